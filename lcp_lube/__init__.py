@@ -1,0 +1,25 @@
+"""Cavitation in lubricated bearings as a complementarity problem, solved with PETSc.
+
+Importing this package starts neither PETSc nor MPI: a program may still call
+``petsc4py.init(argv)`` first, which is a silent no-op once PETSc runs.
+"""
+
+from importlib import import_module
+from typing import Any
+
+__version__ = "0.1.0"
+
+_PUBLIC = {
+    "InputError": "lcp_lube.errors",
+    "Scene": "lcp_lube.scene",
+    "load_scene": "lcp_lube.scene",
+    "solve": "lcp_lube.api",
+    "Solution": "lcp_lube.problems.solution",
+}
+__all__ = [*_PUBLIC, "__version__"]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _PUBLIC:
+        return getattr(import_module(_PUBLIC[name]), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,0 +1,124 @@
+"""The command line's grammar. Own options begin with two dashes; every single-dash option is PETSc's. No PETSc here."""
+
+import argparse
+import re
+from pathlib import Path
+from typing import Any, NoReturn
+
+from . import __version__
+from .errors import InputError, nearest
+
+
+class Parser(argparse.ArgumentParser):
+    """argparse, but an error is an InputError: one line, with the nearest legal name."""
+
+    def error(self, message: str) -> NoReturn:
+        unknown = re.match(r"unrecognized arguments: (--\S+)", message)
+        if unknown:
+            legal = [option for action in self._actions for option in action.option_strings]
+            message = f"{unknown[1]}: no such option{nearest(unknown[1], legal)}"
+        wrong = re.match(r"argument (\S+): invalid choice: '(.*?)' \(choose from (.*)\)", message)
+        if wrong:
+            legal = [name.strip("' ") for name in wrong[3].split(",")]
+            message = f"{wrong[1]} {wrong[2]}: allowed are {', '.join(legal)}{nearest(wrong[2], legal)}"
+        raise InputError(message)
+
+
+def split(argv: list[str]) -> tuple[list[str], list[str]]:
+    """Ours and PETSc's arguments. A PETSc option takes the next word as its value unless that begins with a dash.
+
+    `--` options and their values, and words that no PETSc option takes, are ours.
+
+    Raises
+    ------
+    InputError : -options_file names a file that cannot be read (PETSc itself would abort).
+    """
+    own: list[str] = []
+    petsc: list[str] = []
+    words = list(argv)
+    while words:
+        word = words.pop(0)
+        if not re.match(r"-[A-Za-z]", word) or word == "-h":
+            own.append(word)
+            continue
+        petsc.append(word)
+        if words and (not words[0].startswith("-") or re.match(r"-[\d.]", words[0])):
+            petsc.append(words.pop(0))
+            if word == "-options_file" and not Path(petsc[-1]).is_file():
+                raise InputError(f"-options_file {petsc[-1]}: no such file")
+    return own, petsc
+
+
+def parse(own: list[str]) -> argparse.Namespace:
+    """The command and its options.
+
+    Raises
+    ------
+    InputError : an unknown option or command, a missing or malformed value.
+    """
+    parser = Parser(
+        prog="lcp-lube",
+        description="Cavitation in lubricated bearings as a complementarity problem, solved with PETSc.",
+        epilog="Every single-dash option goes to PETSc (-ksp_type gmres -pc_type ilu -log_view); put them after SCENE. "
+        "-help lists them.",
+        allow_abbrev=False,
+    )
+    parser.add_argument("--version", action="version", version=f"lcp-lube {__version__}")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=Parser)
+
+    def command(name: str, text: str) -> argparse.ArgumentParser:
+        return commands.add_parser(name, help=text, description=text, allow_abbrev=False)
+
+    solve = command("solve", "solve a scene")
+    _scene_options(solve)
+    solve.add_argument("--method", default="auto", help="see 'lcp-lube list'; default auto")
+    solve.add_argument("--recipe", help="inner solver: options/NAME.opts; explicit PETSc options win over it")
+    solve.add_argument("--output", action="append", default=[], metavar="FILE", help=".npz, .vts (ParaView) or .h5")
+    solve.add_argument("--plot", metavar="FILE.png", help="picture of p, r and h")
+    solve.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")
+    solve.add_argument("--monitor", action="store_true", help="a line an iteration on stderr")
+
+    compare = command("compare", "several methods and recipes on one scene, in one table")
+    _scene_options(compare)
+    compare.add_argument("--methods", default="din", metavar="A,B,...", help="default din")
+    compare.add_argument("--recipes", default="", metavar="A,B,...", help="default: the default recipe")
+    compare.add_argument("--json", action="store_true", help="a JSON list of the runs")
+
+    table = command("table", "reproduce a published table beside the printed one")
+    table.add_argument("number", type=int, metavar="K")
+    table.add_argument("--paper", default="mezzadri", choices=["mezzadri", "bergamaschi"])
+    table.add_argument("--quick", action="store_true", help="leave the long rows out")
+
+    command("list", "scenes, methods, systems and recipes, each with a line")
+    return parser.parse_args(own)
+
+
+def _scene_options(parser: argparse.ArgumentParser) -> None:
+    """What both `solve` and `compare` take."""
+    parser.add_argument("scene", metavar="SCENE", help="a .toml file or a built-in name, see 'lcp-lube list'")
+    parser.add_argument("--n", type=int, help="interior points (a side, in 2D)")
+    parser.add_argument("--nx", type=int)
+    parser.add_argument("--ny", type=int)
+    parser.add_argument("--film", help="sinusoid or parabola (published problems)")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="change a scene's value (SI), or "
+                        "METHOD.OPTION=VALUE for a method's parameter, din.gamma=0.4")
+    parser.add_argument("--system", default="auto", help="which matrix the inner solver sees; default auto")
+    parser.add_argument("--eps1", type=float, default=1e-8, help="stop when ||F|| <= eps1, default 1e-8")
+    parser.add_argument("--eps2", type=float, default=1e-8, help="and ||alpha d|| <= eps2, default 1e-8")
+    parser.add_argument("--max-it", type=int, default=500, help="at most so many outer iterations, default 500")
+    parser.add_argument("--p0", type=float, help="start of p in the scene's p_unit (MPa in the published problems), 1")
+    parser.add_argument("--r0", type=float, help="start of r, 0.1")
+    parser.add_argument("--mu", help="perturbation: mu1, mu2 (default) or adaptive")
+    parser.add_argument("--conditions", help="step-length conditions, any of the letters FRCB; default FCB")
+
+
+def scene_changes(args: argparse.Namespace) -> tuple[list[str], list[str]]:
+    """The --set assignments for the scene and those for a method (METHOD.OPTION=VALUE)."""
+    method = [text for text in args.set if "." in text.partition("=")[0]]
+    return [text for text in args.set if text not in method], method
+
+
+def method_options(args: argparse.Namespace) -> dict[str, Any]:
+    """The method's options that have a flag of their own, where given."""
+    named = {"p0": args.p0, "r0": args.r0, "mu": args.mu, "conditions": args.conditions}
+    return {name: value for name, value in named.items() if value is not None}

@@ -1,0 +1,155 @@
+"""The commands: argv's namespace -> calls; prints the summary or the JSON; returns the exit status."""
+
+import argparse
+import json
+import sys
+from collections.abc import Callable
+from typing import Any
+
+from mpi4py import MPI
+
+from .api import solve
+from .arguments import method_options, scene_changes
+from .errors import InputError, nearest
+from .linear.options import check_unread
+from .output.results import as_dict, finite, summary
+from .problems.solution import Step
+from .registry import METHODS, SYSTEMS, recipe_line, recipe_names
+from .scene import Scene, load_scene, parse_changes, scene_line, scene_names
+from .solvers.newton import Stopping
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command; exit status 0 or 1. Collective.
+
+    Raises
+    ------
+    InputError : bad input, for exit status 2.
+    """
+    return COMMANDS[args.command](args)
+
+
+def say(text: str) -> None:
+    """Print on rank 0."""
+    if MPI.COMM_WORLD.rank == 0:
+        print(text, flush=True)
+
+
+def scene_of(args: argparse.Namespace) -> Scene:
+    """The scene with the command line's changes."""
+    changes = parse_changes(scene_changes(args)[0])
+    for key in ("n", "nx", "ny", "film"):
+        if getattr(args, key) is not None:
+            changes[key] = getattr(args, key)
+    return load_scene(args.scene, changes)
+
+
+def stopping_of(args: argparse.Namespace) -> Stopping:
+    for name in ("eps1", "eps2"):
+        value = getattr(args, name)
+        if not 0 < value < 1:
+            raise InputError(f"--{name} {value}: allowed are numbers between 0 and 1")
+    if args.max_it < 1:
+        raise InputError(f"--max-it {args.max_it}: at least 1 is needed")
+    return Stopping(args.eps1, args.eps2, args.max_it)
+
+
+def options_of(args: argparse.Namespace, method: str) -> dict[str, Any]:
+    """The method's options from flags and from --set METHOD.OPTION=VALUE."""
+    options = method_options(args)
+    for key, value in parse_changes(scene_changes(args)[1]).items():
+        owner, _, name = key.partition(".")
+        if owner not in METHODS:
+            raise InputError(f"--set {key}: {owner} is no method{nearest(owner, METHODS)}")
+        if owner == method or method == "auto":
+            options[name] = value
+    return options
+
+
+def run_solve(args: argparse.Namespace) -> int:
+    scene, stopping = scene_of(args), stopping_of(args)
+    from .output import files
+
+    for path in [*args.output, *([args.plot] if args.plot else [])]:
+        files.check_target(path, plot=path == args.plot)
+
+    def monitor(k: int, step: Step) -> None:
+        if k == 1:
+            check_unread()
+        if args.monitor and MPI.COMM_WORLD.rank == 0:
+            print(monitor_line(k, step), file=sys.stderr, flush=True)
+
+    solution = solve(
+        scene,
+        method=args.method,
+        system=args.system,
+        recipe_name=args.recipe,
+        stopping=stopping,
+        options=options_of(args, args.method),
+        monitor=monitor,
+    )
+    try:
+        check_unread()
+        data = as_dict(solution)
+        for path in args.output:
+            files.save(solution, path)
+        if args.plot:
+            from .output.plot import plot
+
+            plot(solution, args.plot)
+    finally:
+        solution.destroy()
+    say(json.dumps(finite(data)) if args.json else summary(data))
+    return 0 if solution.converged else 1
+
+
+def monitor_line(k: int, step: Step) -> str:
+    return (
+        f"{k:4d}  ||F|| {step.norm:.6e}  ||alpha d|| {step.step_norm:.3e}  alpha {step.alpha:.3e}  "
+        f"sigma {step.sigma:.1e}  cuts {step.centrality}+{step.backtracking}  rtol {step.rtol:.1e}  "
+        f"linear its {step.linear_iterations}"
+    )
+
+
+def run_compare(args: argparse.Namespace) -> int:
+    from .compare import compare, table
+
+    rows = compare(
+        scene_of(args),
+        methods=args.methods.split(","),
+        recipes=[name for name in args.recipes.split(",") if name] or [None],
+        system=args.system,
+        stopping=stopping_of(args),
+        options=lambda method: options_of(args, method),
+    )
+    check_unread()
+    say(json.dumps(finite(rows)) if args.json else table(rows))
+    return 0 if all(row["converged"] for row in rows) else 1
+
+
+def run_table(args: argparse.Namespace) -> int:
+    from .tables import run_published_table
+
+    return run_published_table(args.paper, args.number, quick=args.quick)
+
+
+def run_list(args: argparse.Namespace) -> int:
+    groups = {
+        "scenes": {name: scene_line(name) for name in scene_names()},
+        "methods": {name: entry.line for name, entry in METHODS.items()},
+        "systems": {name: entry.line for name, entry in SYSTEMS.items()},
+        "recipes": {name: recipe_line(name) for name in recipe_names()},
+    }
+    for title, lines in groups.items():
+        say(f"{title}:")
+        for name, line in lines.items():
+            say(f"  {name:<16} {line}")
+    return 0
+
+
+COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
+    "solve": run_solve,
+    "compare": run_compare,
+    "table": run_table,
+    "list": run_list,
+}

@@ -1,0 +1,1 @@
+"""The Newton matrices and the KSP behind them."""

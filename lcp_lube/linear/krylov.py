@@ -1,0 +1,107 @@
+"""One KSP, configured by options alone: tolerances, counts, and failures that are heard of."""
+
+import numpy as np
+from petsc4py import PETSc
+
+from ..errors import InputError
+from .options import explain_error, set_names
+
+MAX_INNER_ITERATIONS = 10_000  # the paper's limit; -ksp_max_it overrides it
+
+
+class LinearSolverError(ArithmeticError):
+    """The inner solver broke down; the message says how."""
+
+
+class Krylov:
+    """A KSP with the empty prefix for one matrix whose values change.
+
+    Parameters
+    ----------
+    mat : operator; -mat_type TYPE converts it for the solver (dense for LAPACK), the AIJ assembly stays.
+    fields : index sets by name, for PCFIELDSPLIT.
+
+    Raises
+    ------
+    InputError : an option's value is unknown or does not fit the matrix or the number of ranks.
+    """
+
+    def __init__(self, mat: PETSc.Mat, fields: dict[str, PETSc.IS] | None = None):
+        self.mat = mat
+        options = PETSc.Options()
+        given = set_names()
+        kind = options.getString("mat_type", "")
+        self._converted = PETSc.Mat() if kind and kind not in ("aij", mat.getType()) else None
+        self._kind = kind
+        self._fixed_rtol = "ksp_rtol" in given
+        self.ksp = PETSc.KSP().create(mat.comm)
+        self.ksp.setTolerances(max_it=MAX_INNER_ITERATIONS)
+        self._ready = False
+        self.fields = fields or {}
+        try:
+            self.ksp.setFromOptions()
+        except PETSc.Error as error:
+            raise InputError(explain_error(error)) from None
+
+    @property
+    def direct(self) -> bool:
+        return self.ksp.getType() == PETSc.KSP.Type.PREONLY
+
+    @property
+    def ksp_type(self) -> str:
+        return str(self.ksp.getType())
+
+    @property
+    def pc_type(self) -> str:
+        return str(self.ksp.getPC().getType())
+
+    def _set_up(self) -> None:
+        """Hand the matrix over; bad options that only show against a matrix show here, before anything is solved."""
+        try:
+            operator = self.mat
+            if self._converted is not None:
+                operator = self.mat.convert(self._kind, self._converted)
+            self.ksp.setOperators(operator)
+            pc = self.ksp.getPC()
+            if not self._ready and pc.getType() == PETSc.PC.Type.FIELDSPLIT and self.fields:
+                pc.setFieldSplitIS(*self.fields.items())
+            self.ksp.setUp()
+            self.ksp.setUpOnBlocks()
+        except PETSc.Error as error:
+            if self._ready:
+                raise LinearSolverError(explain_error(error)) from None
+            raise InputError(explain_error(error)) from None
+        self._ready = True
+
+    def solve(self, b: PETSc.Vec, x: PETSc.Vec, rtol: float) -> int:
+        """Solve for the matrix's present values; returns the number of iterations (0 for a direct solver). Collective.
+
+        Raises
+        ------
+        LinearSolverError : any negative reason but the iteration limit (the outer loop can use what was reached), or a
+            result that is not finite.
+        """
+        if not self.direct and not self._fixed_rtol:
+            self.ksp.setTolerances(rtol=rtol)
+        self._set_up()
+        try:
+            self.ksp.solve(b, x)
+        except PETSc.Error as error:
+            raise LinearSolverError(explain_error(error)) from None
+        reason = self.ksp.getConvergedReason()
+        if reason < 0 and reason != PETSc.KSP.ConvergedReason.DIVERGED_MAX_IT:
+            raise LinearSolverError(f"KSP {self.ksp_type} with PC {self.pc_type} failed: {reason_name(reason)}")
+        if not np.isfinite(x.norm()):
+            raise LinearSolverError(f"KSP {self.ksp_type} with PC {self.pc_type} gave a vector that is not finite")
+        return 0 if self.direct else self.ksp.getIterationNumber()
+
+    def destroy(self) -> None:
+        self.ksp.destroy()
+        if self._converted is not None:
+            self._converted.destroy()
+
+
+def reason_name(reason: int) -> str:
+    """PETSc's name of a converged reason, DIVERGED_BREAKDOWN for -5, say."""
+    names = {v: k for k, v in vars(PETSc.KSP.ConvergedReason).items() if not k.startswith("_") and isinstance(v, int)}
+    return names.get(reason, str(reason))

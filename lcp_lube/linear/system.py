@@ -1,0 +1,25 @@
+"""What a method asks of a linear system, whichever matrix stands behind it."""
+
+from typing import Protocol
+
+from ..parallel import Array
+from .krylov import Krylov
+from .stages import Stages
+
+
+class System(Protocol):
+    """Solves A dp + B dr = f1, D_p dp + D_r dr = f2 with diagonal D_p, D_r."""
+
+    stages: Stages
+    krylov: Krylov
+
+    @property
+    def direct(self) -> bool:
+        """Whether the inner solves are direct: then the forcing term is zero."""
+        ...
+
+    def solve(self, D_p: Array, D_r: Array, f1: Array, f2: Array, rtol: float) -> tuple[Array, Array, int]:
+        """dp, dr and the number of linear iterations. Collective."""
+        ...
+
+    def destroy(self) -> None: ...

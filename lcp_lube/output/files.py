@@ -1,0 +1,1 @@
+def check_target(path, plot=False): pass

@@ -1,0 +1,103 @@
+"""A Solution as the JSON object of the command line, and as a summary to read."""
+
+import resource
+from typing import Any
+
+import mpi4py
+import numpy as np
+import petsc4py
+from petsc4py import PETSc
+
+from .. import __version__
+from ..problems.quantities import quantities
+from ..problems.solution import Solution
+
+
+def as_dict(solution: Solution) -> dict[str, Any]:
+    """The keys of the command line's --json, in their order. Collective; the same on every rank."""
+    problem, grid = solution.problem, solution.problem.grid
+    certificate, settings = solution.certificate, solution.settings
+    last = solution.steps[-1] if solution.steps else None
+    times = solution.times
+    return {
+        "scene": settings.get("scene"),
+        "nx": grid.shape[0],
+        "ny": grid.shape[1] if grid.dim == 2 else None,
+        "unknowns": 2 * problem.size,
+        "ranks": grid.comm.size,
+        **{key: settings.get(key) for key in ("method", "system", "scheme", "recipe", "ksp_type", "pc_type")},
+        "outcome": str(solution.outcome),
+        "converged": solution.converged,
+        "message": solution.message,
+        "iterations": solution.iterations,
+        "backtracking": solution.total("backtracking"),
+        "centrality": solution.total("centrality"),
+        "linear_iterations": solution.total("linear_iterations"),
+        "c1": last.norm if last else None,
+        "c2": last.step_norm if last else None,
+        **quantities(problem, solution.p, solution.r),
+        **certificate.extremes,
+        **certificate.measures,
+        "certificate_tol": certificate.tol,
+        "p_unit": problem.p_unit,
+        "memory_mb": peak_memory(solution),
+        "time_s": {
+            "total": times.get("total"),
+            "setup": times.get("setup"),
+            "assembly": times.get("assembly", 0.0) + times.get("Jacobian", 0.0),
+            "linear": times.get("KSP", 0.0),
+            "step_length": times.get("step length", 0.0),
+        },
+        "versions": versions(),
+    }
+
+
+def peak_memory(solution: Solution) -> float:
+    """Largest resident memory so far in MB, summed over the ranks. Collective."""
+    return solution.problem.grid.comm.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0)
+
+
+def versions() -> dict[str, str]:
+    """What a result depends on."""
+    return {
+        "lcp_lube": __version__,
+        "petsc": ".".join(map(str, PETSc.Sys.getVersion())),
+        "petsc4py": petsc4py.__version__,
+        "mpi4py": mpi4py.__version__,
+        "numpy": np.__version__,
+    }
+
+
+def finite(value: Any) -> Any:
+    """NaN and infinities as None: JSON has no word for them."""
+    if isinstance(value, dict):
+        return {key: finite(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [finite(item) for item in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+def summary(data: dict[str, Any]) -> str:
+    """A few lines for people."""
+    one_d = data["ny"] is None
+    size = f"n = {data['nx']}" if one_d else f"{data['nx']} x {data['ny']}"
+    load_unit = "N/m" if one_d else "N"
+    inner = f", {data['linear_iterations']} Krylov" if data["linear_iterations"] else ""
+    recipe = data["recipe"] or f"{data['ksp_type']} + {data['pc_type']}"
+    lines = [
+        f"{data['scene']} ({size}, scheme {data['scheme']}) by {data['method']} on the {data['system']} system, {recipe}, "
+        f"{data['ranks']} rank{'s' * (data['ranks'] > 1)}",
+        f"{data['outcome']}: {data['iterations']} iterations{inner}, {data['centrality']} centrality and "
+        f"{data['backtracking']} backtracking cuts, {data['time_s']['total']:.2f} s; {data['message']}",
+        f"p_max {data['p_max'] / 1e6:.6g} MPa, load {data['load']:.6g} {load_unit}, friction {data['friction']:.6g} "
+        f"{load_unit}, cavitated {100 * data['cavitated_fraction']:.1f} %",
+        f"certificate (tol {data['certificate_tol']:.0e}): residual {data['residual']:.1e}, complementarity "
+        f"{data['complementarity']:.1e}, mass defect {data['mass_defect']:.1e}, min p {data['min_p']:.1e} Pa, "
+        f"min r {data['min_r']:.1e}",
+    ]
+    if one_d and data["rupture"] is not None:
+        behind = f", reformation {1e3 * data['reformation']:.5g} mm" if data["reformation"] is not None else ""
+        lines.insert(3, f"rupture {1e3 * data['rupture']:.5g} mm{behind}")
+    return "\n".join(lines)

@@ -1,0 +1,44 @@
+"""Reductions over arrays that each rank holds its own part of."""
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Reduce:
+    """Sums, norms and extrema of distributed arrays; every method is collective.
+
+    Parameters
+    ----------
+    comm : the communicator that the arrays are spread over.
+    """
+
+    def __init__(self, comm: MPI.Comm):
+        self.comm = comm
+
+    def sum(self, a: Array) -> float:
+        return self.comm.allreduce(float(np.sum(a)))
+
+    def dot(self, a: Array, b: Array) -> float:
+        return self.comm.allreduce(float(np.dot(a, b)))
+
+    def norm(self, *arrays: Array) -> float:
+        """Euclidean norm of the arrays laid end to end."""
+        return float(np.sqrt(self.comm.allreduce(sum(float(np.dot(a, a)) for a in arrays))))
+
+    def min(self, a: Array) -> float:
+        """Smallest entry, inf where there is none; NaN if any entry is NaN (MPI.MIN alone may drop it)."""
+        return self._extremum(a, np.inf, MPI.MIN)
+
+    def max(self, a: Array) -> float:
+        """Largest entry, -inf where there is none; NaN if any entry is NaN."""
+        return self._extremum(a, -np.inf, MPI.MAX)
+
+    def _extremum(self, a: Array, empty: float, op: MPI.Op) -> float:
+        value = float(op(float(np.min(a) if op == MPI.MIN else np.max(a)), empty)) if a.size else empty
+        if self.comm.size == 1:
+            return value
+        bad = self.comm.allreduce(bool(np.isnan(value)), MPI.LOR)
+        return float("nan") if bad else self.comm.allreduce(value, op)

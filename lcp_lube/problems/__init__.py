@@ -1,0 +1,1 @@
+"""What is solved: films, grids, equations, exact solutions. Knows no solver."""

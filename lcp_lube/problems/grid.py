@@ -1,0 +1,113 @@
+"""Uniform grids of interior points, distributed by a PETSc DMDA. The only file that knows ghost points."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from ..errors import InputError
+from ..parallel import Array, Reduce
+
+
+class Grid:
+    """Interior points x_i = i dx, dx = L/(nx+1) (and y_j = j dy, dy = Ly/(ny+1)) of a line or a rectangle.
+
+    Arrays of owned points are flat, in PETSc's order on this rank: y outer, x inner. `box` gives their
+    two-dimensional shape (1 line in 1D).
+
+    Parameters
+    ----------
+    shape : numbers of interior points, (nx,) or (nx, ny).
+    lengths : side lengths in metres, (L,) or (L, Ly).
+    comm : PETSc communicator; default all ranks.
+
+    Raises
+    ------
+    InputError : fewer than one point a side, or more ranks than the points can be dealt to.
+    """
+
+    def __init__(self, shape: Sequence[int], lengths: Sequence[float], comm: PETSc.Comm | None = None):
+        if any(n < 1 for n in shape):
+            raise InputError(f"grid {'x'.join(map(str, shape))}: at least 1 interior point a side is needed")
+        self.shape = tuple(int(n) for n in shape)
+        self.lengths = tuple(float(length) for length in lengths)
+        self.spacing = tuple(length / (n + 1) for length, n in zip(self.lengths, self.shape, strict=True))
+        self.dim = len(self.shape)
+        self.size = int(np.prod(self.shape))
+        comm = comm or PETSc.COMM_WORLD
+        try:
+            self.dm = PETSc.DMDA().create(
+                dim=self.dim, sizes=self.shape, dof=1, stencil_width=1, stencil_type=PETSc.DMDA.StencilType.STAR, comm=comm
+            )
+        except PETSc.Error:
+            raise InputError(
+                f"grid {'x'.join(map(str, self.shape))}: too few points for {comm.size} ranks; use fewer ranks or a finer grid"
+            ) from None
+        self.comm = self.dm.comm.tompi4py()
+        self.reduce = Reduce(self.comm)
+        ranges = self.dm.getRanges()
+        (self.x_start, self.x_end) = ranges[0]
+        (self.y_start, self.y_end) = ranges[1] if self.dim == 2 else (0, 1)
+        self.box = (self.y_end - self.y_start, self.x_end - self.x_start)
+        # Rank k owns the global (PETSc) numbers starts[k] to starts[k + 1].
+        self.starts = np.concatenate([[0], np.cumsum(self.comm.allgather(self.local_size))])
+
+    @property
+    def local_size(self) -> int:
+        return self.box[0] * self.box[1]
+
+    @property
+    def first(self) -> int:
+        """Global number of this rank's first point."""
+        return int(self.starts[self.comm.rank])
+
+    @property
+    def cell(self) -> float:
+        """Length (1D, m) or area (2D, m2) of a grid cell."""
+        return float(np.prod(self.spacing))
+
+    @property
+    def x(self) -> Array:
+        """Owned x coordinates in metres, shape (1, nx_local)."""
+        return (np.arange(self.x_start, self.x_end) + 1.0)[None, :] * self.spacing[0]
+
+    @property
+    def y(self) -> Array:
+        """Owned y coordinates in metres, shape (ny_local, 1); 0 in 1D."""
+        if self.dim == 1:
+            return np.zeros((1, 1))
+        return (np.arange(self.y_start, self.y_end) + 1.0)[:, None] * self.spacing[1]
+
+    def ghosted(self, owned: Array) -> Array:
+        """Owned values with one layer of the neighbours' around them, NaN outside the domain.
+
+        Returns an array of shape (ny_local + 2, nx_local + 2); its corners are not to be used. Collective.
+        """
+        source = self.dm.getGlobalVec()
+        target = self.dm.getLocalVec()
+        source.setArray(owned)
+        self.dm.globalToLocal(source, target)
+        out = self._frame(target.array_r, np.nan)
+        self.dm.restoreGlobalVec(source)
+        self.dm.restoreLocalVec(target)
+        return out
+
+    def neighbours(self) -> NDArray[np.int64]:
+        """Global (PETSc) numbers of the owned points and their neighbours, -1 outside the domain.
+
+        Shape (ny_local + 2, nx_local + 2); its corners are not to be used.
+        """
+        return self._frame(self.dm.getLGMap().indices, -1)
+
+    def _frame(self, values: NDArray, outside: float) -> NDArray:
+        ghost = self.dm.getGhostRanges()
+        (gx0, gx1) = ghost[0]
+        (gy0, gy1) = ghost[1] if self.dim == 2 else (0, 1)
+        out = np.full((self.box[0] + 2, self.box[1] + 2), outside, dtype=np.asarray(values).dtype)
+        row, col = gy0 - self.y_start + 1, gx0 - self.x_start + 1
+        out[row : row + gy1 - gy0, col : col + gx1 - gx0] = np.reshape(values, (gy1 - gy0, gx1 - gx0))
+        return out
+
+    def destroy(self) -> None:
+        self.dm.destroy()

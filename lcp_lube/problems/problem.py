@@ -1,0 +1,122 @@
+"""The door between physics and solvers: the data of A p + B r = c, p r = 0, p, r >= 0, and what certifies an answer."""
+
+from collections.abc import Callable
+
+import numpy as np
+from petsc4py import PETSc
+
+from ..parallel import Array
+from .certificate import Certificate, certificate_tol
+from .exact import ExactSolution
+from .grid import Grid
+from .reynolds import BoxScheme, assemble, sides
+
+
+class LubricationProblem:
+    """Steady Reynolds problem with mass-conserving cavitation on a grid.
+
+    The fields are arrays of this rank's points, in the grid's order: p in units of `p_unit` above the cavitation
+    pressure, r the void fraction.
+
+    Parameters
+    ----------
+    grid : the interior points.
+    scheme : coefficients of the box scheme there, in units of p_unit.
+    mu, U : viscosity in Pa s and wall speed in m/s.
+    p_unit : pressure unit in Pa.
+    p_sides : pressures above p_c at west, east, south, north in Pa.
+    p_c : cavitation pressure in Pa, added to the pressures that are reported.
+    film : h(x, y) in metres.
+    exact : gives the exact 1D solution, where one is known.
+    """
+
+    def __init__(
+        self,
+        grid: Grid,
+        scheme: BoxScheme,
+        *,
+        mu: float,
+        U: float,
+        p_unit: float,
+        p_sides: tuple[float, float, float, float],
+        p_c: float,
+        film: Callable[[Array, Array], Array],
+        exact: Callable[[], ExactSolution] | None = None,
+    ):
+        self.grid, self.scheme, self.film = grid, scheme, film
+        self.mu, self.U, self.p_unit, self.p_sides, self.p_c = mu, U, p_unit, p_sides, p_c
+        self.exact = exact
+        self.reduce = grid.reduce
+        self.A = assemble(grid, scheme.pressure_entries())
+        self.B = assemble(grid, scheme.void_entries())
+        self.c = scheme.c.ravel()
+
+    @property
+    def size(self) -> int:
+        """Number n of unknown points; there are 2 n unknowns."""
+        return self.grid.size
+
+    def multiply(self, mat: PETSc.Mat, a: Array) -> Array:
+        """mat @ a for one of A, B and an array of owned points. Collective."""
+        out = np.empty(self.grid.local_size)
+        x = PETSc.Vec().createWithArray(np.ascontiguousarray(a), size=(a.size, self.size), comm=mat.comm)
+        y = PETSc.Vec().createWithArray(out, size=(out.size, self.size), comm=mat.comm)
+        mat.mult(x, y)
+        x.destroy()
+        y.destroy()
+        return out
+
+    def linear_flow(self, p: Array, r: Array) -> Array:
+        """A p + B r. Collective."""
+        return self.multiply(self.A, p) + self.multiply(self.B, r)
+
+    def flow(self, p: Array, r: Array) -> Array:
+        """F1 = A p + B r - c, the flow balance of every point in m2/s. Collective."""
+        return self.linear_flow(p, r) - self.c
+
+    def certify(self, p: Array, r: Array, eps1: float) -> Certificate:
+        """Certificate of the pair (p, r) for a run whose tolerance was eps1. Collective.
+
+        residual: ||A p + B r - c|| / (||A p|| + ||B r|| + ||c||);
+        complementarity: max_i |min(p_i / max|p|, r_i)|, which bounds negative p, negative r and products alike;
+        mass_defect: |flow in - flow out| / flow in, over the whole boundary.
+        """
+        red = self.reduce
+        Ap, Br = self.multiply(self.A, p), self.multiply(self.B, r)
+        scale = red.norm(Ap) + red.norm(Br) + red.norm(self.c)
+        p_max = red.max(np.abs(p))
+        west, east, south, north = self.boundary_flows(p, r)
+        inflow = max(west, 0.0) + max(-east, 0.0) + max(south, 0.0) + max(-north, 0.0)
+        return Certificate(
+            measures={
+                "residual": red.norm(Ap + Br - self.c) / scale if scale > 0 else 0.0,
+                "complementarity": red.max(np.abs(np.minimum(p / p_max if p_max > 0 else p, r))),
+                "mass_defect": abs(west - east + south - north) / inflow if inflow > 0 else 0.0,
+            },
+            tol=certificate_tol(eps1),
+            extremes={"min_p": red.min(p) * self.p_unit, "min_r": red.min(r)},
+        )
+
+    def boundary_flows(self, p: Array, r: Array) -> tuple[float, float, float, float]:
+        """Scaled flow through the west, east, south and north side, positive towards larger x or y.
+
+        In the equation's terms, U h (1 - r) - h^3/(6 mu) dp/dx, that is twice the volume flow; m2/s in 1D, in 2D the sum
+        over the side's points (times dy: m3/s).
+        """
+        s, box = self.scheme, self.grid.box
+        p, r = p.reshape(box), r.reshape(box)
+        p_W, p_E, p_S, p_N = (side / self.p_unit for side in self.p_sides)
+        west, east, south, north = sides(self.grid)
+        total = self.reduce.sum
+        return (
+            total(np.where(west, s.couette_W + s.k_W * (p_W - p), 0.0)),
+            total(np.where(east, s.couette_E + s.b_C * r + s.k_E * (p - p_E), 0.0)),
+            total(np.where(south, s.k_S * (p_S - p), 0.0)),
+            total(np.where(north, s.k_N * (p - p_N), 0.0)),
+        )
+
+    def destroy(self) -> None:
+        """Free the PETSc objects."""
+        self.A.destroy()
+        self.B.destroy()
+        self.grid.destroy()

@@ -1,0 +1,147 @@
+"""Box scheme of the steady Reynolds equation with cavitation: film -> coefficients of A p + B r = c."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from ..parallel import Array
+from .grid import Grid
+
+SCHEMES = ("nodal", "face", "upwind")
+Film = Callable[[Array, Array], Array]
+
+
+@dataclass(frozen=True)
+class BoxScheme:
+    """Coefficients on the owned points, each of shape (ny_local, nx_local); a row is a balance per unit width.
+
+    The flow balance of point i, with p in units of p_unit, is
+
+        sum over faces of k_face (p_i - p_neighbour) + b_C r_i + b_W r_west = c_i        [m2/s]
+
+    k_W, k_E = p_unit h^3/(6 mu dx);  k_S, k_N = p_unit h^3 dx/(6 mu dy2) (absent in 1D).
+    Dirichlet neighbours are in c; `k_*` keeps their conductance, for A's diagonal and the boundary fluxes.
+    """
+
+    k_W: Array
+    k_E: Array
+    k_S: Array
+    k_N: Array
+    b_C: Array
+    b_W: Array
+    c: Array
+    couette_W: Array  # U h at the west and east face of a cell without void: the flux balance that c holds
+    couette_E: Array
+    h: Array  # film at the points, m
+
+    def pressure_entries(self) -> list[tuple[int, int, Array]]:
+        """Row entries of A as (dj, di, value)."""
+        centre = self.k_W + self.k_E + self.k_S + self.k_N
+        entries = [(0, 0, centre), (0, -1, -self.k_W), (0, 1, -self.k_E)]
+        if self.k_S.any() or self.k_N.any():
+            entries += [(-1, 0, -self.k_S), (1, 0, -self.k_N)]
+        return entries
+
+    def void_entries(self) -> list[tuple[int, int, Array]]:
+        """Row entries of B as (dj, di, value)."""
+        return [(0, 0, self.b_C), (0, -1, self.b_W)]
+
+
+def box_scheme(
+    grid: Grid,
+    film: Film,
+    *,
+    mu: float,
+    U: float,
+    scheme: str,
+    p_sides: tuple[float, float, float, float],
+    p_unit: float,
+    mean_cubes: bool = False,
+) -> BoxScheme:
+    """Coefficients of the box scheme on the owned points.
+
+    Parameters
+    ----------
+    film : h(x, y) in metres for arrays of coordinates in metres that broadcast.
+    mu, U : viscosity in Pa s, speed of the moving wall in m/s (U > 0: the flow goes to larger x).
+    scheme : form of the Couette flux. 'nodal' (paper, eq. 7): U (h_face - (h r)_upwind); 'face': U h_face (1 - r_upwind);
+        'upwind': U (h (1 - r))_upwind.
+    p_sides : Dirichlet pressures above the cavitation pressure at west, east, south, north in Pa (south, north: 2D only).
+    p_unit : pressure unit in Pa; p in the equations is measured in it.
+    mean_cubes : take h^3 at a face as the mean of the nodal values (scene 5) instead of the film at the face.
+    """
+    dx = grid.spacing[0]
+    x, y = np.broadcast_arrays(grid.x, grid.y)
+    h = film(x, y)
+
+    def cube(ox: float, oy: float) -> Array:
+        if mean_cubes:
+            return 0.5 * (h**3 + film(x + 2 * ox, y + 2 * oy) ** 3)
+        return film(x + ox, y + oy) ** 3
+
+    k = p_unit / (6.0 * mu)
+    k_W, k_E = k * cube(-dx / 2, 0.0) / dx, k * cube(dx / 2, 0.0) / dx
+    if grid.dim == 2:
+        dy = grid.spacing[1]
+        k_S, k_N = (k * cube(0.0, o) * dx / dy**2 for o in (-dy / 2, dy / 2))
+    else:
+        k_S = k_N = np.zeros(grid.box)
+
+    first = (np.arange(grid.x_start, grid.x_end) == 0)[None, :]
+    if scheme == "upwind":
+        couette_W, couette_E = U * film(x - dx, y), U * h
+    else:
+        couette_W, couette_E = U * film(x - dx / 2, y), U * film(x + dx / 2, y)
+    if scheme == "face":
+        b_C, b_W = -couette_E, couette_W
+    else:
+        b_C, b_W = -U * h, U * film(x - dx, y)
+    b_W = np.where(first, 0.0, b_W)  # r = 0 on the inflow boundary
+
+    c = couette_W - couette_E
+    for conductance, at_side, p_side in zip((k_W, k_E, k_S, k_N), sides(grid), p_sides, strict=True):
+        c = c + np.where(at_side, conductance * (p_side / p_unit), 0.0)
+    return BoxScheme(k_W, k_E, k_S, k_N, b_C, b_W, c, couette_W, couette_E, h)
+
+
+def sides(grid: Grid) -> tuple[NDArray[np.bool_], ...]:
+    """Masks (they broadcast to `grid.box`) of the owned points next to the west, east, south and north side."""
+    i = np.arange(grid.x_start, grid.x_end)[None, :]
+    j = np.arange(grid.y_start, grid.y_end)[:, None]
+    if grid.dim == 1:
+        none = np.zeros((1, 1), dtype=bool)
+        return i == 0, i == grid.shape[0] - 1, none, none
+    return i == 0, i == grid.shape[0] - 1, j == 0, j == grid.shape[1] - 1
+
+
+def coo(grid: Grid, entries: list[tuple[int, int, Array]]) -> Iterator[tuple[NDArray, NDArray, Array]]:
+    """Global rows, columns and values of stencil entries; neighbours outside the domain are left out."""
+    number = grid.neighbours()
+    ny, nx = grid.box
+    rows = number[1:-1, 1:-1]
+    for dj, di, values in entries:
+        columns = number[1 + dj : 1 + dj + ny, 1 + di : 1 + di + nx]
+        inside = columns >= 0
+        yield rows[inside], columns[inside], np.broadcast_to(values, grid.box)[inside]
+
+
+def csr(rows: NDArray, columns: NDArray, first: int, count: int) -> tuple[NDArray, NDArray, NDArray]:
+    """CSR structure of COO entries in `count` owned rows from `first` on.
+
+    Returns row pointers, columns (sorted in each row), and the order that takes COO values to CSR values.
+    """
+    order = np.lexsort((columns, rows))
+    pointers = np.zeros(count + 1, dtype=PETSc.IntType)
+    np.cumsum(np.bincount(rows - first, minlength=count), out=pointers[1:])
+    return pointers, columns[order].astype(PETSc.IntType), order
+
+
+def assemble(grid: Grid, entries: list[tuple[int, int, Array]]) -> PETSc.Mat:
+    """A distributed n-by-n AIJ matrix from stencil entries."""
+    rows, columns, values = (np.concatenate(parts) for parts in zip(*coo(grid, entries), strict=True))
+    pointers, columns, order = csr(rows, columns, grid.first, grid.local_size)
+    size = (grid.local_size, grid.size)
+    return PETSc.Mat().createAIJ((size, size), csr=(pointers, columns, values[order]), comm=grid.dm.comm)

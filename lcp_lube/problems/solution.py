@@ -1,0 +1,97 @@
+"""What a run gives back: fields, outcome, record, and the certificate that the problem's data give it."""
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+from ..parallel import Array
+from .certificate import Certificate
+from .problem import LubricationProblem
+
+
+class Outcome(StrEnum):
+    """How a run ended. Only `converged` is a success."""
+
+    CONVERGED = "converged"
+    MAX_ITERATIONS = "max_iterations"
+    STEP_LENGTH = "step_length"
+    LINEAR_SOLVER = "linear_solver"
+    NOT_FINITE = "not_finite"
+    WRONG_SOLUTION = "wrong_solution"
+
+    @property
+    def sentence(self) -> str:
+        return {
+            Outcome.CONVERGED: "converged, and the certificate holds",
+            Outcome.MAX_ITERATIONS: "the iteration limit was reached",
+            Outcome.STEP_LENGTH: "no acceptable step length was found",
+            Outcome.LINEAR_SOLVER: "the inner linear solver failed",
+            Outcome.NOT_FINITE: "the iterates overflowed or became NaN",
+            Outcome.WRONG_SOLUTION: "the method stopped, but its answer is not a solution",
+        }[self]
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of the outer loop: the letters of the paper.
+
+    norm is ||F|| after the step, step_norm ||alpha d||; centrality and backtracking count halvings of alpha.
+    """
+
+    norm: float
+    step_norm: float
+    alpha: float
+    linear_iterations: int = 0
+    centrality: int = 0
+    backtracking: int = 0
+    sigma: float = 0.0
+    rtol: float = 0.0
+
+
+@dataclass
+class Solution:
+    """Fields and record of one run.
+
+    Attributes
+    ----------
+    problem : the problem that was solved; it owns PETSc objects, see `destroy`.
+    fields : this rank's points of p (units of problem.p_unit above the cavitation pressure) and r.
+    outcome, message : how the run ended, in a word and in a sentence.
+    certificate : from the problem's data alone.
+    steps : the record of the outer loop.
+    settings : method, system, recipe, ksp_type ... as the JSON prints them.
+    times : seconds by stage: setup, assembly, linear, total.
+    """
+
+    problem: LubricationProblem
+    fields: dict[str, Array]
+    outcome: Outcome
+    message: str
+    certificate: Certificate
+    steps: list[Step]
+    settings: dict[str, Any] = field(default_factory=dict)
+    times: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def p(self) -> Array:
+        return self.fields["p"]
+
+    @property
+    def r(self) -> Array:
+        return self.fields["r"]
+
+    @property
+    def converged(self) -> bool:
+        return self.outcome is Outcome.CONVERGED
+
+    @property
+    def iterations(self) -> int:
+        return len(self.steps)
+
+    def total(self, name: str) -> int:
+        """Sum of `linear_iterations`, `centrality` or `backtracking` over the steps."""
+        return sum(getattr(step, name) for step in self.steps)
+
+    def destroy(self) -> None:
+        """Free the PETSc objects behind the problem."""
+        self.problem.destroy()

@@ -1,0 +1,171 @@
+"""Scenes: a TOML file with the data of one bearing, validated, from which a Problem is built."""
+
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from petsc4py import PETSc
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from .errors import InputError, nearest
+from .problems.exact import ExactSolution, exact_solution
+from .problems.film import Wave
+from .problems.grid import Grid
+from .problems.problem import LubricationProblem
+from .problems.reynolds import box_scheme
+
+SCENE_DIR = Path(__file__).parent / "scenes"
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Count = Annotated[int, Field(ge=1, le=2**31 - 2)]
+
+
+class Scene(BaseModel):
+    """A slider of length L (and width) with one wave of the film, in SI units; defaults are the paper's data.
+
+    Pressures are above the cavitation pressure p_c, which is added to what is reported.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=False)
+
+    name: str = ""
+    dimension: Literal[1, 2] = 1
+    film: Literal["sinusoid", "parabola"] = "sinusoid"
+    form: Literal["convergent-divergent", "divergent-convergent"] = "convergent-divergent"
+    wave: tuple[NotNegative, NotNegative] = Field((0.0, 1.0), description="where the wave starts and ends, in parts of L")
+    h_min: Positive = Field(15e-6, description="smallest film, m")
+    h_max: Positive = Field(25e-6, description="largest film, m")
+    L: Positive = Field(0.1, description="length in the direction of motion, m")
+    width: Positive | None = Field(None, description="width Ly, m; default L (2D)")
+    mu: Positive = Field(0.015, description="viscosity, Pa s")
+    U: Positive = Field(5.0, description="speed of the moving wall, m/s")
+    p_a: NotNegative = Field(0.0, description="pressure at x = 0, Pa")
+    p_b: NotNegative = Field(0.0, description="pressure at x = L, Pa")
+    p_side: NotNegative = Field(0.0, description="pressure at y = 0 and y = width, Pa (2D)")
+    p_c: Annotated[float, Field(allow_inf_nan=False)] = Field(0.0, description="cavitation pressure, Pa")
+    scheme: Literal["nodal", "face", "upwind"] = Field("nodal", description="form of the Couette flux")
+    p_unit: Positive = Field(1e6, description="pressure unit of the equations, Pa")
+    n: Count = Field(100, description="interior points a side")
+    nx: Count | None = Field(None, description="interior points in x; default n")
+    ny: Count | None = Field(None, description="interior points in y; default n (2D)")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "Scene":
+        if self.h_max < self.h_min:
+            raise ValueError(f"h_max = {self.h_max:g}: at least h_min = {self.h_min:g} is needed")
+        if not self.wave[0] < self.wave[1] <= 1:
+            raise ValueError(f"wave = {list(self.wave)}: 0 <= start < end <= 1 is needed")
+        if self.dimension == 1 and self.ny is not None:
+            raise ValueError(f"ny = {self.ny}: the scene is one-dimensional")
+        return self
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Numbers of interior points, (nx,) or (nx, ny)."""
+        nx = self.nx or self.n
+        return (nx,) if self.dimension == 1 else (nx, self.ny or self.n)
+
+    @property
+    def gap(self) -> Wave:
+        """The film h(x, y) in metres."""
+        start, end = (self.L * part for part in self.wave)
+        return Wave(self.film, self.form, self.h_min, self.h_max, start, end - start)
+
+    def exact(self) -> ExactSolution | None:
+        """The exact solution in 1D; None where none is known."""
+        if self.dimension == 2:
+            return None
+        return exact_solution(self.gap, self.L, self.mu, self.U, self.p_a, self.p_b)
+
+    def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
+        """The discrete problem on this scene's grid. Collective.
+
+        Raises
+        ------
+        InputError : more ranks than the grid can be dealt to.
+        """
+        lengths = (self.L,) if self.dimension == 1 else (self.L, self.width or self.L)
+        grid = Grid(self.shape, lengths, comm)
+        p_sides = (self.p_a, self.p_b, self.p_side, self.p_side)
+        gap = self.gap
+        scheme = box_scheme(
+            grid, gap, mu=self.mu, U=self.U, scheme=self.scheme, p_sides=p_sides, p_unit=self.p_unit
+        )
+        return LubricationProblem(
+            grid,
+            scheme,
+            mu=self.mu,
+            U=self.U,
+            p_unit=self.p_unit,
+            p_sides=p_sides,
+            p_c=self.p_c,
+            film=gap,
+            exact=self.exact,
+        )
+
+
+def scene_names() -> list[str]:
+    return sorted(path.stem for path in SCENE_DIR.glob("*.toml"))
+
+
+def scene_line(name: str) -> str:
+    """First line of a built-in scene: what it is."""
+    return (SCENE_DIR / f"{name}.toml").read_text().partition("\n")[0].lstrip("# ")
+
+
+def load_scene(source: str | Path, changes: dict[str, Any] | None = None) -> Scene:
+    """A scene from a built-in name or a .toml file, with some of its values changed.
+
+    Raises
+    ------
+    InputError : no such scene, an unreadable file, an unknown key, a value of the wrong type or out of range; one line
+        that names the file, the key, what was found and what is allowed.
+    """
+    changes = changes or {}
+    source = str(source)
+    if source.endswith(".toml"):
+        path, name = Path(source), Path(source).stem
+    elif source in scene_names():
+        path, name = SCENE_DIR / f"{source}.toml", source
+    else:
+        raise InputError(f"scene {source}: neither a .toml file nor a built-in name{nearest(source, scene_names())}; see 'lcp-lube list'")
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise InputError(f"{source}: {reason}") from None
+    try:
+        return Scene(**{"name": name, **data, **changes})
+    except ValidationError as error:
+        raise InputError(f"{source}: {_first_fault(error)}") from None
+
+
+def parse_changes(assignments: Iterable[str]) -> dict[str, Any]:
+    """{'h_min': 1e-5} from ['h_min=1e-5']; values as TOML, bare words as strings.
+
+    Raises
+    ------
+    InputError : not of the form KEY=VALUE.
+    """
+    changes = {}
+    for text in assignments:
+        key, equals, value = (part.strip() for part in text.partition("="))
+        if not (key and equals and value):
+            raise InputError(f"--set {text}: KEY=VALUE is needed")
+        try:
+            changes[key] = tomllib.loads(f"value = {value}")["value"]
+        except tomllib.TOMLDecodeError:
+            changes[key] = value
+    return changes
+
+
+def _first_fault(error: ValidationError) -> str:
+    """The first of pydantic's complaints: key, what was found, what is allowed."""
+    fault = error.errors()[0]
+    key = ".".join(str(part) for part in fault["loc"])
+    if fault["type"] == "extra_forbidden":
+        return f"unknown key {key}{nearest(key, list(Scene.model_fields)) or '; known are ' + ', '.join(Scene.model_fields)}"
+    allowed = fault["msg"].removeprefix("Value error, ").replace("Input should be ", "allowed is ")
+    return f"{key} = {fault['input']}: {allowed}" if key else allowed

@@ -1,0 +1,1 @@
+"""How it is solved: outer loops, directions, step lengths. Knows no film."""

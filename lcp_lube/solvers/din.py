@@ -1,0 +1,156 @@
+"""Damped inexact Newton (DIN) of Mezzadri and Galligani: an interior method for F(p, r) = (A p + B r - c, P R e) = 0."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..linear.system import System
+from ..parallel import Array
+from ..problems.problem import LubricationProblem
+from ..problems.solution import Step
+from .method_options import make_options
+from .steplength import Centrality, feasible, halve_until, inexact_decrease, reduction
+
+
+def mu1(gap: float, norm: float, n: int) -> float:
+    """Average complementarity p'r/n."""
+    return gap / n
+
+
+def mu2(gap: float, norm: float, n: int) -> float:
+    """||F||/sqrt(n): never vanishes before F does, so a start near zero can leave the boundary."""
+    return norm / np.sqrt(n)
+
+
+def adaptive(gap: float, norm: float, n: int) -> float:
+    """mu1 while p'r > 0.1, then mu2."""
+    return mu1(gap, norm, n) if gap > 0.1 else mu2(gap, norm, n)
+
+
+MU_RULES: dict[str, Callable[[float, float, int], float]] = {"mu1": mu1, "mu2": mu2, "adaptive": adaptive}
+
+
+@dataclass(frozen=True)
+class DinOptions:
+    """Parameters of DIN; the defaults are the paper's.
+
+    p0 (in the problem's pressure unit) and r0 start every point. conditions is any combination of F (feasibility),
+    R (reduction), C (centrality), B (backtracking). tol_min is the floor of the inner relative tolerance.
+    """
+
+    p0: float = 1.0
+    r0: float = 0.1
+    mu: str = "mu2"
+    conditions: str = "FCB"
+    sigma_max: float = 0.9
+    sigma_factor: float = 0.01
+    gamma: float = 0.5
+    theta: float = 0.5
+    beta: float = 1e-4
+    tol_min: float = 1e-8
+
+    def __post_init__(self) -> None:
+        if self.mu not in MU_RULES:
+            raise InputError(f"--mu {self.mu}: allowed are {', '.join(MU_RULES)}")
+        if set(self.conditions) - set("FRCB") or len(set(self.conditions)) < len(self.conditions):
+            raise InputError(f"--conditions {self.conditions}: any combination of the letters F, R, C, B, each once")
+        for name in ("p0", "r0"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0):
+                raise InputError(f"--{name} {value}: a positive number is needed (the method starts inside p, r > 0)")
+        for name in ("sigma_max", "sigma_factor", "gamma", "theta", "beta", "tol_min"):
+            value = getattr(self, name)
+            if not 0 < value < 1:
+                raise InputError(f"din.{name} = {value}: allowed are numbers between 0 and 1")
+
+
+class DIN:
+    """The iterates and steps of DIN; `newton.iterate` runs it.
+
+    Parameters
+    ----------
+    problem : supplies F1 = A p + B r - c and n.
+    system : solves A dp + B dr = f1, r dp + p dr = f2.
+    options : see `DinOptions`.
+    """
+
+    def __init__(self, problem: LubricationProblem, system: System, options: DinOptions):
+        self.problem, self.system, self.options = problem, system, options
+        self.p = np.full(problem.grid.local_size, options.p0)
+        self.r = np.full(problem.grid.local_size, options.r0)
+        self.F1 = problem.flow(self.p, self.r)
+        reduce = problem.reduce
+        self.central = Centrality(reduce, self.p * self.r, problem.size, reduce.norm(self.F1), options.gamma)
+        self.norm = reduce.norm(self.F1, self.p * self.r)
+
+    @property
+    def fields(self) -> dict[str, Array]:
+        return {"p": self.p, "r": self.r}
+
+    def forcing(self, sigma: float) -> float:
+        """delta_k of the inner solves, at most 0.1 and small enough for (31), sigma_k > delta_k max(...)."""
+        n, c, gamma = self.problem.size, self.central, self.options.gamma
+        worst = max(
+            (np.sqrt(n) + c.tau1 * gamma) / (1.0 - c.tau1 * gamma),
+            (np.sqrt(n) + c.tau2 * gamma) / np.sqrt(n),
+        )
+        return min(0.1, sigma / n / worst)
+
+    def advance(self) -> Step:
+        """One step: perturbed Newton direction, then alpha by the conditions in the order F, R, C, B."""
+        o, n, reduce = self.options, self.problem.size, self.problem.reduce
+        p, r, norm = self.p, self.r, self.norm
+        products = p * r
+        gap = reduce.sum(products)
+        sigma = min(o.sigma_max, o.sigma_factor * norm)
+        mu = MU_RULES[o.mu](gap, norm, n)
+        delta = 0.0 if self.system.direct else self.forcing(sigma)
+        rtol = max(o.tol_min, delta * norm)
+        dp, dr, linear_iterations = self.system.solve(r, p, -self.F1, sigma * mu - products, rtol)
+
+        with self.system.stages("step length"):
+            alpha, centrality, backtracking = self._step_length(dp, dr, gap, sigma + delta)
+            self.p, self.r = p + alpha * dp, r + alpha * dr
+            self.F1 = self.problem.flow(self.p, self.r)
+            self.norm = reduce.norm(self.F1, self.p * self.r)
+            step_norm = alpha * reduce.norm(dp, dr)
+        return Step(self.norm, step_norm, alpha, linear_iterations, centrality, backtracking, sigma, rtol)
+
+    def _step_length(self, dp: Array, dr: Array, gap: float, forcing: float) -> tuple[float, int, int]:
+        """alpha and the cuts that centrality and backtracking made."""
+        o, reduce = self.options, self.problem.reduce
+        alpha, centrality, backtracking = 1.0, 0, 0
+        slope = self.problem.linear_flow(dp, dr)  # F1 is affine: trial points need no product with A or B
+
+        def trial(alpha: float) -> tuple[Array, Array]:
+            return self.F1 + alpha * slope, (self.p + alpha * dp) * (self.r + alpha * dr)
+
+        def central(alpha: float) -> bool:
+            F1, products = trial(alpha)
+            return self.central.holds(products, reduce.norm(F1))
+
+        def decreases(alpha: float) -> bool:
+            return inexact_decrease(self.norm, reduce.norm(*trial(alpha)), alpha, forcing, o.beta)
+
+        if "F" in o.conditions:
+            alpha = feasible(reduce, (self.p, dp), (self.r, dr))
+        if "R" in o.conditions:
+            alpha = reduction(alpha, gap)
+        if "C" in o.conditions:
+            alpha, centrality = halve_until(central, alpha, o.theta)
+        if "B" in o.conditions:
+            alpha, backtracking = halve_until(decreases, alpha, o.theta)
+        return alpha, centrality, backtracking
+
+
+def build(problem: LubricationProblem, system: System, options: dict[str, Any]) -> DIN:
+    """The registry's door: DIN for the options that were given, by name.
+
+    Raises
+    ------
+    InputError : an unknown option or a value out of range.
+    """
+    return DIN(problem, system, make_options(DinOptions, "din", options))

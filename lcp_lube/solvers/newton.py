@@ -1,0 +1,61 @@
+"""The outer loop of every method: step, test, record. A method supplies the step; the loop owns limits and outcomes."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from ..linear.krylov import LinearSolverError
+from ..problems.solution import Outcome, Step
+from .steplength import StepLengthError
+
+
+class Method(Protocol):
+    """What the loop needs of a method: ||F|| at the start, and one step at a time."""
+
+    norm: float
+
+    def advance(self) -> Step: ...
+
+
+@dataclass(frozen=True)
+class Stopping:
+    """Stop when ||F|| <= eps1 and ||alpha d|| <= eps2; give up after max_it steps."""
+
+    eps1: float = 1e-8
+    eps2: float = 1e-8
+    max_it: int = 500
+
+
+Monitor = Callable[[int, Step], None]
+
+
+def iterate(method: Method, stopping: Stopping, monitor: Monitor | None = None) -> tuple[Outcome, str, list[Step]]:
+    """Run a method to its end. Collective.
+
+    Returns
+    -------
+    outcome : CONVERGED means here only that the stopping test held; the caller adds the certificate.
+    message : why it ended, as a sentence.
+    steps : one record a step.
+    """
+    steps: list[Step] = []
+    if not np.isfinite(method.norm):
+        return Outcome.NOT_FINITE, "||F|| at the starting vector is not finite", steps
+    for k in range(1, stopping.max_it + 1):
+        try:
+            step = method.advance()
+        except StepLengthError as error:
+            return Outcome.STEP_LENGTH, f"step {k}: no acceptable step length, {error}", steps
+        except LinearSolverError as error:
+            return Outcome.LINEAR_SOLVER, f"step {k}: {error}", steps
+        steps.append(step)
+        if monitor is not None:
+            monitor(k, step)
+        if not (np.isfinite(step.norm) and np.isfinite(step.step_norm)):
+            return Outcome.NOT_FINITE, f"step {k}: ||F|| = {step.norm}, ||alpha d|| = {step.step_norm}", steps
+        if step.norm <= stopping.eps1 and step.step_norm <= stopping.eps2:
+            return Outcome.CONVERGED, f"||F|| = {step.norm:.2e}, ||alpha d|| = {step.step_norm:.2e}", steps
+    last = f" with ||F|| = {steps[-1].norm:.2e}, ||alpha d|| = {steps[-1].step_norm:.2e}" if steps else ""
+    return Outcome.MAX_ITERATIONS, f"not converged after {stopping.max_it} iterations{last}", steps
