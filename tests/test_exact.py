@@ -110,6 +110,10 @@ def test_pocketed_pad():
     assert exact.p_max == pytest.approx(9808818.754, abs=0.5e-3)
     assert exact.load - p_0 * 0.01 == pytest.approx(34165.70098, abs=0.5e-5)
 
+    hidden = Pad(1.05e-6, 1e-6, 0.01, (0.002, 0.005), 1e-6)
+    object.__setattr__(hidden, "breakpoints", lambda: ())  # found by bisection
+    assert exact_solution(hidden, 0.01, 0.01, 1.0, p_0, p_0).load == pytest.approx(exact.load, rel=1e-10)
+
     exact = exact_solution(film, 0.01, 0.01, 0.02, p_0, p_0)
     assert exact.rupture is None and not exact.r(np.linspace(0, 0.01, 99)).any()
     np.testing.assert_allclose(exact.p([0.002, 0.005]), [40621.8837, 451923.9105], atol=0.5e-4)
@@ -330,7 +334,16 @@ def test_refused_pressures(name, value):
 def test_refused_films():
     with pytest.raises(InputError, match=r"^h = .*must be positive"):
         exact_solution(Pad(1e-6, -1e-6, L), L, MU, U, 0, 0)
-    hidden_jump = Pad(2e-6, 1e-6, L, (0.031, 0.032), 1e-6)
-    object.__setattr__(hidden_jump, "breakpoints", lambda: ())
-    with pytest.raises(InputError, match=r"^film: not smooth between its breakpoints, near x = 0\.03"):
-        exact_solution(hidden_jump, L, MU, U, 0, 0)
+    rough = Ripple(10**7)
+    object.__setattr__(rough, "breakpoints", lambda: ())
+    with pytest.raises(InputError, match=r"^film: not smooth between its breakpoints, from x = .* m on$"):
+        exact_solution(rough, L, MU, U, 0, 0)
+
+
+@pytest.mark.parametrize("ulps", [-2, -1, 1, 2])
+def test_ends_that_rounding_sets_apart(ulps):
+    """A wave from 3L/8 on whose end is not quite L, as sums of fractions of L are."""
+    ends = [Wave("sinusoid", DC, 15e-6, 25e-6, 0.0375, 0.0625 + k * np.spacing(0.1)) for k in (0, ulps)]
+    one, two = (exact_solution(film, L, MU, U, 1e6, 1e6) for film in ends)
+    for name in ("rupture", "reformation", "Q", "p_max", "x_max", "load"):
+        assert getattr(two, name) == pytest.approx(getattr(one, name), rel=1e-12)
