@@ -66,13 +66,9 @@ class LubricationProblem:
         y.destroy()
         return out
 
-    def linear_flow(self, p: Array, r: Array) -> Array:
-        """A p + B r. Collective."""
-        return self.multiply(self.A, p) + self.multiply(self.B, r)
-
     def flow(self, p: Array, r: Array) -> Array:
         """F1 = A p + B r - c, the flow balance of every point in m2/s. Collective."""
-        return self.linear_flow(p, r) - self.c
+        return self.multiply(self.A, p) + self.multiply(self.B, r) - self.c
 
     def certify(self, p: Array, r: Array, eps1: float) -> Certificate:
         """Certificate of the pair (p, r) for a run whose tolerance was eps1. Collective.

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,8 @@ from ..problems.problem import LubricationProblem
 from ..problems.solution import Step
 from .method_options import make_options
 from .steplength import Centrality, feasible, halve_until, inexact_decrease, reduction
+
+Trial = tuple[Array, Array, Array]  # p, r, F1
 
 
 def mu1(gap: float, norm: float, n: int) -> float:
@@ -112,28 +115,30 @@ class DIN:
         dp, dr, linear_iterations = self.system.solve(r, p, -self.F1, sigma * mu - products, rtol)
 
         with self.system.stages("step length"):
-            alpha, centrality, backtracking = self._step_length(dp, dr, gap, sigma + delta)
-            self.p, self.r = p + alpha * dp, r + alpha * dr
-            self.F1 = self.problem.flow(self.p, self.r)
+            alpha, centrality, backtracking, trial = self._step_length(dp, dr, gap, sigma + delta)
+            self.p, self.r, self.F1 = trial
             self.norm = reduce.norm(self.F1, self.p * self.r)
             step_norm = alpha * reduce.norm(dp, dr)
         return Step(self.norm, step_norm, alpha, linear_iterations, centrality, backtracking, sigma, rtol)
 
-    def _step_length(self, dp: Array, dr: Array, gap: float, forcing: float) -> tuple[float, int, int]:
-        """alpha and the cuts that centrality and backtracking made."""
+    def _step_length(self, dp: Array, dr: Array, gap: float, forcing: float) -> tuple[float, int, int, Trial]:
+        """alpha, the cuts that centrality and backtracking made, and p, r, F1 at the new point."""
         o, reduce = self.options, self.problem.reduce
         alpha, centrality, backtracking = 1.0, 0, 0
-        slope = self.problem.linear_flow(dp, dr)  # F1 is affine: trial points need no product with A or B
 
-        def trial(alpha: float) -> tuple[Array, Array]:
-            return self.F1 + alpha * slope, (self.p + alpha * dp) * (self.r + alpha * dr)
+        @lru_cache(maxsize=1)  # C, B and the step itself ask for the same point
+        def trial(alpha: float) -> Trial:
+            # F1 is affine, but its value at the trial point is what the paper tests: at rounding level they differ.
+            p, r = self.p + alpha * dp, self.r + alpha * dr
+            return p, r, self.problem.flow(p, r)
 
         def central(alpha: float) -> bool:
-            F1, products = trial(alpha)
-            return self.central.holds(products, reduce.norm(F1))
+            p, r, F1 = trial(alpha)
+            return self.central.holds(p * r, reduce.norm(F1))
 
         def decreases(alpha: float) -> bool:
-            return inexact_decrease(self.norm, reduce.norm(*trial(alpha)), alpha, forcing, o.beta)
+            p, r, F1 = trial(alpha)
+            return inexact_decrease(self.norm, reduce.norm(F1, p * r), alpha, forcing, o.beta)
 
         if "F" in o.conditions:
             alpha = feasible(reduce, (self.p, dp), (self.r, dr))
@@ -143,7 +148,7 @@ class DIN:
             alpha, centrality = halve_until(central, alpha, o.theta)
         if "B" in o.conditions:
             alpha, backtracking = halve_until(decreases, alpha, o.theta)
-        return alpha, centrality, backtracking
+        return alpha, centrality, backtracking, trial(alpha)
 
 
 def build(problem: LubricationProblem, system: System, options: dict[str, Any]) -> DIN:
