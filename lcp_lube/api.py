@@ -1,5 +1,6 @@
 """solve(scene) -> Solution: choose method, system and recipe, run the outer loop, certify."""
 
+from collections.abc import Iterable
 from time import perf_counter
 from typing import Any
 
@@ -8,9 +9,8 @@ from petsc4py import PETSc
 from .errors import InputError, nearest
 from .linear.options import recipe, set_names
 from .linear.stages import Stages
-from .problems.problem import LubricationProblem
-from .problems.solution import Outcome, Solution
-from .registry import METHODS, SYSTEMS
+from .problems.solution import Outcome, Problem, Solution
+from .registry import DEFAULT_METHOD, METHODS
 from .scene import Scene
 from .solvers.newton import Monitor, Stopping, iterate
 
@@ -49,27 +49,30 @@ def solve(
     """
     stopping = stopping or Stopping()
     start = perf_counter()
-    method = _choose(method, "din", METHODS, "--method")
-    system = _choose(system, "full", SYSTEMS, "--system")
     stages = Stages()
     with stages("setup"):
         problem = scene.build(comm)
+    method = _choose(method, DEFAULT_METHOD[problem.kind], METHODS, "--method")
+    entry = METHODS[method]
+    if problem.kind not in entry.kinds:
+        fitting = [name for name, other in METHODS.items() if problem.kind in other.kinds]
+        raise InputError(f"--method {method}: not for scene {scene.name}; allowed are {', '.join(fitting)}")
+    system = _choose(system, entry.systems[0], entry.systems, "--system")
     name = recipe_name or default_recipe(problem)
     with recipe(name):
-        linear = SYSTEMS[system].load()(problem, stages)
-        defaults = {"tol_min": max(1e-12, min(1e-4, stopping.eps1))}
-        run = METHODS[method].load()(problem, linear, {**defaults, **(options or {})})
+        run = entry.load()(problem, stages, system, options or {}, stopping)
         try:
             outcome, message, steps = iterate(run, stopping, monitor)
-            ksp_type, pc_type = linear.krylov.ksp_type, linear.krylov.pc_type
+            ksp_type, pc_type = (run.krylov.ksp_type, run.krylov.pc_type) if run.krylov else (None, None)
+            fields = run.fields
         finally:
-            linear.destroy()
-    certificate = problem.certify(**run.fields, eps1=stopping.eps1)
+            run.destroy()
+    certificate = problem.certify(fields, stopping.eps1)
     if outcome is Outcome.CONVERGED and not certificate.holds:
         outcome, message = Outcome.WRONG_SOLUTION, f"{message}, but the certificate fails: {certificate.failure}"
     return Solution(
         problem,
-        run.fields,
+        fields,
         outcome,
         message,
         certificate,
@@ -87,7 +90,7 @@ def solve(
     )
 
 
-def default_recipe(problem: LubricationProblem) -> str | None:
+def default_recipe(problem: Problem) -> str | None:
     """The direct solver that this PETSc has for this number of ranks; None if the user has chosen by PETSc's options."""
     if {"ksp_type", "pc_type"} & set_names():
         return None
@@ -95,7 +98,7 @@ def default_recipe(problem: LubricationProblem) -> str | None:
     return next((name for name in names if PETSc.Sys.hasExternalPackage(name)), "bjacobi")
 
 
-def _choose(name: str, default: str, table: dict[str, Any], option: str) -> str:
+def _choose(name: str, default: str, table: Iterable[str], option: str) -> str:
     if name == "auto":
         return default
     if name not in table:

@@ -100,8 +100,13 @@ def _scene_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--nx", type=int)
     parser.add_argument("--ny", type=int)
     parser.add_argument("--film", help="sinusoid or parabola (published problems)")
-    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="change a scene's value (SI), or "
-                        "METHOD.OPTION=VALUE for a method's parameter, din.gamma=0.4")
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="change a scene's value (SI), or METHOD.OPTION=VALUE for a method's parameter, din.gamma=0.4",
+    )
     parser.add_argument("--system", default="auto", help="which matrix the inner solver sees; default auto")
     parser.add_argument("--eps1", type=float, default=1e-8, help="stop when ||F|| <= eps1, default 1e-8")
     parser.add_argument("--eps2", type=float, default=1e-8, help="and ||alpha d|| <= eps2, default 1e-8")

@@ -25,12 +25,31 @@ class Entry:
         return getattr(import_module(module), name)
 
 
-METHODS: dict[str, Entry] = {
-    "din": Entry("lcp_lube.solvers.din:build", "damped inexact Newton of Mezzadri and Galligani (interior method)"),
+@dataclass(frozen=True)
+class MethodEntry(Entry):
+    """A method: `target` is build(problem, stages, system, options, stopping, start) -> Method.
+
+    kinds are the problems it solves (`Problem.kind`), systems the matrices it can use, its default first.
+    """
+
+    kinds: tuple[str, ...] = ("lubrication",)
+    systems: tuple[str, ...] = ("full",)
+
+
+METHODS: dict[str, MethodEntry] = {
+    "din": MethodEntry("lcp_lube.solvers.din:build", "damped inexact Newton of Mezzadri and Galligani (interior method)"),
 }
+
+# What 'auto' takes for a kind of problem.
+DEFAULT_METHOD = {"lubrication": "din"}
 
 SYSTEMS: dict[str, Entry] = {
     "full": Entry("lcp_lube.linear.newton_matrix:FullSystem", "the 2n-by-2n matrix [A B; R P] of the papers"),
+}
+
+# A scene file's `family` names the model that validates it and builds its problem.
+FAMILIES: dict[str, Entry] = {
+    "slider": Entry("lcp_lube.scene:SliderScene", "slider with one wave of the film (the published problems)"),
 }
 
 

@@ -14,6 +14,8 @@ from .problems.film import Wave
 from .problems.grid import Grid
 from .problems.problem import LubricationProblem
 from .problems.reynolds import box_scheme
+from .problems.solution import Problem
+from .registry import FAMILIES
 
 SCENE_DIR = Path(__file__).parent / "scenes"
 
@@ -23,14 +25,25 @@ Count = Annotated[int, Field(ge=1, le=2**31 - 2)]
 
 
 class Scene(BaseModel):
+    """What every scene has; a family (registry.FAMILIES) adds its data and builds its problem."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    family: str = "slider"
+    name: str = ""
+    scheme: str | None = None
+
+    def build(self, comm: PETSc.Comm | None = None) -> Problem:
+        """The discrete problem on this scene's grid. Collective."""
+        raise NotImplementedError
+
+
+class SliderScene(Scene):
     """A slider of length L (and width) with one wave of the film, in SI units; defaults are the paper's data.
 
     Pressures are above the cavitation pressure p_c, which is added to what is reported.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=False)
-
-    name: str = ""
     dimension: Literal[1, 2] = 1
     film: Literal["sinusoid", "parabola"] = "sinusoid"
     form: Literal["convergent-divergent", "divergent-convergent"] = "convergent-divergent"
@@ -52,7 +65,7 @@ class Scene(BaseModel):
     ny: Count | None = Field(None, description="interior points in y; default n (2D)")
 
     @model_validator(mode="after")
-    def _consistent(self) -> "Scene":
+    def _consistent(self) -> "SliderScene":
         if self.h_max < self.h_min:
             raise ValueError(f"h_max = {self.h_max:g}: at least h_min = {self.h_min:g} is needed")
         if not self.wave[0] < self.wave[1] <= 1:
@@ -90,9 +103,7 @@ class Scene(BaseModel):
         grid = Grid(self.shape, lengths, comm)
         p_sides = (self.p_a, self.p_b, self.p_side, self.p_side)
         gap = self.gap
-        scheme = box_scheme(
-            grid, gap, mu=self.mu, U=self.U, scheme=self.scheme, p_sides=p_sides, p_unit=self.p_unit
-        )
+        scheme = box_scheme(grid, gap, mu=self.mu, U=self.U, scheme=self.scheme, p_sides=p_sides, p_unit=self.p_unit)
         return LubricationProblem(
             grid,
             scheme,
@@ -130,16 +141,23 @@ def load_scene(source: str | Path, changes: dict[str, Any] | None = None) -> Sce
     elif source in scene_names():
         path, name = SCENE_DIR / f"{source}.toml", source
     else:
-        raise InputError(f"scene {source}: neither a .toml file nor a built-in name{nearest(source, scene_names())}; see 'lcp-lube list'")
+        raise InputError(
+            f"scene {source}: neither a .toml file nor a built-in name{nearest(source, scene_names())}; see 'lcp-lube list'"
+        )
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise InputError(f"{source}: {reason}") from None
+    data = {"name": name, **data, **changes}
+    family = data.get("family", "slider")
+    if family not in FAMILIES:
+        raise InputError(f"{source}: family = {family}: allowed are {', '.join(FAMILIES)}")
+    model: Any = FAMILIES[family].load()
     try:
-        return Scene(**{"name": name, **data, **changes})
+        return model(**data)
     except ValidationError as error:
-        raise InputError(f"{source}: {_first_fault(error)}") from None
+        raise InputError(f"{source}: {_first_fault(error, model.model_fields)}") from None
 
 
 def parse_changes(assignments: Iterable[str]) -> dict[str, Any]:
@@ -161,11 +179,11 @@ def parse_changes(assignments: Iterable[str]) -> dict[str, Any]:
     return changes
 
 
-def _first_fault(error: ValidationError) -> str:
+def _first_fault(error: ValidationError, known: Iterable[str]) -> str:
     """The first of pydantic's complaints: key, what was found, what is allowed."""
     fault = error.errors()[0]
     key = ".".join(str(part) for part in fault["loc"])
     if fault["type"] == "extra_forbidden":
-        return f"unknown key {key}{nearest(key, list(Scene.model_fields)) or '; known are ' + ', '.join(Scene.model_fields)}"
+        return f"unknown key {key}{nearest(key, known) or '; known are ' + ', '.join(known)}"
     allowed = fault["msg"].removeprefix("Value error, ").replace("Input should be ", "allowed is ")
     return f"{key} = {fault['input']}: {allowed}" if key else allowed

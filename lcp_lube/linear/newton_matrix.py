@@ -47,10 +47,7 @@ class FullSystem:
             self.mat = PETSc.Mat().createAIJ(
                 (size, size), csr=(pointers, sorted_columns, np.concatenate(values)[order]), comm=comm
             )
-            self.fields = {
-                name: PETSc.IS().createGeneral(own, comm=comm)
-                for name, own in (("p", own_p), ("r", own_r))
-            }
+            self.fields = {name: PETSc.IS().createGeneral(own, comm=comm) for name, own in (("p", own_p), ("r", own_r))}
             self.mat.setAttr("fields", self.fields)
             self.mat.setAttr("problem", problem)
             self._x, self._b = self.mat.createVecs()

@@ -78,7 +78,7 @@ def known_names() -> list[str]:
         pc_hypre_boomeramg_interp_type pc_hypre_boomeramg_relax_type_all pc_gamg_type pc_gamg_threshold pc_mg_levels
         pc_fieldsplit_type pc_fieldsplit_schur_fact_type pc_fieldsplit_schur_precondition pc_python_type pc_composite_pcs
         sub_ksp_type sub_pc_type sub_pc_factor_levels sub_pc_factor_mat_solver_type mat_type mat_view log_view
-        mat_mumps_icntl_14 mat_mumps_icntl_4 options_left options_file options_view""".split()
+        mat_mumps_icntl_14 mat_mumps_icntl_4 options_left options_file options_view""".split()  # noqa: SIM905
     return sorted({*usual, *(key for name in recipe_names() for key in read_recipe(name))})
 
 
@@ -86,8 +86,12 @@ def explain_error(error: PETSc.Error) -> str:
     """One line from PETSc's traceback; an unknown type gets the nearest legal one."""
     lines = [re.sub(r"^\[\d+\]\s*", "", line).strip() for line in str(error).splitlines()]
     text = next((line for line in reversed(lines) if line and not re.match(r"^\w+\(\) (line|at)", line)), str(error))
-    kinds = ((r"KSP type (\S+)", PETSc.KSP.Type), (r"PC type (\S+)", PETSc.PC.Type), (r"[Mm]at(?:rix)? type (\S+)", PETSc.Mat.Type),
-             (r"solver type (\S+)", PETSc.Mat.SolverType))
+    kinds = (
+        (r"KSP type (\S+)", PETSc.KSP.Type),
+        (r"PC type (\S+)", PETSc.PC.Type),
+        (r"[Mm]at(?:rix)? type (\S+)", PETSc.Mat.Type),
+        (r"solver type (\S+)", PETSc.Mat.SolverType),
+    )
     for pattern, enum in kinds:
         found = re.search(pattern, text)
         legal = [value for key, value in vars(enum).items() if not key.startswith("_")]

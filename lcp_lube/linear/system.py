@@ -3,6 +3,8 @@
 from typing import Protocol
 
 from ..parallel import Array
+from ..problems.problem import LubricationProblem
+from ..registry import SYSTEMS
 from .krylov import Krylov
 from .stages import Stages
 
@@ -23,3 +25,8 @@ class System(Protocol):
         ...
 
     def destroy(self) -> None: ...
+
+
+def make_system(name: str, problem: LubricationProblem, stages: Stages) -> System:
+    """The system that the registry knows by this name, for one problem."""
+    return SYSTEMS[name].load()(problem, stages)

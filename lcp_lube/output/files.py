@@ -1,1 +1,2 @@
-def check_target(path, plot=False): pass
+def check_target(path, plot=False):
+    pass

@@ -9,7 +9,6 @@ import petsc4py
 from petsc4py import PETSc
 
 from .. import __version__
-from ..problems.quantities import quantities
 from ..problems.solution import Solution
 
 
@@ -23,7 +22,7 @@ def as_dict(solution: Solution) -> dict[str, Any]:
         "scene": settings.get("scene"),
         "nx": grid.shape[0],
         "ny": grid.shape[1] if grid.dim == 2 else None,
-        "unknowns": 2 * problem.size,
+        "unknowns": problem.unknowns,
         "ranks": grid.comm.size,
         **{key: settings.get(key) for key in ("method", "system", "scheme", "recipe", "ksp_type", "pc_type")},
         "outcome": str(solution.outcome),
@@ -35,11 +34,10 @@ def as_dict(solution: Solution) -> dict[str, Any]:
         "linear_iterations": solution.total("linear_iterations"),
         "c1": last.norm if last else None,
         "c2": last.step_norm if last else None,
-        **quantities(problem, solution.p, solution.r),
+        **problem.quantities(solution.fields),
         **certificate.extremes,
         **certificate.measures,
         "certificate_tol": certificate.tol,
-        "p_unit": problem.p_unit,
         "memory_mb": peak_memory(solution),
         "time_s": {
             "total": times.get("total"),

@@ -21,24 +21,37 @@ class Grid:
     shape : numbers of interior points, (nx,) or (nx, ny).
     lengths : side lengths in metres, (L,) or (L, Ly).
     comm : PETSc communicator; default all ranks.
+    origin : coordinates of the corner x = y = 0 of the description above, in metres.
 
     Raises
     ------
     InputError : fewer than one point a side, or more ranks than the points can be dealt to.
     """
 
-    def __init__(self, shape: Sequence[int], lengths: Sequence[float], comm: PETSc.Comm | None = None):
+    def __init__(
+        self,
+        shape: Sequence[int],
+        lengths: Sequence[float],
+        comm: PETSc.Comm | None = None,
+        origin: tuple[float, float] = (0.0, 0.0),
+    ):
         if any(n < 1 for n in shape):
             raise InputError(f"grid {'x'.join(map(str, shape))}: at least 1 interior point a side is needed")
         self.shape = tuple(int(n) for n in shape)
         self.lengths = tuple(float(length) for length in lengths)
         self.spacing = tuple(length / (n + 1) for length, n in zip(self.lengths, self.shape, strict=True))
         self.dim = len(self.shape)
+        self.origin = origin
         self.size = int(np.prod(self.shape))
         comm = comm or PETSc.COMM_WORLD
         try:
             self.dm = PETSc.DMDA().create(
-                dim=self.dim, sizes=self.shape, dof=1, stencil_width=1, stencil_type=PETSc.DMDA.StencilType.STAR, comm=comm
+                dim=self.dim,
+                sizes=self.shape,
+                dof=1,
+                stencil_width=1,
+                stencil_type=PETSc.DMDA.StencilType.STAR,
+                comm=comm,
             )
         except PETSc.Error:
             raise InputError(
@@ -47,8 +60,8 @@ class Grid:
         self.comm = self.dm.comm.tompi4py()
         self.reduce = Reduce(self.comm)
         ranges = self.dm.getRanges()
-        (self.x_start, self.x_end) = ranges[0]
-        (self.y_start, self.y_end) = ranges[1] if self.dim == 2 else (0, 1)
+        self.x_start, self.x_end = (int(i) for i in ranges[0])
+        self.y_start, self.y_end = (int(j) for j in ranges[1]) if self.dim == 2 else (0, 1)
         self.box = (self.y_end - self.y_start, self.x_end - self.x_start)
         # Rank k owns the global (PETSc) numbers starts[k] to starts[k + 1].
         self.starts = np.concatenate([[0], np.cumsum(self.comm.allgather(self.local_size))])
@@ -70,14 +83,14 @@ class Grid:
     @property
     def x(self) -> Array:
         """Owned x coordinates in metres, shape (1, nx_local)."""
-        return (np.arange(self.x_start, self.x_end) + 1.0)[None, :] * self.spacing[0]
+        return self.origin[0] + (np.arange(self.x_start, self.x_end) + 1.0)[None, :] * self.spacing[0]
 
     @property
     def y(self) -> Array:
         """Owned y coordinates in metres, shape (ny_local, 1); 0 in 1D."""
         if self.dim == 1:
             return np.zeros((1, 1))
-        return (np.arange(self.y_start, self.y_end) + 1.0)[:, None] * self.spacing[1]
+        return self.origin[1] + (np.arange(self.y_start, self.y_end) + 1.0)[:, None] * self.spacing[1]
 
     def ghosted(self, owned: Array) -> Array:
         """Owned values with one layer of the neighbours' around them, NaN outside the domain.

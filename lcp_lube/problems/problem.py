@@ -1,6 +1,7 @@
 """The door between physics and solvers: the data of A p + B r = c, p r = 0, p, r >= 0, and what certifies an answer."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
@@ -9,7 +10,9 @@ from ..parallel import Array
 from .certificate import Certificate, certificate_tol
 from .exact import ExactSolution
 from .grid import Grid
+from .quantities import quantities
 from .reynolds import BoxScheme, assemble, sides
+from .solution import Fields
 
 
 class LubricationProblem:
@@ -30,6 +33,8 @@ class LubricationProblem:
     exact : gives the exact 1D solution, where one is known.
     """
 
+    kind = "lubrication"
+
     def __init__(
         self,
         grid: Grid,
@@ -41,7 +46,7 @@ class LubricationProblem:
         p_sides: tuple[float, float, float, float],
         p_c: float,
         film: Callable[[Array, Array], Array],
-        exact: Callable[[], ExactSolution] | None = None,
+        exact: Callable[[], ExactSolution | None] | None = None,
     ):
         self.grid, self.scheme, self.film = grid, scheme, film
         self.mu, self.U, self.p_unit, self.p_sides, self.p_c = mu, U, p_unit, p_sides, p_c
@@ -50,6 +55,10 @@ class LubricationProblem:
         self.A = assemble(grid, scheme.pressure_entries())
         self.B = assemble(grid, scheme.void_entries())
         self.c = scheme.c.ravel()
+
+    @property
+    def unknowns(self) -> int:
+        return 2 * self.size
 
     @property
     def size(self) -> int:
@@ -70,14 +79,14 @@ class LubricationProblem:
         """F1 = A p + B r - c, the flow balance of every point in m2/s. Collective."""
         return self.multiply(self.A, p) + self.multiply(self.B, r) - self.c
 
-    def certify(self, p: Array, r: Array, eps1: float) -> Certificate:
-        """Certificate of the pair (p, r) for a run whose tolerance was eps1. Collective.
+    def certify(self, fields: Fields, eps1: float) -> Certificate:
+        """Certificate of the fields p and r for a run whose tolerance was eps1. Collective.
 
         residual: ||A p + B r - c|| / (||A p|| + ||B r|| + ||c||);
         complementarity: max_i |min(p_i / max|p|, r_i)|, which bounds negative p, negative r and products alike;
         mass_defect: |flow in - flow out| / flow in, over the whole boundary.
         """
-        red = self.reduce
+        red, p, r = self.reduce, fields["p"], fields["r"]
         Ap, Br = self.multiply(self.A, p), self.multiply(self.B, r)
         scale = red.norm(Ap) + red.norm(Br) + red.norm(self.c)
         p_max = red.max(np.abs(p))
@@ -110,6 +119,18 @@ class LubricationProblem:
             total(np.where(south, s.k_S * (p_S - p), 0.0)),
             total(np.where(north, s.k_N * (p - p_N), 0.0)),
         )
+
+    def quantities(self, fields: Fields) -> dict[str, Any]:
+        """Load, friction, largest pressure, cavitated share, fronts; see `quantities.quantities`. Collective."""
+        return quantities(self, fields["p"], fields["r"])
+
+    def physical(self, fields: Fields) -> dict[str, tuple[Array, str]]:
+        """Absolute pressure in Pa, void fraction, film in m."""
+        return {
+            "p": (fields["p"] * self.p_unit + self.p_c, "Pa"),
+            "r": (fields["r"], ""),
+            "h": (self.scheme.h.ravel(), "m"),
+        }
 
     def destroy(self) -> None:
         """Free the PETSc objects."""

@@ -1,9 +1,15 @@
 """What an engineer reads off the fields: load, friction, largest pressure, cavitated area, fronts."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ..parallel import Array
-from .problem import LubricationProblem
+
+if TYPE_CHECKING:
+    from .problem import LubricationProblem
 
 
 def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, float | None]:
@@ -25,6 +31,7 @@ def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, flo
         "p_max": max(red.max(p_pa), *problem.p_sides[: 2 * grid.dim]) + problem.p_c,
         "load": _load(problem, p_pa),
         "friction": _friction(problem, p_pa, r),
+        "p_unit": problem.p_unit,
         "cavitated_fraction": red.sum((z < 0).astype(float)) / grid.size,
     }
     if grid.dim == 1:
@@ -60,7 +67,7 @@ def _friction(problem: LubricationProblem, p_pa: Array, r: Array) -> float:
     dx = grid.spacing[0]
     h, box = problem.scheme.h, grid.box
     p2, r2 = p_pa.reshape(box), r.reshape(box)
-    x, y = np.broadcast_arrays(grid.x, grid.y)
+    x, y = (np.array(a) for a in np.broadcast_arrays(grid.x, grid.y))
     framed = grid.ghosted(p_pa)
     p_W = np.where(x < 1.5 * dx, problem.p_sides[0], framed[1:-1, :-2])
     last = x > grid.lengths[0] - 1.5 * dx
@@ -76,33 +83,30 @@ def _friction(problem: LubricationProblem, p_pa: Array, r: Array) -> float:
 def fronts(problem: LubricationProblem, p: Array, r: Array) -> tuple[float | None, float | None]:
     """First rupture and first reformation behind it in 1D, in metres; None where there is none. Collective.
 
-    Each front is found to its cell from the sign of p/max|p| - r and placed inside it by a field that is smooth up to it:
-    the void fraction behind rupture and the pressure behind reformation, both extrapolated linearly to zero.
+    Each front is found to its cell from the sign of p/max|p| - r and placed inside it. Rupture: where U h = Q, the one flow
+    of the discrete solution (p = p' = 0 there; bearing.md), h linear over the cell (and a cell beyond, where the discrete front is late). Reformation: where the
+    pressure behind it, extrapolated linearly, is zero.
     """
-    grid = problem.grid
+    grid, film = problem.grid, problem.film
     dx, L = grid.spacing[0], grid.lengths[0]
     x = grid.x[0]
     z = grid.ghosted(cavity_sign(problem, p, r))[1]
     z[0] = 1.0 if grid.x_start == 0 else z[0]  # the inflow boundary is full
     cavity = z < 0
-    at_end = grid.x_end == grid.shape[0]
-
-    def place(field: Array, front: Array) -> Array:
-        """Zero of the line through the first two points behind the front (moved off its cell by at most the cell)."""
-        value, after = field[1:-1], field[2:]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            back = np.where(after > value, value / (after - value), 0.5)
-        back = np.where(np.isfinite(back), np.clip(back, 0.0, 1.0), 0.5)
-        return np.where(front, x - back * dx, np.inf)
-
-    rupture = problem.reduce.min(place(grid.ghosted(r)[1], cavity[1:-1] & ~cavity[:-2]))
+    west, east = film(x - dx, 0 * x), film(x, 0 * x)
+    Q = problem.boundary_flows(p, r)[0]
+    front = cavity[1:-1] & ~cavity[:-2]
+    slope = np.where(east > west, east - west, np.inf)  # a step up in the film: rupture at its edge, the cell's start
+    rupture = problem.reduce.min(np.where(front, x - dx + dx * np.clip((Q / problem.U - west) / slope, -1.0, 2.0), np.inf))
     if not np.isfinite(rupture):
         return None, None
-    starts = ~cavity[1:-1] & cavity[:-2] & (x > rupture)
     p_line = grid.ghosted(p)[1]
-    if at_end:
+    if grid.x_end == grid.shape[0]:
         p_line[-1] = problem.p_sides[1] / problem.p_unit
-    reformation = problem.reduce.min(place(p_line, starts))
+    rise = p_line[2:] - p_line[1:-1]
+    back = np.where(rise > 0, np.clip(p_line[1:-1] / np.where(rise > 0, rise, 1.0), 0.0, 1.0), 0.5)
+    full_again = ~cavity[1:-1] & cavity[:-2] & (x > rupture)
+    reformation = problem.reduce.min(np.where(full_again, x - back * dx, np.inf))
     if not np.isfinite(reformation) and problem.p_sides[1] > 0:
-        reformation = L - 0.5 * dx  # the last cell, in front of a boundary above the cavitation pressure
+        reformation = L - 0.5 * dx  # in the last cell, before a boundary above the cavitation pressure
     return rupture, reformation if np.isfinite(reformation) else None

@@ -2,11 +2,45 @@
 
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any
+from typing import Any, Protocol
 
-from ..parallel import Array
+from ..parallel import Array, Reduce
 from .certificate import Certificate
-from .problem import LubricationProblem
+from .grid import Grid
+
+Fields = dict[str, Array]  # this rank's points of each field, by name, in the grid's order
+
+
+class Problem(Protocol):
+    """What every problem offers, whatever it models: the door between the physics and everything else.
+
+    Attributes
+    ----------
+    kind : which methods apply (`Entry.kinds` in the registry): 'lubrication', 'box', ...
+    grid : the points; `grid.reduce` reduces over them.
+    unknowns : number of unknowns of the complementarity problem.
+    """
+
+    kind: str
+    grid: Grid
+    reduce: Reduce
+
+    @property
+    def unknowns(self) -> int: ...
+
+    def certify(self, fields: Fields, eps1: float) -> Certificate:
+        """How far the fields are from a solution, from the problem's data alone. Collective."""
+        ...
+
+    def quantities(self, fields: Fields) -> dict[str, Any]:
+        """The JSON keys that are this problem's own: loads, fronts, counts. Collective."""
+        ...
+
+    def physical(self, fields: Fields) -> dict[str, tuple[Array, str]]:
+        """Fields to print, plot and store: name -> (values in SI, unit)."""
+        ...
+
+    def destroy(self) -> None: ...
 
 
 class Outcome(StrEnum):
@@ -55,7 +89,7 @@ class Solution:
     Attributes
     ----------
     problem : the problem that was solved; it owns PETSc objects, see `destroy`.
-    fields : this rank's points of p (units of problem.p_unit above the cavitation pressure) and r.
+    fields : this rank's points; for a lubrication problem p (units of problem.p_unit above the cavitation pressure) and r.
     outcome, message : how the run ended, in a word and in a sentence.
     certificate : from the problem's data alone.
     steps : the record of the outer loop.
@@ -63,8 +97,8 @@ class Solution:
     times : seconds by stage: setup, assembly, linear, total.
     """
 
-    problem: LubricationProblem
-    fields: dict[str, Array]
+    problem: Problem
+    fields: Fields
     outcome: Outcome
     message: str
     certificate: Certificate

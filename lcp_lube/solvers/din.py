@@ -8,11 +8,14 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..linear.system import System
+from ..linear.krylov import Krylov
+from ..linear.stages import Stages
+from ..linear.system import System, make_system
 from ..parallel import Array
 from ..problems.problem import LubricationProblem
-from ..problems.solution import Step
+from ..problems.solution import Fields, Step
 from .method_options import make_options
+from .newton import Stopping
 from .steplength import Centrality, feasible, halve_until, inexact_decrease, reduction
 
 Trial = tuple[Array, Array, Array]  # p, r, F1
@@ -80,18 +83,25 @@ class DIN:
     options : see `DinOptions`.
     """
 
-    def __init__(self, problem: LubricationProblem, system: System, options: DinOptions):
+    def __init__(self, problem: LubricationProblem, system: System, options: DinOptions, start: Fields | None = None):
         self.problem, self.system, self.options = problem, system, options
-        self.p = np.full(problem.grid.local_size, options.p0)
-        self.r = np.full(problem.grid.local_size, options.r0)
+        self.p = start["p"].copy() if start else np.full(problem.grid.local_size, options.p0)
+        self.r = start["r"].copy() if start else np.full(problem.grid.local_size, options.r0)
         self.F1 = problem.flow(self.p, self.r)
         reduce = problem.reduce
         self.central = Centrality(reduce, self.p * self.r, problem.size, reduce.norm(self.F1), options.gamma)
         self.norm = reduce.norm(self.F1, self.p * self.r)
 
     @property
-    def fields(self) -> dict[str, Array]:
+    def fields(self) -> Fields:
         return {"p": self.p, "r": self.r}
+
+    @property
+    def krylov(self) -> Krylov:
+        return self.system.krylov
+
+    def destroy(self) -> None:
+        self.system.destroy()
 
     def forcing(self, sigma: float) -> float:
         """delta_k of the inner solves, at most 0.1 and small enough for (31), sigma_k > delta_k max(...)."""
@@ -151,11 +161,24 @@ class DIN:
         return alpha, centrality, backtracking, trial(alpha)
 
 
-def build(problem: LubricationProblem, system: System, options: dict[str, Any]) -> DIN:
-    """The registry's door: DIN for the options that were given, by name.
+def build(
+    problem: LubricationProblem,
+    stages: Stages,
+    system: str,
+    options: dict[str, Any],
+    stopping: Stopping,
+    start: Fields | None = None,
+) -> DIN:
+    """The registry's door: DIN on the named system, for the options that were given by name.
+
+    Parameters
+    ----------
+    start : fields p and r to start from, all positive; default p0 and r0 everywhere.
 
     Raises
     ------
     InputError : an unknown option or a value out of range.
     """
-    return DIN(problem, system, make_options(DinOptions, "din", options))
+    floor = float(np.clip(stopping.eps1, 1e-12, 1e-4))  # no inner solve need be much better than the outer test
+    settings = make_options(DinOptions, "din", {"tol_min": floor, **options})
+    return DIN(problem, make_system(system, problem, stages), settings, start)

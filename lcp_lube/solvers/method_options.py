@@ -15,7 +15,7 @@ def make_options(kind: type[T], method: str, given: dict[str, Any]) -> T:
     ------
     InputError : an unknown name, or a value of another type; the dataclass itself checks ranges.
     """
-    known = {field.name: type(field.default) for field in fields(kind)}  # type: ignore[arg-type]
+    known: dict[str, type] = {field.name: type(field.default) for field in fields(kind)}  # type: ignore[arg-type]
     values = {}
     for name, value in given.items():
         if name not in known:

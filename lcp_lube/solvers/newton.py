@@ -6,17 +6,29 @@ from typing import Protocol
 
 import numpy as np
 
-from ..linear.krylov import LinearSolverError
-from ..problems.solution import Outcome, Step
+from ..linear.krylov import Krylov, LinearSolverError
+from ..problems.solution import Fields, Outcome, Step
 from .steplength import StepLengthError
 
 
 class Method(Protocol):
-    """What the loop needs of a method: ||F|| at the start, and one step at a time."""
+    """What the loop and its caller need of a method: ||F|| at the start, one step at a time, and the fields it reached."""
 
     norm: float
 
+    @property
+    def fields(self) -> Fields: ...
+
+    @property
+    def krylov(self) -> Krylov | None:
+        """The KSP behind the steps, for the record; None for a method without one."""
+        ...
+
     def advance(self) -> Step: ...
+
+    def destroy(self) -> None:
+        """Free the PETSc objects that the method made."""
+        ...
 
 
 @dataclass(frozen=True)
