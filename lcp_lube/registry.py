@@ -38,6 +38,8 @@ class MethodEntry(Entry):
 
 METHODS: dict[str, MethodEntry] = {
     "din": MethodEntry("lcp_lube.solvers.din:build", "damped inexact Newton of Mezzadri and Galligani (interior method)"),
+    "fbn-a": MethodEntry("lcp_lube.solvers.fischer:build_armijo", "Fischer-Burmeister Newton, Armijo rule on ||F||^2/2"),
+    "fbn-i": MethodEntry("lcp_lube.solvers.fischer:build_inexact", "Fischer-Burmeister Newton, inexact-Newton decrease of ||F||"),
 }
 
 # What 'auto' takes for a kind of problem.

@@ -73,3 +73,8 @@ class Centrality:
 def inexact_decrease(norm: float, new_norm: float, alpha: float, forcing: float, beta: float) -> bool:
     """B: ||F(x + alpha d)|| <= (1 - beta alpha (1 - forcing)) ||F(x)||, the decrease of an inexact Newton step."""
     return new_norm <= (1.0 - beta * alpha * (1.0 - forcing)) * norm
+
+
+def armijo(merit: float, new_merit: float, alpha: float, slope: float, beta: float) -> bool:
+    """Armijo: Phi(x + alpha d) <= Phi(x) + beta alpha slope, with the slope of Phi along d (negative)."""
+    return new_merit <= merit + beta * alpha * slope

@@ -1,0 +1,178 @@
+"""Fischer-Burmeister Newton (FBN-A, FBN-I): a semismooth Newton method for F~(p, r) = (A p + B r - c, phi(p, r)) = 0.
+
+phi(p, r) = sqrt(p^2 + r^2) - p - r vanishes exactly where p >= 0, r >= 0 and p r = 0, so the iterates may have any sign.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..linear.krylov import Krylov
+from ..linear.stages import Stages
+from ..linear.system import System, make_system
+from ..parallel import Array
+from ..problems.problem import LubricationProblem
+from ..problems.solution import Fields, Step
+from .method_options import make_options
+from .newton import Stopping
+from .steplength import StepLengthError, armijo, halve_until, inexact_decrease
+
+Trial = tuple[Array, Array, Array, Array]  # p, r, F1, F2
+
+
+def fischer_burmeister(p: Array, r: Array) -> Array:
+    """phi = sqrt(p^2 + r^2) - p - r, subtracted as printed.
+
+    The equivalent -2 p r/(sqrt(p^2 + r^2) + p + r) would be exact for |p| << r, and then the residue of p in the cavity
+    that the paper's table 7 shows (some 1e-18, of either sign) would not be there.
+    """
+    return np.hypot(p, r) - p - r
+
+
+def derivatives(p: Array, r: Array) -> tuple[Array, Array]:
+    """D_p = p/s - 1 and D_r = r/s - 1 with s = sqrt(p^2 + r^2).
+
+    Where p = r = 0, phi has no derivative; (1/sqrt 2 - 1, 1/sqrt 2 - 1) is the element of its generalised Jacobian
+    {(a - 1, b - 1): a^2 + b^2 <= 1} that the approach along p = r gives.
+    """
+    s = np.hypot(p, r)
+    origin = s == 0.0
+    s = np.where(origin, 1.0, s)
+    return np.where(origin, np.sqrt(0.5), p / s) - 1.0, np.where(origin, np.sqrt(0.5), r / s) - 1.0
+
+
+@dataclass(frozen=True)
+class FischerOptions:
+    """Parameters of FBN; the defaults are the paper's where it has them.
+
+    p0 (in the problem's pressure unit) and r0 start every point. beta is the share of the predicted decrease that a step
+    must reach, theta the factor that cuts it. Iterative inner solves stop at the relative residual
+    delta_k = max(tol_min, min(delta_max, delta_factor ||F~||)): quadratic convergence down to tol_min.
+    """
+
+    p0: float = 1.0
+    r0: float = 0.1
+    beta: float = 1e-4
+    theta: float = 0.5
+    delta_max: float = 0.1
+    delta_factor: float = 0.01
+    tol_min: float = 1e-8
+
+    def __post_init__(self) -> None:
+        for name in ("p0", "r0"):
+            if not np.isfinite(getattr(self, name)):
+                raise InputError(f"--{name} {getattr(self, name)}: a finite number is needed")
+        for name in ("beta", "theta", "delta_max", "delta_factor", "tol_min"):
+            if not 0 < getattr(self, name) < 1:
+                raise InputError(f"fbn.{name} = {getattr(self, name)}: allowed are numbers between 0 and 1")
+
+
+class FischerNewton:
+    """The iterates and steps of FBN; `newton.iterate` runs it.
+
+    Parameters
+    ----------
+    problem : supplies F1 = A p + B r - c.
+    system : solves A dp + B dr = f1, D_p dp + D_r dr = f2.
+    options : see `FischerOptions`.
+    merit : the decrease that ends the halving of alpha: 'armijo' (FBN-A) on ||F~||^2/2, or 'inexact' (FBN-I) on ||F~||.
+    start : fields p and r to start from; default p0 and r0 everywhere.
+    """
+
+    def __init__(
+        self,
+        problem: LubricationProblem,
+        system: System,
+        options: FischerOptions,
+        merit: str,
+        start: Fields | None = None,
+    ):
+        self.problem, self.system, self.options, self.merit = problem, system, options, merit
+        self.p = start["p"].copy() if start else np.full(problem.grid.local_size, options.p0)
+        self.r = start["r"].copy() if start else np.full(problem.grid.local_size, options.r0)
+        self.F1, self.F2 = problem.flow(self.p, self.r), fischer_burmeister(self.p, self.r)
+        self.norm = problem.reduce.norm(self.F1, self.F2)
+
+    @property
+    def fields(self) -> Fields:
+        return {"p": self.p, "r": self.r}
+
+    @property
+    def krylov(self) -> Krylov:
+        return self.system.krylov
+
+    def destroy(self) -> None:
+        self.system.destroy()
+
+    def advance(self) -> Step:
+        """One step: the Newton direction of F~, then alpha = 1 halved until the merit function falls enough."""
+        o, reduce = self.options, self.problem.reduce
+        delta = 0.0 if self.system.direct else max(o.tol_min, min(o.delta_max, o.delta_factor * self.norm))
+        D_p, D_r = derivatives(self.p, self.r)
+        dp, dr, linear_iterations = self.system.solve(D_p, D_r, -self.F1, -self.F2, delta)
+
+        with self.system.stages("step length"):
+
+            @lru_cache(maxsize=1)  # the test and the step itself ask for the same point
+            def trial(alpha: float) -> Trial:
+                p, r = self.p + alpha * dp, self.r + alpha * dr
+                return p, r, self.problem.flow(p, r), fischer_burmeister(p, r)
+
+            decreases = self._decrease(trial, self._slope(D_p * dp + D_r * dr, dp, dr), delta)
+            alpha, backtracking = halve_until(decreases, 1.0, o.theta)
+            self.p, self.r, self.F1, self.F2 = trial(alpha)
+            self.norm = reduce.norm(self.F1, self.F2)
+            step_norm = alpha * reduce.norm(dp, dr)
+        return Step(self.norm, step_norm, alpha, linear_iterations, backtracking=backtracking, rtol=delta)
+
+    def _slope(self, change2: Array, dp: Array, dr: Array) -> float:
+        """Derivative of Phi = ||F~||^2/2 along d, F~ . F~' d: -2 Phi for an exact step."""
+        problem = self.problem
+        if self.system.direct:
+            return -(self.norm**2)
+        change1 = problem.multiply(problem.A, dp) + problem.multiply(problem.B, dr)
+        return problem.reduce.dot(self.F1, change1) + problem.reduce.dot(self.F2, change2)
+
+    def _decrease(self, trial: Callable[[float], Trial], slope: float, delta: float) -> Callable[[float], bool]:
+        """The test of a trial alpha.
+
+        Raises
+        ------
+        StepLengthError : the inner solver's direction does not reduce the merit function (FBN-A).
+        """
+        o, reduce, norm = self.options, self.problem.reduce, self.norm
+        if self.merit == "inexact":
+            return lambda alpha: inexact_decrease(norm, reduce.norm(*trial(alpha)[2:]), alpha, delta, o.beta)
+        if slope >= 0.0 and norm > 0.0:
+            raise StepLengthError(f"the inexact direction is not one of descent: slope {slope:.1e}")
+        return lambda alpha: armijo(0.5 * norm**2, 0.5 * reduce.norm(*trial(alpha)[2:]) ** 2, alpha, slope, o.beta)
+
+
+def _build(
+    merit: str,
+    problem: LubricationProblem,
+    stages: Stages,
+    system: str,
+    options: dict[str, Any],
+    stopping: Stopping,
+    start: Fields | None = None,
+) -> FischerNewton:
+    """FBN with one of its two rules, for the options that were given by name.
+
+    Raises
+    ------
+    InputError : an unknown option or a value out of range.
+    """
+    floor = float(np.clip(stopping.eps1, 1e-12, 1e-4))  # no inner solve need be much better than the outer test
+    name = "fbn-a" if merit == "armijo" else "fbn-i"
+    settings = make_options(FischerOptions, name, {"tol_min": floor, **options})
+    return FischerNewton(problem, make_system(system, problem, stages), settings, merit, start)
+
+
+# The registry's doors to the two methods; arguments as `din.build` has them.
+build_armijo = partial(_build, "armijo")
+build_inexact = partial(_build, "inexact")
