@@ -33,13 +33,13 @@ class MethodEntry(Entry):
     """
 
     kinds: tuple[str, ...] = ("lubrication",)
-    systems: tuple[str, ...] = ("full",)
+    systems: tuple[str, ...] = ("full", "reduced")
 
 
 METHODS: dict[str, MethodEntry] = {
     "din": MethodEntry("lcp_lube.solvers.din:build", "damped inexact Newton of Mezzadri and Galligani (interior method)"),
     "fbn-a": MethodEntry("lcp_lube.solvers.fischer:build_armijo", "Fischer-Burmeister Newton, Armijo rule on ||F||^2/2"),
-    "fbn-i": MethodEntry("lcp_lube.solvers.fischer:build_inexact", "Fischer-Burmeister Newton, inexact-Newton decrease of ||F||"),
+    "fbn-i": MethodEntry("lcp_lube.solvers.fischer:build_inexact", "Fischer-Burmeister Newton, inexact decrease of ||F||"),
 }
 
 # What 'auto' takes for a kind of problem.
@@ -47,6 +47,7 @@ DEFAULT_METHOD = {"lubrication": "din"}
 
 SYSTEMS: dict[str, Entry] = {
     "full": Entry("lcp_lube.linear.newton_matrix:FullSystem", "the 2n-by-2n matrix [A B; R P] of the papers"),
+    "reduced": Entry("lcp_lube.linear.reduced:ReducedSystem", "the n-by-n M-matrix A diag(theta) - B diag(1 - theta)"),
 }
 
 # A scene file's `family` names the model that validates it and builds its problem.
