@@ -44,10 +44,14 @@ class Grid:
         self.origin = origin
         self.size = int(np.prod(self.shape))
         comm = comm or PETSc.COMM_WORLD
+        # Lines of the flow direction stay whole where there are enough of them: what the void does is told along them.
+        whole_lines = self.dim == 2 and self.shape[1] >= comm.size
+        proc_sizes = (1, comm.size) if whole_lines else None
         try:
             self.dm = PETSc.DMDA().create(
                 dim=self.dim,
                 sizes=self.shape,
+                proc_sizes=proc_sizes,
                 dof=1,
                 stencil_width=1,
                 stencil_type=PETSc.DMDA.StencilType.STAR,

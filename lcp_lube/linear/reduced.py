@@ -1,0 +1,99 @@
+"""The n-by-n system J(theta) = A diag(theta) - B diag(1 - theta), theta in [0, 1]^n, behind every method.
+
+J(theta) blends the columns of two column diagonally dominant M-matrices, A and -B, so it is one itself and nonsingular for
+every theta. It comes out of the 2n-by-2n system
+
+    A dp + B dr = f1,   D_p dp + D_r dr = f2
+
+by w = D_p + D_r, theta = D_r/w, g = f2/w, dp = theta y + g, dr = -(1 - theta) y + g: the second equation then holds for
+every y, and the first one reads J(theta) y = f1 - (A + B) g. D_p and D_r must have the same sign, as DIN's r and p have
+and the derivatives of the Fischer-Burmeister function.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from ..parallel import Array
+from ..problems.problem import LubricationProblem
+from ..problems.reynolds import coo, csr
+from .krylov import Krylov
+from .stages import Stages
+
+
+class ReducedSystem:
+    """The step of any method through a KSP on J(theta), with its columns scaled to the diagonal of A.
+
+    Column scaling balances full-film columns (conductances h^3/dx) and cavitated ones (U h): after it the diagonal is A's
+    for every theta, and in the full film the matrix is A. The sparsity is A's and never changes.
+    """
+
+    def __init__(self, problem: LubricationProblem, stages: Stages | None = None):
+        self.problem = problem
+        self.stages = stages or Stages()
+        grid, scheme = problem.grid, problem.scheme
+        with self.stages("assembly"):
+            rows, columns, a, b, neighbour = self._stencil()
+            self._pointers, self._columns, order = csr(rows, columns, grid.first, grid.local_size)
+            # In CSR order: the entries of A and B, and where their column stands in an array with ghosts.
+            self._a, self._b_entries, self._neighbour = a[order], b[order], neighbour[order]
+            size = (grid.local_size, grid.size)
+            csr_arrays = (self._pointers, self._columns, self._a)
+            self.mat = PETSc.Mat().createAIJ((size, size), csr=csr_arrays, comm=grid.dm.comm)
+            self._diagonal_A = (scheme.k_W + scheme.k_E + scheme.k_S + scheme.k_N).ravel()
+            self._diagonal_B = -scheme.b_C.ravel()
+            self._x, self._b = self.mat.createVecs()
+            self.krylov = Krylov(self.mat)
+
+    @property
+    def direct(self) -> bool:
+        return self.krylov.direct
+
+    def _stencil(self) -> tuple[NDArray, ...]:
+        """Rows, columns, entries of A and of B, and the column's place in an array with ghosts, for A's sparsity."""
+        grid, scheme = self.problem.grid, self.problem.scheme
+        ny, nx = grid.box
+        place = np.arange((ny + 2) * (nx + 2)).reshape(ny + 2, nx + 2)
+        void = {(dj, di): value for dj, di, value in scheme.void_entries()}
+        pressure = scheme.pressure_entries()
+        columns_of = [(dj, di, place[1 + dj : 1 + dj + ny, 1 + di : 1 + di + nx]) for dj, di, _ in pressure]
+        b_entries = [(dj, di, void.get((dj, di), np.zeros((1, 1)))) for dj, di, _ in pressure]
+        rows, columns, a = (np.concatenate(part) for part in zip(*coo(grid, pressure), strict=True))
+        b = np.concatenate([value for _, _, value in coo(grid, b_entries)])
+        return rows, columns, a, b, np.concatenate([value for _, _, value in coo(grid, columns_of)])
+
+    def assemble(self, theta: Array) -> Array:
+        """Refresh the matrix for theta; returns the column scaling, y = scaling * (the KSP's solution). Collective."""
+        scaling = self._diagonal_A / (theta * self._diagonal_A + (1.0 - theta) * self._diagonal_B)
+        full = self.problem.grid.ghosted(theta * scaling).ravel()
+        cavity = self.problem.grid.ghosted((1.0 - theta) * scaling).ravel()
+        values = self._a * full[self._neighbour] - self._b_entries * cavity[self._neighbour]
+        self.mat.setValuesCSR(self._pointers, self._columns, values)
+        self.mat.assemble()
+        return scaling
+
+    def solve(self, D_p: Array, D_r: Array, f1: Array, f2: Array, rtol: float) -> tuple[Array, Array, int]:
+        """dp, dr and the number of linear iterations; D_p and D_r of the same sign, not both zero. Collective.
+
+        Raises
+        ------
+        LinearSolverError : breakdown, a failed factorisation, or a result that is not finite.
+        """
+        problem = self.problem
+        with self.stages("Jacobian"):
+            w = D_p + D_r
+            theta, g = D_r / w, f2 / w
+            scaling = self.assemble(theta)
+            if g.any() or problem.grid.comm.size > 1:
+                f1 = f1 - problem.multiply(problem.A, g) - problem.multiply(problem.B, g)
+            self._b.setArray(f1)
+        with self.stages("KSP"):
+            iterations = self.krylov.solve(self._b, self._x, rtol)
+        y = scaling * self._x.array_r
+        return theta * y + g, -(1.0 - theta) * y + g, iterations
+
+    def destroy(self) -> None:
+        """Free the PETSc objects."""
+        self.krylov.destroy()
+        for obj in (self.mat, self._x, self._b):
+            obj.destroy()
