@@ -13,10 +13,10 @@ from .arguments import method_options, scene_changes
 from .errors import InputError, nearest
 from .linear.options import check_unread
 from .output.results import as_dict, finite, summary
-from .problems.solution import Step
+from .problems.solution import Solution, Step
 from .registry import METHODS, SYSTEMS, recipe_line, recipe_names
 from .scene import Scene, load_scene, parse_changes, scene_line, scene_names
-from .solvers.newton import Stopping
+from .solvers.newton import Monitor, Stopping
 
 
 def run(args: argparse.Namespace) -> int:
@@ -66,8 +66,20 @@ def options_of(args: argparse.Namespace, method: str) -> dict[str, Any]:
     return options
 
 
+def solution_of(args: argparse.Namespace, monitor: Monitor | None = None) -> Solution:
+    """What `solve` with these arguments finds. Collective."""
+    return solve(
+        scene_of(args),
+        method=args.method,
+        system=args.system,
+        recipe_name=args.recipe,
+        stopping=stopping_of(args),
+        options=options_of(args, args.method),
+        monitor=monitor,
+    )
+
+
 def run_solve(args: argparse.Namespace) -> int:
-    scene, stopping = scene_of(args), stopping_of(args)
     from .output import files
 
     for path in [*args.output, *([args.plot] if args.plot else [])]:
@@ -79,15 +91,7 @@ def run_solve(args: argparse.Namespace) -> int:
         if args.monitor and MPI.COMM_WORLD.rank == 0:
             print(monitor_line(k, step), file=sys.stderr, flush=True)
 
-    solution = solve(
-        scene,
-        method=args.method,
-        system=args.system,
-        recipe_name=args.recipe,
-        stopping=stopping,
-        options=options_of(args, args.method),
-        monitor=monitor,
-    )
+    solution = solution_of(args, monitor)
     try:
         check_unread()
         data = as_dict(solution)
