@@ -38,6 +38,11 @@ class MethodEntry(Entry):
 
 METHODS: dict[str, MethodEntry] = {
     "din": MethodEntry("lcp_lube.solvers.din:build", "damped inexact Newton of Mezzadri and Galligani (interior method)"),
+    "active-set": MethodEntry(
+        "lcp_lube.solvers.active_set:build",
+        "semismooth Newton in z = p or -r: finitely many steps to the exact discrete solution",
+        systems=("reduced", "full"),
+    ),
     "fbn-a": MethodEntry("lcp_lube.solvers.fischer:build_armijo", "Fischer-Burmeister Newton, Armijo rule on ||F||^2/2"),
     "fbn-i": MethodEntry("lcp_lube.solvers.fischer:build_inexact", "Fischer-Burmeister Newton, inexact decrease of ||F||"),
 }

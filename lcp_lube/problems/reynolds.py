@@ -1,6 +1,6 @@
 """Box scheme of the steady Reynolds equation with cavitation: film -> coefficients of A p + B r = c."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -117,7 +117,7 @@ def sides(grid: Grid) -> tuple[NDArray[np.bool_], ...]:
     return i == 0, i == grid.shape[0] - 1, j == 0, j == grid.shape[1] - 1
 
 
-def coo(grid: Grid, entries: list[tuple[int, int, Array]]) -> Iterator[tuple[NDArray, NDArray, Array]]:
+def coo(grid: Grid, entries: Sequence[tuple[int, int, NDArray]]) -> Iterator[tuple[NDArray, NDArray, NDArray]]:
     """Global rows, columns and values of stencil entries; neighbours outside the domain are left out."""
     number = grid.neighbours()
     ny, nx = grid.box

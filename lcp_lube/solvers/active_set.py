@@ -1,0 +1,132 @@
+"""Primal-dual active set: the semismooth Newton method for the piecewise linear equation in z.
+
+With p = max(z, 0) and r = s max(-z, 0), s > 0, complementarity holds for every z, and what is left is
+
+    G(z) = A max(z, 0) + B s max(-z, 0) - c = 0,
+
+piecewise linear, with Jacobian J(theta) for theta = 1 where z >= 0 and 0 elsewhere. A full step lands on the solution of one
+linear piece; where the signs of z come out as they went in, that is the exact discrete solution, so the iteration ends after
+finitely many steps or cycles. Plain steps cycle on some rough films, and a line search at every step is worse: it forbids
+the rise of ||G|| through which the method gets out of a poor start. Damping only once ||G|| has stalled cured the cycles.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..linear.krylov import Krylov
+from ..linear.stages import Stages
+from ..linear.system import System, make_system
+from ..parallel import Array
+from ..problems.problem import LubricationProblem
+from ..problems.solution import Fields, Step
+from .method_options import make_options
+from .newton import Stopping
+
+DAMPED_STEPS = (0.7, 0.5, 0.3, 0.2, 0.1, 0.05)
+
+
+@dataclass(frozen=True)
+class ActiveSetOptions:
+    """patience: steps without a fall of ||G|| by 10 % before a step is damped; p0: full film at this p (p_unit) at the start;
+    rtol: relative tolerance of iterative inner solves."""
+
+    p0: float = 1.0
+    patience: int = 4
+    rtol: float = 1e-8
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.p0) and self.p0 > 0):
+            raise InputError(f"--p0 {self.p0}: a positive number is needed")
+        if self.patience < 1:
+            raise InputError(f"active-set.patience = {self.patience}: at least 1 is needed")
+        if not 0 < self.rtol < 1:
+            raise InputError(f"active-set.rtol = {self.rtol}: allowed are numbers between 0 and 1")
+
+
+class ActiveSet:
+    """The iterates z; `newton.iterate` runs it. `norm` is ||G(z)|| / ||c|| (||G|| itself if c = 0).
+
+    Parameters
+    ----------
+    start : fields p and r, a cell being cavitated where r > 0; default full film at options.p0.
+    """
+
+    def __init__(self, problem: LubricationProblem, system: System, options: ActiveSetOptions, start: Fields | None = None):
+        self.problem, self.system, self.options = problem, system, options
+        scheme = problem.scheme
+        # Cavitated columns of J then have A's diagonal: a step in z means the same in both phases.
+        self.s = (scheme.k_W + scheme.k_E + scheme.k_S + scheme.k_N).ravel() / -scheme.b_C.ravel()
+        self.scale = problem.reduce.norm(problem.c) or 1.0
+        self.z = start["p"] - start["r"] / self.s if start else np.full(problem.grid.local_size, options.p0)
+        self.G = self._residual(self.z)
+        self.norm = problem.reduce.norm(self.G) / self.scale
+        self._best, self._stalled = self.norm, 0
+
+    @property
+    def fields(self) -> Fields:
+        return {"p": np.maximum(self.z, 0.0), "r": self.s * np.maximum(-self.z, 0.0)}
+
+    @property
+    def krylov(self) -> Krylov:
+        return self.system.krylov
+
+    def destroy(self) -> None:
+        self.system.destroy()
+
+    def _residual(self, z: Array) -> Array:
+        return self.problem.flow(np.maximum(z, 0.0), self.s * np.maximum(-z, 0.0))
+
+    def advance(self) -> Step:
+        """One Newton step; damped by the best of DAMPED_STEPS if ||G|| has stalled.
+
+        The step's norm counts as zero when no sign of z changed in a full step: the next one would solve the same linear
+        system again.
+        """
+        full = self.z >= 0
+        cavity = (~full).astype(float)
+        dp, dr, linear_iterations = self.system.solve(cavity, 1.0 - cavity, -self.G, np.zeros_like(self.G), self.options.rtol)
+        with self.system.stages("step length"):
+            d = np.where(full, dp, -dr / self.s)
+            alpha, cuts = 1.0, 0
+            z = self.z + d
+            G = self._residual(z)
+            norm = self.problem.reduce.norm(G) / self.scale
+            if self._stalled >= self.options.patience:
+                trials = [(norm, 1.0, z, G)]
+                for damped in DAMPED_STEPS:
+                    trial = self.z + damped * d
+                    residual = self._residual(trial)
+                    trials.append((self.problem.reduce.norm(residual) / self.scale, damped, trial, residual))
+                norm, alpha, z, G = min(trials, key=lambda t: t[0])
+                cuts, self._stalled = len(trials) - 1, 0
+            changed = self.problem.reduce.sum((full != (z >= 0)).astype(float))
+            step_norm = alpha * self.problem.reduce.norm(d) if changed or alpha < 1.0 else 0.0
+            self.z, self.G, self.norm = z, G, norm
+            self._stalled = 0 if norm <= 0.9 * self._best else self._stalled + 1
+            self._best = min(self._best, norm)
+        return Step(norm, step_norm, alpha, linear_iterations, backtracking=cuts, rtol=self.options.rtol)
+
+
+def build(
+    problem: LubricationProblem,
+    stages: Stages,
+    system: str,
+    options: dict[str, Any],
+    stopping: Stopping,
+    start: Fields | None = None,
+) -> ActiveSet:
+    """The registry's door.
+
+    Parameters
+    ----------
+    start : fields p and r to start from.
+
+    Raises
+    ------
+    InputError : an unknown option or a value out of range.
+    """
+    settings = make_options(ActiveSetOptions, "active-set", options)
+    return ActiveSet(problem, make_system(system, problem, stages), settings, start)
