@@ -1,0 +1,48 @@
+# `make demo` and `make test` install what they need on Debian 12 and Ubuntu 24.04; for other systems see README.md.
+
+BIN := .venv/bin
+READY := .venv/.ready
+
+# Open MPI: root may start it (containers), and a test may start more ranks than there are cores (releases 4 and 5).
+export OMPI_ALLOW_RUN_AS_ROOT := 1
+export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM := 1
+export OMPI_MCA_rmaps_base_oversubscribe := 1
+export PRTE_MCA_rmaps_default_mapping_policy := :oversubscribe
+# The ranks are the parallelism; threads inside each would only compete.
+export OMP_NUM_THREADS := 1
+
+.PHONY: help setup demo test lint format charts clean
+
+help: ## this list
+	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | expand -t 10
+
+setup: $(READY) ## install what is missing, nothing else
+
+# With a fresh stamp a target starts at once: no apt, no pip, no network.
+$(READY): pyproject.toml tools/setup.sh
+	tools/setup.sh
+	touch $@
+
+demo: $(READY) ## solve problem 4 and draw it: problem4.png
+	$(BIN)/lcp-lube solve problem4 --n 100 --plot problem4.png
+
+test: lint ## ruff, mypy, then all tests with their coverage
+	$(BIN)/python -m pytest -q --cov=lcp_lube --cov-report=term
+
+lint: $(READY) ## ruff and mypy
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+
+format: $(READY) ## let ruff rewrite the code
+	$(BIN)/ruff check --fix
+	$(BIN)/ruff format
+
+charts: $(READY) ## draw the charts from their csv files
+	$(BIN)/lcp-lube chart precision
+	$(BIN)/lcp-lube chart stability
+	$(BIN)/lcp-lube chart scaling
+
+clean: ## remove caches and build products; .venv stays
+	rm -rf build dist *.egg-info .coverage .hypothesis .mypy_cache .pytest_cache .ruff_cache problem4.png
+	find lcp_lube tests benchmarks -name __pycache__ -prune -exec rm -rf {} +
