@@ -7,6 +7,7 @@ from typing import Any, NoReturn
 
 from . import __version__
 from .errors import InputError, nearest
+from .registry import scene_names
 
 
 class Parser(argparse.ArgumentParser):
@@ -15,23 +16,28 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         unknown = re.match(r"unrecognized arguments: (--\S+)", message)
         if unknown:
-            legal = [option for action in self._actions for option in action.option_strings]
-            message = f"{unknown[1]}: no such option{nearest(unknown[1], legal)}"
+            message = f"{unknown[1]}: no such option{nearest(unknown[1].partition('=')[0], self.option_names())}"
         wrong = re.match(r"argument (\S+): invalid choice: '(.*?)' \(choose from (.*)\)", message)
         if wrong:
             legal = [name.strip("' ") for name in wrong[3].split(",")]
             message = f"{wrong[1]} {wrong[2]}: allowed are {', '.join(legal)}{nearest(wrong[2], legal)}"
         raise InputError(message)
 
+    def option_names(self) -> list[str]:
+        """Of this parser and of its commands: the error of an unknown option is raised at the top."""
+        own = [option for action in self._actions for option in action.option_strings]
+        below = [parser for action in self._actions if isinstance(action.choices, dict) for parser in action.choices.values()]
+        return [*own, *(name for parser in below for name in parser.option_names())]
+
 
 def split(argv: list[str]) -> tuple[list[str], list[str]]:
     """Ours and PETSc's arguments. A PETSc option takes the next word as its value unless that begins with a dash.
 
-    `--` options and their values, and words that no PETSc option takes, are ours.
+    `--` options and their values, and words that no PETSc option takes, are ours; so is a scene's name.
 
     Raises
     ------
-    InputError : -options_file names a file that cannot be read (PETSc itself would abort).
+    InputError : -options_file names a file that PETSc would abort on.
     """
     own: list[str] = []
     petsc: list[str] = []
@@ -44,9 +50,43 @@ def split(argv: list[str]) -> tuple[list[str], list[str]]:
         petsc.append(word)
         if words and (not words[0].startswith("-") or re.match(r"-[\d.]", words[0])):
             petsc.append(words.pop(0))
-            if word == "-options_file" and not Path(petsc[-1]).is_file():
-                raise InputError(f"-options_file {petsc[-1]}: no such file")
+        if word == "-options_file":
+            if petsc[-1] == word:
+                raise InputError("-options_file: a file name is needed")
+            check_options_file(petsc[-1])
+    _free_scene(own, petsc)
     return own, petsc
+
+
+def check_options_file(name: str) -> None:
+    """Raise InputError for a file that PETSc would abort on: unreadable, or a line that is no option."""
+    try:
+        lines = Path(name).read_text(encoding="utf-8").splitlines()
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "not a text file"
+        raise InputError(f"-options_file {name}: {reason}") from None
+    if Path(name).suffix in (".yml", ".yaml"):
+        return
+    for number, line in enumerate(lines, start=1):
+        words = line.partition("#")[0].split()
+        if words and words[0].lower() != "alias" and not re.match(r"--?[A-Za-z]", words[0]):
+            raise InputError(f"-options_file {name}, line {number}: {words[0]}: an option that begins with a dash is needed")
+
+
+def _free_scene(own: list[str], petsc: list[str]) -> None:
+    """Give SCENE back where a PETSc option before it has taken it for its value: `solve -log_view problem1`.
+
+    Changes both lists in place, if no word of ours and exactly one value of PETSc's is a scene.
+    """
+
+    def is_scene(word: str) -> bool:
+        return word.endswith(".toml") or word in scene_names()
+
+    if own[:1] not in (["solve"], ["compare"]) or any(is_scene(word) for word in own):
+        return
+    taken = [k for k, word in enumerate(petsc) if is_scene(word) and petsc[k - 1] != "-options_file"]
+    if len(taken) == 1:
+        own.insert(1, petsc.pop(taken[0]))
 
 
 def parse(own: list[str]) -> argparse.Namespace:

@@ -9,6 +9,7 @@ from typing import Any
 from .errors import InputError, nearest
 
 PACKAGE = Path(__file__).parent
+SCENE_DIR = PACKAGE / "scenes"
 # A wheel carries the recipes inside the package; in a checkout they stand at top level.
 RECIPE_DIR = next((d for d in (PACKAGE / "options", PACKAGE.parent / "options") if d.is_dir()), PACKAGE / "options")
 
@@ -59,6 +60,10 @@ SYSTEMS: dict[str, Entry] = {
 FAMILIES: dict[str, Entry] = {
     "slider": Entry("lcp_lube.scene:SliderScene", "slider with one wave of the film (the published problems)"),
 }
+
+
+def scene_names() -> list[str]:
+    return sorted(path.stem for path in SCENE_DIR.glob("*.toml"))
 
 
 def recipe_names() -> list[str]:

@@ -15,9 +15,7 @@ from .problems.grid import Grid
 from .problems.problem import LubricationProblem
 from .problems.reynolds import box_scheme
 from .problems.solution import Problem
-from .registry import FAMILIES
-
-SCENE_DIR = Path(__file__).parent / "scenes"
+from .registry import FAMILIES, SCENE_DIR, scene_names
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -115,10 +113,6 @@ class SliderScene(Scene):
             film=gap,
             exact=self.exact,
         )
-
-
-def scene_names() -> list[str]:
-    return sorted(path.stem for path in SCENE_DIR.glob("*.toml"))
 
 
 def scene_line(name: str) -> str:
