@@ -1,6 +1,7 @@
 """Start PETSc with the left-over arguments, run the command, end every rank when one fails."""
 
 import os
+import signal
 import sys
 import time
 import traceback
@@ -10,13 +11,15 @@ from .errors import InputError
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run one command line; returns the exit status (0 converged, 1 not, 2 bad input)."""
+    """Run one command line; returns the exit status (0 converged, 1 not, 2 bad input, 130 interrupted)."""
     words = sys.argv[1:] if argv is None else argv
     try:
         own, petsc_arguments = split(words)
         args = None if "-help" in petsc_arguments and not own else parse(own)
     except InputError as error:
         return _refuse(error)
+    if getattr(args, "json", False):
+        _reserve_stdout()
     alarm = _start(petsc_arguments)
     if args is None:
         return 0
@@ -26,6 +29,12 @@ def main(argv: list[str] | None = None) -> int:
         return run(args)
     except InputError as error:
         return _refuse(error, alone=not alarm.all_arrive())
+    except MemoryError:
+        error = InputError("not enough memory; fewer points or more ranks are needed")
+        return _refuse(error, alone=not alarm.all_arrive())
+    except KeyboardInterrupt:
+        print("lcp-lube: interrupted", file=sys.stderr)
+        return 130
     except Exception:
         if alarm.all_arrive() and alarm.rank > 0:
             return 1  # rank 0 has the same to say
@@ -64,7 +73,15 @@ def _start(petsc_arguments: list[str]) -> _Alarm:
     import petsc4py
 
     petsc4py.init(["lcp-lube", *petsc_arguments])
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # `| head` is no error; PETSc's handler reports a crash
     return _Alarm()
+
+
+def _reserve_stdout() -> None:
+    """Keep stdout for the JSON: what PETSc prints, monitors and -log_view at its very end, goes to stderr."""
+    sys.stdout.flush()
+    sys.stdout = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)
 
 
 def _refuse(error: InputError, alone: bool = False) -> int:
