@@ -1,2 +1,207 @@
-def check_target(path, plot=False):
-    pass
+"""Fields in files: NumPy (.npz), ParaView (.vts, .vtr), HDF5 (.h5). SI units throughout."""
+
+import json
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from ..errors import InputError, nearest
+from ..parallel import Array
+from ..problems.grid import Grid
+from ..problems.solution import Solution
+from .results import as_dict, finite
+
+FIELD_FILES = (".npz", ".vts", ".vtr", ".h5")
+PICTURES = (".png", ".pdf", ".svg")
+
+
+def check_target(path: str | Path, plot: bool = False, comm: MPI.Comm = MPI.COMM_WORLD) -> None:
+    """Refuse, before a long run, a file that could not be written after it. Collective.
+
+    Parameters
+    ----------
+    path : the file; its extension chooses the format.
+    plot : a picture (`PICTURES`), else fields (`FIELD_FILES`).
+
+    Raises
+    ------
+    InputError : an extension off the list, a folder that is missing or cannot be written to, a format whose library is
+        missing. Rank 0 looks, all ranks raise.
+    """
+    fault = comm.bcast(_fault(Path(path), plot) if comm.rank == 0 else None)
+    if fault:
+        raise InputError(f"{'--plot' if plot else '--output'} {path}: {fault}")
+
+
+def save(solution: Solution, path: str | Path) -> None:
+    """Write the fields of `Problem.physical` at the interior points; boundary values are data of the scene. Collective.
+
+    All in SI: for a lubrication problem p in Pa (absolute), r (void fraction), h in m; coordinates x, y in m. Arrays have
+    shape (ny, nx), or (nx,) in 1D, in the natural order, whatever the number of ranks.
+
+    - .npz: the fields, x of shape (nx,), y of shape (ny,) in 2D, and two JSON strings: `units` by field, and `result`, the
+      object that --json prints. Rank 0 gathers one field after the other: take .h5 or .vts where that is too much for it.
+    - .vts, .vtr: ParaView's structured and rectilinear grid by PETSc's viewer; rank 0 writes, one rank's part at a time.
+    - .h5: the fields, x and y as datasets by PETSc's viewer, all ranks writing; `Vec.load` with the field's name reads one
+      back on any number of ranks. petsc4py writes no attributes, so the units are those above.
+
+    Raises
+    ------
+    InputError : the file cannot be written; then nothing is left behind.
+    """
+    path, grid = Path(path), solution.problem.grid
+    suffix = path.suffix.lower()
+    if suffix not in FIELD_FILES:
+        raise InputError(f"{path}: {_allowed(suffix, FIELD_FILES)}")
+    fields = solution.problem.physical(solution.fields)
+    with replacing(path, grid.comm) as temporary:
+        if suffix == ".npz":
+            _save_npz(solution, fields, temporary)
+        else:
+            _save_by_viewer(grid, {name: values for name, (values, _) in fields.items()}, temporary)
+
+
+def gather(grid: Grid, values: Array, stride: tuple[int, int] = (1, 1)) -> Array | None:
+    """A field on rank 0, or every stride-th point of it in x and in y; None on the other ranks. Collective.
+
+    Parameters
+    ----------
+    values : owned points, in the grid's order.
+    stride : steps in x and y; the points taken are `taken(n, step)` in each direction.
+
+    Returns
+    -------
+    Array of shape (ny, nx) or, in 1D, (nx,), counted after the strides.
+    """
+    columns, rows = taken(grid.shape[0], stride[0]), taken(grid.shape[1], stride[1]) if grid.dim == 2 else np.arange(1)
+    own_columns = (columns >= grid.x_start) & (columns < grid.x_end)
+    own_rows = (rows >= grid.y_start) & (rows < grid.y_end)
+    box = values.reshape(grid.box)
+    part = box[np.ix_(rows[own_rows] - grid.y_start, columns[own_columns] - grid.x_start)]
+    if grid.comm.rank > 0:
+        grid.comm.send((own_rows, own_columns, part), dest=0)
+        return None
+    out = np.empty((rows.size, columns.size))
+    out[np.ix_(own_rows, own_columns)] = part
+    for rank in range(1, grid.comm.size):  # one after the other: rank 0 holds the field and one part
+        own_rows, own_columns, part = grid.comm.recv(source=rank)
+        out[np.ix_(own_rows, own_columns)] = part
+    return out if grid.dim == 2 else out[0]
+
+
+def taken(n: int, step: int) -> np.ndarray:
+    """Numbers of the points 0 to n - 1 that a stride takes, as far from the one end as from the other."""
+    return np.arange((n - 1) % step // 2, n, step)
+
+
+def coordinates(grid: Grid, stride: tuple[int, int] = (1, 1)) -> tuple[Array, ...]:
+    """Coordinates x, and y in 2D, of the points that `gather` returns, in metres; on every rank."""
+    return tuple(
+        start + (taken(n, step) + 1.0) * spacing
+        for start, n, step, spacing in zip(grid.origin, grid.shape, stride, grid.spacing, strict=False)
+    )
+
+
+@contextmanager
+def replacing(path: Path, comm: MPI.Comm) -> Iterator[str]:
+    """A temporary name beside `path`, which becomes `path` when the block ends well, and vanishes when not. Collective.
+
+    Raises
+    ------
+    InputError : rank 0 could not write or rename (on every rank), or PETSc could not write (on the ranks that noticed).
+    """
+    temporary = Path(comm.bcast(str(path.with_name(f".{path.stem}.{os.getpid()}{path.suffix.lower()}"))))
+    reason = ""
+    try:
+        yield str(temporary)
+        if comm.rank == 0:
+            os.replace(temporary, path)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        reason = error.strerror or str(error)
+    except PETSc.Error as error:
+        temporary.unlink(missing_ok=True)
+        raise InputError(f"{path}: PETSc could not write it: {PETSc.Error(error.ierr)}".splitlines()[0]) from None
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+    if reason := comm.bcast(reason):
+        raise InputError(f"{path}: could not be written: {reason}")
+
+
+def _save_npz(solution: Solution, fields: dict[str, tuple[Array, str]], target: str) -> None:
+    grid = solution.problem.grid
+    arrays = {name: gather(grid, values) for name, (values, _) in fields.items()}
+    arrays |= dict(zip("xy", coordinates(grid), strict=False))
+    units = {name: unit for name, (_, unit) in fields.items()} | dict.fromkeys("xy"[: grid.dim], "m")
+    result = json.dumps(finite(as_dict(solution)))
+    if grid.comm.rank == 0:
+        np.savez(target, **arrays, units=json.dumps(units), result=result)
+
+
+def _save_by_viewer(grid: Grid, fields: dict[str, Array], target: str) -> None:
+    """VTK or HDF5, by the extension. PETSc writes all that was viewed when the viewer is destroyed."""
+    dm, comm = grid.dm.duplicate(), grid.dm.comm  # a copy: coordinates would stay in the grid's own
+    try:
+        if target.endswith(".h5"):
+            viewer = PETSc.Viewer().createHDF5(target, "w", comm)
+            for name, x in zip("xy", coordinates(grid), strict=False):
+                vec = PETSc.Vec().createMPI(x.size, comm=comm)
+                vec.setArray(x[slice(*vec.owner_range)])
+                _view(vec, name, viewer)
+        else:
+            viewer = PETSc.Viewer().createVTK(target, "w", comm)
+            points = np.broadcast_arrays(grid.x, grid.y)[: grid.dim]
+            vec = dm.getCoordinateDM().createGlobalVec()
+            vec.setArray(np.stack(points, axis=-1).ravel())
+            dm.setCoordinates(vec)
+            vec.destroy()
+        for name, values in fields.items():
+            vec = dm.createGlobalVec()
+            vec.setArray(values)
+            _view(vec, name, viewer)
+        viewer.destroy()
+    finally:
+        dm.destroy()
+
+
+def _view(vec: PETSc.Vec, name: str, viewer: PETSc.Viewer) -> None:
+    vec.setName(name)
+    vec.view(viewer)
+    vec.destroy()  # a VTK viewer keeps a reference until it writes
+
+
+def _allowed(suffix: str, allowed: tuple[str, ...]) -> str:
+    found = f"extension {suffix}" if suffix else "no extension"
+    return f"{found}; allowed are {', '.join(allowed)}{nearest(suffix, allowed) if suffix else ''}"
+
+
+def _fault(path: Path, plot: bool) -> str:
+    """What is wrong with a target; empty if nothing."""
+    suffix, allowed, folder = path.suffix.lower(), PICTURES if plot else FIELD_FILES, path.parent
+    if suffix not in allowed:
+        return _allowed(suffix, allowed)
+    if plot and find_spec("matplotlib") is None:
+        return "pictures need matplotlib: pip install lcp-lube[plot]"
+    if suffix == ".h5" and not PETSc.Sys.hasExternalPackage("hdf5"):
+        return "this PETSc was built without HDF5; use .npz, .vts or .vtr"
+    if path.is_dir():
+        return "is a folder"
+    if not folder.is_dir():
+        return f"folder {folder} does not exist"
+    try:
+        with tempfile.TemporaryFile(dir=folder):  # by trying: permission bits say little about root and network disks
+            pass
+        if path.exists():
+            with path.open("ab"):
+                pass
+    except OSError as error:
+        return f"cannot be written in {folder}: {error.strerror}"
+    return ""
