@@ -128,6 +128,13 @@ def parse(own: list[str]) -> argparse.Namespace:
     table.add_argument("number", type=int, metavar="K")
     table.add_argument("--paper", default="mezzadri", choices=["mezzadri", "bergamaschi"])
     table.add_argument("--quick", action="store_true", help="leave the long rows out")
+    table.add_argument(
+        "--results",
+        type=Path,
+        default=Path("lcp_lube_results"),
+        metavar="DIR",
+        help="where the runs are kept: those that are there are not made again; default lcp_lube_results",
+    )
 
     command("list", "scenes, methods, systems and recipes, each with a line")
     return parser.parse_args(own)

@@ -134,7 +134,7 @@ def run_compare(args: argparse.Namespace) -> int:
 def run_table(args: argparse.Namespace) -> int:
     from .tables import run_published_table
 
-    return run_published_table(args.paper, args.number, quick=args.quick)
+    return run_published_table(args.paper, args.number, quick=args.quick, results=args.results)
 
 
 def run_list(args: argparse.Namespace) -> int:

@@ -1,5 +1,7 @@
 """A Solution as the JSON object of the command line, and as a summary to read."""
 
+import os
+import platform
 import resource
 from typing import Any
 
@@ -64,6 +66,16 @@ def versions() -> dict[str, str]:
         "mpi4py": mpi4py.__version__,
         "numpy": np.__version__,
     }
+
+
+def machine() -> str:
+    """What the seconds depend on: processor and number of cores."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        lines = []
+    model = next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), platform.processor())
+    return f"{model or platform.machine()}, {os.cpu_count()} cores"
 
 
 def finite(value: Any) -> Any:

@@ -1,0 +1,92 @@
+"""A csv that a long experiment fills row by row, and takes up again where it was left."""
+
+import csv
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from mpi4py import MPI
+
+from ..errors import InputError
+
+Row = dict[str, str]
+
+
+class ResumableCsv:
+    """Rows that are in the file already need not be run again.
+
+    Rank 0 reads and writes, the other ranks hear of it. The file is replaced whole after each row, so that it is
+    never half-written.
+
+    Parameters
+    ----------
+    path : the csv; it and its folder are made with the first row.
+    columns : names of all columns; a row leaves some of them out, they stay empty.
+    key : the columns that tell one row from another.
+    comm : the ranks that work together; every method but `find` is collective.
+
+    Raises
+    ------
+    InputError : the file cannot be read, or is no csv with these keys.
+    """
+
+    def __init__(self, path: Path, columns: Sequence[str], key: Sequence[str], comm: MPI.Comm = MPI.COMM_WORLD):
+        self.path, self.columns, self.key, self.comm = path, list(columns), list(key), comm
+        self.rows: list[Row] = self._on_rank_0(self._read)
+
+    def find(self, **key: object) -> Row | None:
+        """The row with these keys, its values as text."""
+        wanted = [str(key[name]) for name in self.key]
+        return next((row for row in self.rows if [row[name] for name in self.key] == wanted), None)
+
+    def add(self, values: dict[str, Any]) -> Row:
+        """Write a row, in the place of the one with the same keys if there is one; returns it as text.
+
+        Raises
+        ------
+        InputError : the file cannot be written.
+        """
+        row = {name: "" if values.get(name) is None else str(values[name]) for name in self.columns}
+        row = self.comm.bcast(row)  # seconds differ from rank to rank
+        old = self.find(**{name: row[name] for name in self.key})
+        if old is None:
+            self.rows.append(row)
+        else:
+            self.rows[self.rows.index(old)] = row
+        self._on_rank_0(self._write)
+        return row
+
+    def _read(self) -> list[Row]:
+        if not self.path.exists():
+            return []
+        with self.path.open(newline="", encoding="utf-8") as file:
+            reader = csv.DictReader(file, restval="")
+            missing = set(self.key) - set(reader.fieldnames or ())
+            if missing:
+                raise InputError(f"{self.path}: no csv of this experiment, it has no column {sorted(missing)[0]}; move it away")
+            return [{name: row.get(name) or "" for name in self.columns} for row in reader]
+
+    def _write(self) -> None:
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        temporary = self.path.with_name(f".{self.path.name}.{os.getpid()}")
+        with temporary.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.DictWriter(file, self.columns, lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(self.rows)
+        os.replace(temporary, self.path)
+
+    def _on_rank_0(self, call: Callable[[], Any]) -> Any:
+        """The call's result on every rank; its failure too, as an InputError."""
+        result, failure = None, None
+        if self.comm.rank == 0:
+            try:
+                result = call()
+            except InputError as error:
+                failure = str(error)
+            except (OSError, UnicodeDecodeError, csv.Error) as error:
+                failure = f"{self.path}: {getattr(error, 'strerror', None) or error}"
+        result, failure = self.comm.bcast((result, failure))
+        if failure is not None:
+            raise InputError(failure)
+        return result

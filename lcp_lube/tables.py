@@ -1,0 +1,278 @@
+"""The published tables, run again: a printed row becomes a command line, its numbers stand beside the printed ones."""
+
+import re
+import shlex
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .arguments import parse
+from .cli import say, solution_of
+from .errors import InputError
+from .linear.options import LATE, set_names
+from .output.resumable import ResumableCsv, Row
+from .output.results import as_dict, machine
+from .problems.solution import Solution
+from .registry import PACKAGE
+
+# A wheel carries the printed tables inside the package; in a checkout they stand with the benchmarks.
+PUBLISHED = next((d for d in (PACKAGE / "published", PACKAGE.parent / "benchmarks" / "published") if d.is_dir()), PACKAGE)
+
+KEY = ("command", "ranks")
+RECORD = """outcome iterations backtracking centrality linear_iterations c1 c2 min_p min_r residual complementarity
+    mass_defect time_s linear_s machine petsc message""".split()  # noqa: SIM905
+
+# A printed column and the column of our record that it is compared with; other columns only name the row.
+MEASURED = {
+    "it": "iterations",
+    "back": "backtracking",
+    "cent": "centrality",
+    "linear_it": "linear_iterations",
+    "gmres": "linear_iterations",
+    "c1": "c1",
+    "c2": "c2",
+    "wrong_solution": "outcome",
+    "time_s": "time_s",
+}
+
+
+@dataclass(frozen=True)
+class Spec:
+    """How a printed table is run.
+
+    Attributes
+    ----------
+    title : what the table shows.
+    command : a row's arguments of `lcp-lube`, with the printed columns that fill it in braces.
+    rows : makes one row a run of the printed csv.
+    points : numbers i of the points x_i = i dx (1D) whose pressure, in the problem's unit, is printed as p_i.
+    quick : --quick leaves rows with a larger n out.
+    note : said under the table.
+    """
+
+    title: str
+    command: str
+    rows: Callable[[list[Row]], list[Row]] = list
+    points: tuple[int, ...] = ()
+    quick: float = np.inf
+    note: str = "benchmarks/README.md explains what differs."
+
+
+def _row_a_method(printed: list[Row]) -> list[Row]:
+    """Table 7 turned: a row a method, a column p_i a point."""
+    columns = [name for name in printed[0] if name.startswith("p_")]
+    return [
+        {"method": column.removeprefix("p_").replace("_", "-"), **{f"p_{row['i']}": row[column] for row in printed}}
+        for column in columns
+    ]
+
+
+_LOOSE = "--method din --eps1 1e-4 --eps2 1e-4"
+
+MEZZADRI = {
+    2: Spec("DIN, direct solver, n = 100", "solve problem{problem} --film {film} --method din --recipe lu"),
+    3: Spec(
+        "DIN with GMRES: no preconditioner, no restart (problem 1)",
+        "solve problem1 --n {n} --method din --recipe gmres --set din.tol_min=1e-12",
+        quick=100,
+    ),
+    4: Spec(
+        "the conditions on the step length taken apart, n = 100",
+        "solve problem{problem} --method din --conditions {conditions} --recipe lu",
+    ),
+    5: Spec(
+        "starting vectors and mu, n = 100", "solve problem{problem} --method din --p0 {p0} --r0 {r0} --mu {mu} --recipe lu"
+    ),
+    6: Spec("DIN and Fischer-Burmeister Newton, n = 100", "solve problem{problem} --method {method} --recipe lu"),
+    7: Spec(
+        "p in MPa at points of the cavity (problem 1, n = 100)",
+        "solve problem1 --method {method} --recipe lu",
+        rows=_row_a_method,
+        points=(70, 71, 72, 73, 74, 75),
+    ),
+    8: Spec("DIN with LAPACK's dense LU (problem 1)", f"solve problem1 --n {{n}} --recipe lu {_LOOSE}"),
+    9: Spec("DIN with sparse direct solvers (problem 1)", f"solve problem1 --n {{n}} --recipe {{solver}} {_LOOSE}"),
+    10: Spec("DIN with ILU(0) (problem 1)", f"solve problem1 --n {{n}} --recipe {{solver}} {_LOOSE}", quick=1000),
+    11: Spec(
+        "DIN on the square, n x n (problem 4)",
+        f"solve problem4 --n {{n}} --recipe {{solver}} {_LOOSE}",
+        quick=50,
+        note="The paper's text does not determine problem 4: no reading of it gives both printed counts; see benchmarks/README.md.",
+    ),
+}
+
+# The papers by the name that --paper takes: folder of the printed figures, and tables by number.
+PAPERS: dict[str, tuple[str, dict[int, Spec]]] = {
+    "mezzadri": ("mezzadri_galligani_2018", MEZZADRI),
+    "bergamaschi": ("bergamaschi_zilli", {}),
+}
+
+
+def find_table(paper: str, number: int) -> tuple[Spec, list[Row]]:
+    """A table's spec and its printed rows.
+
+    Raises
+    ------
+    InputError : no such table, or its printed figures cannot be read.
+    """
+    folder, tables = PAPERS[paper]
+    if number not in tables:
+        known = ", ".join(map(str, tables)) or "none"
+        raise InputError(f"table {number}: allowed for --paper {paper} are {known}")
+    path = PUBLISHED / folder / f"table{number}.csv"
+    try:
+        lines = path.read_text(encoding="utf-8").split()
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror}") from None
+    names, *rows = (line.split(",") for line in lines)
+    spec = tables[number]
+    return spec, spec.rows([dict(zip(names, row, strict=True)) for row in rows])
+
+
+def row_command(spec: Spec, printed: Row) -> str:
+    """The command line that runs a printed row; names of methods are in lower case here."""
+    return f"lcp-lube {spec.command} --system full".format(**{**printed, "method": printed.get("method", "").lower()})
+
+
+def run_published_table(paper: str, number: int, quick: bool = False, results: Path = Path("lcp_lube_results")) -> int:
+    """Run a table and print each row beside the printed one; `=` marks a match, `!=` a difference. Collective.
+
+    The runs are kept in `results` as a csv; a run that is there already, whatever its outcome, is not made again.
+
+    Returns
+    -------
+    int : exit status, 0 if every row ran; a failed run is a row, a run that its recipe or method refuses is not.
+
+    Raises
+    ------
+    InputError : no such table; a csv that cannot be read or written; PETSc options that would change the runs.
+    """
+    spec, rows = find_table(paper, number)
+    foreign = sorted(name for name in set_names() if not name.startswith(LATE))
+    if foreign:
+        raise InputError(f"-{foreign[0]}: the rows of a published table bring their own inner solvers")
+    runs = [row for row in rows if not (quick and float(row.get("n", 0)) > spec.quick)]
+    store = ResumableCsv(
+        results / f"{paper}_table{number}.csv",
+        [*KEY, *(f"p_{i}" for i in spec.points), *RECORD],
+        KEY,
+    )
+    say(f"{paper} table {number}: {spec.title}. ours = printed where they match, ours != printed where they differ.")
+    layout = _Layout(rows)
+    say(layout.head())
+    known = refused = 0
+    for printed in runs:
+        command = row_command(spec, printed)
+        record = store.find(command=command, ranks=store.comm.size)
+        known += record is not None
+        if record is None:
+            values = {"command": command, "ranks": store.comm.size, **run_command(command, spec.points)}
+            if values["outcome"] == "refused":
+                refused += 1
+                say(f"{layout.name(printed)}refused: {values['message']}")
+                continue
+            record = store.add(values)
+        say(layout.line(printed, record))
+    say(layout.summary())
+    left = f", {len(rows) - len(runs)} left out by --quick" if len(rows) > len(runs) else ""
+    say(f"{len(runs)} rows, {known} of them already in {store.path} (remove it to run them again){left}. {spec.note}")
+    return 1 if refused else 0
+
+
+def run_command(command: str, points: tuple[int, ...] = ()) -> dict[str, Any]:
+    """Run a `lcp-lube solve` command line and record it, however it ends. Collective.
+
+    Returns
+    -------
+    dict : the columns RECORD, and p_i in the problem's unit for the points asked for; outcome 'refused' and a message
+    alone where the run could not start.
+    """
+    try:
+        solution = solution_of(parse(shlex.split(command)[1:]))
+    except InputError as error:
+        return {"outcome": "refused", "message": str(error)}
+    try:
+        data = as_dict(solution)
+        times = data.pop("time_s")
+        return {
+            **data,
+            "time_s": f"{times['total']:.4f}",
+            "linear_s": f"{times['linear']:.4f}",
+            "machine": machine(),
+            "petsc": data["versions"]["petsc"],
+            **{f"p_{i}": _pressure(solution, i) for i in points},
+        }
+    finally:
+        solution.destroy()
+
+
+def _pressure(solution: Solution, i: int) -> float:
+    """p at x_i = i dx in the problem's unit, on every rank. Collective."""
+    grid = solution.problem.grid
+    here = np.arange(grid.x_start, grid.x_end) + 1 == i
+    return grid.reduce.sum(np.where(here, solution.p, 0.0))
+
+
+class _Layout:
+    """Columns wide enough for the printed rows, and the count of matches."""
+
+    def __init__(self, rows: list[Row]):
+        self.measured = [name for name in rows[0] if name in MEASURED or re.fullmatch(r"p_\d+", name)]
+        self.names = [name for name in rows[0] if name not in self.measured]
+        self.widths = {name: max(len(name), *(len(_rounded(row[name], row[name])) for row in rows)) for name in rows[0]}
+        self.matches = {name: [0, 0] for name in self.measured if name != "time_s"}
+
+    def _width(self, name: str) -> int:
+        return 2 * max(self.widths[name], 5) + 4
+
+    def head(self) -> str:
+        return "  ".join([f"{n:<{self.widths[n]}}" for n in self.names] + [f"{n:^{self._width(n)}}" for n in self.measured])
+
+    def name(self, printed: Row) -> str:
+        return "".join(f"{printed[n]:<{self.widths[n]}}  " for n in self.names)
+
+    def line(self, printed: Row, record: Row) -> str:
+        cells = [self._cell(n, printed[n], _ours(n, record)) for n in self.measured]
+        outcome = "" if record["outcome"] == "converged" else f"  {record['outcome']}"
+        return self.name(printed) + "  ".join(cells) + outcome
+
+    def _cell(self, name: str, printed: str, ours: str) -> str:
+        ours = _rounded(ours, printed)
+        mark = "  "
+        if name == "time_s":
+            mark, printed = " (", f"{printed})"
+        elif printed:
+            equal = matches(ours, printed)
+            self.matches[name][0] += equal
+            self.matches[name][1] += 1
+            mark = " =" if equal else "!="
+        half = (self._width(name) - 4) // 2
+        return f"{ours:>{half}} {mark} {_rounded(printed, printed):<{half}}"
+
+    def summary(self) -> str:
+        return "match: " + ", ".join(f"{name} {same} of {of}" for name, (same, of) in self.matches.items())
+
+
+def _ours(name: str, record: Row) -> str:
+    """Our value of a printed column, in the paper's words."""
+    value = record[MEASURED.get(name, name)]
+    if name == "wrong_solution":
+        return "yes" if value == "wrong_solution" else "no"
+    return "maxit" if name == "it" and record["outcome"] == "max_iterations" else value
+
+
+def _rounded(value: str, printed: str) -> str:
+    """A number with as many digits as the printed one has; anything else as it is."""
+    digits = re.fullmatch(r"-?\d\.(\d+)e-?\d+", printed)
+    if digits and value:
+        return f"{float(value):.{len(digits[1])}e}"
+    seconds = re.fullmatch(r"\d+\.\d+", printed)
+    return f"{float(value):.2f}" if seconds and value else value
+
+
+def matches(ours: str, printed: str) -> bool:
+    """Whether a number of ours is the printed one, to the digits that are printed."""
+    return _rounded(ours, printed) == _rounded(printed, printed)
