@@ -80,7 +80,8 @@ def _start(petsc_arguments: list[str]) -> _Alarm:
 def _reserve_stdout() -> None:
     """Keep stdout for the JSON: what PETSc prints, monitors and -log_view at its very end, goes to stderr."""
     sys.stdout.flush()
-    sys.stdout = os.fdopen(os.dup(1), "w")
+    # Both names: petsc4py hands PETSc's output to a sys.stdout that differs from sys.__stdout__.
+    sys.stdout = sys.__stdout__ = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
 
 
