@@ -1,18 +1,21 @@
 """solve(scene) -> Solution: choose method, system and recipe, run the outer loop, certify."""
 
-from collections.abc import Iterable
 from time import perf_counter
 from typing import Any
 
+import numpy as np
 from petsc4py import PETSc
 
-from .errors import InputError, nearest
-from .linear.options import recipe, set_names
+from .auto import plan
+from .linear.options import recipe
 from .linear.stages import Stages
-from .problems.solution import Outcome, Problem, Solution
-from .registry import DEFAULT_METHOD, METHODS
+from .problems.solution import Fields, Outcome, Problem, Solution
+from .registry import METHODS
 from .scene import Scene
+from .solvers.nested import level_shapes
 from .solvers.newton import Monitor, Stopping, iterate
+
+COARSE_EPS = 1e-4
 
 
 def solve(
@@ -25,6 +28,7 @@ def solve(
     options: dict[str, Any] | None = None,
     monitor: Monitor | None = None,
     comm: PETSc.Comm | None = None,
+    nested: bool | None = None,
 ) -> Solution:
     """Solve a scene and certify the answer. Collective.
 
@@ -32,12 +36,13 @@ def solve(
     ----------
     scene : what to solve; see `load_scene`.
     method, system : names in the registry, or 'auto'.
-    recipe_name : options/NAME.opts for the inner solver; PETSc options that are set already win over it. By default a
-        sparse direct solver, unless a -ksp_type or -pc_type is set.
+    recipe_name : options/NAME.opts for the inner solver; PETSc options that are set already win over it. By default see
+        `auto.plan`, unless a -ksp_type or -pc_type is set.
     stopping : tolerances and iteration limit.
     options : the method's own parameters by name (p0, r0, mu, conditions, ... of `DinOptions`).
     monitor : called after every step with its number and record.
     comm : communicator; default all ranks.
+    nested : start from the answers on coarser grids; default: where it pays.
 
     Returns
     -------
@@ -48,25 +53,48 @@ def solve(
     InputError : an unknown name, a value out of range, an option that does not fit.
     """
     stopping = stopping or Stopping()
-    start = perf_counter()
+    begin = perf_counter()
     stages = Stages()
     with stages("setup"):
         problem = scene.build(comm)
-    method = _choose(method, DEFAULT_METHOD[problem.kind], METHODS, "--method")
-    entry = METHODS[method]
-    if problem.kind not in entry.kinds:
-        fitting = [name for name, other in METHODS.items() if problem.kind in other.kinds]
-        raise InputError(f"--method {method}: not for scene {scene.name}; allowed are {', '.join(fitting)}")
-    system = _choose(system, entry.systems[0], entry.systems, "--system")
-    name = recipe_name or default_recipe(problem)
-    with recipe(name):
-        run = entry.load()(problem, stages, system, options or {}, stopping)
-        try:
-            outcome, message, steps = iterate(run, stopping, monitor)
-            ksp_type, pc_type = (run.krylov.ksp_type, run.krylov.pc_type) if run.krylov else (None, None)
-            fields = run.fields
-        finally:
-            run.destroy()
+    chosen = plan(problem, scene.name, method, system, recipe_name, nested, options or ())
+    entry = METHODS[chosen.method]
+    shapes = level_shapes(scene.shape) if chosen.nested else [scene.shape]
+    start: Fields | None = None
+    coarse: Problem | None = None
+    levels = []
+    with recipe(chosen.recipe):
+        for shape in shapes:
+            finest = shape == shapes[-1]
+            level_begin = perf_counter()
+            with stages("setup"):
+                level = problem if finest else scene.with_shape(shape).build(comm)
+            with stages("prolongation"):
+                if coarse is not None and start is not None:
+                    start = level.prolong(coarse, start, entry.interior)
+                    coarse.destroy()
+            # A coarse answer is a start: its front matters, not its last digits.
+            level_stopping = stopping if finest else Stopping(max(COARSE_EPS, stopping.eps1), np.inf, stopping.max_it)
+            run = entry.load()(level, stages, chosen.system, options or {}, level_stopping, start)
+            try:
+                outcome, message, steps = iterate(run, level_stopping, monitor)
+                krylov = run.krylov
+                ksp_type, pc_type = (krylov.ksp_type, krylov.pc_type) if krylov else (None, None)
+                start = run.fields
+            finally:
+                run.destroy()
+            if not finest and outcome in (Outcome.NOT_FINITE, Outcome.LINEAR_SOLVER):
+                start = None  # nothing to start from: the next grid begins by itself
+            coarse = level
+            levels.append(
+                {
+                    **dict(zip(("nx", "ny"), shape, strict=False)),
+                    "iterations": len(steps),
+                    "linear_iterations": sum(step.linear_iterations for step in steps),
+                    "time_s": perf_counter() - level_begin,
+                }
+            )
+    fields = run.fields
     certificate = problem.certify(fields, stopping.eps1)
     if outcome is Outcome.CONVERGED and not certificate.holds:
         outcome, message = Outcome.WRONG_SOLUTION, f"{message}, but the certificate fails: {certificate.failure}"
@@ -79,28 +107,14 @@ def solve(
         steps,
         settings={
             "scene": scene.name,
-            "method": method,
-            "system": system,
+            "method": chosen.method,
+            "system": chosen.system,
             "scheme": scene.scheme,
-            "recipe": name,
+            "recipe": chosen.recipe,
             "ksp_type": ksp_type,
             "pc_type": pc_type,
+            "why": chosen.why,
         },
-        times={**stages.seconds, "total": perf_counter() - start},
+        times={**stages.seconds, "total": perf_counter() - begin},
+        levels=levels if chosen.nested else [],
     )
-
-
-def default_recipe(problem: Problem) -> str | None:
-    """The direct solver that this PETSc has for this number of ranks; None if the user has chosen by PETSc's options."""
-    if {"ksp_type", "pc_type"} & set_names():
-        return None
-    names = ("mumps", "superlu_dist") if problem.grid.comm.size > 1 else ("superlu", "umfpack", "mumps")
-    return next((name for name in names if PETSc.Sys.hasExternalPackage(name)), "bjacobi")
-
-
-def _choose(name: str, default: str, table: Iterable[str], option: str) -> str:
-    if name == "auto":
-        return default
-    if name not in table:
-        raise InputError(f"{option} {name}: allowed are auto, {', '.join(table)}{nearest(name, table)}")
-    return name

@@ -116,6 +116,7 @@ def parse(own: list[str]) -> argparse.Namespace:
     solve.add_argument("--output", action="append", default=[], metavar="FILE", help=".npz, .vts (ParaView) or .h5")
     solve.add_argument("--plot", metavar="FILE.png", help="picture of p, r and h")
     solve.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")
+    solve.add_argument("--explain", action="store_true", help="say on stderr what was chosen, and why")
     solve.add_argument("--monitor", action="store_true", help="a line an iteration on stderr")
 
     compare = command("compare", "several methods and recipes on one scene, in one table")
@@ -155,6 +156,12 @@ def _scene_options(parser: argparse.ArgumentParser) -> None:
         help="change a scene's value (SI), or METHOD.OPTION=VALUE for a method's parameter, din.gamma=0.4",
     )
     parser.add_argument("--system", default="auto", help="which matrix the inner solver sees; default auto")
+    parser.add_argument(
+        "--nested",
+        action=argparse.BooleanOptionalAction,
+        default=None,
+        help="start from the answers on coarser grids; default: where it pays",
+    )
     parser.add_argument("--eps1", type=float, default=1e-8, help="stop when ||F|| <= eps1, default 1e-8")
     parser.add_argument("--eps2", type=float, default=1e-8, help="and ||alpha d|| <= eps2, default 1e-8")
     parser.add_argument("--max-it", type=int, default=500, help="at most so many outer iterations, default 500")

@@ -76,6 +76,7 @@ def solution_of(args: argparse.Namespace, monitor: Monitor | None = None) -> Sol
         stopping=stopping_of(args),
         options=options_of(args, args.method),
         monitor=monitor,
+        nested=args.nested,
     )
 
 
@@ -94,6 +95,8 @@ def run_solve(args: argparse.Namespace) -> int:
     solution = solution_of(args, monitor)
     try:
         check_unread()
+        if args.explain and MPI.COMM_WORLD.rank == 0:
+            print("\n".join(solution.settings["why"]), file=sys.stderr, flush=True)
         data = as_dict(solution)
         for path in args.output:
             files.save(solution, path)

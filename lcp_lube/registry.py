@@ -30,26 +30,33 @@ class Entry:
 class MethodEntry(Entry):
     """A method: `target` is build(problem, stages, system, options, stopping, start) -> Method.
 
-    kinds are the problems it solves (`Problem.kind`), systems the matrices it can use, its default first.
+    kinds are the problems it solves (`Problem.kind`), systems the matrices it can use, its default first; nested: it can
+    start from a coarser grid's answer, which must lie strictly inside p, r > 0 if it is an interior method.
     """
 
     kinds: tuple[str, ...] = ("lubrication",)
     systems: tuple[str, ...] = ("full", "reduced")
+    nested: bool = False
+    interior: bool = True
 
 
 METHODS: dict[str, MethodEntry] = {
-    "din": MethodEntry("lcp_lube.solvers.din:build", "damped inexact Newton of Mezzadri and Galligani (interior method)"),
+    "din": MethodEntry(
+        "lcp_lube.solvers.din:build", "damped inexact Newton of Mezzadri and Galligani (interior method)", nested=True
+    ),
     "active-set": MethodEntry(
         "lcp_lube.solvers.active_set:build",
         "semismooth Newton in z = p or -r: finitely many steps to the exact discrete solution",
         systems=("reduced", "full"),
+        nested=True,
+        interior=False,
     ),
     "fbn-a": MethodEntry("lcp_lube.solvers.fischer:build_armijo", "Fischer-Burmeister Newton, Armijo rule on ||F||^2/2"),
     "fbn-i": MethodEntry("lcp_lube.solvers.fischer:build_inexact", "Fischer-Burmeister Newton, inexact decrease of ||F||"),
 }
 
 # What 'auto' takes for a kind of problem.
-DEFAULT_METHOD = {"lubrication": "din"}
+DEFAULT_METHOD = {"lubrication": "active-set"}
 
 SYSTEMS: dict[str, Entry] = {
     "full": Entry("lcp_lube.linear.newton_matrix:FullSystem", "the 2n-by-2n matrix [A B; R P] of the papers"),

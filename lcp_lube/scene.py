@@ -31,6 +31,15 @@ class Scene(BaseModel):
     name: str = ""
     scheme: str | None = None
 
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Numbers of interior points, (nx,) or (nx, ny)."""
+        raise NotImplementedError
+
+    def with_shape(self, shape: tuple[int, ...]) -> "Scene":
+        """The same scene on another grid."""
+        return self.model_copy(update=dict(zip(("nx", "ny"), shape, strict=False)))
+
     def build(self, comm: PETSc.Comm | None = None) -> Problem:
         """The discrete problem on this scene's grid. Collective."""
         raise NotImplementedError

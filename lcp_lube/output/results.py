@@ -3,6 +3,7 @@
 import os
 import platform
 import resource
+from pathlib import Path
 from typing import Any
 
 import mpi4py
@@ -40,6 +41,7 @@ def as_dict(solution: Solution) -> dict[str, Any]:
         **certificate.extremes,
         **certificate.measures,
         "certificate_tol": certificate.tol,
+        **({"levels": solution.levels} if solution.levels else {}),
         "memory_mb": peak_memory(solution),
         "time_s": {
             "total": times.get("total"),

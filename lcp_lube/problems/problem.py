@@ -13,6 +13,7 @@ from .grid import Grid
 from .quantities import quantities
 from .reynolds import BoxScheme, assemble, sides
 from .solution import Fields
+from .transfer import Transfer
 
 
 class LubricationProblem:
@@ -131,6 +132,19 @@ class LubricationProblem:
             "r": (fields["r"], ""),
             "h": (self.scheme.h.ravel(), "m"),
         }
+
+    def prolong(self, coarse: "LubricationProblem", fields: Fields, interior: bool) -> Fields:
+        """p and r on this grid from a coarser one, by interpolating z = p/P - r/R bilinearly (P, R: largest p and r).
+
+        interior: p, r = (+-z + sqrt(z^2 + 4 m))/2 with m = 1e-3, off the boundary with products p r = m P R. Collective.
+        """
+        P = coarse.reduce.max(fields["p"]) or 1.0
+        R = coarse.reduce.max(fields["r"]) or 1.0
+        transfer = Transfer(coarse.grid, self.grid)
+        z = transfer(fields["p"] / P - fields["r"] / R)
+        transfer.destroy()
+        root = np.sqrt(z * z + 4e-3) if interior else np.abs(z)
+        return {"p": 0.5 * P * (root + z), "r": 0.5 * R * (root - z)}
 
     def destroy(self) -> None:
         """Free the PETSc objects."""

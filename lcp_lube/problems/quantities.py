@@ -73,8 +73,8 @@ def _friction(problem: LubricationProblem, p_pa: Array, r: Array) -> float:
     last = x > grid.lengths[0] - 1.5 * dx
     muU = problem.mu * problem.U
     total = muU * (1.0 - r2) / h * dx + 0.5 * problem.film(x - dx / 2, y) * (p2 - p_W)
-    first_end = np.where(x < 1.5 * dx, 0.5 * muU / problem.film(0 * x, y) * dx, 0.0)
-    h_end = problem.film(0 * x + grid.lengths[0], y)
+    first_end = np.where(x < 1.5 * dx, 0.5 * muU / problem.film(np.zeros_like(x), y) * dx, 0.0)
+    h_end = problem.film(np.full_like(x, grid.lengths[0]), y)
     last_end = 0.5 * muU * (1.0 - r2) / h_end * dx + 0.5 * problem.film(x + dx / 2, y) * (problem.p_sides[1] - p2)
     per_width = problem.reduce.sum(total + first_end + np.where(last, last_end, 0.0))
     return per_width * (grid.spacing[1] if grid.dim == 2 else 1.0)
@@ -84,8 +84,8 @@ def fronts(problem: LubricationProblem, p: Array, r: Array) -> tuple[float | Non
     """First rupture and first reformation behind it in 1D, in metres; None where there is none. Collective.
 
     Each front is found to its cell from the sign of p/max|p| - r and placed inside it. Rupture: where U h = Q, the one flow
-    of the discrete solution (p = p' = 0 there; bearing.md), h linear over the cell (and a cell beyond, where the discrete front is late). Reformation: where the
-    pressure behind it, extrapolated linearly, is zero.
+    of the discrete solution (p = p' = 0 there), h taken linear over the cell (and one beyond: the discrete front
+    may be late). Reformation: where the pressure behind it, extrapolated linearly, is zero.
     """
     grid, film = problem.grid, problem.film
     dx, L = grid.spacing[0], grid.lengths[0]

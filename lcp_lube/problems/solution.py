@@ -40,6 +40,10 @@ class Problem(Protocol):
         """Fields to print, plot and store: name -> (values in SI, unit)."""
         ...
 
+    def prolong(self, coarse: Any, fields: Fields, interior: bool) -> Fields:
+        """A start on this grid from the same problem's fields on a coarser one; strictly inside if `interior`. Collective."""
+        ...
+
     def destroy(self) -> None: ...
 
 
@@ -95,6 +99,7 @@ class Solution:
     steps : the record of the outer loop.
     settings : method, system, recipe, ksp_type ... as the JSON prints them.
     times : seconds by stage: setup, assembly, linear, total.
+    levels : nested iteration's grids, coarse to fine: nx, ny, iterations, linear_iterations, time_s; the last is this one.
     """
 
     problem: Problem
@@ -105,6 +110,7 @@ class Solution:
     steps: list[Step]
     settings: dict[str, Any] = field(default_factory=dict)
     times: dict[str, float] = field(default_factory=dict)
+    levels: list[dict[str, Any]] = field(default_factory=list)
 
     @property
     def p(self) -> Array:

@@ -25,6 +25,7 @@ from ..problems.solution import Fields, Step
 from .method_options import make_options
 from .newton import Stopping
 
+EPS = float(np.finfo(float).eps)
 DAMPED_STEPS = (0.7, 0.5, 0.3, 0.2, 0.1, 0.05)
 
 
@@ -47,7 +48,7 @@ class ActiveSetOptions:
 
 
 class ActiveSet:
-    """The iterates z; `newton.iterate` runs it. `norm` is ||G(z)|| / ||c|| (||G|| itself if c = 0).
+    """The iterates z; `newton.iterate` runs it. `norm` is ||G(z)|| / ||c|| (||G|| itself if c = 0), less its rounding.
 
     Parameters
     ----------
@@ -58,11 +59,12 @@ class ActiveSet:
         self.problem, self.system, self.options = problem, system, options
         scheme = problem.scheme
         # Cavitated columns of J then have A's diagonal: a step in z means the same in both phases.
-        self.s = (scheme.k_W + scheme.k_E + scheme.k_S + scheme.k_N).ravel() / -scheme.b_C.ravel()
+        self.diagonal = (scheme.k_W + scheme.k_E + scheme.k_S + scheme.k_N).ravel()
+        self.s = self.diagonal / -scheme.b_C.ravel()
         self.scale = problem.reduce.norm(problem.c) or 1.0
         self.z = start["p"] - start["r"] / self.s if start else np.full(problem.grid.local_size, options.p0)
         self.G = self._residual(self.z)
-        self.norm = problem.reduce.norm(self.G) / self.scale
+        self.norm = self._norm(self.z, self.G)
         self._best, self._stalled = self.norm, 0
 
     @property
@@ -75,6 +77,11 @@ class ActiveSet:
 
     def destroy(self) -> None:
         self.system.destroy()
+
+    def _norm(self, z: Array, G: Array) -> float:
+        """||G|| / ||c||, less what rounding alone makes of the sums in G: on fine grids that is all that remains."""
+        rounding = 16 * EPS * (self.diagonal * np.abs(z) + np.abs(self.problem.c))
+        return self.problem.reduce.norm(np.maximum(np.abs(G) - rounding, 0.0)) / self.scale
 
     def _residual(self, z: Array) -> Array:
         return self.problem.flow(np.maximum(z, 0.0), self.s * np.maximum(-z, 0.0))
@@ -93,13 +100,13 @@ class ActiveSet:
             alpha, cuts = 1.0, 0
             z = self.z + d
             G = self._residual(z)
-            norm = self.problem.reduce.norm(G) / self.scale
+            norm = self._norm(z, G)
             if self._stalled >= self.options.patience:
                 trials = [(norm, 1.0, z, G)]
                 for damped in DAMPED_STEPS:
                     trial = self.z + damped * d
                     residual = self._residual(trial)
-                    trials.append((self.problem.reduce.norm(residual) / self.scale, damped, trial, residual))
+                    trials.append((self._norm(trial, residual), damped, trial, residual))
                 norm, alpha, z, G = min(trials, key=lambda t: t[0])
                 cuts, self._stalled = len(trials) - 1, 0
             changed = self.problem.reduce.sum((full != (z >= 0)).astype(float))

@@ -1,0 +1,90 @@
+"""What to run when the user does not say: method, system, recipe and nested iteration, with the reasons."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from petsc4py import PETSc
+
+from .errors import InputError, nearest
+from .linear.options import set_names
+from .problems.solution import Problem
+from .registry import DEFAULT_METHOD, METHODS
+
+SMALL_2D = 20_000  # points up to which a sparse direct solver beats multigrid's set-up (benchmarks/README.md)
+DIN_ONLY = {"r0", "mu", "conditions"}  # flags that only an interior method can heed
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The choices of one run; `why` has a sentence for each that was not the user's."""
+
+    method: str
+    system: str
+    recipe: str | None
+    nested: bool
+    why: list[str] = field(default_factory=list)
+
+
+def plan(
+    problem: Problem,
+    scene: str,
+    method: str = "auto",
+    system: str = "auto",
+    recipe: str | None = None,
+    nested: bool | None = None,
+    options: Iterable[str] = (),
+) -> Plan:
+    """Fill in what was left to us; `options` are the names of the method options that were given.
+
+    Raises
+    ------
+    InputError : a name that does not exist, or does not fit the scene or the method.
+    """
+    why = []
+    if method == "auto":
+        method = DEFAULT_METHOD[problem.kind]
+        reason = METHODS[method].line
+        if problem.kind == "lubrication" and DIN_ONLY & set(options):
+            method, reason = "din", f"{', '.join(sorted(DIN_ONLY & set(options)))} are its options"
+        why.append(f"method {method}: {reason}")
+    entry = METHODS[_known(method, METHODS, "--method")]
+    if problem.kind not in entry.kinds:
+        fitting = [name for name, other in METHODS.items() if problem.kind in other.kinds]
+        raise InputError(f"--method {method}: not for scene {scene}; allowed are {', '.join(fitting)}")
+    if system == "auto":
+        system = entry.systems[0]
+    _known(system, entry.systems, f"method {method}: --system")
+    large = problem.grid.dim == 2 and problem.grid.size > SMALL_2D
+    if nested is None:
+        nested = entry.nested and large
+        if nested:
+            why.append("nested: the front found on a coarser grid leaves a few steps on this one")
+    elif nested and not entry.nested:
+        raise InputError(f"--nested: method {method} does not start from a coarser grid")
+    if recipe is None and not {"ksp_type", "pc_type"} & set_names():
+        recipe, reason = default_recipe(problem, system, large)
+        why.append(f"recipe {recipe}: {reason}")
+    return Plan(method, system, recipe, nested, why)
+
+
+def default_recipe(problem: Problem, system: str, large: bool) -> tuple[str, str]:
+    """The inner solver that this PETSc has for this system, size and number of ranks, and why."""
+    has = PETSc.Sys.hasExternalPackage
+    if problem.kind == "lubrication" and system == "reduced" and large and has("hypre"):
+        return "bcgs_amg", "a large 2D M-matrix: multigrid costs the same per point on every grid"
+    ranks = problem.grid.comm.size
+    if problem.grid.dim == 1 and system == "reduced" and ranks == 1:
+        return "banded", "tridiagonal, an M-matrix: elimination in natural order, without pivoting or fill"
+    names = ("mumps", "superlu_dist") if ranks > 1 else ("superlu", "umfpack", "mumps")
+    if problem.grid.dim == 2 and ranks == 1:
+        names = ("umfpack", "superlu", "mumps")
+    for name in names:
+        if has(name if name != "umfpack" else "suitesparse"):
+            return name, f"a direct solver that this PETSc has for {ranks} rank{'s' * (ranks > 1)}"
+    return "bjacobi", "this PETSc has no parallel direct solver"
+
+
+def _known(name: str, legal: Iterable[str], option: str) -> str:
+    if name not in legal:
+        raise InputError(f"{option} {name}: allowed are auto, {', '.join(legal)}{nearest(name, legal)}")
+    return name

@@ -1,0 +1,11 @@
+"""Nested iteration: the same scene on a sequence of grids, each started from the answer on the one before."""
+
+MIN_POINTS = {1: 50, 2: 24}  # coarsest grid, points a side: small enough to cost nothing, with a front to be found
+
+
+def level_shapes(shape: tuple[int, ...]) -> list[tuple[int, ...]]:
+    """Grids from coarse to fine: (n - 1) // 2 points a side on every coarser one, so that 2^k - 1 points nest."""
+    shapes = [shape]
+    while min(shapes[0]) // 2 >= MIN_POINTS[len(shape)]:
+        shapes.insert(0, tuple((n - 1) // 2 for n in shapes[0]))
+    return shapes
