@@ -42,6 +42,8 @@ class Krylov:
             self.ksp.setFromOptions()
         except PETSc.Error as error:
             raise InputError(explain_error(error)) from None
+        except (ImportError, AttributeError) as error:  # PETSc imports the class of a python PC here
+            raise InputError(f"-pc_python_type {options.getString('pc_python_type', '')}: {error}") from None
 
     @property
     def direct(self) -> bool:

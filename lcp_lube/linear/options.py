@@ -11,8 +11,17 @@ from petsc4py import PETSc
 from ..errors import InputError, nearest
 from ..registry import read_recipe, recipe_names
 
-# Read by PETSc at its end, or by its start-up without being marked.
-LATE = ("log_view", "log_", "options_left", "malloc", "help", "on_error", "objects_dump", "citations", "memory_view")
+# Read by PETSc at its end.
+LATE = {"log_view", "options_left", "options_view", "malloc_dump", "malloc_view", "memory_view", "objects_dump", "citations"}
+# Options that mean nothing without a value: PETSc takes its default in silence.
+VALUED = re.compile(r"(_type|_[ard]tol|divtol|_max_it|_levels|_restart|_overlap|_omega|_its|_blocks|_icntl_\d+|_pcs)$")
+# What PETSc says of a word that it does not know.
+KINDS = (
+    (r"requested (KSP type) (\S+)", PETSc.KSP.Type),
+    (r"requested (PC type) (\S+)", PETSc.PC.Type),
+    (r"Unknown ([Mm]at type) given: (\S+)", PETSc.Mat.Type),
+    (r"locate (solver type) (\S+)", PETSc.Mat.SolverType),
+)
 
 
 def set_names() -> set[str]:
@@ -24,15 +33,28 @@ def set_names() -> set[str]:
 def recipe(name: str | None) -> Iterator[None]:
     """Set a recipe's options for the duration, but for those that the user gave.
 
-    A user's -pc_type replaces the recipe's preconditioner whole: the recipe's options for it would go unread or clash.
+    A user's -ksp_type, -pc_type or -pc_factor_mat_solver_type that differs replaces all that the recipe says of that part:
+    its options for it would go unread or clash.
+
+    Raises
+    ------
+    InputError : no such recipe, or a user's option that lacks its value.
     """
-    given = set_names()
-    chosen = read_recipe(name) if name else {}
-    if "pc_type" in given:
-        chosen = {key: value for key, value in chosen.items() if key.startswith("ksp_")}
-    if "ksp_type" in given:
-        chosen = {key: value for key, value in chosen.items() if not key.startswith("ksp_")}
     options = PETSc.Options()
+    user = options.getAll()
+    for key, value in user.items():
+        if not value and VALUED.search(key):
+            raise InputError(f"-{key}: a value is needed")
+    given = set(user)
+    chosen = read_recipe(name) if name is not None else {}
+    parts = {
+        "ksp_type": lambda key: key.startswith("ksp_"),
+        "pc_type": lambda key: not key.startswith("ksp_"),
+        "pc_factor_mat_solver_type": lambda key: key.startswith("mat_mumps_"),
+    }
+    for leader, belongs in parts.items():
+        if leader in user and user[leader] != chosen.get(leader):
+            chosen = {key: value for key, value in chosen.items() if not belongs(key)}
     added = [key for key in chosen if key not in given]
     for key in added:
         options.setValue(key, chosen[key] or None)
@@ -53,7 +75,7 @@ def unread() -> list[str]:
     library.PetscOptionsLeftGet(None, ctypes.byref(count), ctypes.byref(names), ctypes.byref(values))
     left = [names[i].decode() for i in range(count.value)]
     library.PetscOptionsLeftRestore(None, ctypes.byref(count), ctypes.byref(names), ctypes.byref(values))
-    return [name for name in left if not name.startswith(LATE)]
+    return [name for name in left if name not in LATE]
 
 
 def check_unread() -> None:
@@ -83,21 +105,29 @@ def known_names() -> list[str]:
 
 
 def explain_error(error: PETSc.Error) -> str:
-    """One line from PETSc's traceback; an unknown type gets the nearest legal one."""
+    """One line from PETSc's traceback that names the option, where it can be told, and the nearest legal value."""
     lines = [re.sub(r"^\[\d+\]\s*", "", line).strip() for line in str(error).splitlines()]
     text = next((line for line in reversed(lines) if line and not re.match(r"^\w+\(\) (line|at)", line)), str(error))
-    kinds = (
-        (r"KSP type (\S+)", PETSc.KSP.Type),
-        (r"PC type (\S+)", PETSc.PC.Type),
-        (r"[Mm]at(?:rix)? type (\S+)", PETSc.Mat.Type),
-        (r"solver type (\S+)", PETSc.Mat.SolverType),
-    )
-    for pattern, enum in kinds:
-        found = re.search(pattern, text)
-        legal = [value for key, value in vars(enum).items() if not key.startswith("_")]
-        if found and found[1].rstrip(".,") not in legal:
-            text += nearest(found[1].rstrip(".,"), legal)
-    return f"PETSc: {text}"
+    given = PETSc.Options().getAll()
+
+    def option(value: str) -> str:
+        return next((f"-{key} {value}" for key, set_to in given.items() if set_to == value), value)
+
+    if found := re.search(r"Unknown option (\S+) for (-\S+)\. Available options: (.*)", text):
+        legal = found[3].split()
+        return f"{found[2]} {found[1]}: allowed are {', '.join(legal)}{nearest(found[1], legal)}"
+    if found := re.search(r"factorization type (\S+) and matrix type mpi", text):
+        other = "bjacobi has one inside each rank" if found[1] in ("ILU", "ICC") else "mumps and superlu_dist have one"
+        return f"PETSc has no {found[1]} of its own for several ranks; the recipes {other}"
+    if found := re.search(r"MatSolverType (\S+) does not support matrix type mpi", text):
+        return f"{option(found[1])}: for one rank only; for several there are the recipes mumps and superlu_dist"
+    for pattern, enum in KINDS:
+        if found := re.search(pattern, text):
+            word = found[2].rstrip(".,")
+            legal = [value for key, value in vars(enum).items() if not key.startswith("_")]
+            return f"{option(word)}: no such {found[1]} in this PETSc{'' if word in legal else nearest(word, legal)}"
+    culprit = next((option(word) + ": " for word in text.split() if word in given.values()), "")
+    return f"{culprit if re.search('Input string|Unknown|Unsupported|Cannot open', text) else ''}PETSc: {text}"
 
 
 def petsc_version() -> str:
