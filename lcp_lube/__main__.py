@@ -30,8 +30,8 @@ def main(argv: list[str] | None = None) -> int:
     except InputError as error:
         return _refuse(error, alone=not alarm.all_arrive())
     except MemoryError:
-        error = InputError("not enough memory; fewer points or more ranks are needed")
-        return _refuse(error, alone=not alarm.all_arrive())
+        short = InputError("not enough memory; fewer points or more ranks are needed")
+        return _refuse(short, alone=not alarm.all_arrive())
     except KeyboardInterrupt:
         print("lcp-lube: interrupted", file=sys.stderr)
         return 130
@@ -81,7 +81,7 @@ def _reserve_stdout() -> None:
     """Keep stdout for the JSON: what PETSc prints, monitors and -log_view at its very end, goes to stderr."""
     sys.stdout.flush()
     # Both names: petsc4py hands PETSc's output to a sys.stdout that differs from sys.__stdout__.
-    sys.stdout = sys.__stdout__ = os.fdopen(os.dup(1), "w")
+    sys.stdout = sys.__stdout__ = os.fdopen(os.dup(1), "w")  # type: ignore[misc]
     os.dup2(2, 1)
 
 

@@ -151,7 +151,7 @@ def run_published_table(paper: str, number: int, quick: bool = False, results: P
     InputError : no such table; a csv that cannot be read or written; PETSc options that would change the runs.
     """
     spec, rows = find_table(paper, number)
-    foreign = sorted(name for name in set_names() if not name.startswith(LATE))
+    foreign = sorted(set_names() - LATE)
     if foreign:
         raise InputError(f"-{foreign[0]}: the rows of a published table bring their own inner solvers")
     runs = [row for row in rows if not (quick and float(row.get("n", 0)) > spec.quick)]
