@@ -63,7 +63,7 @@ def solve(
     start: Fields | None = None
     coarse: Problem | None = None
     levels = []
-    with recipe(chosen.recipe):
+    with recipe(chosen.recipe) as recipe_used:
         for shape in shapes:
             finest = shape == shapes[-1]
             level_begin = perf_counter()
@@ -110,7 +110,7 @@ def solve(
             "method": chosen.method,
             "system": chosen.system,
             "scheme": scene.scheme,
-            "recipe": chosen.recipe,
+            "recipe": recipe_used,
             "ksp_type": ksp_type,
             "pc_type": pc_type,
             "why": chosen.why,

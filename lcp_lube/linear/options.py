@@ -30,8 +30,8 @@ def set_names() -> set[str]:
 
 
 @contextmanager
-def recipe(name: str | None) -> Iterator[None]:
-    """Set a recipe's options for the duration, but for those that the user gave.
+def recipe(name: str | None) -> Iterator[str | None]:
+    """Set a recipe's options for the duration, but for those that the user gave; yields a name that tells of these.
 
     A user's -ksp_type, -pc_type or -pc_factor_mat_solver_type that differs replaces all that the recipe says of that part:
     its options for it would go unread or clash.
@@ -46,7 +46,8 @@ def recipe(name: str | None) -> Iterator[None]:
         if not value and VALUED.search(key):
             raise InputError(f"-{key}: a value is needed")
     given = set(user)
-    chosen = read_recipe(name) if name is not None else {}
+    own = read_recipe(name) if name is not None else {}
+    chosen = own
     parts = {
         "ksp_type": lambda key: key.startswith("ksp_"),
         "pc_type": lambda key: not key.startswith("ksp_"),
@@ -56,10 +57,11 @@ def recipe(name: str | None) -> Iterator[None]:
         if leader in user and user[leader] != chosen.get(leader):
             chosen = {key: value for key, value in chosen.items() if not belongs(key)}
     added = [key for key in chosen if key not in given]
+    changed = " ".join(f"-{key} {user[key]}" for key in own if key in user and user[key] != own[key])
     for key in added:
         options.setValue(key, chosen[key] or None)
     try:
-        yield
+        yield f"{name} but {changed}" if changed else name
     finally:
         for key in added:
             options.delValue(key)
@@ -113,6 +115,8 @@ def explain_error(error: PETSc.Error) -> str:
     def option(value: str) -> str:
         return next((f"-{key} {value}" for key, set_to in given.items() if set_to == value), value)
 
+    if "-pc_python_type [package.]" in text:
+        return "-pc_type python: -pc_python_type MODULE.CLASS is needed too"
     if found := re.search(r"Unknown option (\S+) for (-\S+)\. Available options: (.*)", text):
         legal = found[3].split()
         return f"{found[2]} {found[1]}: allowed are {', '.join(legal)}{nearest(found[1], legal)}"
