@@ -66,6 +66,8 @@ SYSTEMS: dict[str, Entry] = {
 # A scene file's `family` names the model that validates it and builds its problem.
 FAMILIES: dict[str, Entry] = {
     "slider": Entry("lcp_lube.scene:SliderScene", "slider with one wave of the film (the published problems)"),
+    "textured": Entry("lcp_lube.scenes_textured:TexturedScene", "flat slider with square dimples"),
+    "rough": Entry("lcp_lube.scenes_textured:RoughScene", "slider with one wave and a random surface"),
 }
 
 

@@ -13,7 +13,7 @@ from .problems.exact import ExactSolution, exact_solution
 from .problems.film import Wave
 from .problems.grid import Grid
 from .problems.problem import LubricationProblem
-from .problems.reynolds import box_scheme
+from .problems.reynolds import Film, box_scheme
 from .problems.solution import Problem
 from .registry import FAMILIES, SCENE_DIR, scene_names
 
@@ -45,59 +45,47 @@ class Scene(BaseModel):
         raise NotImplementedError
 
 
-class SliderScene(Scene):
-    """A slider of length L (and width) with one wave of the film, in SI units; defaults are the paper's data.
+class LubricationScene(Scene):
+    """A film over [0, L] or [0, L] x [0, width], in SI units; a family adds its film, `gap`.
 
     Pressures are above the cavitation pressure p_c, which is added to what is reported.
     """
 
     dimension: Literal[1, 2] = 1
-    film: Literal["sinusoid", "parabola"] = "sinusoid"
-    form: Literal["convergent-divergent", "divergent-convergent"] = "convergent-divergent"
-    wave: tuple[NotNegative, NotNegative] = Field((0.0, 1.0), description="where the wave starts and ends, in parts of L")
-    h_min: Positive = Field(15e-6, description="smallest film, m")
-    h_max: Positive = Field(25e-6, description="largest film, m")
     L: Positive = Field(0.1, description="length in the direction of motion, m")
     width: Positive | None = Field(None, description="width Ly, m; default L (2D)")
     mu: Positive = Field(0.015, description="viscosity, Pa s")
     U: Positive = Field(5.0, description="speed of the moving wall, m/s")
-    p_a: NotNegative = Field(0.0, description="pressure at x = 0, Pa")
-    p_b: NotNegative = Field(0.0, description="pressure at x = L, Pa")
-    p_side: NotNegative = Field(0.0, description="pressure at y = 0 and y = width, Pa (2D)")
+    p_a: NotNegative = Field(0.0, description="pressure at x = 0, Pa above p_c")
+    p_b: NotNegative = Field(0.0, description="pressure at x = L, Pa above p_c")
+    p_side: NotNegative = Field(0.0, description="pressure at y = 0 and y = width, Pa above p_c (2D)")
     p_c: Annotated[float, Field(allow_inf_nan=False)] = Field(0.0, description="cavitation pressure, Pa")
-    scheme: Literal["nodal", "face", "upwind"] = Field("nodal", description="form of the Couette flux")
+    scheme: Literal["nodal", "face", "upwind"] = Field("face", description="form of the Couette flux")
+    mean_cubes: bool = Field(False, description="h^3 at a face as the mean of the nodal values")
     p_unit: Positive = Field(1e6, description="pressure unit of the equations, Pa")
     n: Count = Field(100, description="interior points a side")
     nx: Count | None = Field(None, description="interior points in x; default n")
     ny: Count | None = Field(None, description="interior points in y; default n (2D)")
 
     @model_validator(mode="after")
-    def _consistent(self) -> "SliderScene":
-        if self.h_max < self.h_min:
-            raise ValueError(f"h_max = {self.h_max:g}: at least h_min = {self.h_min:g} is needed")
-        if not self.wave[0] < self.wave[1] <= 1:
-            raise ValueError(f"wave = {list(self.wave)}: 0 <= start < end <= 1 is needed")
+    def _one_dimensional(self) -> "LubricationScene":
         if self.dimension == 1 and self.ny is not None:
             raise ValueError(f"ny = {self.ny}: the scene is one-dimensional")
         return self
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Numbers of interior points, (nx,) or (nx, ny)."""
         nx = self.nx or self.n
         return (nx,) if self.dimension == 1 else (nx, self.ny or self.n)
 
     @property
-    def gap(self) -> Wave:
+    def gap(self) -> Film:
         """The film h(x, y) in metres."""
-        start, end = (self.L * part for part in self.wave)
-        return Wave(self.film, self.form, self.h_min, self.h_max, start, end - start)
+        raise NotImplementedError
 
     def exact(self) -> ExactSolution | None:
-        """The exact solution in 1D; None where none is known."""
-        if self.dimension == 2:
-            return None
-        return exact_solution(self.gap, self.L, self.mu, self.U, self.p_a, self.p_b)
+        """The exact solution; None where none is known."""
+        return None
 
     def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
         """The discrete problem on this scene's grid. Collective.
@@ -110,7 +98,16 @@ class SliderScene(Scene):
         grid = Grid(self.shape, lengths, comm)
         p_sides = (self.p_a, self.p_b, self.p_side, self.p_side)
         gap = self.gap
-        scheme = box_scheme(grid, gap, mu=self.mu, U=self.U, scheme=self.scheme, p_sides=p_sides, p_unit=self.p_unit)
+        scheme = box_scheme(
+            grid,
+            gap,
+            mu=self.mu,
+            U=self.U,
+            scheme=self.scheme,
+            p_sides=p_sides,
+            p_unit=self.p_unit,
+            mean_cubes=self.mean_cubes,
+        )
         return LubricationProblem(
             grid,
             scheme,
@@ -122,6 +119,35 @@ class SliderScene(Scene):
             film=gap,
             exact=self.exact,
         )
+
+
+class SliderScene(LubricationScene):
+    """A slider with one wave of the film; defaults are the published problems' data."""
+
+    film: Literal["sinusoid", "parabola"] = "sinusoid"
+    form: Literal["convergent-divergent", "divergent-convergent"] = "convergent-divergent"
+    wave: tuple[NotNegative, NotNegative] = Field((0.0, 1.0), description="where the wave starts and ends, in parts of L")
+    h_min: Positive = Field(15e-6, description="smallest film, m")
+    h_max: Positive = Field(25e-6, description="largest film, m")
+    scheme: Literal["nodal", "face", "upwind"] = Field("nodal", description="form of the Couette flux")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "SliderScene":
+        if self.h_max < self.h_min:
+            raise ValueError(f"h_max = {self.h_max:g}: at least h_min = {self.h_min:g} is needed")
+        if not self.wave[0] < self.wave[1] <= 1:
+            raise ValueError(f"wave = {list(self.wave)}: 0 <= start < end <= 1 is needed")
+        return self
+
+    @property
+    def gap(self) -> Wave:
+        start, end = (self.L * part for part in self.wave)
+        return Wave(self.film, self.form, self.h_min, self.h_max, start, end - start)
+
+    def exact(self) -> ExactSolution | None:
+        if self.dimension == 2:
+            return None
+        return exact_solution(self.gap, self.L, self.mu, self.U, self.p_a, self.p_b)
 
 
 def scene_line(name: str) -> str:
