@@ -1,0 +1,24 @@
+"""Loops that cannot be array arithmetic: compiled by numba where it is installed, the same Python where it is not."""
+
+from collections.abc import Callable
+from functools import cache
+from typing import TypeVar
+
+Kernel = TypeVar("Kernel", bound=Callable)
+
+
+@cache
+def compiled(kernel: Kernel) -> Kernel:
+    """The kernel in machine code, or itself if numba is not installed: the arithmetic, and so the result, is the same.
+
+    numba is imported at the first call, not with the package. Machine code is kept between runs beside the kernel's file
+    or in the user's cache directory; where neither can be written it is made anew in each run.
+    """
+    try:
+        from numba import njit
+    except ImportError:
+        return kernel
+    try:
+        return njit(cache=True)(kernel)
+    except RuntimeError:  # numba found no directory for its cache
+        return njit(kernel)
