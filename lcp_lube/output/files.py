@@ -3,6 +3,7 @@
 import json
 import os
 import tempfile
+import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
@@ -47,7 +48,7 @@ def save(solution: Solution, path: str | Path) -> None:
     shape (ny, nx), or (nx,) in 1D, in the natural order, whatever the number of ranks.
 
     - .npz: the fields, x of shape (nx,), y of shape (ny,) in 2D, and two JSON strings: `units` by field, and `result`, the
-      object that --json prints. Rank 0 gathers one field after the other: take .h5 or .vts where that is too much for it.
+      object that --json prints. Rank 0 gathers it all: take .h5 or .vts where that is too much for it.
     - .vts, .vtr: ParaView's structured and rectilinear grid by PETSc's viewer; rank 0 writes, one rank's part at a time.
     - .h5: the fields, x and y as datasets by PETSc's viewer, all ranks writing; `Vec.load` with the field's name reads one
       back on any number of ranks. petsc4py writes no attributes, so the units are those above.
@@ -128,7 +129,7 @@ def replacing(path: Path, comm: MPI.Comm) -> Iterator[str]:
         reason = error.strerror or str(error)
     except PETSc.Error as error:
         temporary.unlink(missing_ok=True)
-        raise InputError(f"{path}: PETSc could not write it: {PETSc.Error(error.ierr)}".splitlines()[0]) from None
+        raise InputError(f"{path}: PETSc could not write it (its error code {error.ierr}); is the disk full?") from None
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
@@ -142,25 +143,30 @@ def _save_npz(solution: Solution, fields: dict[str, tuple[Array, str]], target: 
     arrays |= dict(zip("xy", coordinates(grid), strict=False))
     units = {name: unit for name, (_, unit) in fields.items()} | dict.fromkeys("xy"[: grid.dim], "m")
     result = json.dumps(finite(as_dict(solution)))
-    if grid.comm.rank == 0:
-        np.savez(target, **arrays, units=json.dumps(units), result=result)
+    if grid.comm.rank > 0:
+        return
+    entries = {**arrays, "units": np.array(json.dumps(units)), "result": np.array(result)}
+    with zipfile.ZipFile(target, "w") as archive:  # what np.savez does, but for a traceback when the disk is full
+        for name, values in entries.items():
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as entry:
+                np.lib.format.write_array(entry, np.asarray(values), allow_pickle=False)
 
 
 def _save_by_viewer(grid: Grid, fields: dict[str, Array], target: str) -> None:
     """VTK or HDF5, by the extension. PETSc writes all that was viewed when the viewer is destroyed."""
     dm, comm = grid.dm.duplicate(), grid.dm.comm  # a copy: coordinates would stay in the grid's own
+    viewer = PETSc.Viewer()
     try:
         if target.endswith(".h5"):
-            viewer = PETSc.Viewer().createHDF5(target, "w", comm)
+            viewer.createHDF5(target, "w", comm)
             for name, x in zip("xy", coordinates(grid), strict=False):
                 vec = PETSc.Vec().createMPI(x.size, comm=comm)
                 vec.setArray(x[slice(*vec.owner_range)])
                 _view(vec, name, viewer)
         else:
-            viewer = PETSc.Viewer().createVTK(target, "w", comm)
-            points = np.broadcast_arrays(grid.x, grid.y)[: grid.dim]
+            viewer.createVTK(target, "w", comm)
             vec = dm.getCoordinateDM().createGlobalVec()
-            vec.setArray(np.stack(points, axis=-1).ravel())
+            vec.setArray(np.stack(np.broadcast_arrays(grid.x, grid.y)[: grid.dim], axis=-1).ravel())
             dm.setCoordinates(vec)
             vec.destroy()
         for name, values in fields.items():
@@ -168,6 +174,10 @@ def _save_by_viewer(grid: Grid, fields: dict[str, Array], target: str) -> None:
             vec.setArray(values)
             _view(vec, name, viewer)
         viewer.destroy()
+    except PETSc.Error:
+        if viewer:
+            viewer.incRef()  # never destroyed: PETSc would try to write once more, and leave an empty file
+        raise
     finally:
         dm.destroy()
 
