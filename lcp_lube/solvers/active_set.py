@@ -48,20 +48,26 @@ class ActiveSetOptions:
 
 
 class ActiveSet:
-    """The iterates z; `newton.iterate` runs it. `norm` is ||G(z)|| / ||c|| (||G|| itself if c = 0), less its rounding.
+    """The iterates z; `newton.iterate` runs it. `norm` is ||G(z)|| / ||c||, see `_norm`.
 
     Parameters
     ----------
     start : fields p and r, a cell being cavitated where r > 0; default full film at options.p0.
     """
 
-    def __init__(self, problem: LubricationProblem, system: System, options: ActiveSetOptions, start: Fields | None = None):
-        self.problem, self.system, self.options = problem, system, options
+    def __init__(
+        self,
+        problem: LubricationProblem,
+        system: System,
+        options: ActiveSetOptions,
+        eps1: float,
+        start: Fields | None = None,
+    ):
+        self.problem, self.system, self.options, self.eps1 = problem, system, options, eps1
         scheme = problem.scheme
         # Cavitated columns of J then have A's diagonal: a step in z means the same in both phases.
         self.diagonal = (scheme.k_W + scheme.k_E + scheme.k_S + scheme.k_N).ravel()
         self.s = self.diagonal / -scheme.b_C.ravel()
-        self.scale = problem.reduce.norm(problem.c) or 1.0
         self.z = start["p"] - start["r"] / self.s if start else np.full(problem.grid.local_size, options.p0)
         self.G = self._residual(self.z)
         self.norm = self._norm(self.z, self.G)
@@ -79,9 +85,10 @@ class ActiveSet:
         self.system.destroy()
 
     def _norm(self, z: Array, G: Array) -> float:
-        """||G|| / ||c||, less what rounding alone makes of the sums in G: on fine grids that is all that remains."""
-        rounding = 16 * EPS * (self.diagonal * np.abs(z) + np.abs(self.problem.c))
-        return self.problem.reduce.norm(np.maximum(np.abs(G) - rounding, 0.0)) / self.scale
+        """||G|| / ||c||; where rounding in G's sums alone exceeds eps1, on very fine grids, relative to that."""
+        reduce, c = self.problem.reduce, self.problem.c
+        rounding = 16 * EPS * reduce.norm(self.diagonal * np.abs(z) + np.abs(c))
+        return reduce.norm(G) / (max(reduce.norm(c), rounding / self.eps1) or 1.0)
 
     def _residual(self, z: Array) -> Array:
         return self.problem.flow(np.maximum(z, 0.0), self.s * np.maximum(-z, 0.0))
@@ -136,4 +143,4 @@ def build(
     InputError : an unknown option or a value out of range.
     """
     settings = make_options(ActiveSetOptions, "active-set", options)
-    return ActiveSet(problem, make_system(system, problem, stages), settings, start)
+    return ActiveSet(problem, make_system(system, problem, stages), settings, stopping.eps1, start)
