@@ -1,5 +1,7 @@
 """Uniform grids of interior points, distributed by a PETSc DMDA. The only file that knows ghost points."""
 
+import math
+import os
 from collections.abc import Sequence
 
 import numpy as np
@@ -8,6 +10,8 @@ from petsc4py import PETSc
 
 from ..errors import InputError
 from ..parallel import Array, Reduce
+
+BYTES_PER_POINT = 250  # of the coefficients, A, B and the fields alone: no run needs less
 
 
 class Grid:
@@ -25,7 +29,7 @@ class Grid:
 
     Raises
     ------
-    InputError : fewer than one point a side, or more ranks than the points can be dealt to.
+    InputError : fewer than one point a side, more points than fit, or more ranks than the points can be dealt to.
     """
 
     def __init__(
@@ -42,8 +46,9 @@ class Grid:
         self.spacing = tuple(length / (n + 1) for length, n in zip(self.lengths, self.shape, strict=True))
         self.dim = len(self.shape)
         self.origin = origin
-        self.size = int(np.prod(self.shape))
+        self.size = math.prod(self.shape)
         comm = comm or PETSc.COMM_WORLD
+        self._check_size(comm)
         # Lines of the flow direction stay whole where there are enough of them: what the void does is told along them.
         whole_lines = self.dim == 2 and self.shape[1] >= comm.size
         proc_sizes = (1, comm.size) if whole_lines else None
@@ -69,6 +74,17 @@ class Grid:
         self.box = (self.y_end - self.y_start, self.x_end - self.x_start)
         # Rank k owns the global (PETSc) numbers starts[k] to starts[k + 1].
         self.starts = np.concatenate([[0], np.cumsum(self.comm.allgather(self.local_size))])
+
+    def _check_size(self, comm: PETSc.Comm) -> None:
+        """Refuse before anything is allocated what PETSc's integers or this machine's memory cannot hold."""
+        what = f"grid {'x'.join(map(str, self.shape))}: {self.size} points"
+        largest = np.iinfo(PETSc.IntType).max // 2  # of the 2 n unknowns
+        if self.size > largest:
+            raise InputError(f"{what}; this PETSc numbers at most {largest}")
+        memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+        needed = BYTES_PER_POINT * self.size // comm.size
+        if needed > memory:
+            raise InputError(f"{what} need {needed / 1e9:.0f} GB a rank, this machine has {memory / 1e9:.0f}; use fewer points")
 
     @property
     def local_size(self) -> int:

@@ -95,9 +95,9 @@ class LubricationProblem:
         inflow = max(west, 0.0) + max(-east, 0.0) + max(south, 0.0) + max(-north, 0.0)
         return Certificate(
             measures={
-                "residual": red.norm(Ap + Br - self.c) / scale if scale > 0 else 0.0,
+                "residual": red.norm(Ap + Br - self.c) / scale if scale != 0 else 0.0,  # NaN stays NaN
                 "complementarity": red.max(np.abs(np.minimum(p / p_max if p_max > 0 else p, r))),
-                "mass_defect": abs(west - east + south - north) / inflow if inflow > 0 else 0.0,
+                "mass_defect": abs(west - east + south - north) / inflow if inflow != 0 else 0.0,
             },
             tol=certificate_tol(eps1),
             extremes={"min_p": red.min(p) * self.p_unit, "min_r": red.min(r)},

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from ..errors import InputError
 from ..parallel import Array
 from .grid import Grid
 
@@ -72,7 +73,34 @@ def box_scheme(
     p_sides : Dirichlet pressures above the cavitation pressure at west, east, south, north in Pa (south, north: 2D only).
     p_unit : pressure unit in Pa; p in the equations is measured in it.
     mean_cubes : take h^3 at a face as the mean of the nodal values (scene 5) instead of the film at the face.
+
+    Raises
+    ------
+    InputError : a film that is not positive, or data so large or small that a coefficient overflows or vanishes.
     """
+    with np.errstate(all="ignore"):
+        box = _coefficients(grid, film, mu, U, scheme, p_sides, p_unit, mean_cubes)
+    reduce = grid.reduce
+    faces = [box.k_W, box.k_E] + ([box.k_S, box.k_N] if grid.dim == 2 else [])
+    smallest, largest = min(map(reduce.min, [box.h, *faces])), max(map(reduce.max, [*faces, np.abs(box.b_C), np.abs(box.c)]))
+    if not (smallest > 0 and largest < np.inf):
+        raise InputError(
+            f"film {reduce.min(box.h):g} to {reduce.max(box.h):g} m, mu = {mu:g} Pa s, U = {U:g} m/s, pressure unit {p_unit:g} Pa: "
+            f"coefficients of the flow balance between {smallest:g} and {largest:g}; positive, finite ones are needed (SI units?)"
+        )
+    return box
+
+
+def _coefficients(
+    grid: Grid,
+    film: Film,
+    mu: float,
+    U: float,
+    scheme: str,
+    p_sides: tuple[float, float, float, float],
+    p_unit: float,
+    mean_cubes: bool,
+) -> BoxScheme:
     dx = grid.spacing[0]
     x, y = np.broadcast_arrays(grid.x, grid.y)
     h = film(x, y)

@@ -14,13 +14,13 @@ class StepLengthError(ArithmeticError):
 
 
 def feasible(reduce: Reduce, *pairs: tuple[Array, Array]) -> float:
-    """F: the largest step alpha <= 1 that keeps every x + alpha dx >= 0, for pairs (x, dx) with x >= 0. Collective."""
+    """F: the largest step alpha in [0, 1] that keeps every x + alpha dx >= 0, for pairs (x, dx) with x >= 0. Collective."""
     limit = 1.0
     for x, dx in pairs:
         falling = dx < 0
         if falling.any():
             limit = min(limit, float(np.min(x[falling] / -dx[falling])))
-    return reduce.min(np.array([limit]))
+    return max(reduce.min(np.array([limit])), 0.0)  # rounding may have left an x at -1e-25
 
 
 def reduction(alpha: float, gap: float) -> float:
