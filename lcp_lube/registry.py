@@ -53,10 +53,16 @@ METHODS: dict[str, MethodEntry] = {
     ),
     "fbn-a": MethodEntry("lcp_lube.solvers.fischer:build_armijo", "Fischer-Burmeister Newton, Armijo rule on ||F||^2/2"),
     "fbn-i": MethodEntry("lcp_lube.solvers.fischer:build_inexact", "Fischer-Burmeister Newton, inexact decrease of ||F||"),
+    "newton": MethodEntry(
+        "lcp_lube.solvers.plain_newton:build",
+        "Newton or inexact Newton for equations without complementarity",
+        kinds=("equations",),
+        systems=("jacobian",),
+    ),
 }
 
 # What 'auto' takes for a kind of problem.
-DEFAULT_METHOD = {"lubrication": "active-set"}
+DEFAULT_METHOD = {"lubrication": "active-set", "equations": "newton"}
 
 SYSTEMS: dict[str, Entry] = {
     "full": Entry("lcp_lube.linear.newton_matrix:FullSystem", "the 2n-by-2n matrix [A B; R P] of the papers"),
@@ -68,6 +74,8 @@ FAMILIES: dict[str, Entry] = {
     "slider": Entry("lcp_lube.scene:SliderScene", "slider with one wave of the film (the published problems)"),
     "textured": Entry("lcp_lube.scenes_textured:TexturedScene", "flat slider with square dimples"),
     "rough": Entry("lcp_lube.scenes_textured:RoughScene", "slider with one wave and a random surface"),
+    "bratu": Entry("lcp_lube.scenes_semilinear:BratuScene", "Bratu's equation on the unit square"),
+    "poisson_cubic": Entry("lcp_lube.scenes_semilinear:PoissonCubicScene", "Poisson's equation with a cubic term"),
 }
 
 

@@ -56,6 +56,7 @@ class Outcome(StrEnum):
     LINEAR_SOLVER = "linear_solver"
     NOT_FINITE = "not_finite"
     WRONG_SOLUTION = "wrong_solution"
+    NO_SOLUTION = "no_solution"
 
     @property
     def sentence(self) -> str:
@@ -66,6 +67,7 @@ class Outcome(StrEnum):
             Outcome.LINEAR_SOLVER: "the inner linear solver failed",
             Outcome.NOT_FINITE: "the iterates overflowed or became NaN",
             Outcome.WRONG_SOLUTION: "the method stopped, but its answer is not a solution",
+            Outcome.NO_SOLUTION: "the problem has no solution",
         }[self]
 
 

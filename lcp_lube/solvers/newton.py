@@ -11,6 +11,10 @@ from ..problems.solution import Fields, Outcome, Step
 from .steplength import StepLengthError
 
 
+class NoSolutionError(ArithmeticError):
+    """The problem has no solution, as the method has found; the message says how it knows."""
+
+
 class Method(Protocol):
     """What the loop and its caller need of a method: ||F|| at the start, one step at a time, and the fields it reached."""
 
@@ -62,6 +66,8 @@ def iterate(method: Method, stopping: Stopping, monitor: Monitor | None = None) 
             return Outcome.STEP_LENGTH, f"step {k}: no acceptable step length, {error}", steps
         except LinearSolverError as error:
             return Outcome.LINEAR_SOLVER, f"step {k}: {error}", steps
+        except NoSolutionError as error:
+            return Outcome.NO_SOLUTION, f"step {k}: {error}", steps
         steps.append(step)
         if monitor is not None:
             monitor(k, step)

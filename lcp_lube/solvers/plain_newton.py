@@ -1,0 +1,146 @@
+"""Newton's method for f(v) = 0, exact or inexact: no complementarity, the same outer loop and KSP.
+
+When the source is convex (`semilinear.Source.convex`) and v0 <= 0, full steps need no damping and tell when there is no
+solution. f is then order-concave with symmetric f' whose off-diagonal entries are <= 0, and a smallest solution v*, if
+there is one, has f'(v*) positive semidefinite. While v_k <= v*, f'(v_k) >= f'(v*) is a positive definite M-matrix, so
+
+    d_k = -f'(v_k)^-1 f(v_k) >= 0,   f(v_{k+1}) <= 0   and   v_{k+1} <= v*:
+
+the iterates climb to v* (Ortega and Rheinboldt, Iterative Solution of Nonlinear Equations, 13.3). A step that turns
+downwards therefore shows that no solution exists.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from petsc4py import PETSc
+
+from ..errors import InputError
+from ..linear.krylov import Krylov, LinearSolverError
+from ..linear.stages import Stages
+from ..parallel import Array
+from ..problems.semilinear import SemilinearProblem
+from ..problems.solution import Fields, Step
+from .method_options import make_options
+from .newton import NoSolutionError, Stopping
+from .steplength import halve_until, inexact_decrease
+
+TURNED = 0.1  # a step down is a turn if it undoes this much of the last one: far more than inexact solves can do,
+ROUNDING = 1e-6  # and this much of v
+
+
+@dataclass(frozen=True)
+class NewtonOptions:
+    """Parameters of Newton's method: eta, relative tolerance of an iterative inner solver; beta, of the decrease test."""
+
+    eta: float = 1e-3
+    beta: float = 1e-4
+
+    def __post_init__(self) -> None:
+        for name in ("eta", "beta"):
+            if not 0 < getattr(self, name) < 1:
+                raise InputError(f"newton.{name} = {getattr(self, name)}: allowed are numbers between 0 and 1")
+
+
+class PlainNewton:
+    """The iterates of v + alpha d, f'(v) d = -f(v) to a relative tolerance eta; `newton.iterate` runs it.
+
+    alpha = 1 for a convex source from below; else it is halved until ||f|| decreases as an inexact Newton step must.
+    """
+
+    def __init__(self, problem: SemilinearProblem, stages: Stages, options: NewtonOptions, start: Fields | None = None):
+        self.problem, self.stages, self.options = problem, stages, options
+        self.v = start["v"].copy() if start else np.full(problem.grid.local_size, problem.v0)
+        self.climbing = problem.source.convex and start is None and problem.v0 <= 0
+        self._last = 0.0  # sum of the last step
+        with stages("assembly"):
+            self.mat = problem.A.duplicate(copy=True)
+            self.mat.setAttr("problem", problem)
+            for option in (PETSc.Mat.Option.SYMMETRIC, PETSc.Mat.Option.SYMMETRY_ETERNAL):
+                self.mat.setOption(option, True)
+            self._x, self._b = self.mat.createVecs()
+            self._krylov = Krylov(self.mat)
+        self.f = problem.residual(self.v)
+        self.norm = problem.reduce.norm(self.f)
+
+    @property
+    def fields(self) -> Fields:
+        return {"v": self.v}
+
+    @property
+    def krylov(self) -> Krylov:
+        return self._krylov
+
+    def direction(self) -> tuple[Array, int]:
+        """d and the number of linear iterations. Collective.
+
+        Raises
+        ------
+        LinearSolverError : breakdown, a failed factorisation, or a result that is not finite.
+        NoSolutionError : climbing, and the KSP met a direction in which f' is not positive.
+        """
+        with self.stages("Jacobian"):
+            self._x.setArray(self.problem.jacobian_diagonal(self.v))
+            self.mat.setDiagonal(self._x)
+            self.mat.assemble()
+            self._b.setArray(-self.f)
+        with self.stages("KSP"):
+            try:
+                iterations = self.krylov.solve(self._b, self._x, self.options.eta)
+            except LinearSolverError:
+                indefinite = PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_MAT
+                if self.climbing and self.krylov.ksp.getConvergedReason() == indefinite:
+                    raise NoSolutionError(f"{self.problem.source.no_solution}: f' is no longer positive definite") from None
+                raise
+        return self._x.array_r.copy(), iterations
+
+    def advance(self) -> Step:
+        """One step. Collective."""
+        problem, reduce, norm = self.problem, self.problem.reduce, self.norm
+        d, iterations = self.direction()
+        alpha, cuts = 1.0, 0
+        if self.climbing:
+            rise = reduce.sum(d)
+            if -rise > max(TURNED * self._last, ROUNDING * reduce.sum(np.abs(self.v))):
+                raise NoSolutionError(f"{problem.source.no_solution}: Newton's climb from below has turned downwards")
+            self._last = rise
+        else:
+            eta = 0.0 if self.krylov.direct else self.options.eta
+            rounding = (
+                np.finfo(float).eps * problem.diagonal * reduce.norm(self.v)
+            )  # of f itself: nothing can decrease below it
+
+            def decreases(alpha: float) -> bool:
+                trial = reduce.norm(problem.residual(self.v + alpha * d))
+                return trial <= rounding or inexact_decrease(norm, trial, alpha, eta, self.options.beta)
+
+            with self.stages("step length"):
+                alpha, cuts = halve_until(decreases, alpha)
+        self.v = self.v + alpha * d
+        self.f = problem.residual(self.v)
+        self.norm = reduce.norm(self.f)
+        return Step(self.norm, alpha * reduce.norm(d), alpha, iterations, 0, cuts, 0.0, self.options.eta)
+
+    def destroy(self) -> None:
+        """Free the PETSc objects; a python PC must not outlive this."""
+        self.krylov.destroy()
+        for obj in (self.mat, self._x, self._b):
+            obj.destroy()
+
+
+def build(
+    problem: SemilinearProblem,
+    stages: Stages,
+    system: str,
+    options: dict[str, Any],
+    stopping: Stopping,
+    start: Fields | None = None,
+) -> PlainNewton:
+    """The registry's door: Newton's method with the options that were given by name.
+
+    Raises
+    ------
+    InputError : an unknown option or a value out of range.
+    """
+    return PlainNewton(problem, stages, make_options(NewtonOptions, "newton", options), start)
