@@ -13,6 +13,7 @@ from .grid import Grid
 
 SCHEMES = ("nodal", "face", "upwind")
 Film = Callable[[Array, Array], Array]
+LARGE = 1e100  # coefficients whose squares still have a norm
 
 
 @dataclass(frozen=True)
@@ -83,10 +84,10 @@ def box_scheme(
     reduce = grid.reduce
     faces = [box.k_W, box.k_E] + ([box.k_S, box.k_N] if grid.dim == 2 else [])
     smallest, largest = min(map(reduce.min, [box.h, *faces])), max(map(reduce.max, [*faces, np.abs(box.b_C), np.abs(box.c)]))
-    if not (smallest > 0 and largest < np.inf):
+    if not (smallest > 1 / LARGE and largest < LARGE):
         raise InputError(
-            f"film {reduce.min(box.h):g} to {reduce.max(box.h):g} m, mu = {mu:g} Pa s, U = {U:g} m/s, pressure unit {p_unit:g} Pa: "
-            f"coefficients of the flow balance between {smallest:g} and {largest:g}; positive, finite ones are needed (SI units?)"
+            f"film {reduce.min(box.h):g} to {reduce.max(box.h):g} m, mu = {mu:g} Pa s, U = {U:g} m/s, p_unit = {p_unit:g} Pa: the "
+            f"flow balance has coefficients from {smallest:g} to {largest:g}, allowed are {1 / LARGE:g} to {LARGE:g} (SI units?)"
         )
     return box
 
