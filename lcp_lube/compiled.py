@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from functools import cache
-from typing import TypeVar
+from typing import TypeVar, cast
 
 Kernel = TypeVar("Kernel", bound=Callable)
 
@@ -19,6 +19,6 @@ def compiled(kernel: Kernel) -> Kernel:
     except ImportError:
         return kernel
     try:
-        return njit(cache=True)(kernel)
+        return cast(Kernel, njit(cache=True)(kernel))
     except RuntimeError:  # numba found no directory for its cache
-        return njit(kernel)
+        return cast(Kernel, njit(kernel))

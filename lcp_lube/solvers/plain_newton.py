@@ -107,9 +107,8 @@ class PlainNewton:
             self._last = rise
         else:
             eta = 0.0 if self.krylov.direct else self.options.eta
-            rounding = (
-                np.finfo(float).eps * problem.diagonal * reduce.norm(self.v)
-            )  # of f itself: nothing can decrease below it
+            # f itself is no more accurate than this: below it nothing can be asked to decrease.
+            rounding = float(np.finfo(float).eps) * problem.diagonal * reduce.norm(self.v)
 
             def decreases(alpha: float) -> bool:
                 trial = reduce.norm(problem.residual(self.v + alpha * d))
