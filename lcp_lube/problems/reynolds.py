@@ -86,8 +86,8 @@ def box_scheme(
     smallest, largest = min(map(reduce.min, [box.h, *faces])), max(map(reduce.max, [*faces, np.abs(box.b_C), np.abs(box.c)]))
     if not (smallest > 1 / LARGE and largest < LARGE):
         raise InputError(
-            f"film {reduce.min(box.h):g} to {reduce.max(box.h):g} m, mu = {mu:g} Pa s, U = {U:g} m/s, p_unit = {p_unit:g} Pa: the "
-            f"flow balance has coefficients from {smallest:g} to {largest:g}, allowed are {1 / LARGE:g} to {LARGE:g} (SI units?)"
+            f"film {reduce.min(box.h):g} to {reduce.max(box.h):g} m, mu = {mu:g} Pa s, U = {U:g} m/s, p_unit = {p_unit:g} Pa: "
+            f"flow balance with coefficients {smallest:g} to {largest:g}, allowed are {1 / LARGE:g} to {LARGE:g} (SI units?)"
         )
     return box
 
