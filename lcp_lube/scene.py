@@ -17,9 +17,11 @@ from .problems.reynolds import Film, box_scheme
 from .problems.solution import Problem
 from .registry import FAMILIES, SCENE_DIR, scene_names
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Count = Annotated[int, Field(ge=1, le=2**31 - 2)]
+# Strict: neither true nor "1e-5" is a number.
+Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Positive = Annotated[Finite, Field(gt=0)]
+NotNegative = Annotated[Finite, Field(ge=0)]
+Count = Annotated[int, Field(strict=True, ge=1, le=2**31 - 2)]
 
 
 class Scene(BaseModel):
@@ -59,7 +61,7 @@ class LubricationScene(Scene):
     p_a: NotNegative = Field(0.0, description="pressure at x = 0, Pa above p_c")
     p_b: NotNegative = Field(0.0, description="pressure at x = L, Pa above p_c")
     p_side: NotNegative = Field(0.0, description="pressure at y = 0 and y = width, Pa above p_c (2D)")
-    p_c: Annotated[float, Field(allow_inf_nan=False)] = Field(0.0, description="cavitation pressure, Pa")
+    p_c: Finite = Field(0.0, description="cavitation pressure, Pa")
     scheme: Literal["nodal", "face", "upwind"] = Field("face", description="form of the Couette flux")
     mean_cubes: bool = Field(False, description="h^3 at a face as the mean of the nodal values")
     p_unit: Positive = Field(1e6, description="pressure unit of the equations, Pa")
@@ -69,8 +71,9 @@ class LubricationScene(Scene):
 
     @model_validator(mode="after")
     def _one_dimensional(self) -> "LubricationScene":
-        if self.dimension == 1 and self.ny is not None:
-            raise ValueError(f"ny = {self.ny}: the scene is one-dimensional")
+        for key in ("ny", "width", "p_side"):
+            if self.dimension == 1 and getattr(self, key):
+                raise ValueError(f"{key} = {getattr(self, key)}: the scene is one-dimensional")
         return self
 
     @property
@@ -178,15 +181,20 @@ def load_scene(source: str | Path, changes: dict[str, Any] | None = None) -> Sce
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise InputError(f"{source}: {reason}") from None
+    if not data:
+        raise InputError(f"{source}: the file sets nothing; 'family' and the data of a bearing are needed")
+    if "n" in changes:  # a new number of points a side replaces the file's nx and ny too
+        data = {key: value for key, value in data.items() if key not in ("nx", "ny")}
     data = {"name": name, **data, **changes}
     family = data.get("family", "slider")
-    if family not in FAMILIES:
-        raise InputError(f"{source}: family = {family}: allowed are {', '.join(FAMILIES)}")
+    if family not in [*FAMILIES]:  # which may be no string at all
+        raise InputError(f"{source}: family = {family}: allowed are {', '.join(FAMILIES)}{nearest(str(family), FAMILIES)}")
     model: Any = FAMILIES[family].load()
     try:
         return model(**data)
     except ValidationError as error:
-        raise InputError(f"{source}: {_first_fault(error, model.model_fields)}") from None
+        names = [field.alias or name for name, field in model.model_fields.items()]
+        raise InputError(f"{source}: {_first_fault(error, names)}") from None
 
 
 def parse_changes(assignments: Iterable[str]) -> dict[str, Any]:

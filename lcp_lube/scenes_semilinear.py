@@ -1,16 +1,11 @@
 """Scenes of semilinear equations on the unit square: Bratu, and Poisson with a cubic term."""
 
-from typing import Annotated
-
 from petsc4py import PETSc
 from pydantic import Field
 
 from .problems.grid import Grid
 from .problems.semilinear import Bratu, Cubic, SemilinearProblem, Source
-from .scene import Count, NotNegative, Scene
-
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-
+from .scene import Count, Finite, NotNegative, Scene
 
 class SemilinearScene(Scene):
     """-Lap v = g(x, y, v) on the unit square, v = 0 on its boundary; a subclass has g."""
