@@ -1,11 +1,11 @@
 """Bilinear interpolation of a field from one grid of a rectangle to another one, on any number of ranks."""
 
 import numpy as np
+import scipy.sparse
 from petsc4py import PETSc
 
 from ..parallel import Array
 from .grid import Grid
-from .reynolds import csr
 
 
 class Transfer:
@@ -17,47 +17,60 @@ class Transfer:
     Parameters
     ----------
     nearest : take the nearest coarse point's value instead (for fields with jumps).
+    zero_boundary : the field is zero on the boundary: interpolate to that.
+
+    Attributes
+    ----------
+    mat : the interpolation as a matrix, for PCMG.
+    coarse_shape : points of the coarse grid.
     """
 
-    def __init__(self, coarse: Grid, fine: Grid, nearest: bool = False):
-        self._rows = fine.local_size
-        i0, wx = _weights(np.arange(fine.x_start, fine.x_end), coarse.shape[0], fine.shape[0], nearest)
-        if fine.dim == 2:
-            j0, wy = _weights(np.arange(fine.y_start, fine.y_end), coarse.shape[1], fine.shape[1], nearest)
-        else:
-            j0, wy = np.zeros(1, dtype=np.int64), np.zeros(1)
-        nx, ny = coarse.shape[0], coarse.shape[1] if coarse.dim == 2 else 1
-        rows = fine.first + np.arange(fine.local_size)
-        parts = []
-        for dj, y_weight in ((0, 1.0 - wy), (1, wy)):
-            for di, x_weight in ((0, 1.0 - wx), (1, wx)):
-                weight = (y_weight[:, None] * x_weight[None, :]).ravel()
-                column = (np.minimum(j0 + dj, ny - 1)[:, None] * nx + np.minimum(i0 + di, nx - 1)[None, :]).ravel()
-                used = weight > 0
-                parts.append((rows[used], column[used], weight[used]))
-        row, column, value = (np.concatenate(part) for part in zip(*parts, strict=True))
-        column = coarse.dm.getAO().app2petsc(column.astype(PETSc.IntType))
-        pointers, columns, order = csr(row, column, fine.first, fine.local_size)
+    def __init__(self, coarse: Grid, fine: Grid, nearest: bool = False, zero_boundary: bool = False):
+        self.coarse_shape = coarse.shape
+        ranges = ((fine.x_start, fine.x_end), (fine.y_start, fine.y_end))
+        weights = scipy.sparse.csr_matrix([[1.0]])
+        for side in range(fine.dim):
+            points = np.arange(*ranges[side])
+            along = _weights(points, coarse.shape[side], fine.shape[side], nearest, zero_boundary)
+            weights = scipy.sparse.kron(along, weights, format="csr")
+        weights.indices = coarse.dm.getAO().app2petsc(weights.indices.astype(PETSc.IntType))
+        weights.has_sorted_indices = False
+        weights.sort_indices()
+        csr = (weights.indptr.astype(PETSc.IntType), weights.indices, weights.data)
         sizes = ((fine.local_size, fine.size), (coarse.local_size, coarse.size))
-        self._mat = PETSc.Mat().createAIJ(sizes, csr=(pointers, columns, value[order]), comm=fine.dm.comm)
-        self._x, self._y = self._mat.createVecs()
+        self.mat = PETSc.Mat().createAIJ(sizes, csr=csr, comm=fine.dm.comm)
+        self._x, self._y = self.mat.createVecs()
 
     def __call__(self, field: Array) -> Array:
         """The field on the fine grid. Collective."""
         self._x.setArray(field)
-        self._mat.mult(self._x, self._y)
+        self.mat.mult(self._x, self._y)
         return self._y.array_r.copy()
 
+    def restrict(self, field: Array) -> Array:
+        """The transposed map: sums of a fine field with the weights that its points have from each coarse one. Collective."""
+        self._y.setArray(field)
+        self.mat.multTranspose(self._y, self._x)
+        return self._x.array_r.copy()
+
     def destroy(self) -> None:
-        for obj in (self._mat, self._x, self._y):
+        for obj in (self.mat, self._x, self._y):
             obj.destroy()
 
 
-def _weights(fine: np.ndarray, n_coarse: int, n_fine: int, nearest: bool) -> tuple[np.ndarray, Array]:
-    """Index of the coarse point to the left of each fine point, and the weight of the one to its right."""
-    position = (fine + 1.0) * (n_coarse + 1.0) / (n_fine + 1.0) - 1.0
-    position = np.clip(position, 0.0, n_coarse - 1.0)
+def _weights(fine: np.ndarray, n_coarse: int, n_fine: int, nearest: bool, zero_boundary: bool) -> scipy.sparse.csr_matrix:
+    """Linear interpolation along one side as a matrix, a row for each index in `fine`, a column for each coarse point."""
+    # Fine point i lies at (left + part / (n_fine + 1)) coarse spacings: integers, so that nested points get one weight, 1.
+    left, part = np.divmod((fine + 1) * (n_coarse + 1), n_fine + 1)
+    right = part / (n_fine + 1)
     if nearest:
-        position = np.rint(position)
-    left = np.minimum(np.floor(position).astype(np.int64), max(n_coarse - 2, 0))
-    return left, position - left
+        right = np.rint(right)
+    rows = np.concatenate([np.arange(fine.size)] * 2)
+    columns = np.concatenate([left - 1, left])
+    values = np.concatenate([1.0 - right, right])
+    if zero_boundary:
+        used = (columns >= 0) & (columns < n_coarse) & (values > 0)
+    else:
+        columns = np.clip(columns, 0, n_coarse - 1)
+        used = values > 0
+    return scipy.sparse.csr_matrix((values[used], (rows[used], columns[used])), shape=(fine.size, n_coarse))
