@@ -7,6 +7,7 @@ from .problems.grid import Grid
 from .problems.semilinear import Bratu, Cubic, SemilinearProblem, Source
 from .scene import Count, Finite, NotNegative, Scene
 
+
 class SemilinearScene(Scene):
     """-Lap v = g(x, y, v) on the unit square, v = 0 on its boundary; a subclass has g."""
 
