@@ -51,10 +51,16 @@ def plan(
     if problem.kind not in entry.kinds:
         fitting = [name for name, other in METHODS.items() if problem.kind in other.kinds]
         raise InputError(f"--method {method}: not for scene {scene}; allowed are {', '.join(fitting)}")
+    grid = problem.grid
+    large = grid.dim == 2 and grid.size > SMALL_2D
     if system == "auto":
         system = entry.systems[0]
+        if large and "cavity" in entry.systems and grid.box[1] == grid.shape[0] and PETSc.Sys.hasExternalPackage("hypre"):
+            system = "cavity"
+            why.append(
+                "system cavity: without the cavitated cells and scaled by its near-null vector, multigrid never breaks down"
+            )
     _known(system, entry.systems, f"method {method}: --system")
-    large = problem.grid.dim == 2 and problem.grid.size > SMALL_2D
     if nested is None:
         nested = entry.nested and large
         if nested:
@@ -70,7 +76,7 @@ def plan(
 def default_recipe(problem: Problem, system: str, large: bool) -> tuple[str, str]:
     """The inner solver that this PETSc has for this system, size and number of ranks, and why."""
     has = PETSc.Sys.hasExternalPackage
-    if problem.kind == "lubrication" and system == "reduced" and large and has("hypre"):
+    if problem.kind == "lubrication" and system in ("reduced", "cavity") and large and has("hypre"):
         return "bcgs_amg", "a large 2D M-matrix: multigrid costs the same per point on every grid"
     ranks = problem.grid.comm.size
     if problem.grid.dim == 1 and system == "reduced" and ranks == 1:

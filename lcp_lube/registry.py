@@ -47,7 +47,7 @@ METHODS: dict[str, MethodEntry] = {
     "active-set": MethodEntry(
         "lcp_lube.solvers.active_set:build",
         "semismooth Newton in z = p or -r: finitely many steps to the exact discrete solution",
-        systems=("reduced", "full"),
+        systems=("reduced", "full", "cavity"),
         nested=True,
         interior=False,
     ),
@@ -67,6 +67,7 @@ DEFAULT_METHOD = {"lubrication": "active-set", "equations": "newton"}
 SYSTEMS: dict[str, Entry] = {
     "full": Entry("lcp_lube.linear.newton_matrix:FullSystem", "the 2n-by-2n matrix [A B; R P] of the papers"),
     "reduced": Entry("lcp_lube.linear.reduced:ReducedSystem", "the n-by-n M-matrix A diag(theta) - B diag(1 - theta)"),
+    "cavity": Entry("lcp_lube.linear.cavity:CavitySystem", "full-film cells alone, the cavitated ones eliminated exactly"),
 }
 
 # A scene file's `family` names the model that validates it and builds its problem.

@@ -1,0 +1,142 @@
+"""Exact elimination of the cavitated cells, then a KSP on what is left of the full film.
+
+For theta in {0, 1}^n the unknown of a cavitated cell is r, and r is carried downstream without diffusion: what leaves a cell
+enters the next one, b_C of cell i = -b_W of cell i + 1. Adding the rows of a run of cavitated cells to the row of the full
+cell just downstream therefore cancels every r in them. What remains is the Schur complement S on the full cells,
+
+    row of S = own row of A + rows of A of the cavitated run just upstream on its x line, columns in the full film only;
+
+runs that reach the outlet are dropped, and the right-hand side is summed likewise. S has at most A's nonzeros and is again a
+column diagonally dominant M-matrix: its columns are sums over fewer rows of A's. r follows by one sweep along x.
+
+The KSP sees S diag(w), w the near-null vector of S (`nearnull`): row and column sums are then nonnegative and almost zero, as
+multigrid wants them, whatever the fronts look like.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy.sparse import coo_array
+
+from ..errors import InputError
+from ..parallel import Array
+from ..problems.problem import LubricationProblem
+from .krylov import Krylov
+from .nearnull import COARSEST, NearNull
+from .stages import Stages
+
+CYCLES = 1  # from w = 1 or the last w; more of them gain nothing (benchmarks/README.md)
+
+
+class CavitySystem:
+    """Steps of the active-set method (theta in {0, 1}) through a KSP on the Schur complement of the full film.
+
+    Raises
+    ------
+    InputError : a grid whose x lines are cut by ranks (1D, or fewer y lines than ranks, on more than one rank).
+    """
+
+    def __init__(self, problem: LubricationProblem, stages: Stages | None = None):
+        self.problem = problem
+        self.stages = stages or Stages()
+        grid = problem.grid
+        if grid.box[1] != grid.shape[0]:
+            raise InputError("--system cavity: needs every x line on one rank; take --system reduced or fewer ranks")
+        scheme = problem.scheme
+        with self.stages("assembly"):
+            ny, nx = grid.box
+            place = np.arange((ny + 2) * (nx + 2)).reshape(ny + 2, nx + 2)
+            self._offsets = [
+                (value.ravel(), place[1 + dj : 1 + dj + ny, 1 + di : 1 + di + nx].ravel())
+                for dj, di, value in scheme.pressure_entries()
+            ]
+            self._b_C = scheme.b_C.ravel()
+        self._w = np.ones(grid.local_size)  # near-null vector of the last S, 1 where there was none
+        self._column, self._line = (a.ravel() for a in np.broadcast_arrays(np.arange(nx)[None, :], np.arange(ny)[:, None]))
+        self.krylov: Krylov | None = None
+        self._mat: PETSc.Mat | None = None
+
+    @property
+    def direct(self) -> bool:
+        return self.krylov is not None and self.krylov.direct
+
+    def solve(self, D_p: Array, D_r: Array, f1: Array, f2: Array, rtol: float) -> tuple[Array, Array, int]:
+        """dp, dr and the number of linear iterations, for D_r = theta in {0, 1}, D_p = 1 - theta and f2 = 0. Collective."""
+        grid, reduce = self.problem.grid, self.problem.reduce
+        with self.stages("Jacobian"):
+            full = D_r > 0
+            target = self._targets(full)
+            local = int(full.sum())
+            first = int(grid.comm.exscan(local) or 0)
+            total = int(reduce.sum(np.array([float(local)])))
+            rows, columns, values = self._entries(full, target, first)
+            S = coo_array((values, (rows, columns)), shape=(local, total)).tocsr()
+            S.sort_indices()
+            kept = target >= 0
+            rhs = np.bincount(target[kept], weights=f1[kept], minlength=local)
+            self._release()
+            self._mat = PETSc.Mat().createAIJ(
+                ((local, total), (local, total)),
+                csr=(S.indptr.astype(PETSc.IntType), S.indices.astype(PETSc.IntType), S.data),
+                comm=grid.dm.comm,
+            )
+            x, b = self._mat.createVecs()
+            b.setArray(rhs)
+        with self.stages("near-null"):
+            if total > COARSEST:
+                hierarchy = NearNull(self._mat, self._column[full], self._line[full])
+                self._w[full] = hierarchy.improve(self._w[full], CYCLES)
+                hierarchy.destroy()
+                x.setArray(self._w[full])
+                self._mat.diagonalScale(None, x)
+        with self.stages("KSP"):
+            self.krylov = Krylov(self._mat)
+            iterations = self.krylov.solve(b, x, rtol)
+        dp = np.zeros_like(f1)
+        dp[full] = self._w[full] * x.array_r
+        x.destroy()
+        b.destroy()
+        with self.stages("Jacobian"):
+            return dp, self._void(full, f1 - self.problem.multiply(self.problem.A, dp)), iterations
+
+    def _targets(self, full: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """Local full-film number of the cell that each cell's row is added to; -1 for runs that reach the outlet."""
+        ny, nx = self.problem.grid.box
+        number = np.where(full, np.cumsum(full) - 1, -1).reshape(ny, nx)
+        here = np.where(full.reshape(ny, nx), np.arange(nx), nx)
+        downstream = np.minimum.accumulate(here[:, ::-1], axis=1)[:, ::-1]
+        found = np.take_along_axis(number, np.minimum(downstream, nx - 1), axis=1)
+        return np.where(downstream < nx, found, -1).ravel()
+
+    def _entries(self, full: NDArray[np.bool_], target: NDArray[np.int64], first: int) -> tuple[NDArray, NDArray, Array]:
+        """Rows (local), columns (global) and values of S; several to a place add up."""
+        numbers = np.where(full, first + np.cumsum(full) - 1.0, -1.0)
+        framed = np.nan_to_num(self.problem.grid.ghosted(numbers), nan=-1.0).ravel().astype(np.int64)
+        rows, columns, values = [], [], []
+        for value, place in self._offsets:
+            column = framed[place]
+            used = (column >= 0) & (target >= 0)
+            rows.append(target[used])
+            columns.append(column[used])
+            values.append(value[used])
+        return np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
+
+    def _void(self, full: NDArray[np.bool_], balance: Array) -> Array:
+        """dr of the cavitated cells from what A dp leaves of f1: b_C dr adds up along each run."""
+        ny, nx = self.problem.grid.box
+        cells = full.reshape(ny, nx)
+        carried = np.cumsum(np.where(cells, 0.0, balance.reshape(ny, nx)), axis=1)
+        last_full = np.maximum.accumulate(np.where(cells, np.arange(nx), -1), axis=1)
+        at_rupture = np.where(last_full >= 0, np.take_along_axis(carried, np.maximum(last_full, 0), axis=1), 0.0)
+        return np.where(full, 0.0, (carried - at_rupture).ravel() / self._b_C)
+
+    def _release(self) -> None:
+        if self.krylov is not None:
+            self.krylov.destroy()
+        if self._mat is not None:
+            self._mat.destroy()
+
+    def destroy(self) -> None:
+        """Free the PETSc objects."""
+        self._release()
+        self.krylov = None
