@@ -58,7 +58,7 @@ def plan(
         if large and "cavity" in entry.systems and grid.box[1] == grid.shape[0] and PETSc.Sys.hasExternalPackage("hypre"):
             system = "cavity"
             why.append(
-                "system cavity: without the cavitated cells and scaled by its near-null vector, multigrid never breaks down"
+                "system cavity: with the cavitated cells eliminated and its near-null vector scaled out, multigrid holds"
             )
     _known(system, entry.systems, f"method {method}: --system")
     if nested is None:
