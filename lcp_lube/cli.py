@@ -44,14 +44,15 @@ def scene_of(args: argparse.Namespace) -> Scene:
     return load_scene(args.scene, changes)
 
 
-def stopping_of(args: argparse.Namespace) -> Stopping:
-    for name in ("eps1", "eps2"):
-        value = getattr(args, name)
+def stopping_of(args: argparse.Namespace) -> dict[str, Any]:
+    """The tolerances that were given, and the iteration limit."""
+    given = {name: value for name in ("eps1", "eps2") if (value := getattr(args, name)) is not None}
+    for name, value in given.items():
         if not 0 < value < 1:
             raise InputError(f"--{name} {value}: allowed are numbers between 0 and 1")
     if args.max_it < 1:
         raise InputError(f"--max-it {args.max_it}: at least 1 is needed")
-    return Stopping(args.eps1, args.eps2, args.max_it)
+    return {**given, "max_it": args.max_it}
 
 
 def options_of(args: argparse.Namespace, method: str) -> dict[str, Any]:
@@ -83,8 +84,10 @@ def solution_of(args: argparse.Namespace, monitor: Monitor | None = None) -> Sol
 def run_solve(args: argparse.Namespace) -> int:
     from .output import files
 
-    for path in [*args.output, *([args.plot] if args.plot else [])]:
-        files.check_target(path, plot=path == args.plot)
+    for path in args.output:
+        files.check_target(path)
+    if args.plot:
+        files.check_target(args.plot, plot=True)
 
     def monitor(k: int, step: Step) -> None:
         if k == 1:

@@ -59,8 +59,8 @@ def save(solution: Solution, path: str | Path) -> None:
     """
     path, grid = Path(path), solution.problem.grid
     suffix = path.suffix.lower()
-    if suffix not in FIELD_FILES:
-        raise InputError(f"{path}: {_allowed(suffix, FIELD_FILES)}")
+    if wrong := _wrong_extension(suffix, plot=False):
+        raise InputError(f"{path}: {wrong}")
     fields = solution.problem.physical(solution.fields)
     with replacing(path, grid.comm) as temporary:
         if suffix == ".npz":
@@ -69,8 +69,8 @@ def save(solution: Solution, path: str | Path) -> None:
             _save_by_viewer(grid, {name: values for name, (values, _) in fields.items()}, temporary)
 
 
-def gather(grid: Grid, values: Array, stride: tuple[int, int] = (1, 1)) -> Array | None:
-    """A field on rank 0, or every stride-th point of it in x and in y; None on the other ranks. Collective.
+def gather(grid: Grid, values: Array, stride: tuple[int, int] = (1, 1)) -> Array:
+    """A field on rank 0, or every stride-th point of it in x and in y; empty on the other ranks. Collective.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def gather(grid: Grid, values: Array, stride: tuple[int, int] = (1, 1)) -> Array
     part = box[np.ix_(rows[own_rows] - grid.y_start, columns[own_columns] - grid.x_start)]
     if grid.comm.rank > 0:
         grid.comm.send((own_rows, own_columns, part), dest=0)
-        return None
+        return np.empty(0)
     out = np.empty((rows.size, columns.size))
     out[np.ix_(own_rows, own_columns)] = part
     for rank in range(1, grid.comm.size):  # one after the other: rank 0 holds the field and one part
@@ -188,16 +188,20 @@ def _view(vec: PETSc.Vec, name: str, viewer: PETSc.Viewer) -> None:
     vec.destroy()  # a VTK viewer keeps a reference until it writes
 
 
-def _allowed(suffix: str, allowed: tuple[str, ...]) -> str:
-    found = f"extension {suffix}" if suffix else "no extension"
-    return f"{found}; allowed are {', '.join(allowed)}{nearest(suffix, allowed) if suffix else ''}"
+def _wrong_extension(suffix: str, plot: bool) -> str:
+    """What is wrong with an extension, and what is allowed; empty if nothing is."""
+    allowed, others, flag = (PICTURES, FIELD_FILES, "--output") if plot else (FIELD_FILES, PICTURES, "--plot")
+    if suffix in allowed:
+        return ""
+    hint = f"; {suffix} is for {flag}" if suffix in others else nearest(suffix, allowed)
+    return f"{f'extension {suffix}' if suffix else 'no extension'}; allowed are {', '.join(allowed)}{hint}"
 
 
 def _fault(path: Path, plot: bool) -> str:
-    """What is wrong with a target; empty if nothing."""
-    suffix, allowed, folder = path.suffix.lower(), PICTURES if plot else FIELD_FILES, path.parent
-    if suffix not in allowed:
-        return _allowed(suffix, allowed)
+    """What is wrong with a target; empty if nothing is."""
+    suffix, folder = path.suffix.lower(), path.parent
+    if wrong := _wrong_extension(suffix, plot):
+        return wrong
     if plot and find_spec("matplotlib") is None:
         return "pictures need matplotlib: pip install lcp-lube[plot]"
     if suffix == ".h5" and not PETSc.Sys.hasExternalPackage("hdf5"):
