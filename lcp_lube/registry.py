@@ -1,8 +1,9 @@
 """The one place where a name is bound to code: methods, systems, recipes. Imports no PETSc."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import import_module
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -31,25 +32,54 @@ class MethodEntry(Entry):
     """A method: `target` is build(problem, stages, system, options, stopping, start) -> Method.
 
     kinds are the problems it solves (`Problem.kind`), systems the matrices it can use, its default first; nested: it can
-    start from a coarser grid's answer, which must lie strictly inside p, r > 0 if it is an interior method.
+    start from a coarser grid's answer, which must lie strictly inside p, r > 0 if it is an interior method; eps: its default
+    tolerances of ||F|| and ||alpha d||; variants: the same idea for other kinds of problems.
     """
 
     kinds: tuple[str, ...] = ("lubrication",)
     systems: tuple[str, ...] = ("full", "reduced")
     nested: bool = False
     interior: bool = True
+    eps: tuple[float, float] = (1e-8, 1e-8)
+    variants: dict[str, "MethodEntry"] = field(default_factory=dict)
+
+    def of(self, kind: str) -> "MethodEntry":
+        """The entry for one kind of problem."""
+        return self.variants.get(kind, self)
 
 
 METHODS: dict[str, MethodEntry] = {
     "din": MethodEntry(
         "lcp_lube.solvers.din:build", "damped inexact Newton of Mezzadri and Galligani (interior method)", nested=True
     ),
+    "din-pc": MethodEntry(
+        "lcp_lube.solvers.din_pc:build", "DIN with a predictor-corrector step: fewer iterations", nested=True
+    ),
     "active-set": MethodEntry(
         "lcp_lube.solvers.active_set:build",
         "semismooth Newton in z = p or -r: finitely many steps to the exact discrete solution",
+        kinds=("lubrication", "box"),
         systems=("reduced", "full", "cavity"),
         nested=True,
         interior=False,
+        variants={
+            "box": MethodEntry(
+                "lcp_lube.solvers.box_active_set:build",
+                "semismooth Newton: points in contact held, a Newton step at the others",
+                kinds=("box",),
+                systems=("jacobian",),
+                nested=True,
+                interior=False,
+                eps=(1e-8, inf),
+            )
+        },
+    ),
+    "interior": MethodEntry(
+        "lcp_lube.solvers.interior:build",
+        "inexact interior point of Bergamaschi and Zilli for box-constrained problems",
+        kinds=("box",),
+        systems=("jacobian",),
+        eps=(8e-8, inf),
     ),
     "fbn-a": MethodEntry("lcp_lube.solvers.fischer:build_armijo", "Fischer-Burmeister Newton, Armijo rule on ||F||^2/2"),
     "fbn-i": MethodEntry("lcp_lube.solvers.fischer:build_inexact", "Fischer-Burmeister Newton, inexact decrease of ||F||"),
@@ -62,7 +92,7 @@ METHODS: dict[str, MethodEntry] = {
 }
 
 # What 'auto' takes for a kind of problem.
-DEFAULT_METHOD = {"lubrication": "active-set", "equations": "newton"}
+DEFAULT_METHOD = {"lubrication": "active-set", "box": "active-set", "equations": "newton"}
 
 SYSTEMS: dict[str, Entry] = {
     "full": Entry("lcp_lube.linear.newton_matrix:FullSystem", "the 2n-by-2n matrix [A B; R P] of the papers"),
@@ -76,6 +106,7 @@ FAMILIES: dict[str, Entry] = {
     "textured": Entry("lcp_lube.scenes_textured:TexturedScene", "flat slider with square dimples"),
     "rough": Entry("lcp_lube.scenes_textured:RoughScene", "slider with one wave and a random surface"),
     "bratu": Entry("lcp_lube.scenes_semilinear:BratuScene", "Bratu's equation on the unit square"),
+    "obstacle": Entry("lcp_lube.scenes_obstacle:ObstacleScene", "Bratu's equation between two obstacles"),
     "poisson_cubic": Entry("lcp_lube.scenes_semilinear:PoissonCubicScene", "Poisson's equation with a cubic term"),
 }
 

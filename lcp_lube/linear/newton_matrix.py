@@ -64,12 +64,16 @@ class FullSystem:
         ------
         LinearSolverError : breakdown, a failed factorisation, or a result that is not finite.
         """
-        nl = f1.size
         with self.stages("Jacobian"):
             values = np.stack([D_p, D_r], axis=1).ravel()
             self.mat.setValuesIJV(self._pointers, self._columns, values, rowmap=self._rows)
             self.mat.assemble()
-            self._b.setArray(np.concatenate([f1, f2]))
+        return self.resolve(f1, f2, rtol)
+
+    def resolve(self, f1: Array, f2: Array, rtol: float) -> tuple[Array, Array, int]:
+        """Solve once more with the matrix of the last `solve`: a factorisation is not repeated. Collective."""
+        nl = f1.size
+        self._b.setArray(np.concatenate([f1, f2]))
         with self.stages("KSP"):
             iterations = self.krylov.solve(self._b, self._x, rtol)
         x = self._x.array_r.copy()

@@ -79,17 +79,22 @@ class ReducedSystem:
         ------
         LinearSolverError : breakdown, a failed factorisation, or a result that is not finite.
         """
-        problem = self.problem
         with self.stages("Jacobian"):
-            w = D_p + D_r
-            theta, g = D_r / w, f2 / w
-            scaling = self.assemble(theta)
-            if g.any() or problem.grid.comm.size > 1:
-                f1 = f1 - problem.multiply(problem.A, g) - problem.multiply(problem.B, g)
-            self._b.setArray(f1)
+            self._w = D_p + D_r
+            self._theta = D_r / self._w
+            self._scaling = self.assemble(self._theta)
+        return self.resolve(f1, f2, rtol)
+
+    def resolve(self, f1: Array, f2: Array, rtol: float) -> tuple[Array, Array, int]:
+        """Solve once more with the matrix of the last `solve`: a factorisation is not repeated. Collective."""
+        problem, theta = self.problem, self._theta
+        g = f2 / self._w
+        if g.any() or problem.grid.comm.size > 1:
+            f1 = f1 - problem.multiply(problem.A, g) - problem.multiply(problem.B, g)
+        self._b.setArray(f1)
         with self.stages("KSP"):
             iterations = self.krylov.solve(self._b, self._x, rtol)
-        y = scaling * self._x.array_r
+        y = self._scaling * self._x.array_r
         return theta * y + g, -(1.0 - theta) * y + g, iterations
 
     def destroy(self) -> None:

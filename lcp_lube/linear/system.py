@@ -24,6 +24,10 @@ class System(Protocol):
         """dp, dr and the number of linear iterations. Collective."""
         ...
 
+    def resolve(self, f1: Array, f2: Array, rtol: float) -> tuple[Array, Array, int]:
+        """The same for other right-hand sides with the matrix of the last `solve`. Collective."""
+        ...
+
     def destroy(self) -> None: ...
 
 
