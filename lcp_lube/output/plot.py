@@ -5,8 +5,6 @@ Figures are made without pyplot, so no window system is needed and no global sta
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,15 +12,14 @@ import numpy as np
 
 from ..errors import InputError
 from ..parallel import Array
-from ..problems.quantities import cavity_sign
 from ..problems.solution import Solution
-from .files import coordinates, gather, replacing
+from .files import replacing
+from .picture import Picture, collect, largest, prefix, quantity, scaled, title
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MOST_POINTS = {1: 4000, 2: 500}  # a direction; larger fields are thinned before rank 0 gathers them
 # Okabe and Ito's colours, told apart by all eyes; lines differ in their dashes too, for print.
 BLUE, RED, GREY = "#0072B2", "#D55E00", "#555555"
 MAPS = {"p": "viridis", "r": "cividis", "h": "Blues"}
@@ -36,26 +33,6 @@ STYLE: Any = {
     "hatch.linewidth": 0.5,
     "svg.hashsalt": "lcp_lube",  # the same solution gives the same file
 }
-
-
-@dataclass
-class Picture:
-    """What rank 0 draws: fields in SI as (ny, nx) arrays or (nx,) if y is empty, thinned if large.
-
-    sign is positive in the full film and negative in the cavity (`quantities.cavity_sign`); empty for problems without one.
-    """
-
-    solution: Solution
-    x: Array
-    y: Array
-    fields: dict[str, tuple[Array, str]]
-    sign: Array
-    quantities: dict[str, Any] = field(default_factory=dict)
-
-    @property
-    def length_unit(self) -> str:
-        """Metres, unless the problem is dimensionless."""
-        return "m" if any(unit for _, unit in self.fields.values()) else ""
 
 
 def plot(solution: Solution, path: str | Path) -> None:
@@ -80,22 +57,6 @@ def plot(solution: Solution, path: str | Path) -> None:
                 draw(picture).savefig(temporary, dpi=160, metadata={date: None} if date else None)
 
 
-def collect(solution: Solution) -> Picture | None:
-    """What there is to draw, on rank 0; None elsewhere. Collective."""
-    problem: Any = solution.problem
-    grid = problem.grid
-    nx, ny = (math.ceil(n / MOST_POINTS[grid.dim]) for n in (*grid.shape, 1)[:2])
-    stride = (nx, ny)
-    fields = {name: (gather(grid, values, stride), unit) for name, (values, unit) in problem.physical(solution.fields).items()}
-    sign, quantities = np.empty(0), problem.quantities(solution.fields)
-    if problem.kind == "lubrication":
-        sign = gather(grid, cavity_sign(problem, solution.p, solution.r), stride)
-    if grid.comm.rank > 0:
-        return None
-    x, *y = coordinates(grid, stride)
-    return Picture(solution, x, y[0] if y else np.empty(0), fields, sign, quantities)
-
-
 def draw(picture: Picture) -> Figure:
     """The figure that suits the problem."""
     if picture.y.size == 0:
@@ -105,46 +66,6 @@ def draw(picture: Picture) -> Figure:
     converged = picture.solution.converged
     figure.suptitle(title(picture), fontsize=10, x=0.01, ha="left", color="black" if converged else RED)
     return figure
-
-
-def title(picture: Picture) -> str:
-    """Scene, grid and the figures that an engineer asks for; a run that failed says so."""
-    solution, values = picture.solution, picture.quantities
-    shape = " x ".join(map(str, solution.problem.grid.shape))
-    parts = [f"{solution.settings.get('scene', '')} ({shape} points)"]
-    if not solution.converged:
-        return f"{parts[0]}: NOT a solution, {solution.outcome.sentence}"
-    if values.get("p_max") is not None:
-        parts.append(f"$p_{{max}}$ {_quantity(values['p_max'], 'Pa')}")
-    if values.get("load") is not None:
-        parts.append(f"load {_quantity(values['load'], 'N/m' if picture.y.size == 0 else 'N')}")
-    if values.get("cavitated_fraction") is not None:
-        parts.append(f"{100 * values['cavitated_fraction']:.1f} % cavitated{' (dotted)' * (picture.y.size > 0)}")
-    return ",  ".join(parts)
-
-
-def prefix(largest: float, unit: str) -> tuple[float, str]:
-    """(factor, unit): what takes SI values up to `largest` to numbers from 1 to 1000, and their unit."""
-    if not unit or not 0 < largest < math.inf:
-        return 1.0, unit
-    power = min(max(3 * math.floor(math.log10(largest) / 3 + 1e-12), -9), 9)
-    return 10.0**-power, {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}[power] + unit
-
-
-def _quantity(value: float, unit: str) -> str:
-    factor, unit = prefix(abs(value), unit)
-    return f"{value * factor:.4g} {unit}"
-
-
-def _scaled(values: Array, unit: str) -> tuple[Array, str]:
-    """Values in a unit that suits them, and ' (unit)' for a label."""
-    factor, unit = prefix(_largest(values), unit)
-    return values * factor, f" ({unit})" if unit else ""
-
-
-def _largest(values: Array) -> float:
-    """Largest magnitude among the finite values (a run that overflowed is drawn too); 0 where there is none."""
-    return float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
 
 
 def _new_figure(width: float, height: float) -> Figure:
@@ -176,7 +97,7 @@ def _film_maps(picture: Picture) -> Figure:
     lower = figure.add_subplot(grid[2, :], sharex=upper)
     upper.tick_params(labelbottom=False)
     section(upper, lower, picture, row)
-    upper.set_title(f"section at y = {_quantity(picture.y[row], picture.length_unit)} (dashed in the maps)", loc="left")
+    upper.set_title(f"section at y = {quantity(picture.y[row], picture.length_unit)} (dashed in the maps)", loc="left")
     return figure
 
 
@@ -195,29 +116,28 @@ def section(upper: Axes, lower: Axes, picture: Picture, row: int | None = None) 
     at_ends = problem.film(ends, np.zeros(2) if row is None else np.full(2, picture.y[row]))
     r = np.concatenate([[0.0], r, r[-1:]])
     p = np.insert(p, [0, p.size], np.array(problem.p_sides[:2]) + problem.p_c)
-    to_p = prefix(_largest(p), "Pa")[0]
-    p, label_p = _scaled(p, "Pa")
-    h, label_h = _scaled(np.insert(h, [0, h.size], at_ends), "m")
-    x, label_x = _scaled(np.insert(picture.x, [0, picture.x.size], ends), "m")
-    scale = prefix(_largest(ends), "m")[0]
+    to_p = prefix(largest(p), "Pa")[0]
+    p, label_p = scaled(p, "Pa")
+    h, label_h = scaled(np.insert(h, [0, h.size], at_ends), "m")
+    x, label_x = scaled(np.insert(picture.x, [0, picture.x.size], ends), "m")
+    scale = prefix(largest(ends), "m")[0]
 
     fronts = {name: picture.quantities[name] for name in ("rupture", "reformation") if picture.quantities.get(name) is not None}
     spans = [upper.axvspan(scale * a, scale * b, color="0.90", lw=0) for a, b in _cavities(picture.x, sign, ends, fronts)]
     for name, place in fronts.items():
         upper.axvline(scale * place, color=GREY, lw=0.8, ls=(0, (1, 2)))
-        text = f"{name}\n{_quantity(place, 'm')}"
+        text = f"{name}\n{quantity(place, 'm')}"
         upper.text(scale * place, 1.01, text, transform=upper.get_xaxis_transform(), ha="center", va="bottom", fontsize=8)
 
     right = upper.twinx()
     handles = upper.plot(x, p, color=BLUE, lw=2.0, label=NAMES["p"])
     handles += right.plot(x, r, color=RED, lw=1.8, ls="-.", label=NAMES["r"])
-    exact = problem.exact() if row is None and problem.exact is not None else None
-    if exact is not None:
+    if (exact := picture.exact) is not None:
         fine = np.linspace(ends[0], ends[1], 1201)
         handles += upper.plot(scale * fine, to_p * (exact.p(fine) + problem.p_c), "k--", lw=0.8, label="exact")
         right.plot(scale * fine, exact.r(fine), "k--", lw=0.8)
-    upper.set(ylim=(min(0.0, 1.05 * np.nanmin(p)), 1.08 * (_largest(p) or 1.0)), xlim=(x[0], x[-1]))
-    right.set_ylim(0.0, 1.08 * max(_largest(r), 1e-3))
+    upper.set(ylim=(min(0.0, 1.05 * np.nanmin(p)), 1.08 * (largest(p) or 1.0)), xlim=(x[0], x[-1]))
+    right.set_ylim(0.0, 1.08 * max(largest(r), 1e-3))
     upper.set_ylabel(NAMES["p"] + label_p, color=BLUE)
     right.set_ylabel(NAMES["r"], color=RED)
     for span in spans[:1]:
@@ -248,7 +168,7 @@ def _cavities(x: Array, sign: Array, ends: Array, fronts: dict[str, float]) -> l
 def colour_map(figure: Figure, axes: Axes, picture: Picture, name: str) -> float:
     """A map of one field with its colour bar; returns the factor from metres to the axes' unit."""
     values, unit = picture.fields[name]
-    values, label = _scaled(values, unit)
+    values, label = scaled(values, unit)
     lengths, origin = picture.solution.problem.grid.lengths, picture.solution.problem.grid.origin
     scale, length_unit = prefix(max(lengths), picture.length_unit)
     dx, dy = (a[1] - a[0] if a.size > 1 else 2 * a[0] for a in (picture.x, picture.y))
@@ -286,9 +206,9 @@ def _lines(picture: Picture) -> Figure:
     """Any fields in 1D, one above the other."""
     figure = _new_figure(7.2, 1.2 + 1.9 * len(picture.fields))
     panels = figure.subplots(len(picture.fields), 1, sharex=True, squeeze=False)[:, 0]
-    x, label_x = _scaled(picture.x, picture.length_unit)
+    x, label_x = scaled(picture.x, picture.length_unit)
     for axes, (name, (values, unit)) in zip(panels, picture.fields.items(), strict=True):
-        values, label = _scaled(values, unit)
+        values, label = scaled(values, unit)
         axes.plot(x, values, color=BLUE, lw=1.8)
         axes.set_ylabel(NAMES.get(name, name) + label)
     panels[-1].set_xlabel("x" + label_x)
