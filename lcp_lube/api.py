@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from .auto import plan
+from .auto import default_recipe, plan
 from .linear.options import recipe
 from .linear.stages import Stages
+from .problems.box import BoxProblem
 from .problems.solution import Fields, Outcome, Problem, Solution
 from .registry import METHODS
 from .scene import Scene
@@ -24,7 +25,7 @@ def solve(
     method: str = "auto",
     system: str = "auto",
     recipe_name: str | None = None,
-    stopping: Stopping | None = None,
+    stopping: Stopping | dict[str, Any] | None = None,
     options: dict[str, Any] | None = None,
     monitor: Monitor | None = None,
     comm: PETSc.Comm | None = None,
@@ -38,7 +39,7 @@ def solve(
     method, system : names in the registry, or 'auto'.
     recipe_name : options/NAME.opts for the inner solver; PETSc options that are set already win over it. By default see
         `auto.plan`, unless a -ksp_type or -pc_type is set.
-    stopping : tolerances and iteration limit.
+    stopping : tolerances and iteration limit; a dictionary gives some of them, the method's own (`MethodEntry.eps`) the rest.
     options : the method's own parameters by name (p0, r0, mu, conditions, ... of `DinOptions`).
     monitor : called after every step with its number and record.
     comm : communicator; default all ranks.
@@ -52,13 +53,14 @@ def solve(
     ------
     InputError : an unknown name, a value out of range, an option that does not fit.
     """
-    stopping = stopping or Stopping()
     begin = perf_counter()
     stages = Stages()
     with stages("setup"):
         problem = scene.build(comm)
     chosen = plan(problem, scene.name, method, system, recipe_name, nested, options or ())
-    entry = METHODS[chosen.method]
+    entry = METHODS[chosen.method].of(problem.kind)
+    if not isinstance(stopping, Stopping):
+        stopping = Stopping(**{**dict(zip(("eps1", "eps2"), entry.eps, strict=True)), **(stopping or {})})
     shapes = level_shapes(scene.shape) if chosen.nested else [scene.shape]
     start: Fields | None = None
     coarse: Problem | None = None
@@ -95,7 +97,21 @@ def solve(
                 }
             )
     fields = run.fields
+    if outcome is not Outcome.CONVERGED and entry.fallback and set(options or {}) <= {"p0"}:
+        rescue = METHODS[entry.fallback]
+        # Interior methods converge from anywhere, and only direct inner solves keep up with them on films like this one.
+        with recipe(default_recipe(problem, rescue.systems[0], large=False)[0]):
+            run = rescue.load()(problem, stages, rescue.systems[0], {}, stopping)
+            try:
+                failure = message
+                outcome, message, more = iterate(run, stopping, monitor)
+            finally:
+                run.destroy()
+        fields, steps = run.fields, steps + more
+        message = f"{chosen.method} failed ({failure}); {entry.fallback} took over: {message}"
     certificate = problem.certify(fields, stopping.eps1)
+    if outcome is not Outcome.CONVERGED and isinstance(problem, BoxProblem):
+        outcome, message = problem.explain(outcome, message)
     if outcome is Outcome.CONVERGED and not certificate.holds:
         outcome, message = Outcome.WRONG_SOLUTION, f"{message}, but the certificate fails: {certificate.failure}"
     return Solution(

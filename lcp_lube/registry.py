@@ -33,7 +33,8 @@ class MethodEntry(Entry):
 
     kinds are the problems it solves (`Problem.kind`), systems the matrices it can use, its default first; nested: it can
     start from a coarser grid's answer, which must lie strictly inside p, r > 0 if it is an interior method; eps: its default
-    tolerances of ||F|| and ||alpha d||; variants: the same idea for other kinds of problems.
+    tolerances of ||F|| and ||alpha d||; fallback: the method that takes over where this one fails; variants: the same idea for
+    other kinds of problems.
     """
 
     kinds: tuple[str, ...] = ("lubrication",)
@@ -41,6 +42,7 @@ class MethodEntry(Entry):
     nested: bool = False
     interior: bool = True
     eps: tuple[float, float] = (1e-8, 1e-8)
+    fallback: str = ""
     variants: dict[str, "MethodEntry"] = field(default_factory=dict)
 
     def of(self, kind: str) -> "MethodEntry":
@@ -53,7 +55,10 @@ METHODS: dict[str, MethodEntry] = {
         "lcp_lube.solvers.din:build", "damped inexact Newton of Mezzadri and Galligani (interior method)", nested=True
     ),
     "din-pc": MethodEntry(
-        "lcp_lube.solvers.din_pc:build", "DIN with a predictor-corrector step: fewer iterations", nested=True
+        "lcp_lube.solvers.din_pc:build",
+        "DIN with a predictor-corrector step: fewer iterations",
+        systems=("reduced", "full"),
+        nested=True,
     ),
     "active-set": MethodEntry(
         "lcp_lube.solvers.active_set:build",
@@ -62,6 +67,7 @@ METHODS: dict[str, MethodEntry] = {
         systems=("reduced", "full", "cavity"),
         nested=True,
         interior=False,
+        fallback="din-pc",
         variants={
             "box": MethodEntry(
                 "lcp_lube.solvers.box_active_set:build",

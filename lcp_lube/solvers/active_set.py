@@ -24,6 +24,7 @@ from ..problems.problem import LubricationProblem
 from ..problems.solution import Fields, Step
 from .method_options import make_options
 from .newton import Stopping
+from .steplength import StepLengthError
 
 EPS = float(np.finfo(float).eps)
 DAMPED_STEPS = (0.7, 0.5, 0.3, 0.2, 0.1, 0.05)
@@ -31,18 +32,20 @@ DAMPED_STEPS = (0.7, 0.5, 0.3, 0.2, 0.1, 0.05)
 
 @dataclass(frozen=True)
 class ActiveSetOptions:
-    """patience: steps without a fall of ||G|| by 10 % before a step is damped; p0: full film at this p (p_unit) at the start;
-    rtol: relative tolerance of iterative inner solves."""
+    """patience: steps without a fall of ||G|| by 10 % before a step is damped; give_up: steps after which it is taken to
+    cycle; p0: full film at this p (p_unit) at the start; rtol: relative tolerance of iterative inner solves."""
 
     p0: float = 1.0
     patience: int = 4
+    give_up: int = 100
     rtol: float = 1e-8
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.p0) and self.p0 > 0):
             raise InputError(f"--p0 {self.p0}: a positive number is needed")
-        if self.patience < 1:
-            raise InputError(f"active-set.patience = {self.patience}: at least 1 is needed")
+        for name in ("patience", "give_up"):
+            if getattr(self, name) < 1:
+                raise InputError(f"active-set.{name} = {getattr(self, name)}: at least 1 is needed")
         if not 0 < self.rtol < 1:
             raise InputError(f"active-set.rtol = {self.rtol}: allowed are numbers between 0 and 1")
 
@@ -71,7 +74,7 @@ class ActiveSet:
         self.z = start["p"] - start["r"] / self.s if start else np.full(problem.grid.local_size, options.p0)
         self.G = self._residual(self.z)
         self.norm = self._norm(self.z, self.G)
-        self._best, self._stalled = self.norm, 0
+        self._best, self._stalled, self._taken = self.norm, 0, 0
 
     @property
     def fields(self) -> Fields:
@@ -94,11 +97,14 @@ class ActiveSet:
         return self.problem.flow(np.maximum(z, 0.0), self.s * np.maximum(-z, 0.0))
 
     def advance(self) -> Step:
-        """One Newton step; damped by the best of DAMPED_STEPS if ||G|| has stalled.
+        """One Newton step; damped by the best of DAMPED_STEPS if ||G|| has stalled. StepLengthError after give_up steps.
 
         The step's norm counts as zero when no sign of z changed in a full step: the next one would solve the same linear
         system again.
         """
+        if self._taken == self.options.give_up:
+            raise StepLengthError(f"||G|| is at {self.norm:.1e} of ||c|| after {self._taken} steps: they seem to cycle")
+        self._taken += 1
         full = self.z >= 0
         cavity = (~full).astype(float)
         dp, dr, linear_iterations = self.system.solve(cavity, 1.0 - cavity, -self.G, np.zeros_like(self.G), self.options.rtol)
