@@ -66,7 +66,11 @@ class Krylov:
             self.ksp.setOperators(operator)
             pc = self.ksp.getPC()
             if not self._ready and pc.getType() == PETSc.PC.Type.FIELDSPLIT and self.fields:
-                pc.setFieldSplitIS(*self.fields.items())
+                # Which field is solved or eliminated first is an option of ours: PETSc has none, it goes by the calls' order.
+                order = PETSc.Options().getString("fieldsplit_order", ",".join(self.fields))
+                if sorted(order.split(",")) != sorted(self.fields):
+                    raise InputError(f"-fieldsplit_order {order}: allowed are {','.join(self.fields)} in any order")
+                pc.setFieldSplitIS(*((name, self.fields[name]) for name in order.split(",")))
             self.ksp.setUp()
             self.ksp.setUpOnBlocks()
         except PETSc.Error as error:
