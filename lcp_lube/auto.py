@@ -43,12 +43,14 @@ def plan(
     why = []
     if method == "auto":
         method = DEFAULT_METHOD[problem.kind]
-        reason = METHODS[method].line
+        reason = METHODS[method].of(problem.kind).line
         if problem.kind == "lubrication" and DIN_ONLY & set(options):
             method, reason = "din", f"{', '.join(sorted(DIN_ONLY & set(options)))} are its options"
         why.append(f"method {method}: {reason}")
     entry = METHODS[_known(method, METHODS, "--method")]
-    if problem.kind not in entry.kinds:
+    if problem.kind in entry.kinds:
+        entry = entry.of(problem.kind)
+    else:
         fitting = [name for name, other in METHODS.items() if problem.kind in other.kinds]
         raise InputError(f"--method {method}: not for scene {scene}; allowed are {', '.join(fitting)}")
     grid = problem.grid
@@ -78,6 +80,8 @@ def default_recipe(problem: Problem, system: str, large: bool) -> tuple[str, str
     has = PETSc.Sys.hasExternalPackage
     if problem.kind == "lubrication" and system in ("reduced", "cavity") and large and has("hypre"):
         return "bcgs_amg", "a large 2D M-matrix: multigrid costs the same per point on every grid"
+    if problem.kind == "box" and large:
+        return "multigrid", "a large problem with coarser grids: multigrid costs the same per point on every grid"
     ranks = problem.grid.comm.size
     if problem.grid.dim == 1 and system == "reduced" and ranks == 1:
         return "banded", "tridiagonal, an M-matrix: elimination in natural order, without pivoting or fill"

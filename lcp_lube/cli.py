@@ -16,7 +16,7 @@ from .output.results import as_dict, finite, summary
 from .problems.solution import Solution, Step
 from .registry import METHODS, SYSTEMS, recipe_line, recipe_names
 from .scene import Scene, load_scene, parse_changes, scene_line, scene_names
-from .solvers.newton import Monitor, Stopping
+from .solvers.newton import Monitor
 
 
 def run(args: argparse.Namespace) -> int:

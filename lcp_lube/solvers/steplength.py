@@ -6,11 +6,11 @@ import numpy as np
 
 from ..parallel import Array, Reduce
 
-MAX_HALVINGS = 100
+MAX_HALVINGS = 99
 
 
 class StepLengthError(ArithmeticError):
-    """No acceptable step length: a rule halved alpha MAX_HALVINGS times in vain."""
+    """No acceptable step length: a rule has cut alpha as often as it may."""
 
 
 def feasible(reduce: Reduce, *pairs: tuple[Array, Array]) -> float:
@@ -29,14 +29,16 @@ def reduction(alpha: float, gap: float) -> float:
     return alpha * max(0.8, towards if alpha == 1.0 else min(0.9995, towards))
 
 
-def halve_until(accept: Callable[[float], bool], alpha: float, theta: float = 0.5) -> tuple[float, int]:
+def halve_until(
+    accept: Callable[[float], bool], alpha: float, theta: float = 0.5, most: int = MAX_HALVINGS
+) -> tuple[float, int]:
     """Multiply alpha by theta until it is accepted; returns alpha and the number of cuts.
 
     Raises
     ------
-    StepLengthError : not accepted after MAX_HALVINGS cuts.
+    StepLengthError : not accepted after `most` cuts.
     """
-    for cuts in range(MAX_HALVINGS):
+    for cuts in range(most + 1):
         if accept(alpha):
             return alpha, cuts
         alpha *= theta

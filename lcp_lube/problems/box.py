@@ -1,0 +1,154 @@
+"""Box-constrained (mixed) complementarity: l <= v <= u and f(v), a force of the bounds where v touches them.
+
+    v_i = l_i and f_i(v) >= 0,   or   l_i < v_i < u_i and f_i(v) = 0,   or   v_i = u_i and f_i(v) <= 0.
+
+With slacks and multipliers, f(v) = z1 - z2, s1 = v - l, s2 = u - v, all >= 0, s1 z1 = s2 z2 = 0. Bounds may be infinite: with
+all of them, these are the equations f(v) = 0.
+"""
+
+from typing import Any, Protocol
+
+import numpy as np
+from petsc4py import PETSc
+
+from ..errors import InputError
+from ..parallel import Array, Reduce
+from .certificate import Certificate, certificate_tol
+from .grid import Grid
+from .solution import Fields, Outcome
+
+
+class Equations(Protocol):
+    """f and its Jacobian, on arrays of this rank's points."""
+
+    def residual(self, v: Array) -> Array:
+        """f(v); entries that overflow are inf or NaN. Collective."""
+        ...
+
+    def jacobian(self, v: Array) -> PETSc.Mat:
+        """f'(v), an n-by-n AIJ matrix that stores its whole diagonal; the next call overwrites it. Collective."""
+        ...
+
+    def scale(self, v: Array) -> float:
+        """How large the terms of f(v) are: a residual counts as small against this. Collective."""
+        ...
+
+    def destroy(self) -> None: ...
+
+
+class BoxProblem:
+    """l <= v <= u, f(v) complementary to the bounds. The one field is v.
+
+    Parameters
+    ----------
+    grid : the points; a Grid of one dimension serves where the unknowns are no points of a grid.
+    equations : f and its Jacobian.
+    lower, upper : bounds at this rank's points; -inf and inf where there are none.
+    v0 : where to start; moved into the bounds.
+
+    Raises
+    ------
+    InputError : l > u somewhere; a bound or a start that is no number.
+    """
+
+    kind = "box"
+
+    def __init__(self, grid: Grid, equations: Equations, lower: Array, upper: Array, v0: Array):
+        self.grid, self.equations, self.lower, self.upper = grid, equations, lower, upper
+        self.reduce: Reduce = grid.reduce
+        self._check_bounds()
+        self.v0 = np.clip(v0, lower, upper)
+        if not np.isfinite(self.reduce.sum(self.v0)):
+            raise InputError("v0: no finite value at some points of the grid")
+
+    def _check_bounds(self) -> None:
+        l, u = self.lower, self.upper
+        total = self.reduce.sum
+        for name, bound, wrong in (("v_lower", l, np.inf), ("v_upper", u, -np.inf)):
+            if total((np.isnan(bound) | (bound == wrong)).astype(float)):
+                raise InputError(f"{name}: no number, or {wrong:g}, at some points of the grid")
+        crossed = l > u
+        count = int(total(crossed.astype(float)))
+        if count:
+            gap = self.reduce.max(np.where(crossed, l - np.where(crossed, u, l), 0.0))
+            raise InputError(
+                f"infeasible box: v_lower > v_upper at {count} of {self.unknowns} points, by up to {gap:.3g}; "
+                "v_lower <= v_upper is needed everywhere"
+            )
+
+    @property
+    def unknowns(self) -> int:
+        return self.grid.size
+
+    def residual(self, v: Array) -> Array:
+        """f(v). Collective."""
+        return self.equations.residual(v)
+
+    def jacobian(self, v: Array) -> PETSc.Mat:
+        """f'(v); the next call overwrites it. Collective."""
+        return self.equations.jacobian(v)
+
+    def jacobian_diagonal(self, v: Array) -> Array:
+        """Diagonal of f'(v). Collective."""
+        diagonal = self.jacobian(v).getDiagonal()
+        values = diagonal.array_r.copy()
+        diagonal.destroy()
+        return values
+
+    def natural_residual(self, v: Array, f: Array, v_scale: float = 1.0, f_scale: float | Array = 1.0) -> Array:
+        """mid((v - u)/v_scale, f/f_scale, (v - l)/v_scale): zero exactly at the solutions, at least the violation of a bound."""
+        return np.clip(f / f_scale, (v - self.upper) / v_scale, (v - self.lower) / v_scale)
+
+    def scales(self, v: Array) -> tuple[float, float]:
+        """max |v| and the size of the terms of f; 1 in place of 0. Collective."""
+        return self.reduce.max(np.abs(v)) or 1.0, self.equations.scale(v) or 1.0
+
+    def certify(self, fields: Fields, eps1: float) -> Certificate:
+        """Certificate of v, from f and the bounds alone. Collective.
+
+        residual: largest natural residual, v measured against max |v| and f against the size of its terms (on fine grids
+        f itself, being of order dx dy, is small for any smooth v);
+        bound_violation: largest violation of a bound against max |v|, which residual contains.
+        """
+        v, red = fields["v"], self.reduce
+        f = self.residual(v)
+        v_scale, f_scale = self.scales(v)
+        outside = np.maximum(np.maximum(self.lower - v, v - self.upper), 0.0)
+        return Certificate(
+            measures={
+                "residual": red.max(np.abs(self.natural_residual(v, f, v_scale, f_scale))),
+                "bound_violation": red.max(outside) / v_scale,
+            },
+            tol=certificate_tol(eps1),
+            extremes={"natural_residual": red.max(np.abs(self.natural_residual(v, f)))},
+        )
+
+    def quantities(self, fields: Fields) -> dict[str, Any]:
+        """contact_lower, contact_upper: points where the force of the bound exceeds the distance to it, z > s. Collective."""
+        v, total = fields["v"], self.reduce.sum
+        f = self.residual(v)
+        return {
+            "contact_lower": int(total((f > v - self.lower).astype(float))),
+            "contact_upper": int(total((-f > self.upper - v).astype(float))),
+        }
+
+    def physical(self, fields: Fields) -> dict[str, tuple[Array, str]]:
+        """v and f(v), the force of the bounds; they have no unit."""
+        return {"v": (fields["v"], ""), "f": (self.residual(fields["v"]), "")}
+
+    def prolong(self, coarse: Any, fields: Fields, interior: bool) -> Fields:
+        """Without a grid behind the unknowns there is no coarser problem to start from."""
+        raise InputError("--nested: this problem has no coarser grids")
+
+    def coarser(self) -> "BoxProblem | None":
+        """The same problem on a coarser grid, for multigrid; None if there is none. This problem destroys it."""
+        return None
+
+    def explain(self, outcome: Outcome, message: str) -> tuple[Outcome, str]:
+        """Outcome and message of a run that failed, with what the data say about it."""
+        return outcome, message
+
+    def destroy(self) -> None:
+        """Free the PETSc objects."""
+        self.equations.destroy()
+        self.grid.destroy()

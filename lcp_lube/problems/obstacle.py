@@ -1,0 +1,181 @@
+"""Obstacle problems: -Lap v = g(x, y, v) on a rectangle where v touches neither of two obstacles, l <= v <= u; Bratu's g.
+
+f(v) = A v - b - dx dy g(v), A the five-point formula times dx dy, (4, -1) where dx = dy, and b the values on the boundary.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from petsc4py import PETSc
+
+from ..errors import InputError
+from ..parallel import Array
+from .box import BoxProblem
+from .grid import Grid
+from .reynolds import sides
+from .semilinear import Bratu, SemilinearProblem
+from .solution import Fields, Outcome
+from .transfer import Transfer
+
+Surface = Callable[[Array, Array], Array]
+
+# Largest lambda for which -Lap v = lambda e^v, v = 0 on the boundary of the unit square, has a solution. The five-point
+# formula's is smaller by about 1.5 h^2 (6.80674, 6.80777, 6.80803 for n = 32, 64, 128).
+TURNING_POINT = 6.808124
+COARSEST = 8  # points a side of multigrid's coarsest grid, at least (and as many as there are ranks)
+
+
+class ObstacleEquations:
+    """f and f' from a semilinear equation's, with values on the boundary that need not be zero."""
+
+    def __init__(self, semilinear: SemilinearProblem, boundary: Surface):
+        self.semilinear = semilinear
+        self.b = _boundary_terms(semilinear.grid, boundary)
+        self._jacobian = semilinear.A.duplicate(copy=True)
+        for option in (PETSc.Mat.Option.SYMMETRIC, PETSc.Mat.Option.SYMMETRY_ETERNAL):
+            self._jacobian.setOption(option, True)
+        self._diagonal = self._jacobian.createVecLeft()
+
+    def residual(self, v: Array) -> Array:
+        return self.semilinear.residual(v) - self.b
+
+    def jacobian(self, v: Array) -> PETSc.Mat:
+        self._diagonal.setArray(self.semilinear.jacobian_diagonal(v))
+        self._jacobian.setDiagonal(self._diagonal)
+        self._jacobian.assemble()
+        return self._jacobian
+
+    def scale(self, v: Array) -> float:
+        """max |A v - b| + max |dx dy g(v)|: the two sides of the equation."""
+        largest = self.semilinear.reduce.max
+        return largest(np.abs(self.semilinear.flow(v) - self.b)) + largest(np.abs(self.semilinear.supply(v)))
+
+    def destroy(self) -> None:
+        for obj in (self._diagonal, self._jacobian):
+            obj.destroy()
+        self.semilinear.destroy()
+
+
+class ObstacleProblem(BoxProblem):
+    """-Lap v = lambda e^v between two obstacles.
+
+    Parameters
+    ----------
+    grid : the interior points.
+    lam : lambda.
+    lower, upper : the obstacles as functions of x and y.
+    v0 : the start as a function; None: 0.01, the lower branch's side; or, where lambda lies beyond the turning point and
+        only contact with the upper obstacle can hold v, that obstacle.
+    boundary : v on the boundary.
+    coarse : this grid only serves a finer one: obstacles that cross between that one's points are no error.
+
+    Raises
+    ------
+    InputError : the obstacles cross, or a formula has no value somewhere.
+    """
+
+    def __init__(
+        self,
+        grid: Grid,
+        lam: float,
+        lower: Surface,
+        upper: Surface,
+        v0: Surface | None,
+        boundary: Surface,
+        coarse: bool = False,
+    ):
+        self.lam, self._data = lam, (lower, upper, v0, boundary)
+        l, u = (surface(grid.x, grid.y).ravel() for surface in (lower, upper))
+        if coarse:
+            l = np.minimum(l, u)
+        equations = ObstacleEquations(SemilinearProblem(grid, Bratu(lam)), boundary)
+        least, most = grid.reduce.min(equations.b), grid.reduce.max(equations.b)
+        self.homogeneous = least == most == 0.0
+        square = np.isclose(*grid.lengths, rtol=1e-12)
+        self.turning_point = TURNING_POINT / grid.lengths[0] ** 2 if square and least >= 0 else None
+        self._beyond = self.turning_point is not None and lam > self.turning_point
+        self._bounded = grid.reduce.max(u) < np.inf
+        if v0 is not None:
+            start = v0(grid.x, grid.y).ravel()
+        else:
+            start = u if self._beyond and self._bounded else np.full(grid.local_size, 0.01)
+        self._coarser: ObstacleProblem | None = None
+        self._transfer: Transfer | None = None
+        super().__init__(grid, equations, l, u, start)
+
+    def quantities(self, fields: Fields) -> dict[str, Any]:
+        """max_v, sum_v = dx dy sum v, the contact counts, and the turning point where it is known. Collective."""
+        v = fields["v"]
+        return {
+            "max_v": self.reduce.max(v),
+            "sum_v": self.grid.cell * self.reduce.sum(v),
+            **super().quantities(fields),
+            "turning_point": self.turning_point,
+        }
+
+    def explain(self, outcome: Outcome, message: str) -> tuple[Outcome, str]:
+        """Beyond the turning point there is no solution without contact with the upper obstacle.
+
+        Proof: where no upper bound acts, f(v) >= 0, so v is a supersolution of the equation without obstacles, and 0 is a
+        subsolution (v >= 0 on the boundary); the equation would then have a solution between them.
+        """
+        if not self._beyond:
+            return outcome, message
+        where = f"lambda = {self.lam:g} lies beyond the turning point {self.turning_point:.6g}"
+        if not self._bounded:
+            return Outcome.NO_SOLUTION, f"{where} and no upper bound holds v: there is no solution ({message})"
+        return outcome, (
+            f"{message}; {where}: a solution must touch v_upper, and this start did not reach it; "
+            "start nearer to v_upper with --set v0=..."
+        )
+
+    def coarser(self) -> "ObstacleProblem | None":
+        shape = tuple((n - 1) // 2 for n in self.grid.shape)
+        if self._coarser is None and min(shape) >= max(COARSEST, self.grid.comm.size):
+            grid = Grid(shape, self.grid.lengths, self.grid.dm.comm, self.grid.origin)
+            self._coarser = ObstacleProblem(grid, self.lam, *self._data, coarse=True)
+        return self._coarser
+
+    def transfer(self, coarse: Grid) -> Transfer:
+        """Bilinear interpolation from a coarser grid, zero on the boundary; made once. This problem destroys it. Collective."""
+        if self._transfer is not None and self._transfer.coarse_shape != coarse.shape:
+            self._transfer.destroy()
+            self._transfer = None
+        if self._transfer is None:
+            self._transfer = Transfer(coarse, self.grid, zero_boundary=True)
+        return self._transfer
+
+    def prolong(self, coarse: "ObstacleProblem", fields: Fields, interior: bool) -> Fields:
+        """v from a coarser grid, interpolated bilinearly and moved into the bounds. Collective."""
+        if self.homogeneous:
+            v = self.transfer(coarse.grid)(fields["v"])
+        else:
+            transfer = Transfer(coarse.grid, self.grid)
+            v = transfer(fields["v"])
+            transfer.destroy()
+        return {"v": np.clip(v, self.lower, self.upper)}
+
+    def destroy(self) -> None:
+        if self._coarser is not None:
+            self._coarser.destroy()
+        if self._transfer is not None:
+            self._transfer.destroy()
+        super().destroy()
+
+
+def _boundary_terms(grid: Grid, boundary: Surface) -> Array:
+    """What the values on the boundary add to f: (dy/dx) v west and east, (dx/dy) v south and north.
+
+    Raises
+    ------
+    InputError : the boundary's formula has no finite value at a point next to which a grid point lies.
+    """
+    dx, dy = grid.spacing
+    b = np.zeros(grid.box)
+    for at_side, (ox, oy) in zip(sides(grid), ((-dx, 0.0), (dx, 0.0), (0.0, -dy), (0.0, dy)), strict=True):
+        weight = dy / dx if ox else dx / dy
+        b += np.where(at_side, weight * boundary(grid.x + ox, grid.y + oy), 0.0)
+    if not np.isfinite(grid.reduce.sum(b)):
+        raise InputError("boundary: no finite value at some points of the boundary")
+    return b.ravel()

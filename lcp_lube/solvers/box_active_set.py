@@ -1,0 +1,121 @@
+"""Primal-dual active set for l <= v <= u and f(v): the semismooth Newton method for the natural residual.
+
+    R(v) = mid(v - u, D^-1 f(v), v - l) = 0,   D = diag f'(v) (1 where that is not positive).
+
+Points where the middle value is v - l or v - u are held at the bound, the others take a Newton step for f. Where the
+bounds in contact come out as they went in, this is Newton's method and converges as fast. The start is a coarser grid's
+answer where there is one (nested iteration): on one grid alone the contact area moves by a few cells a step.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..linear.box_system import BoxSystem
+from ..linear.krylov import Krylov
+from ..linear.stages import Stages
+from ..parallel import Array
+from ..problems.box import BoxProblem
+from ..problems.solution import Fields, Step
+from .method_options import make_options
+from .newton import Stopping
+from .steplength import halve_until, inexact_decrease
+
+Trial = tuple[Array, Array]  # v, f(v)
+HALVINGS = 12
+
+
+@dataclass(frozen=True)
+class BoxActiveSetOptions:
+    """rtol: relative tolerance of the inner solves; beta: of the decrease test of the step length."""
+
+    rtol: float = 1e-2
+    beta: float = 1e-4
+
+    def __post_init__(self) -> None:
+        for name in ("rtol", "beta"):
+            if not 0 < getattr(self, name) < 1:
+                raise InputError(f"active-set.{name} = {getattr(self, name)}: allowed are numbers between 0 and 1")
+
+
+class BoxActiveSet:
+    """The iterates v; `newton.iterate` runs it.
+
+    `norm` is the largest natural residual with f measured against the size of its terms and v against max |v|, as the
+    certificate has it; steps are measured against max |v|.
+
+    Parameters
+    ----------
+    start : field v, moved into the bounds; default problem.v0.
+    """
+
+    def __init__(self, problem: BoxProblem, system: BoxSystem, options: BoxActiveSetOptions, start: Fields | None = None):
+        self.problem, self.system, self.options = problem, system, options
+        self.v = np.clip(start["v"], problem.lower, problem.upper) if start else problem.v0
+        self.f = problem.residual(self.v)
+        self.norm = self._norm()
+
+    @property
+    def fields(self) -> Fields:
+        return {"v": self.v}
+
+    @property
+    def krylov(self) -> Krylov:
+        return self.system.krylov
+
+    def destroy(self) -> None:
+        self.system.destroy()
+
+    def _norm(self) -> float:
+        residual = self.problem.natural_residual(self.v, self.f, *self.problem.scales(self.v))
+        return self.problem.reduce.max(np.abs(residual))
+
+    def advance(self) -> Step:
+        """One Newton step on the points that touch no bound, halved until ||R|| decreases. Collective."""
+        problem, reduce, o = self.problem, self.problem.reduce, self.options
+        v, f = self.v, self.f
+        D = problem.jacobian_diagonal(v)
+        D = np.where(D > 0, D, 1.0)
+        to_lower, to_upper = v - problem.lower, v - problem.upper
+        held = (f / D >= to_lower) | (f / D <= to_upper)
+        toward = np.where(f / D >= to_lower, -to_lower, -to_upper)
+        d, iterations = self.system.solve(v, np.where(held, toward, -f), o.rtol, held=held)
+
+        @lru_cache(maxsize=1)
+        def trial(alpha: float) -> Trial:
+            at = np.clip(v + alpha * d, problem.lower, problem.upper)
+            return at, problem.residual(at)
+
+        def size(v: Array, f: Array) -> float:
+            return reduce.norm(problem.natural_residual(v, f, f_scale=D))
+
+        with self.system.stages("step length"):
+            before = size(v, f)
+            alpha, cuts = halve_until(
+                lambda alpha: inexact_decrease(before, size(*trial(alpha)), alpha, 0.0, o.beta), 1.0, most=HALVINGS
+            )
+            self.v, self.f = trial(alpha)
+            self.norm = self._norm()
+            step_norm = reduce.max(np.abs(self.v - v)) / (reduce.max(np.abs(self.v)) or 1.0)
+        return Step(self.norm, step_norm, alpha, iterations, backtracking=cuts, rtol=o.rtol)
+
+
+def build(
+    problem: BoxProblem,
+    stages: Stages,
+    system: str,
+    options: dict[str, Any],
+    stopping: Stopping,
+    start: Fields | None = None,
+) -> BoxActiveSet:
+    """The registry's door.
+
+    Raises
+    ------
+    InputError : an unknown option or a value out of range.
+    """
+    settings = make_options(BoxActiveSetOptions, "active-set", options)
+    return BoxActiveSet(problem, BoxSystem(problem, stages), settings, start)

@@ -1,0 +1,178 @@
+"""Inexact interior point of Bergamaschi and Zilli for l <= v <= u and f(v), condensed to n unknowns.
+
+    H(v, s1, s2, z1, z2) = (f(v) - z1 + z2, S1 Z1 e, S2 Z2 e, v - l - s1, u - v - s2) = 0,   s, z > 0.
+
+With b = -H but b2 = sigma mu e - S1 Z1 e, b3 = sigma mu e - S2 Z2 e, the Newton step is
+
+    C dv = b1 + S1^-1 (b2 - Z1 b4) - S2^-1 (b3 - Z2 b5),   C = f'(v) + S1^-1 Z1 + S2^-1 Z2,
+    ds1 = b4 + dv,  ds2 = b5 - dv,  dz1 = S1^-1 (b2 - Z1 ds1),  dz2 = S2^-1 (b3 - Z2 ds2),
+
+where b4 = v - l - s1 and b5 = u - v - s2. (The paper's printed dz1, dz2 are wrong, and it calls C nonsymmetric; C has
+the symmetry of f'.) Where a bound is infinite its s, z and their equations are absent.
+
+The paper leaves sigma, mu, the start and the tolerances open; the defaults here are those that reproduce its table 1.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..linear.box_system import BoxSystem
+from ..linear.krylov import Krylov
+from ..linear.stages import Stages
+from ..parallel import Array
+from ..problems.box import BoxProblem
+from ..problems.solution import Fields, Step
+from .method_options import make_options
+from .newton import Stopping
+from .steplength import feasible, halve_until, inexact_decrease
+
+RTOL = (1e-12, 0.5)  # of the inner solves: what PETSc's test can tell apart, and what still is a solve
+
+
+@dataclass(frozen=True)
+class InteriorOptions:
+    """Parameters of the interior point method.
+
+    z0: start of z1 and z2. sigma_max: sigma = min(sigma_max, mu). forcing: inner solves to ||residual|| <= forcing mu.
+    boundary: the part of the way to the boundary s, z = 0 that a step may go. beta: of the decrease test; halvings: cuts of
+    alpha before the run counts as failed. inside: at least this part of the box (of 1, if wider) between the start and the bounds.
+    """
+
+    z0: float = 1.0
+    sigma_max: float = 0.2
+    forcing: float = 0.05
+    boundary: float = 0.9999
+    beta: float = 1e-4
+    halvings: int = 5
+    inside: float = 1e-3
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.z0) and self.z0 > 0):
+            raise InputError(f"interior.z0 = {self.z0}: a positive number is needed")
+        for name in ("sigma_max", "forcing", "boundary", "beta", "inside"):
+            if not 0 < getattr(self, name) < 1:
+                raise InputError(f"interior.{name} = {getattr(self, name)}: allowed are numbers between 0 and 1")
+        if self.halvings < 1:
+            raise InputError(f"interior.halvings = {self.halvings}: at least 1 is needed")
+
+
+@dataclass(frozen=True)
+class Point:
+    """An iterate (or a step) and H there."""
+
+    v: Array
+    s1: Array
+    s2: Array
+    z1: Array
+    z2: Array
+
+
+class Interior:
+    """The iterates of the interior point method; `newton.iterate` runs it. `norm` is ||H||, all five blocks.
+
+    Parameters
+    ----------
+    start : field v; default problem.v0. Either is moved inside the bounds; the slacks are those of v.
+
+    Raises
+    ------
+    InputError : l = u somewhere: the box has no inside.
+    """
+
+    def __init__(self, problem: BoxProblem, system: BoxSystem, options: InteriorOptions, start: Fields | None = None):
+        self.problem, self.system, self.options = problem, system, options
+        l, u = problem.lower, problem.upper
+        self._has = np.isfinite(l), np.isfinite(u)
+        if problem.reduce.sum((l == u).astype(float)):
+            raise InputError("--method interior: v_lower = v_upper at some points, the box has no inside; active-set can do that")
+        margin = options.inside * np.minimum(u - l, 1.0)
+        v = np.clip(start["v"] if start else problem.v0, l + margin, u - margin)
+        s1, s2 = (np.where(has, s, 1.0) for has, s in zip(self._has, (v - l, u - v), strict=True))
+        z1, z2 = (np.where(has, options.z0, 0.0) for has in self._has)
+        # Without a bound, s = 1 and z = 0 stay as they are.
+        self.at = Point(v, s1, s2, z1, z2)
+        self.H = self._H(self.at)
+        self.norm = problem.reduce.norm(*self.H)
+        self._pairs = problem.reduce.sum(self._has[0].astype(float)) + problem.reduce.sum(self._has[1].astype(float))
+
+    @property
+    def fields(self) -> Fields:
+        return {"v": self.at.v}
+
+    @property
+    def krylov(self) -> Krylov:
+        return self.system.krylov
+
+    def destroy(self) -> None:
+        self.system.destroy()
+
+    def _H(self, at: Point) -> tuple[Array, ...]:
+        """The five blocks; zero where a bound is absent."""
+        has1, has2 = self._has
+        return (
+            self.problem.residual(at.v) - at.z1 + at.z2,
+            at.s1 * at.z1,
+            at.s2 * at.z2,
+            np.where(has1, at.v - self.problem.lower - at.s1, 0.0),
+            np.where(has2, self.problem.upper - at.v - at.s2, 0.0),
+        )
+
+    def advance(self) -> Step:
+        """One inexact Newton step on the perturbed equations, then alpha by feasibility and backtracking. Collective."""
+        o, reduce, at, H = self.options, self.problem.reduce, self.at, self.H
+        has1, has2 = self._has
+        mu = (reduce.sum(H[1]) + reduce.sum(H[2])) / (self._pairs or 1.0)
+        sigma = min(o.sigma_max, mu)
+        b1, b4, b5 = -H[0], H[3], H[4]
+        b2, b3 = (np.where(has, sigma * mu - H[k], 0.0) for has, k in ((has1, 1), (has2, 2)))
+        rhs = b1 + (b2 - at.z1 * b4) / at.s1 - (b3 - at.z2 * b5) / at.s2
+        size = reduce.norm(rhs)
+        wanted = o.forcing * (mu if self._pairs else size)
+        rtol = float(np.clip(wanted / size, *RTOL)) if size > 0 else RTOL[1]
+        dv, iterations = self.system.solve(at.v, rhs, rtol, shift=at.z1 / at.s1 + at.z2 / at.s2)
+        ds1, ds2 = np.where(has1, b4 + dv, 0.0), np.where(has2, b5 - dv, 0.0)
+        step = Point(dv, ds1, ds2, (b2 - at.z1 * ds1) / at.s1, (b3 - at.z2 * ds2) / at.s2)
+
+        with self.system.stages("step length"):
+            alpha, cuts, self.at, self.H = self._step_length(step)
+            self.norm = reduce.norm(*self.H)
+            step_norm = alpha * reduce.norm(step.v, step.s1, step.s2, step.z1, step.z2)
+        return Step(self.norm, step_norm, alpha, iterations, 0, cuts, sigma, rtol)
+
+    def _step_length(self, step: Point) -> tuple[float, int, Point, tuple[Array, ...]]:
+        """alpha, the number of cuts, the new point and H there."""
+        o, at, reduce = self.options, self.at, self.problem.reduce
+        pairs = [(o.boundary * getattr(at, name), getattr(step, name)) for name in ("s1", "s2", "z1", "z2")]
+        alpha = feasible(reduce, *pairs)
+
+        @lru_cache(maxsize=1)
+        def trial(alpha: float) -> tuple[Point, tuple[Array, ...]]:
+            new = Point(*(getattr(at, name) + alpha * getattr(step, name) for name in ("v", "s1", "s2", "z1", "z2")))
+            return new, self._H(new)
+
+        def decreases(alpha: float) -> bool:
+            return inexact_decrease(self.norm, reduce.norm(*trial(alpha)[1]), alpha, 0.0, o.beta)
+
+        alpha, cuts = halve_until(decreases, alpha, most=o.halvings)
+        return alpha, cuts, *trial(alpha)
+
+
+def build(
+    problem: BoxProblem,
+    stages: Stages,
+    system: str,
+    options: dict[str, Any],
+    stopping: Stopping,
+    start: Fields | None = None,
+) -> Interior:
+    """The registry's door.
+
+    Raises
+    ------
+    InputError : an unknown option or a value out of range.
+    """
+    return Interior(problem, BoxSystem(problem, stages), make_options(InteriorOptions, "interior", options), start)
