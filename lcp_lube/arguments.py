@@ -7,7 +7,7 @@ from typing import Any, NoReturn
 
 from . import __version__
 from .errors import InputError, nearest
-from .registry import scene_names
+from .registry import STABILITY, scene_names
 
 
 class Parser(argparse.ArgumentParser):
@@ -129,16 +129,32 @@ def parse(own: list[str]) -> argparse.Namespace:
     table.add_argument("number", type=int, metavar="K")
     table.add_argument("--paper", default="mezzadri", choices=["mezzadri", "bergamaschi"])
     table.add_argument("--quick", action="store_true", help="leave the long rows out")
-    table.add_argument(
+    _results_option(table)
+
+    chart = command("chart", "long experiments: the runs in a csv, the pictures drawn from it")
+    charts = chart.add_subparsers(dest="chart", required=True, metavar="precision|stability", parser_class=Parser)
+    text = "error against the exact solution and what it costs, for every method, system and recipe"
+    precision = charts.add_parser("precision", help=text, description=text, allow_abbrev=False)
+    precision.add_argument("scenes", nargs="*", metavar="SCENE", help="with an exact solution; default problem1 to problem3")
+    text = "where methods fail: " + "; ".join(f"{name}, {entry.line}" for name, entry in STABILITY.items())
+    stability = charts.add_parser("stability", help=text, description=text, allow_abbrev=False)
+    stability.add_argument("maps", nargs="*", metavar="MAP", help=f"any of {', '.join(STABILITY)}; default all")
+    for parser_of_chart in (precision, stability):
+        parser_of_chart.add_argument("--quick", action="store_true", help="a small chart in seconds, with a csv of its own")
+        _results_option(parser_of_chart)
+
+    command("list", "scenes, methods, systems and recipes, each with a line")
+    return parser.parse_args(own)
+
+
+def _results_option(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
         "--results",
         type=Path,
         default=Path("lcp_lube_results"),
         metavar="DIR",
         help="where the runs are kept: those that are there are not made again; default lcp_lube_results",
     )
-
-    command("list", "scenes, methods, systems and recipes, each with a line")
-    return parser.parse_args(own)
 
 
 def _scene_options(parser: argparse.ArgumentParser) -> None:

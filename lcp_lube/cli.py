@@ -14,7 +14,7 @@ from .errors import InputError, nearest
 from .linear.options import check_unread
 from .output.results import as_dict, finite, summary
 from .problems.solution import Solution, Step
-from .registry import METHODS, SYSTEMS, recipe_line, recipe_names
+from .registry import METHODS, STABILITY, SYSTEMS, recipe_line, recipe_names
 from .scene import Scene, load_scene, parse_changes, scene_line, scene_names
 from .solvers.newton import Monitor
 
@@ -143,6 +143,17 @@ def run_table(args: argparse.Namespace) -> int:
     return run_published_table(args.paper, args.number, quick=args.quick, results=args.results)
 
 
+def run_chart(args: argparse.Namespace) -> int:
+    if args.chart == "precision":
+        from .chart.precision import chart
+
+        return chart(args.scenes, quick=args.quick, results=args.results)
+    for name in args.maps:
+        if name not in STABILITY:
+            raise InputError(f"chart stability {name}: allowed are {', '.join(STABILITY)}{nearest(name, STABILITY)}")
+    return max(STABILITY[name].load()(quick=args.quick, results=args.results) for name in args.maps or STABILITY)
+
+
 def run_list(args: argparse.Namespace) -> int:
     groups = {
         "scenes": {name: scene_line(name) for name in scene_names()},
@@ -161,5 +172,6 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "solve": run_solve,
     "compare": run_compare,
     "table": run_table,
+    "chart": run_chart,
     "list": run_list,
 }

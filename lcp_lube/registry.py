@@ -116,6 +116,11 @@ FAMILIES: dict[str, Entry] = {
     "poisson_cubic": Entry("lcp_lube.scenes_semilinear:PoissonCubicScene", "Poisson's equation with a cubic term"),
 }
 
+# The maps of `chart stability`: each makes its runs and draws them.
+STABILITY: dict[str, Entry] = {
+    "starts": Entry("lcp_lube.chart.starts:chart", "starting vectors p0, r0 from 1e-15 to 1e3 by rule for mu (DIN)"),
+}
+
 
 def scene_names() -> list[str]:
     return sorted(path.stem for path in SCENE_DIR.glob("*.toml"))

@@ -1,0 +1,66 @@
+"""What the pictures of the charts share: print size, colours and markers that all eyes tell apart, a sentence underneath."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mpi4py import MPI
+
+from ..output.files import replacing
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+WIDTH = 7.2  # inches: a page's text width, so that the type is read at the size it is set
+# Okabe and Ito's colours, each with a marker of its own.
+SERIES = (
+    ("#0072B2", "o"),
+    ("#009E73", "s"),
+    ("#D55E00", "^"),
+    ("#CC79A7", "v"),
+    ("#E69F00", "D"),
+    ("#56B4E9", "P"),
+    ("#000000", "*"),
+)
+STYLE: Any = {
+    "font.size": 8.0,
+    "axes.titlesize": 8.5,
+    "axes.labelsize": 8.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+    "legend.fontsize": 8.0,
+    "lines.linewidth": 1.2,
+    "lines.markersize": 4.0,
+    "svg.hashsalt": "lcp_lube",  # the same csv gives the same file
+}
+
+
+def save(build: Callable[[], Figure], path: Path, comm: MPI.Comm) -> None:
+    """Draw on rank 0 with the charts' style and replace the picture. Collective.
+
+    Raises
+    ------
+    InputError : the file cannot be written.
+    """
+    import matplotlib as mpl
+
+    with replacing(path, comm) as temporary:
+        if comm.rank == 0:
+            with mpl.rc_context(STYLE):
+                build().savefig(temporary, dpi=200)
+
+
+def new_figure(height: float, sentence: str) -> Figure:
+    """A figure of the page's width with a sentence under it."""
+    from matplotlib.figure import Figure
+
+    text = textwrap.fill(sentence, 128)
+    below = (0.14 * (text.count("\n") + 1) + 0.08) / height
+    figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    figure.get_layout_engine().set(rect=(0.0, below, 1.0, 1.0 - below))
+    figure.text(0.01, 0.06 / height, text, va="bottom", ha="left", linespacing=1.15)
+    return figure

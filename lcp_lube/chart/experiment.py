@@ -1,0 +1,79 @@
+"""What the charts share: where their runs are kept, and one run as a row."""
+
+from collections.abc import Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from ..api import solve
+from ..errors import InputError
+from ..linear.options import LATE, set_names
+from ..output.resumable import ResumableCsv
+from ..output.results import as_dict, machine, versions
+from ..problems.solution import Step
+from ..scene import Scene
+
+KRYLOV_LIMIT = "krylov_limit"  # an outcome of the charts, beside those of `Outcome`
+RECORD = """outcome iterations linear_iterations centrality backtracking c1 c2 ksp_type pc_type load rupture min_p min_r
+    machine petsc message""".split()  # noqa: SIM905
+
+
+def open_store(path: Path, key: Sequence[str], columns: Sequence[str]) -> ResumableCsv:
+    """The csv of a chart, with the columns `key`, `columns` and RECORD. Collective.
+
+    Raises
+    ------
+    InputError : matplotlib is missing, PETSc options are set that would change every run, or the csv cannot be read.
+    """
+    if find_spec("matplotlib") is None:
+        raise InputError("chart: pictures need matplotlib: pip install lcp-lube[plot]")
+    foreign = sorted(set_names() - LATE)
+    if foreign:
+        raise InputError(f"-{foreign[0]}: the runs of a chart bring their own inner solvers")
+    return ResumableCsv(path, [*key, *columns, *RECORD], key)
+
+
+class _Enough(Exception):
+    """Leaves a run from within its monitor."""
+
+
+def run(scene: Scene, krylov_limit: float = float("inf"), **choices: Any) -> dict[str, Any]:
+    """One run, however it ends: RECORD, `seconds` and the rest of the JSON's keys. Collective.
+
+    Parameters
+    ----------
+    scene, choices : as `api.solve` takes them.
+    krylov_limit : the run is left after the step in which its Krylov iterations pass this number; of its answer nothing is
+        then known. Counted in iterations, not in seconds: a limit that falls on the same step on every machine.
+
+    Raises
+    ------
+    InputError : the run was refused.
+    """
+    steps: list[Step] = []
+
+    def monitor(k: int, step: Step) -> None:
+        steps.append(step)
+        if sum(step.linear_iterations for step in steps) > krylov_limit:
+            raise _Enough
+
+    begin = perf_counter()
+    environment = {"machine": machine(), "petsc": versions()["petsc"]}
+    try:
+        solution = solve(scene, monitor=monitor, **choices)
+    except _Enough:
+        return {
+            **environment,
+            "outcome": KRYLOV_LIMIT,
+            "message": f"left after {krylov_limit:,.0f} Krylov iterations with ||F|| = {steps[-1].norm:.2e}",
+            "seconds": perf_counter() - begin,
+            "iterations": len(steps),
+            **{name: sum(getattr(s, name) for s in steps) for name in ("linear_iterations", "centrality", "backtracking")},
+            "c1": steps[-1].norm,
+            "c2": steps[-1].step_norm,
+        }
+    try:
+        return {**environment, **as_dict(solution), "seconds": solution.times["total"]}
+    finally:
+        solution.destroy()
