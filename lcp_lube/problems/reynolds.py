@@ -102,38 +102,56 @@ def _coefficients(
     p_unit: float,
     mean_cubes: bool,
 ) -> BoxScheme:
-    dx = grid.spacing[0]
-    x, y = np.broadcast_arrays(grid.x, grid.y)
-    h = film(x, y)
+    # Nodes with their outer neighbours, and faces: each coordinate comes from its number alone, so that the two cells of a
+    # face see the same film even where it jumps there, and what leaves one cell enters the next.
+    dx, (ny, nx) = grid.spacing[0], grid.box
+    x_nodes, x_faces = (grid.origin[0] + i * dx for i in _numbers(grid.x_start, grid.x_end))
+    x, y = x_nodes[None, 1:-1], grid.y
+    h_x = np.broadcast_to(film(x_nodes[None, :], y), (ny, nx + 2))
+    h_face = np.broadcast_to(film(x_faces[None, :], y), (ny, nx + 1))
+    h = np.array(h_x[:, 1:-1])
 
-    def cube(ox: float, oy: float) -> Array:
+    def cubes(at_faces: Array, at_nodes: Array, axis: int) -> tuple[Array, Array]:
+        """h^3 at the two faces of every cell in one direction."""
         if mean_cubes:
-            return 0.5 * (h**3 + film(x + 2 * ox, y + 2 * oy) ** 3)
-        return film(x + ox, y + oy) ** 3
+            nodal = np.moveaxis(at_nodes, axis, 0) ** 3
+            cube = 0.5 * (nodal[:-1] + nodal[1:])
+        else:
+            cube = np.moveaxis(at_faces, axis, 0) ** 3
+        return np.moveaxis(cube[:-1], 0, axis), np.moveaxis(cube[1:], 0, axis)
 
     k = p_unit / (6.0 * mu)
-    k_W, k_E = k * cube(-dx / 2, 0.0) / dx, k * cube(dx / 2, 0.0) / dx
+    k_W, k_E = (k * cube / dx for cube in cubes(h_face, h_x, 1))
     if grid.dim == 2:
         dy = grid.spacing[1]
-        k_S, k_N = (k * cube(0.0, o) * dx / dy**2 for o in (-dy / 2, dy / 2))
+        y_nodes, y_faces = (grid.origin[1] + j * dy for j in _numbers(grid.y_start, grid.y_end))
+        h_y = np.broadcast_to(film(x, y_nodes[:, None]), (ny + 2, nx))
+        at_y_faces = np.broadcast_to(film(x, y_faces[:, None]), (ny + 1, nx))
+        k_S, k_N = (k * cube * dx / dy**2 for cube in cubes(at_y_faces, h_y, 0))
     else:
         k_S = k_N = np.zeros(grid.box)
 
     first = (np.arange(grid.x_start, grid.x_end) == 0)[None, :]
+    h_W = h_x[:, :-2]
     if scheme == "upwind":
-        couette_W, couette_E = U * film(x - dx, y), U * h
+        couette_W, couette_E = U * h_W, U * h
     else:
-        couette_W, couette_E = U * film(x - dx / 2, y), U * film(x + dx / 2, y)
+        couette_W, couette_E = U * h_face[:, :-1], U * h_face[:, 1:]
     if scheme == "face":
         b_C, b_W = -couette_E, couette_W
     else:
-        b_C, b_W = -U * h, U * film(x - dx, y)
+        b_C, b_W = -U * h, U * h_W
     b_W = np.where(first, 0.0, b_W)  # r = 0 on the inflow boundary
 
     c = couette_W - couette_E
     for conductance, at_side, p_side in zip((k_W, k_E, k_S, k_N), sides(grid), p_sides, strict=True):
         c = c + np.where(at_side, conductance * (p_side / p_unit), 0.0)
     return BoxScheme(k_W, k_E, k_S, k_N, b_C, b_W, c, couette_W, couette_E, h)
+
+
+def _numbers(start: int, end: int) -> tuple[Array, Array]:
+    """Numbers, in spacings from the boundary, of the nodes from point start - 1 to end, and of the faces between them."""
+    return np.arange(start - 1, end + 1) + 1.0, np.arange(start, end + 1) + 0.5
 
 
 def sides(grid: Grid) -> tuple[NDArray[np.bool_], ...]:
