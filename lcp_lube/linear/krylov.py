@@ -42,8 +42,9 @@ class Krylov:
             self.ksp.setFromOptions()
         except PETSc.Error as error:
             raise InputError(explain_error(error)) from None
-        except (ImportError, AttributeError) as error:  # PETSc imports the class of a python PC here
-            raise InputError(f"-pc_python_type {options.getString('pc_python_type', '')}: {error}") from None
+        except (ImportError, AttributeError) as error:  # PETSc imports the class of a python PC or KSP here
+            given_types = [f"-{name} {options.getString(name)}" for name in ("ksp_python_type", "pc_python_type") if name in given]
+            raise InputError(f"{' '.join(given_types)}: {error}") from None
 
     @property
     def direct(self) -> bool:
