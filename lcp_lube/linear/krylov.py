@@ -43,8 +43,8 @@ class Krylov:
         except PETSc.Error as error:
             raise InputError(explain_error(error)) from None
         except (ImportError, AttributeError) as error:  # PETSc imports the class of a python PC or KSP here
-            given_types = [f"-{name} {options.getString(name)}" for name in ("ksp_python_type", "pc_python_type") if name in given]
-            raise InputError(f"{' '.join(given_types)}: {error}") from None
+            names = [f"-{name} {options.getString(name)}" for name in ("ksp_python_type", "pc_python_type") if name in given]
+            raise InputError(f"{' '.join(names)}: {error}") from None
 
     @property
     def direct(self) -> bool:
