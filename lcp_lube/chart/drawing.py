@@ -57,10 +57,10 @@ def save(build: Callable[[], Figure], path: Path, comm: MPI.Comm) -> None:
 def new_figure(height: float, sentence: str) -> Figure:
     """A figure of the page's width with a sentence under it."""
     from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
     text = textwrap.fill(sentence, 128)
     below = (0.14 * (text.count("\n") + 1) + 0.08) / height
-    figure = Figure(figsize=(WIDTH, height), layout="constrained")
-    figure.get_layout_engine().set(rect=(0.0, below, 1.0, 1.0 - below))
+    figure = Figure(figsize=(WIDTH, height), layout=ConstrainedLayoutEngine(rect=(0.0, below, 1.0, 1.0 - below)))
     figure.text(0.01, 0.06 / height, text, va="bottom", ha="left", linespacing=1.15)
     return figure

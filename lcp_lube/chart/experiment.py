@@ -3,14 +3,14 @@
 from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import Any
 
 from ..api import solve
 from ..errors import InputError
 from ..linear.options import LATE, set_names
-from ..output.resumable import ResumableCsv
 from ..output.results import as_dict, machine, versions
+from ..output.resumable import ResumableCsv
 from ..problems.solution import Step
 from ..scene import Scene
 
@@ -39,7 +39,7 @@ class _Enough(Exception):
 
 
 def run(scene: Scene, krylov_limit: float = float("inf"), **choices: Any) -> dict[str, Any]:
-    """One run, however it ends: RECORD, `seconds` and the rest of the JSON's keys. Collective.
+    """One run, however it ends: RECORD, `wall_s`, `cpu_s` (this rank's) and the rest of the JSON's keys. Collective.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def run(scene: Scene, krylov_limit: float = float("inf"), **choices: Any) -> dic
         if sum(step.linear_iterations for step in steps) > krylov_limit:
             raise _Enough
 
-    begin = perf_counter()
+    begin, cpu_begin = perf_counter(), process_time()
     environment = {"machine": machine(), "petsc": versions()["petsc"]}
     try:
         solution = solve(scene, monitor=monitor, **choices)
@@ -67,13 +67,15 @@ def run(scene: Scene, krylov_limit: float = float("inf"), **choices: Any) -> dic
             **environment,
             "outcome": KRYLOV_LIMIT,
             "message": f"left after {krylov_limit:,.0f} Krylov iterations with ||F|| = {steps[-1].norm:.2e}",
-            "seconds": perf_counter() - begin,
+            "wall_s": perf_counter() - begin,
+            "cpu_s": process_time() - cpu_begin,
             "iterations": len(steps),
             **{name: sum(getattr(s, name) for s in steps) for name in ("linear_iterations", "centrality", "backtracking")},
             "c1": steps[-1].norm,
             "c2": steps[-1].step_norm,
         }
+    cpu_s = process_time() - cpu_begin
     try:
-        return {**environment, **as_dict(solution), "seconds": solution.times["total"]}
+        return {**environment, **as_dict(solution), "wall_s": solution.times["total"], "cpu_s": cpu_s}
     finally:
         solution.destroy()

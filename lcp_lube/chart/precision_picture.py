@@ -19,14 +19,20 @@ LEVELS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 
 # Panels from top to bottom, by what the inner solver sees.
 PANELS: dict[str, Callable[[Row], bool]] = {
-    "2n system, direct": lambda row: row["system"] == "full" and row["ksp_type"] == "preonly",
-    "2n system, Krylov": lambda row: row["system"] == "full" and row["ksp_type"] != "preonly",
-    "n-by-n system": lambda row: row["system"] != "full",
+    "2n system, direct": lambda row: row["nested"] != "True" and row["system"] == "full" and row["ksp_type"] == "preonly",
+    "2n system, Krylov": lambda row: row["nested"] != "True" and row["system"] == "full" and row["ksp_type"] != "preonly",
+    "n-by-n system": lambda row: row["nested"] != "True" and row["system"] != "full",
+    "nested iteration": lambda row: row["nested"] == "True",
 }
 AXES = {
     "load": "relative error of the load",
     "rupture": "error of the rupture point / L",
 }
+
+
+def seconds(row: Row) -> float:
+    """What a run costs: seconds by the clock, or of the processor where that is less, because other jobs slowed the clock."""
+    return min(float(row["wall_s"]), float(row["cpu_s"]))
 
 
 def error(row: Row, quantity: str) -> float | None:
@@ -40,16 +46,11 @@ def error(row: Row, quantity: str) -> float | None:
     return max(values) if row["outcome"] == "converged" and values else None
 
 
-def label(row: Row) -> str:
-    """The method, nested or not."""
-    return row["method"] + ", nested" * (row["nested"] == "True")
-
-
 def front(rows: Sequence[Row], quantity: str) -> list[Row]:
     """The Pareto front: runs that no other one beats in seconds and in error, from fast to accurate."""
     best: list[Row] = []
     least = float("inf")
-    for row in sorted(rows, key=lambda row: float(row["seconds"])):
+    for row in sorted(rows, key=lambda row: seconds(row)):
         here = error(row, quantity)
         if here is not None and here < least:
             best.append(row)
@@ -61,12 +62,13 @@ def cheapest(rows: Sequence[Row]) -> list[str]:
     """Lines of a table: for each scene and method the seconds of its fastest run within each of LEVELS, and which one it is."""
     lines = []
     for scene in dict.fromkeys(row["scene"] for row in rows):
-        lines.append(f"{scene}: seconds of the fastest run whose load is within" + "".join(f"{_percent(x):>10}" for x in LEVELS))
+        head = f"{scene}: seconds of the fastest run whose load is within"
+        lines.append(head + "".join(f"{_percent(level):>10}" for level in LEVELS))
         mine = [row for row in rows if row["scene"] == scene]
-        for name in dict.fromkeys(label(row) for row in mine):
-            runs = [fastest([row for row in mine if label(row) == name], level) for level in LEVELS]
-            cells = "".join(f"{float(run['seconds']):>10.2g}" if run else f"{'-':>10}" for run in runs)
-            lines.append(f"  {name:<{len(scene) + 47}}{cells}")
+        for method in dict.fromkeys(row["method"] for row in mine):
+            runs = [fastest([row for row in mine if row["method"] == method], level) for level in LEVELS]
+            cells = "".join(f"{seconds(run):>10.2g}" if run else f"{'-':>10}" for run in runs)
+            lines.append(f"  {method:<{len(head) - 2}}{cells}")
         for level in LEVELS:
             run = fastest(mine, level)
             if run:
@@ -81,7 +83,9 @@ def fastest(rows: Sequence[Row], level: float) -> Row | None:
 
 def describe(row: Row) -> str:
     """A run in a few words."""
-    return f"{label(row)}, {row['system']} system, {row['recipe']}, n = {row['n']}, {1e3 * float(row['seconds']):.3g} ms"
+    nested = ", nested" * (row["nested"] == "True")
+    inner = f"{row['system']} system, {row['recipe']}"
+    return f"{row['method']}{nested}, {inner}, eps {float(row['eps']):g}, n = {row['n']}: {1e3 * seconds(row):.3g} ms"
 
 
 def _percent(level: float) -> str:
@@ -96,8 +100,8 @@ def draw(rows: Sequence[Row], quantity: str, path: Path, comm: MPI.Comm) -> None
 def picture(rows: Sequence[Row], quantity: str) -> Figure:
     """A column a scene, a row a kind of inner solve; lines join a method's fastest runs over the grids."""
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
-    names = list(dict.fromkeys(label(row) for row in rows))
-    figure = new_figure(8.2, caption(rows, quantity))
+    names = list(dict.fromkeys(row["method"] for row in rows))
+    figure = new_figure(8.8, caption(rows, quantity))
     grid = figure.subplots(len(PANELS), len(scenes), sharex=True, sharey=True, squeeze=False)
     accurate = [value for row in rows if (value := error(row, quantity))]
     failed_at = 4 * max(accurate, default=1.0)
@@ -107,22 +111,20 @@ def picture(rows: Sequence[Row], quantity: str) -> Figure:
             _front_line(axes, front(mine, quantity), quantity)
             inside = [row for row in mine if belongs(row)]
             for name, style in zip(names, SERIES, strict=False):
-                _series(axes, [row for row in inside if label(row) == name], quantity, style, failed_at)
+                _series(axes, [row for row in inside if row["method"] == name], quantity, style, failed_at)
             axes.set(xscale="log", yscale="log")
             axes.grid(which="major", color="0.9", lw=0.6)
-            axes.set_title(title, loc="left", fontsize=8.0)
+            if column == 0:
+                axes.set_ylabel(f"{title}\n{AXES[quantity]}")
         grid[0, column].set_title(scene, fontweight="bold")
         grid[-1, column].set_xlabel("seconds")
-    for axes in grid[:, 0]:
-        axes.set_ylabel(AXES[quantity])
     figure.legend(handles=_legend(names, rows), loc="outside upper center", ncols=4)
     return figure
 
 
 def _front_line(axes: Axes, best: Sequence[Row], quantity: str) -> None:
-    seconds = [float(row["seconds"]) for row in best]
-    errors = [error(row, quantity) for row in best]
-    axes.step(seconds, errors, where="post", color="0.75", lw=4.0, solid_capstyle="butt", zorder=1)
+    errors = [error(row, quantity) or 0.0 for row in best]
+    axes.step([seconds(row) for row in best], errors, where="post", color="0.75", lw=4.0, solid_capstyle="butt", zorder=1)
 
 
 def _series(axes: Axes, rows: Sequence[Row], quantity: str, style: tuple[str, str], failed_at: float) -> None:
@@ -132,10 +134,10 @@ def _series(axes: Axes, rows: Sequence[Row], quantity: str, style: tuple[str, st
         points = []
         for n in dict.fromkeys(row["n"] for row in rows):
             here = [row for row in rows if row["eps"] == eps and row["n"] == n and error(row, quantity)]
-            points += sorted(here, key=lambda row: float(row["seconds"]))[:1]
-        seconds = [float(row["seconds"]) for row in points]
-        axes.plot(seconds, [error(row, quantity) for row in points], color=colour, marker=marker, **_tolerance(eps))
-    failed = [float(row["seconds"]) for row in rows if row["outcome"] != "converged"]
+            points += sorted(here, key=lambda row: seconds(row))[:1]
+        errors = [error(row, quantity) or 0.0 for row in points]
+        axes.plot([seconds(row) for row in points], errors, color=colour, marker=marker, **_tolerance(eps))
+    failed = [seconds(row) for row in rows if row["outcome"] != "converged"]
     axes.plot(failed, [failed_at] * len(failed), ls="none", marker="x", color=colour, ms=5.0)
 
 
