@@ -68,22 +68,25 @@ def draw(picture: Picture) -> Figure:
     return figure
 
 
-def _new_figure(width: float, height: float) -> Figure:
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure, sizes in inches."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")
 
 
 def _film_line(picture: Picture) -> Figure:
-    figure = _new_figure(7.2, 5.2)
+    figure = new_figure(7.2, 5.2)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[2.6, 1.0])
-    section(upper, lower, picture)
+    handles = section(upper, lower, picture)
+    above = 1.1 if picture.quantities.get("rupture") is not None else 0.98  # over the fronts' names
+    upper.legend(handles=handles, ncols=4, loc="lower right", bbox_to_anchor=(1.0, above))
     return figure
 
 
 def _film_maps(picture: Picture) -> Figure:
     """Maps of p, r and h with the cavity's outline above a section through the largest pressure."""
-    figure = _new_figure(9.6, 6.9)
+    figure = new_figure(9.6, 6.9)
     grid = figure.add_gridspec(3, 3, height_ratios=[2.45, 1.6, 0.85])
     row = int(np.argmax(picture.fields["p"][0])) // picture.x.size
     for k, name in enumerate(("p", "r", "h")):
@@ -96,18 +99,23 @@ def _film_maps(picture: Picture) -> Figure:
     upper = figure.add_subplot(grid[1, :])
     lower = figure.add_subplot(grid[2, :], sharex=upper)
     upper.tick_params(labelbottom=False)
-    section(upper, lower, picture, row)
+    handles = section(upper, lower, picture, row)
+    upper.legend(handles=handles, ncols=3, loc="lower right", bbox_to_anchor=(1.0, 0.98))
     upper.set_title(f"section at y = {quantity(picture.y[row], picture.length_unit)} (dashed in the maps)", loc="left")
     return figure
 
 
-def section(upper: Axes, lower: Axes, picture: Picture, row: int | None = None) -> None:
+def section(upper: Axes, lower: Axes, picture: Picture, row: int | None = None) -> list[Any]:
     """p and r along a line in the upper axes, the film and its liquid part (1 - r) h in the lower ones.
 
     Parameters
     ----------
     picture : of a lubrication problem.
     row : which row of a 2D picture; the boundary values of p and h at both ends of the line are added.
+
+    Returns
+    -------
+    What a legend should show.
     """
     problem: Any = picture.solution.problem
     p, r, h, sign = (a if row is None else a[row] for a in (*(picture.fields[name][0] for name in "prh"), picture.sign))
@@ -142,8 +150,6 @@ def section(upper: Axes, lower: Axes, picture: Picture, row: int | None = None) 
     right.set_ylabel(NAMES["r"], color=RED)
     for span in spans[:1]:
         span.set_label("cavity")
-    above = (1.0, 1.1 if fronts else 0.98)  # over the fronts' names
-    upper.legend(handles=[*handles, *spans[:1]], ncols=4, loc="lower right", bbox_to_anchor=above)
 
     lower.fill_between(x, 0.0, (1.0 - r) * h, color=BLUE, alpha=0.35, lw=0)
     lower.fill_between(x, h, 1.25 * h.max(), facecolor="0.75", edgecolor="0.45", hatch="////", lw=0)
@@ -152,6 +158,7 @@ def section(upper: Axes, lower: Axes, picture: Picture, row: int | None = None) 
     lower.annotate("", (0.11, 0.14), (0.02, 0.14), xycoords="axes fraction", arrowprops={"arrowstyle": "->"})
     lower.text(0.12, 0.14, "U      liquid (1 - r) h", transform=lower.transAxes, va="center")
     lower.set(ylim=(0.0, 1.25 * h.max()), ylabel=NAMES["h"] + label_h, xlabel="x" + label_x)
+    return [*handles, *spans[:1]]
 
 
 def _cavities(x: Array, sign: Array, ends: Array, fronts: dict[str, float]) -> list[tuple[float, float]]:
@@ -204,7 +211,7 @@ def _outline(axes: Axes, picture: Picture, scale: float, hatch: str) -> None:
 
 def _lines(picture: Picture) -> Figure:
     """Any fields in 1D, one above the other."""
-    figure = _new_figure(7.2, 1.2 + 1.9 * len(picture.fields))
+    figure = new_figure(7.2, 1.2 + 1.9 * len(picture.fields))
     panels = figure.subplots(len(picture.fields), 1, sharex=True, squeeze=False)[:, 0]
     x, label_x = scaled(picture.x, picture.length_unit)
     for axes, (name, (values, unit)) in zip(panels, picture.fields.items(), strict=True):
@@ -217,7 +224,7 @@ def _lines(picture: Picture) -> Figure:
 
 def _maps(picture: Picture) -> Figure:
     """Any fields in 2D, side by side."""
-    figure = _new_figure(4.6 * len(picture.fields), 4.8)
+    figure = new_figure(4.6 * len(picture.fields), 4.8)
     for axes, name in zip(figure.subplots(1, len(picture.fields), squeeze=False)[0], picture.fields, strict=True):
         colour_map(figure, axes, picture, name)
     return figure

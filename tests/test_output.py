@@ -1,0 +1,336 @@
+"""Fields in files and pictures: what is written is what was solved, on any number of ranks; a failure leaves nothing."""
+
+import json
+import re
+import sys
+import zipfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import Run
+from hypothesis import given
+from hypothesis import strategies as st
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from lcp_lube.api import solve
+from lcp_lube.errors import InputError
+from lcp_lube.output import files, picture
+from lcp_lube.output.plot import draw, plot
+from lcp_lube.problems.solution import Outcome, Solution
+from lcp_lube.scene import load_scene
+
+HDF5 = PETSc.Sys.hasExternalPackage("hdf5")
+SCENES = {"problem2": {"n": 11}, "problem4": {"nx": 11, "ny": 7}}
+Fields = dict[str, np.ndarray]
+
+
+@pytest.fixture(scope="module", params=SCENES)
+def solution(request: pytest.FixtureRequest) -> Iterator[Solution]:
+    """A solved problem, in 1D and in 2D, on this process."""
+    solved = solve(load_scene(request.param, SCENES[request.param]))
+    yield solved
+    solved.destroy()
+
+
+@pytest.fixture
+def line() -> Iterator[Solution]:
+    solved = solve(load_scene("problem2", {"n": 60}))
+    yield solved
+    solved.destroy()
+
+
+def expected(solution: Solution) -> Fields:
+    """p, r, h and the coordinates as they should stand in a file."""
+    grid = solution.problem.grid
+    fields = {
+        name: values.reshape(grid.shape[::-1]) for name, (values, _) in solution.problem.physical(solution.fields).items()
+    }
+    places = {a: (1 + np.arange(n)) * L / (n + 1) for a, n, L in zip("xy", grid.shape, grid.lengths, strict=False)}
+    return fields | places
+
+
+def assert_same(found: Fields, wanted: Fields, rtol: float = 0.0) -> None:
+    for name, values in wanted.items():
+        assert found[name].shape == values.shape
+        np.testing.assert_allclose(found[name], values, rtol=1e-15 if name in "xy" else 0.0, atol=rtol * np.abs(values).max())
+
+
+def read_vtk(path: Path) -> Fields:
+    """Point data and coordinates of a .vts or .vtr, pieces put together; a reader of its own, from VTK's description."""
+    content = path.read_bytes()
+    head, _, data = content.partition(b'<AppendedData encoding="raw">')
+    data = data[data.index(b"_") + 1 :]
+    text = head.decode()
+    word = np.dtype("<u8" if 'header_type="UInt64"' in text else "<u4")
+    extent = re.search(r'WholeExtent="([\d ]+)"', text)
+    assert extent is not None
+    x1, y1 = (int(k) for k in extent[1].split()[1:4:2])
+    whole: Fields = {}
+    for bounds, piece in re.findall(r'<Piece Extent="([\d ]+)">(.*?)</Piece>', text, re.DOTALL):
+        i0, i1, j0, j1 = (int(k) for k in bounds.split()[:4])
+        here = np.s_[j0 : j1 + 1, i0 : i1 + 1]
+        for name, offset in re.findall(r'Name="(\w+)".*?offset="(\d+)"', piece):
+            start = int(offset) + word.itemsize
+            size = int(np.frombuffer(data, word, 1, int(offset))[0])
+            values = np.frombuffer(data, "<f8", size // 8, start)
+            box = (j1 - j0 + 1, i1 - i0 + 1)
+            if name == "Position":
+                points = values.reshape(*box, 3)
+                parts = {"x": points[:, :, 0], "y": points[:, :, 1]}
+            elif name.endswith("coord"):
+                axis = name[0].lower()
+                parts = {axis: np.broadcast_to(values[:, None] if axis == "y" else values, box)} if axis != "z" else {}
+            else:
+                parts = {name: values.reshape(box)}
+            for key, part in parts.items():
+                whole.setdefault(key, np.full((y1 + 1, x1 + 1), np.nan))[here] = part
+    assert not any(np.isnan(values).any() for values in whole.values()), "the pieces do not cover the grid"
+    x, y = whole.pop("x"), whole.pop("y")
+    assert np.ptp(x, axis=0).max() == 0 == np.ptp(y, axis=1).max()
+    if y1 == 0:
+        return {name: values[0] for name, values in whole.items()} | {"x": x[0]}
+    return whole | {"x": x[0], "y": y[:, 0]}
+
+
+def read_h5(path: Path, solution: Solution) -> Fields:
+    """The datasets by PETSc's own reader on this process's grid."""
+    grid = solution.problem.grid
+    viewer = PETSc.Viewer().createHDF5(str(path), "r")
+    out = {}
+    for name in ("p", "r", "h"):
+        vec = grid.dm.createGlobalVec()
+        vec.setName(name)
+        vec.load(viewer)
+        out[name] = vec.array_r.reshape(grid.shape[::-1]).copy()
+        vec.destroy()
+    for name, n in zip("xy", grid.shape, strict=False):
+        vec = PETSc.Vec().createMPI(n)
+        vec.setName(name)
+        vec.load(viewer)
+        out[name] = vec.array_r.copy()
+        vec.destroy()
+    viewer.destroy()
+    return out
+
+
+def read(path: Path, solution: Solution) -> Fields:
+    if path.suffix == ".npz":
+        with np.load(path) as content:
+            return {name: content[name] for name in content if name not in ("units", "result")}
+    return read_h5(path, solution) if path.suffix == ".h5" else read_vtk(path)
+
+
+FORMATS = [".npz", ".vts", ".vtr", pytest.param(".h5", marks=pytest.mark.skipif(not HDF5, reason="PETSc without HDF5"))]
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_a_file_gives_the_fields_back(solution: Solution, suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f"fields{suffix}"
+    files.save(solution, path)
+    assert_same(read(path, solution), expected(solution))
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_npz_carries_units_and_the_result(solution: Solution, tmp_path: Path) -> None:
+    files.save(solution, tmp_path / "a.npz")
+    with np.load(tmp_path / "a.npz") as content:
+        units, result = json.loads(str(content["units"])), json.loads(str(content["result"]))
+        assert units | {"y": "m"} == {"p": "Pa", "r": "", "h": "m", "x": "m", "y": "m"}
+        assert result["converged"] and result["p_max"] >= content["p"].max()
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_files_of_three_ranks_equal_those_of_one(scene: str, cli: Callable[..., Run], tmp_path: Path) -> None:
+    """Sizes that three ranks do not divide; .h5 is written by three ranks and read by one."""
+    serial = solve(load_scene(scene, SCENES[scene]))
+    targets = [f"fields{suffix}" for suffix in (".npz", ".vts", ".vtr", *([".h5"] if HDF5 else []))]
+    size = [word for key, n in SCENES[scene].items() for word in (f"--{key}", n)]
+    outputs = [word for target in targets for word in ("--output", target)]
+    done = cli("solve", scene, *size, *outputs, "--plot", "picture.png", ranks=3)
+    assert done.status == 0, done.err
+    for target in targets:
+        assert_same(read(tmp_path / target, serial), expected(serial), rtol=1e-10)
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([*targets, "picture.png"])
+    serial.destroy()
+
+
+def test_absolute_pressure_is_stored(tmp_path: Path) -> None:
+    shifted = solve(load_scene("problem1", {"n": 9, "p_c": -3e4}))
+    files.save(shifted, tmp_path / "a.npz")
+    with np.load(tmp_path / "a.npz") as content:
+        assert content["p"].min() == pytest.approx(-3e4)
+    shifted.destroy()
+
+
+def test_a_failed_write_leaves_the_old_file_and_nothing_else(line: Solution, tmp_path: Path, monkeypatch: Any) -> None:
+    path = tmp_path / "a.npz"
+    path.write_text("the old one")
+
+    def full(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(zipfile.ZipFile, "open", full)
+    with pytest.raises(InputError, match=r"a\.npz: could not be written: No space left"):
+        files.save(line, path)
+    assert path.read_text() == "the old one"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("suffix", [".vts", pytest.param(".h5", marks=pytest.mark.skipif(not HDF5, reason="no HDF5"))])
+def test_a_folder_that_vanished_is_one_line(line: Solution, suffix: str, tmp_path: Path, capfd: Any) -> None:
+    with pytest.raises(InputError, match=r"PETSc could not write it"):
+        files.save(line, tmp_path / "gone" / f"a{suffix}")
+    capfd.readouterr()  # HDF5 prints its own account
+
+
+def test_an_interrupt_removes_the_temporary_file(tmp_path: Path) -> None:
+    with pytest.raises(KeyboardInterrupt), files.replacing(tmp_path / "a.png", MPI.COMM_SELF) as temporary:
+        Path(temporary).write_text("half")
+        raise KeyboardInterrupt
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("name", "as_plot", "message"),
+    [
+        ("a.vtk", False, r"extension \.vtk; allowed are \.npz, \.vts, \.vtr, \.h5; nearest is \.vts"),
+        ("a", False, r"no extension; allowed are"),
+        ("a.png", False, r"\.png is for --plot"),
+        ("a.h5", True, r"allowed are \.png, \.pdf, \.svg; \.h5 is for --output"),
+        ("a.pgn", True, r"nearest is \.png"),
+        ("gone/a.npz", False, r"folder .*gone does not exist"),
+        ("folder.npz", False, r"is a folder"),
+    ],
+)
+def test_a_bad_target_is_refused(name: str, as_plot: bool, message: str, tmp_path: Path) -> None:
+    (tmp_path / "folder.npz").mkdir()
+    with pytest.raises(InputError, match=message) as refusal:
+        files.check_target(tmp_path / name, plot=as_plot)
+    assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="no folder that even root cannot write to")
+def test_a_folder_that_cannot_be_written_to_is_refused() -> None:
+    with pytest.raises(InputError, match=r"cannot be written in /proc"):
+        files.check_target("/proc/a.npz")
+
+
+def test_a_good_target_leaves_no_trace(tmp_path: Path) -> None:
+    (tmp_path / "a.npz").write_text("the old one")
+    for name in ("a.npz", "b.vts", "C.NPZ"):
+        files.check_target(tmp_path / name)
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["the old one"]
+
+
+def test_missing_libraries_are_named(line: Solution, tmp_path: Path, monkeypatch: Any) -> None:
+    monkeypatch.setattr(files, "find_spec", lambda name: None)
+    with pytest.raises(InputError, match=r"pip install lcp-lube\[plot\]"):
+        files.check_target(tmp_path / "a.png", plot=True)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(InputError, match=r"pip install lcp-lube\[plot\]"):
+        plot(line, tmp_path / "a.png")
+    without = SimpleNamespace(Sys=SimpleNamespace(hasExternalPackage=lambda name: False))
+    monkeypatch.setattr(files, "PETSc", without)
+    with pytest.raises(InputError, match=r"without HDF5; use \.npz"):
+        files.check_target(tmp_path / "a.h5")
+
+
+def test_the_command_line_refuses_before_it_solves(cli: Callable[..., Run]) -> None:
+    done = cli("solve", "problem4", "--n", 2000, "--output", "a.vtk", timeout=20)  # too large to be solved in this time
+    assert done.status == 2
+    assert done.lines == ["lcp-lube: --output a.vtk: extension .vtk; allowed are .npz, .vts, .vtr, .h5; nearest is .vts"]
+
+
+@pytest.mark.parametrize(("suffix", "magic"), [(".png", b"\x89PNG"), (".pdf", b"%PDF"), (".svg", b"<?xml")])
+def test_pictures_are_files_of_their_kind_and_reproducible(
+    solution: Solution, suffix: str, magic: bytes, tmp_path: Path
+) -> None:
+    pytest.importorskip("matplotlib")
+    paths = [tmp_path / f"{k}{suffix}" for k in "ab"]
+    for path in paths:
+        plot(solution, path)
+    assert paths[0].read_bytes().startswith(magic)
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+
+
+def drawn(axes: Any, label: str) -> tuple[np.ndarray, np.ndarray]:
+    """x and y of the line with this label."""
+    line = next(line for line in axes.lines if line.get_label() == label)
+    return np.asarray(line.get_xdata(), dtype=float), np.asarray(line.get_ydata(), dtype=float)
+
+
+def test_a_line_picture_shows_fields_fronts_and_the_exact_solution(line: Solution) -> None:
+    pytest.importorskip("matplotlib")
+    shown = picture.collect(line)
+    assert shown is not None
+    upper, lower, right = draw(shown).axes
+    x, p = drawn(upper, "pressure p")
+    np.testing.assert_allclose(x, np.concatenate([[0.0], shown.x, [0.1]]) * 1e3)
+    np.testing.assert_allclose(p, np.concatenate([[1.0], line.p, [1.0]]))  # both ends at 1 MPa
+    np.testing.assert_allclose(np.interp(x, *drawn(upper, "exact")), p, atol=0.02)
+    np.testing.assert_allclose(drawn(right, "void fraction r")[1][1:-1], line.r)
+    texts = [text.get_text() for text in upper.texts]
+    for name in ("rupture", "reformation"):
+        assert f"{name}\n{1e3 * shown.quantities[name]:.4g} mm" in texts
+    assert lower.get_xlabel() == "x (mm)"
+
+
+def test_a_failed_run_says_so_in_its_title(line: Solution) -> None:
+    shown = picture.collect(line)
+    assert shown is not None
+    assert "6.6" in picture.title(shown) and "NOT" not in picture.title(shown)
+    line.outcome = Outcome.MAX_ITERATIONS
+    assert "NOT a solution, the iteration limit was reached" in picture.title(shown)
+
+
+@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("value", [np.nan, 0.0])
+def test_useless_fields_are_drawn_all_the_same(scene: str, value: float, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    solved = solve(load_scene(scene, SCENES[scene]))
+    solved.fields["p"][:] = solved.fields["r"][:] = value
+    plot(solved, tmp_path / "a.png")
+    solved.destroy()
+
+
+def test_large_fields_are_thinned_before_they_are_gathered(monkeypatch: Any) -> None:
+    solved = solve(load_scene("problem4", {"nx": 23, "ny": 12}))
+    monkeypatch.setattr(picture, "MOST_POINTS", {2: 5})
+    shown = picture.collect(solved)
+    assert shown is not None
+    whole = expected(solved)
+    assert shown.fields["p"][0].shape == shown.sign.shape == (4, 5)
+    np.testing.assert_array_equal(shown.fields["p"][0], whole["p"][1::3, 1::5])
+    np.testing.assert_allclose(shown.x, whole["x"][1::5])
+    solved.destroy()
+
+
+def test_problems_of_another_kind_are_stored_and_drawn(tmp_path: Path) -> None:
+    """Files and pictures ask for names, values and units, not for p and r."""
+    pytest.importorskip("matplotlib")
+    other = solve(load_scene("bratu", {"n": 9}))
+    files.save(other, tmp_path / "a.npz")
+    plot(other, tmp_path / "a.png")
+    with np.load(tmp_path / "a.npz") as content:
+        assert content["v"].shape == (9, 9)
+    other.destroy()
+
+
+@given(n=st.integers(1, 5000), step=st.integers(1, 600))
+def test_a_stride_takes_points_as_far_from_both_ends(n: int, step: int) -> None:
+    points = files.taken(n, step)
+    assert points.size == -(-n // step)
+    assert np.all(np.diff(points) == step)
+    assert 0 <= (n - 1 - points[-1]) - points[0] <= 1
+
+
+@given(st.floats(1e-9, 9.99e11))
+def test_a_prefix_brings_numbers_to_three_digits(value: float) -> None:
+    factor, unit = picture.prefix(value, "Pa")
+    assert 1 - 1e-9 <= value * factor < 1000
+    assert unit.endswith("Pa")
