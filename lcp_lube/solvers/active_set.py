@@ -33,7 +33,7 @@ DAMPED_STEPS = (0.7, 0.5, 0.3, 0.2, 0.1, 0.05)
 @dataclass(frozen=True)
 class ActiveSetOptions:
     """patience: steps without a fall of ||G|| by 10 % before a step is damped; give_up: steps after which it is taken to
-    cycle; p0: full film at this p (p_unit) at the start; rtol: relative tolerance of iterative inner solves."""
+    cycle; p0: full film at this p (p_unit) at the start; rtol: smallest relative tolerance of iterative inner solves."""
 
     p0: float = 1.0
     patience: int = 4
@@ -107,7 +107,9 @@ class ActiveSet:
         self._taken += 1
         full = self.z >= 0
         cavity = (~full).astype(float)
-        dp, dr, linear_iterations = self.system.solve(cavity, 1.0 - cavity, -self.G, np.zeros_like(self.G), self.options.rtol)
+        # Early steps need signs, not digits; the last one is to bring ||G|| below eps1, and no further.
+        rtol = max(self.options.rtol, min(1e-2, 0.1 * max(self.norm, self.eps1 / self.norm if self.norm else 1.0)))
+        dp, dr, linear_iterations = self.system.solve(cavity, 1.0 - cavity, -self.G, np.zeros_like(self.G), rtol)
         with self.system.stages("step length"):
             d = np.where(full, dp, -dr / self.s)
             alpha, cuts = 1.0, 0
@@ -127,7 +129,7 @@ class ActiveSet:
             self.z, self.G, self.norm = z, G, norm
             self._stalled = 0 if norm <= 0.9 * self._best else self._stalled + 1
             self._best = min(self._best, norm)
-        return Step(norm, step_norm, alpha, linear_iterations, backtracking=cuts, rtol=self.options.rtol)
+        return Step(norm, step_norm, alpha, linear_iterations, backtracking=cuts, rtol=rtol)
 
 
 def build(
