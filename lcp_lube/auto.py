@@ -10,7 +10,7 @@ from .linear.options import set_names
 from .problems.solution import Problem
 from .registry import DEFAULT_METHOD, METHODS
 
-SMALL_2D = 20_000  # points up to which a sparse direct solver beats multigrid's set-up (benchmarks/README.md)
+SMALL = 20_000  # points up to which one grid and a direct solver cost less than setting up anything better
 DIN_ONLY = {"r0", "mu", "conditions"}  # flags that only an interior method can heed
 
 
@@ -54,7 +54,7 @@ def plan(
         fitting = [name for name, other in METHODS.items() if problem.kind in other.kinds]
         raise InputError(f"--method {method}: not for scene {scene}; allowed are {', '.join(fitting)}")
     grid = problem.grid
-    large = grid.dim == 2 and grid.size > SMALL_2D
+    large = grid.dim == 2 and grid.size > SMALL
     if system == "auto":
         system = entry.systems[0]
         if large and "cavity" in entry.systems and grid.box[1] == grid.shape[0] and PETSc.Sys.hasExternalPackage("hypre"):
@@ -64,7 +64,7 @@ def plan(
             )
     _known(system, entry.systems, f"method {method}: --system")
     if nested is None:
-        nested = entry.nested and large
+        nested = entry.nested and not entry.interior and grid.size > SMALL
         if nested:
             why.append("nested: the front found on a coarser grid leaves a few steps on this one")
     elif nested and not entry.nested:
