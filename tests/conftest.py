@@ -1,0 +1,127 @@
+"""Fixtures of all tests: clean PETSc options, the command line, jobs under mpiexec."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+TESTS = Path(__file__).parent
+# A singleton's MPI leaves traces in the environment that would confuse a job started from it.
+ENVIRONMENT = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_COMM", "PMIX_", "PMI_", "PETSC_OPTIONS"))} | {
+    "OMP_NUM_THREADS": "1",
+    "OMPI_ALLOW_RUN_AS_ROOT": "1",
+    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+    "OMPI_MCA_rmaps_base_oversubscribe": "1",
+    "PYTHONPATH": os.pathsep.join(filter(None, [str(TESTS.parent), os.environ.get("PYTHONPATH", "")])),
+}
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+
+@dataclass(frozen=True)
+class Run:
+    """How a process ended and what it said."""
+
+    status: int
+    out: str
+    err: str
+
+    @property
+    def json(self) -> dict[str, Any]:
+        """The whole of stdout as one JSON value."""
+        return json.loads(self.out)
+
+    @property
+    def lines(self) -> list[str]:
+        """Lines on stderr, but for what mpiexec adds to a rank's exit status: its boxed notices."""
+        lines = self.err.splitlines()
+        start = next((k for k, line in enumerate(lines) if line.startswith("-" * 70)), len(lines))
+        return [line for line in lines[:start] if line.strip()]
+
+
+def start(arguments: list[str], ranks: int, cwd: Path, timeout: float) -> Run:
+    """A Python process, or an MPI job of several, with a time limit."""
+    command = [sys.executable, *arguments]
+    if ranks > 1:
+        mpiexec = shutil.which("mpiexec")
+        if mpiexec is None:
+            pytest.skip("no mpiexec")
+        command = [mpiexec, "-n", str(ranks), *command]
+    done = subprocess.run(command, cwd=cwd, env=ENVIRONMENT, capture_output=True, text=True, timeout=timeout)
+    return Run(done.returncode, done.stdout, done.stderr)
+
+
+@pytest.fixture
+def cli(tmp_path: Path) -> Callable[..., Run]:
+    """`cli("solve", "problem1", ranks=2)`: the command line as a process, in a folder of its own."""
+
+    def run(*words: object, ranks: int = 1, timeout: float = 60) -> Run:
+        return start(["-m", "lcp_lube", *map(str, words)], ranks, tmp_path, timeout)
+
+    return run
+
+
+@pytest.fixture
+def script(tmp_path: Path) -> Callable[..., Run]:
+    """`script("mpi_fields.py", ranks=3)`: a script of this folder as an MPI job."""
+
+    def run(name: str, *words: object, ranks: int = 1, timeout: float = 120) -> Run:
+        return start([str(TESTS / name), *map(str, words)], ranks, tmp_path, timeout)
+
+    return run
+
+
+@pytest.fixture(autouse=True)
+def clean_options() -> Iterator[None]:
+    """Every test begins without PETSc options and leaves none behind."""
+    yield
+    if "petsc4py.PETSc" not in sys.modules:
+        return
+    from petsc4py import PETSc
+
+    options = PETSc.Options()
+    left = options.getAll()
+    for name in left:
+        options.delValue(name)
+    assert not left, f"the test left PETSc options behind: {left}"
+
+
+@pytest.fixture
+def petsc_options() -> Iterator[Callable[..., None]]:
+    """`petsc_options(ksp_type="gmres")` sets PETSc options for one test, as the command line would."""
+    from petsc4py import PETSc
+
+    options, names = PETSc.Options(), []
+
+    def set_options(**given: object) -> None:
+        for name, value in given.items():
+            options.setValue(name, str(value) if value is not None else None)
+            names.append(name)
+
+    yield set_options
+    for name in names:
+        options.delValue(name)
+
+
+@pytest.fixture(scope="session")
+def mpi_job(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int], dict[str, Any]]:
+    """`mpi_job(3)`: the record and, under "fields", the whole fields of tests/mpi_job.py; run once for a number of ranks."""
+    done: dict[int, dict[str, Any]] = {}
+
+    def run(ranks: int) -> dict[str, Any]:
+        if ranks not in done:
+            folder = tmp_path_factory.mktemp(f"ranks{ranks}")
+            job = start([str(TESTS / "mpi_job.py"), str(folder)], ranks, folder, timeout=200)
+            assert job.status == 0, job.err
+            with np.load(folder / "fields.npz") as fields:
+                done[ranks] = {**json.loads((folder / "record.json").read_text()), "fields": dict(fields)}
+        return done[ranks]
+
+    return run

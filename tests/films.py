@@ -1,0 +1,78 @@
+"""What several tests need: films from random numbers, scenes with any film, matrices as NumPy arrays."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from hypothesis import strategies as st
+from petsc4py import PETSc
+from pydantic import PrivateAttr
+
+from lcp_lube.problems.grid import Grid
+from lcp_lube.problems.problem import LubricationProblem
+from lcp_lube.problems.reynolds import SCHEMES, box_scheme
+from lcp_lube.scene import LubricationScene
+
+L, WIDTH, MU, U = 0.1, 0.07, 0.015, 5.0
+
+
+@dataclass(frozen=True)
+class Knots:
+    """Film through random heights at equidistant knots along x, and tilted along y."""
+
+    heights: tuple[float, ...]  # m
+    tilt: float = 0.0  # relative rise from y = 0 to y = WIDTH
+
+    def __call__(self, x: Any, y: Any = 0.0, /) -> np.ndarray:
+        knots = np.linspace(0, L, len(self.heights))
+        return np.interp(x, knots, self.heights) * (1 + self.tilt * np.asarray(y) / WIDTH)
+
+
+class FilmScene(LubricationScene):
+    """A scene with any film at all: `FilmScene.of(film, p_a=1e6, ...)`."""
+
+    _film: Any = PrivateAttr()
+
+    @classmethod
+    def of(cls, film: Any, **data: Any) -> "FilmScene":
+        scene = cls(**data)
+        scene._film = film
+        return scene
+
+    @property
+    def gap(self) -> Any:
+        return self._film
+
+
+def knots(ratio: float = 20.0) -> st.SearchStrategy[Knots]:
+    """Films between 5 and 5 ratio micrometres."""
+    heights = st.lists(st.floats(0, 1), min_size=1, max_size=9).map(lambda s: tuple(5e-6 * ratio**t for t in s))
+    return st.builds(Knots, heights, st.floats(0, 3))
+
+
+shapes = st.one_of(st.tuples(st.integers(1, 12)), st.tuples(st.integers(1, 5), st.integers(1, 4)))
+schemes = st.sampled_from(SCHEMES)
+pressures = st.tuples(*[st.sampled_from([0.0, 1e5, 3e6])] * 4)  # Pa, at the four sides
+
+
+def make_problem(
+    shape: tuple[int, ...],
+    film: Any,
+    scheme: str = "nodal",
+    p_sides: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
+    p_unit: float = 1e6,
+    p_c: float = 0.0,
+    comm: PETSc.Comm | None = None,
+) -> LubricationProblem:
+    """A small problem on [0, L] or [0, L] x [0, WIDTH]."""
+    grid = Grid(shape, (L, WIDTH)[: len(shape)], comm)
+    box = box_scheme(grid, film, mu=MU, U=U, scheme=scheme, p_sides=p_sides, p_unit=p_unit)
+    return LubricationProblem(grid, box, mu=MU, U=U, p_unit=p_unit, p_sides=p_sides, p_c=p_c, film=film)
+
+
+def dense(mat: PETSc.Mat) -> np.ndarray:
+    """The entries of a matrix on one rank."""
+    full = mat.convert("dense", PETSc.Mat())
+    out = full.getDenseArray().copy()
+    full.destroy()
+    return out

@@ -1,0 +1,57 @@
+"""What each recipe is tried on: a command line a recipe, and what came of it."""
+
+import argparse
+from typing import Any
+
+from lcp_lube.arguments import parse
+from lcp_lube.registry import recipe_line
+
+# Those that do not suit the problem which their first line leads to.
+SUITED = {
+    "fsai": "bratu --n 12",
+    "bcgs_jacobi": "bratu --n 12",
+    "multigrid": "obstacle_bratu --n 31",
+    "dense_lu": "ehl_line --n 40",
+    "redundant_lu": "ehl_line --n 40",
+}
+
+
+def example(name: str) -> argparse.Namespace:
+    """Arguments of `solve` on a small problem for this recipe, as its first line says what it is for."""
+    line = recipe_line(name)
+    system = next((word for word in ("reduced", "cavity") if f"{word} system" in line), "full")
+    method = "active-set" if system == "cavity" else "din"
+    scene = "problem4 --nx 13 --ny 11" if "2D" in line or system == "cavity" else "problem1 --n 21"
+    words = SUITED.get(name, f"{scene} --method {method} --system {system} --no-nested").split()
+    return parse(["solve", *words, "--recipe", name])
+
+
+def one_rank(name: str) -> bool:
+    return "one rank" in recipe_line(name)
+
+
+def attempt(name: str) -> dict[str, Any]:
+    """Outcome of a recipe's example and the options that nobody had read by its last step. Collective."""
+    from lcp_lube.cli import solution_of
+    from lcp_lube.linear.options import unread
+
+    left: list[list[str]] = []
+    solution = solution_of(example(name), lambda k, step: left.append(unread()))
+    result = {
+        "outcome": str(solution.outcome),
+        "message": solution.message,
+        "unread": left[-1] if left else ["no step was made"],
+        "recipe": solution.settings["recipe"],
+    }
+    solution.destroy()
+    return result
+
+
+def faults(name: str, result: dict[str, Any]) -> list[str]:
+    """What is wrong with a result; a recipe whose first line says that it fails may fail."""
+    wrong = [f"option -{option} goes unread" for option in result["unread"]]
+    if result["recipe"] != name:
+        wrong.append(f"ran as {result['recipe']}")
+    if result["outcome"] != "converged" and "fails" not in recipe_line(name):
+        wrong.append(f"{result['outcome']}: {result['message']}")
+    return wrong
