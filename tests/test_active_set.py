@@ -1,0 +1,151 @@
+"""Active set, predictor-corrector, nested iteration and the plan behind 'auto'."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lcp_lube.api import solve
+from lcp_lube.errors import InputError
+from lcp_lube.problems.solution import Outcome
+from lcp_lube.scene import load_scene
+from lcp_lube.solvers.nested import level_shapes
+from lcp_lube.solvers.newton import Stopping
+
+
+def run(name, changes=None, **kwargs):
+    return solve(load_scene(name, changes or {}), **kwargs)
+
+
+@pytest.mark.parametrize("name", ["problem1", "problem2", "problem3"])
+@pytest.mark.parametrize("scheme", ["nodal", "face", "upwind"])
+def test_active_set_ends_at_the_discrete_solution(name, scheme):
+    """The answer of DIN converged to rounding, exactly complementary, in few steps."""
+    changes = {"n": 73, "scheme": scheme}
+    ours, din = run(name, changes, method="active-set"), run(name, changes, method="din")
+    assert ours.converged and ours.iterations <= 12
+    assert not (ours.p * ours.r).any() and (ours.p >= 0).all() and (ours.r >= 0).all()
+    np.testing.assert_allclose(ours.p, din.p, atol=1e-6)
+    np.testing.assert_allclose(ours.r, din.r, atol=1e-6)
+    assert ours.certificate.measures["residual"] < 1e-12
+    ours.destroy()
+    din.destroy()
+
+
+@pytest.mark.parametrize(
+    "K, p_max, force, cavitated", [(1, 482112.287892, -230.290207, 484), (4, 529298.978092, -277.726716, 7730)]
+)
+def test_textured_slider_to_nine_digits(K, p_max, force, cavitated):
+    """Benchmark of the FBNS codes: two other codes agree on these digits."""
+    solution = run("textured_slider", {"K": K}, method="active-set", nested=False)
+    p = solution.p * solution.problem.p_unit + 30e3
+    assert p.max() == pytest.approx(p_max, rel=1e-11)
+    assert np.sum(p - 100e3) * (0.08 / (30 * K + 1)) ** 2 == pytest.approx(force, rel=2e-9)
+    assert (solution.r > 0).sum() == cavitated
+    solution.destroy()
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    seed=st.integers(0, 10**6),
+    amplitude=st.floats(0, 8e-6),
+    p=st.sampled_from([0.0, 1e3, 1e5, 1e6]),
+    U=st.floats(0.05, 50),
+    scheme=st.sampled_from(["face", "upwind"]),
+)
+def test_rough_films(seed, amplitude, p, U, scheme):
+    """Complementarity, r < 1 and mass conservation on any film; the interior method may have to help."""
+    sides = {"p_a": p, "p_b": p, "p_side": p}
+    changes = {"seed": seed, "amplitude": amplitude, "U": U, "scheme": scheme, "nx": 19, "ny": 22, "cells": 15, **sides}
+    solution = run("rough", changes, method="active-set")
+    assert solution.converged, solution.message
+    assert solution.r.max() < 1.0 and solution.p.min() >= 0.0
+    assert solution.certificate.measures["mass_defect"] < 1e-7
+    solution.destroy()
+
+
+def test_fallback_takes_over_and_says_so():
+    solution = run("problem3", {"n": 60}, method="active-set", options={"p0": 1.0})
+    assert solution.converged and "took over" not in solution.message
+    solution.destroy()
+    given_up = run("problem3", {"n": 60}, method="active-set", options={"give_up": 1})
+    assert given_up.outcome is Outcome.STEP_LENGTH  # a user's own limit is kept
+    given_up.destroy()
+
+
+def test_fallback_from_a_cycling_start(monkeypatch):
+    from lcp_lube.solvers.active_set import ActiveSetOptions
+
+    monkeypatch.setattr(ActiveSetOptions.__init__, "__defaults__", (1.0, 4, 1, 1e-8))  # give up after one step
+    solution = run("problem3", {"n": 60}, method="active-set")
+    assert solution.converged and "din-pc took over" in solution.message
+    solution.destroy()
+
+
+@pytest.mark.parametrize("name, n", [("problem1", 100), ("problem2", 100), ("problem1", 1000), ("problem4", 24)])
+@pytest.mark.parametrize("system", ["full", "reduced"])
+def test_predictor_corrector(name, n, system):
+    solution = run(name, {"n": n}, method="din-pc", system=system, recipe_name="umfpack")
+    assert solution.converged and solution.iterations <= 15
+    solution.destroy()
+
+
+def test_nested_iteration_ends_where_one_grid_does():
+    flat, nested = (run("problem4", {"nx": 61, "ny": 50}, method="active-set", nested=n) for n in (False, True))
+    assert [level["nx"] for level in nested.levels] == [30, 61] and not flat.levels
+    assert nested.iterations <= flat.iterations
+    np.testing.assert_allclose(nested.p, flat.p, atol=1e-9)
+    flat.destroy()
+    nested.destroy()
+
+
+@pytest.mark.parametrize("method", ["din", "din-pc"])
+def test_interior_methods_start_inside_on_the_next_grid(method):
+    solution = run("problem2", {"n": 211}, method=method, nested=True)
+    assert solution.converged and len(solution.levels) == 3
+    solution.destroy()
+
+
+def test_level_shapes():
+    assert level_shapes((1023, 511)) == [(63, 31), (127, 63), (255, 127), (511, 255), (1023, 511)]
+    assert level_shapes((10,)) == [(10,)] and level_shapes((3, 1000)) == [(3, 1000)]
+
+
+def test_very_fine_line():
+    """Steps on the finest of many grids stay few, and rounding in G is not taken for a failure."""
+    solution = run("problem3", {"n": 30_011})
+    assert solution.converged and solution.iterations <= 3
+    solution.destroy()
+
+
+def test_auto_chooses_and_says_why():
+    small, line = run("problem4", {"n": 20}), run("problem1")
+    assert small.settings["method"] == "active-set" and small.settings["recipe"] in ("umfpack", "superlu", "mumps")
+    assert line.settings["recipe"] == "banded" and any("tridiagonal" in reason for reason in line.settings["why"])
+    din = run("problem1", options={"mu": "mu1"})
+    assert din.settings["method"] == "din"
+    for solution in (small, line, din):
+        solution.destroy()
+
+
+@pytest.mark.parametrize(
+    "options, message",
+    [({"patience": 0}, "patience"), ({"rtol": 2.0}, "rtol"), ({"p0": -1.0}, "--p0"), ({"nosuch": 1}, "no such option")],
+)
+def test_options_out_of_range(options, message):
+    with pytest.raises(InputError, match=message):
+        run("problem1", {"n": 10}, method="active-set", options=options)
+
+
+def test_constant_film_and_no_flow_to_speak_of():
+    """c = 0: norms are absolute, and the answer is the linear pressure."""
+    solution = run("problem1", {"h_max": 15e-6, "p_a": 2e6, "p_b": 1e6, "n": 9}, method="active-set")
+    assert solution.converged and solution.iterations <= 2
+    np.testing.assert_allclose(solution.p, 2 - np.arange(1, 10) / 10, rtol=1e-12)
+    solution.destroy()
+
+
+def test_not_converged_in_time():
+    solution = run("problem3", method="active-set", stopping=Stopping(max_it=2), options={"give_up": 50})
+    assert solution.outcome is Outcome.MAX_ITERATIONS and not solution.converged
+    solution.destroy()
