@@ -131,6 +131,7 @@ def run_compare(args: argparse.Namespace) -> int:
         system=args.system,
         stopping=stopping_of(args),
         options=lambda method: options_of(args, method),
+        nested=args.nested,
     )
     check_unread()
     say(json.dumps(finite(rows)) if args.json else table(rows))

@@ -13,8 +13,8 @@ from .arguments import parse
 from .cli import say, solution_of
 from .errors import InputError
 from .linear.options import LATE, set_names
-from .output.resumable import ResumableCsv, Row
 from .output.results import as_dict, machine
+from .output.resumable import ResumableCsv, Row
 from .problems.solution import Solution
 from .registry import PACKAGE
 
@@ -100,7 +100,7 @@ MEZZADRI = {
         "DIN on the square, n x n (problem 4)",
         f"solve problem4 --n {{n}} --recipe {{solver}} {_LOOSE}",
         quick=50,
-        note="The paper's text does not determine problem 4: no reading of it gives both printed counts; see benchmarks/README.md.",
+        note="The paper's text does not determine problem 4, and no reading of it gives both counts: benchmarks/README.md.",
     ),
 }
 
@@ -134,7 +134,9 @@ def find_table(paper: str, number: int) -> tuple[Spec, list[Row]]:
 
 def row_command(spec: Spec, printed: Row) -> str:
     """The command line that runs a printed row; names of methods are in lower case here."""
-    return f"lcp-lube {spec.command} --system full".format(**{**printed, "method": printed.get("method", "").lower()})
+    return f"lcp-lube {spec.command} --system full --no-nested".format(
+        **{**printed, "method": printed.get("method", "").lower()}
+    )
 
 
 def run_published_table(paper: str, number: int, quick: bool = False, results: Path = Path("lcp_lube_results")) -> int:
