@@ -15,16 +15,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WIDTH = 7.2  # inches: a page's text width, so that the type is read at the size it is set
-# Okabe and Ito's colours, each with a marker of its own.
-SERIES = (
-    ("#0072B2", "o"),
-    ("#009E73", "s"),
-    ("#D55E00", "^"),
-    ("#CC79A7", "v"),
-    ("#E69F00", "D"),
-    ("#56B4E9", "P"),
-    ("#000000", "*"),
-)
+COLOURS = ("#0072B2", "#009E73", "#D55E00", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito's
+MARKERS = ("o", "s", "^", "v", "D", "P", "*", "<", ">")
 STYLE: Any = {
     "font.size": 8.0,
     "axes.titlesize": 8.5,
@@ -37,6 +29,11 @@ STYLE: Any = {
     "lines.markersize": 4.0,
     "svg.hashsalt": "lcp_lube",  # the same csv gives the same file
 }
+
+
+def look(number: int) -> dict[str, Any]:
+    """Colour and marker of a chart's series; the pair is told apart by all eyes and in print."""
+    return {"color": COLOURS[number % len(COLOURS)], "marker": MARKERS[number % len(MARKERS)]}
 
 
 def save(build: Callable[[], Figure], path: Path, comm: MPI.Comm) -> None:
@@ -59,7 +56,7 @@ def new_figure(height: float, sentence: str) -> Figure:
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    text = textwrap.fill(sentence, 128)
+    text = textwrap.fill(sentence, 116)
     below = (0.14 * (text.count("\n") + 1) + 0.08) / height
     figure = Figure(figsize=(WIDTH, height), layout=ConstrainedLayoutEngine(rect=(0.0, below, 1.0, 1.0 - below)))
     figure.text(0.01, 0.06 / height, text, va="bottom", ha="left", linespacing=1.15)

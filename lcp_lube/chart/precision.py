@@ -148,7 +148,7 @@ def fill(
             except InputError as error:
                 say(f"{name}: {configuration}: left out: {error}")
                 return
-            row = store.add({**key, **values})
+            row = store.add({**values, **key})
             say(f"{name} n = {n}: {configuration}: {row['outcome']}, {row['iterations']} iterations, {seconds(row):.3g} s")
         if row["outcome"] == KRYLOV_LIMIT:
             return

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from mpi4py import MPI
 
 from ..output.resumable import Row
-from .drawing import SERIES, new_figure, save
+from .drawing import look, new_figure, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -110,8 +110,8 @@ def picture(rows: Sequence[Row], quantity: str) -> Figure:
         for (title, belongs), axes in zip(PANELS.items(), grid[:, column], strict=True):
             _front_line(axes, front(mine, quantity), quantity)
             inside = [row for row in mine if belongs(row)]
-            for name, style in zip(names, SERIES, strict=False):
-                _series(axes, [row for row in inside if row["method"] == name], quantity, style, failed_at)
+            for number, name in enumerate(names):
+                _series(axes, [row for row in inside if row["method"] == name], quantity, number, failed_at)
             axes.set(xscale="log", yscale="log")
             axes.grid(which="major", color="0.9", lw=0.6)
             if column == 0:
@@ -127,18 +127,17 @@ def _front_line(axes: Axes, best: Sequence[Row], quantity: str) -> None:
     axes.step([seconds(row) for row in best], errors, where="post", color="0.75", lw=4.0, solid_capstyle="butt", zorder=1)
 
 
-def _series(axes: Axes, rows: Sequence[Row], quantity: str, style: tuple[str, str], failed_at: float) -> None:
+def _series(axes: Axes, rows: Sequence[Row], quantity: str, number: int, failed_at: float) -> None:
     """A method's fastest recipe on each grid, by tolerance; every run that failed as a cross on one line."""
-    colour, marker = style
     for eps in dict.fromkeys(row["eps"] for row in rows):
         points = []
-        for n in dict.fromkeys(row["n"] for row in rows):
+        for n in sorted({row["n"] for row in rows}, key=int):
             here = [row for row in rows if row["eps"] == eps and row["n"] == n and error(row, quantity)]
             points += sorted(here, key=lambda row: seconds(row))[:1]
         errors = [error(row, quantity) or 0.0 for row in points]
-        axes.plot([seconds(row) for row in points], errors, color=colour, marker=marker, **_tolerance(eps))
+        axes.plot([seconds(row) for row in points], errors, **look(number), **_tolerance(eps))
     failed = [seconds(row) for row in rows if row["outcome"] != "converged"]
-    axes.plot(failed, [failed_at] * len(failed), ls="none", marker="x", color=colour, ms=5.0)
+    axes.plot(failed, [failed_at] * len(failed), ls="none", marker="x", color=look(number)["color"], ms=5.0)
 
 
 def _tolerance(eps: str) -> dict[str, Any]:
@@ -149,7 +148,7 @@ def _tolerance(eps: str) -> dict[str, Any]:
 def _legend(names: Sequence[str], rows: Sequence[Row]) -> list[Any]:
     from matplotlib.lines import Line2D
 
-    handles = [Line2D([], [], color=c, marker=m, label=name) for name, (c, m) in zip(names, SERIES, strict=False)]
+    handles = [Line2D([], [], **look(number), label=name) for number, name in enumerate(names)]
     for eps in dict.fromkeys(row["eps"] for row in rows):
         handles.append(Line2D([], [], color="0.3", marker="o", label=f"eps = {float(eps):g}", **_tolerance(eps)))
     return [

@@ -10,9 +10,7 @@ from ..problems.solution import Outcome
 from ..scene import load_scene
 from ..solvers.din import MU_RULES
 from .experiment import open_store, run
-from .starts_picture import findings
-
-draw_lines = draw_maps = None
+from .starts_picture import draw_lines, draw_maps, lines_sentence, map_sentence
 
 SCENES = ("problem1", "problem2", "problem3")
 DECADES = range(-15, 4)  # p0 = r0 = 10^k; p0 in the problem's unit, MPa
@@ -58,7 +56,7 @@ def chart(quick: bool = False, results: Path = Path("lcp_lube_results")) -> int:
     known = len(store.rows)
     wanted = list(starts(quick))
     rows = [_row(store, start) for start in wanted]
-    say(findings(rows))
+    say(f"{lines_sentence(rows)}\n{map_sentence(rows)}")
     draw_lines(rows, results / f"{stem}_lines.png", store.comm)
     draw_maps(rows, results / f"{stem}_map.png", store.comm)
     say(
@@ -81,7 +79,7 @@ def _row(store: ResumableCsv, start: dict[str, Any]) -> dict[str, str]:
         recipe_name=start["recipe"],
         options={"p0": float(start["p0"]), "r0": float(start["r0"]), "mu": start["mu"]},
     )
-    row = store.add({**key, **values})
+    row = store.add({**values, **key})
     if row["outcome"] != Outcome.CONVERGED:
         say(f"{start['scene']} {start['recipe']} {start['mu']} p0 {start['p0']} r0 {start['r0']}: {row['message']}")
     return row
