@@ -7,6 +7,8 @@ from ..errors import InputError
 from .options import explain_error, set_names
 
 MAX_INNER_ITERATIONS = 10_000  # the paper's limit; -ksp_max_it overrides it
+MUMPS_SHORT = (-8, -9, -11, -14, -15, -17, -18, -19, -20)  # INFOG(1): a workspace or buffer is too small
+MUMPS_LARGEST_RESERVE = 2000
 
 
 class LinearSolverError(ArithmeticError):
@@ -91,16 +93,42 @@ class Krylov:
         if not self.direct and not self._fixed_rtol:
             self.ksp.setTolerances(rtol=rtol)
         self._set_up()
-        try:
-            self.ksp.solve(b, x)
-        except PETSc.Error as error:
-            raise LinearSolverError(explain_error(error)) from None
-        reason = self.ksp.getConvergedReason()
+        reason = self._run(b, x)
+        while reason == PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED and self._enlarge_mumps():
+            reason = self._run(b, x)
         if reason < 0 and reason != PETSc.KSP.ConvergedReason.DIVERGED_MAX_IT:
             raise LinearSolverError(f"KSP {self.ksp_type} with PC {self.pc_type} failed: {reason_name(reason)}")
         if not np.isfinite(x.norm()):
             raise LinearSolverError(f"KSP {self.ksp_type} with PC {self.pc_type} gave a vector that is not finite")
         return 0 if self.direct else self.ksp.getIterationNumber()
+
+    def _run(self, b: PETSc.Vec, x: PETSc.Vec) -> int:
+        """Solve; returns PETSc's reason."""
+        try:
+            self.ksp.solve(b, x)
+        except PETSc.Error as error:
+            raise LinearSolverError(explain_error(error)) from None
+        return self.ksp.getConvergedReason()
+
+    def _enlarge_mumps(self) -> bool:
+        """If MUMPS ran out of the workspace that it had foreseen, which pivoting can outgrow: provide four times the reserve."""
+        pc = self.ksp.getPC()
+        if self.pc_type not in ("lu", "cholesky") or pc.getFactorSolverType() != "mumps":
+            return False
+        factor = pc.getFactorMatrix()
+        reserve = 4 * factor.getMumpsIcntl(14)  # in per cent
+        if factor.getMumpsInfog(1) not in MUMPS_SHORT or reserve > MUMPS_LARGEST_RESERVE:
+            return False
+        # Only a new factor takes it, and that reads it from the options.
+        options, name = PETSc.Options(), "mat_mumps_icntl_14"
+        before = options.getString(name, "")
+        options.setValue(name, str(reserve))
+        pc.reset()
+        self.ksp.setUp()
+        options.delValue(name)
+        if before:
+            options.setValue(name, before)
+        return True
 
     def destroy(self) -> None:
         self.ksp.destroy()
