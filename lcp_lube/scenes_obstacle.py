@@ -53,9 +53,9 @@ class ObstacleScene(Scene):
     def shape(self) -> tuple[int, ...]:
         return self.nx or self.n, self.ny or self.n
 
-    def with_shape(self, shape: tuple[int, ...]) -> "Scene":
+    def with_shape(self, shape: tuple[int, ...]) -> "ObstacleScene":
         """The same scene on a grid that serves this one."""
-        scene = super().with_shape(shape)
+        scene = self.model_copy(update={"nx": shape[0], "ny": shape[1]})
         scene._coarse = True
         return scene
 

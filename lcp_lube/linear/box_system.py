@@ -7,6 +7,7 @@ from petsc4py import PETSc
 from ..errors import InputError
 from ..parallel import Array
 from ..problems.box import BoxProblem
+from ..problems.transfer import Transfer
 from .krylov import Krylov
 from .options import explain_error
 from .stages import Stages
@@ -35,9 +36,13 @@ class BoxSystem:
     def direct(self) -> bool:
         return self.krylov.direct
 
-    def solve(
-        self, v: Array, rhs: Array, rtol: float, shift: Array | None = None, held: Mask | None = None
-    ) -> tuple[Array, int]:
+    def linearise(self, v: Array) -> Array:
+        """Take f' at v for the next `solve`; returns its diagonal. Collective."""
+        with self.stages("Jacobian"):
+            self._v = v
+            return self.matrix.linearise(v)
+
+    def solve(self, rhs: Array, rtol: float, shift: Array | None = None, held: Mask | None = None) -> tuple[Array, int]:
         """x and the number of linear iterations. Collective.
 
         Parameters
@@ -51,10 +56,10 @@ class BoxSystem:
         LinearSolverError : breakdown, a failed factorisation, or a result that is not finite.
         """
         with self.stages("Jacobian"):
-            self.matrix.update(v, shift, held)
+            self.matrix.update(shift, held)
             self.matrix.set_right_hand_side(rhs, held)
             if self._multigrid is not None:
-                self._multigrid.update(v, shift, held)
+                self._multigrid.update(self._v, shift, held)
         with self.stages("KSP"):
             iterations = self.krylov.solve(self.matrix.b, self.matrix.x, rtol)
         return self.matrix.x.array_r.copy(), iterations
@@ -75,21 +80,25 @@ class NewtonMatrix:
         self.mat = problem.jacobian(problem.v0).duplicate(copy=True)
         self.x, self.b = self.mat.createVecs()
 
-    def update(self, v: Array, shift: Array | None, held: Mask | None) -> None:
-        """New values. Collective."""
+    def linearise(self, v: Array) -> Array:
+        """Take f' at v for `update`; returns its diagonal. Collective."""
         self._jacobian = self.problem.jacobian(v)
+        self._jacobian.getDiagonal(self.b)
+        self._diagonal = self.b.array_r.copy()
+        return self._diagonal
+
+    def update(self, shift: Array | None, held: Mask | None) -> None:
+        """New values. Collective."""
         self._jacobian.copy(self.mat, structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-        self.mat.getDiagonal(self.b)
-        diagonal = self.b.array_r.copy()
-        if shift is not None:
-            diagonal += shift
         if held is not None:
-            # Any positive value does where x is known; f's own keeps the rows in one size.
-            self._unit = np.where(diagonal > 0, diagonal, 1.0)
-            diagonal = np.where(held, self._unit, diagonal)
             self.b.setArray(np.where(held, 0.0, 1.0))
             self.mat.diagonalScale(self.b, self.b)
-        self.b.setArray(diagonal)
+            # Any positive value does where x is known; f's own keeps the rows in one size.
+            self.b.setArray(np.where(held & (self._diagonal <= 0), 1.0, self._diagonal))
+        elif shift is not None:
+            self.b.setArray(self._diagonal + shift)
+        else:
+            return
         self.mat.setDiagonal(self.b)
         self.mat.assemble()
 
@@ -98,7 +107,8 @@ class NewtonMatrix:
         if held is not None:
             self.x.setArray(np.where(held, rhs, 0.0))
             self._jacobian.mult(self.x, self.b)
-            rhs = np.where(held, self._unit * rhs, rhs - self.b.array_r)
+            unit = np.where(self._diagonal > 0, self._diagonal, 1.0)
+            rhs = np.where(held, unit * rhs, rhs - self.b.array_r)
         self.b.setArray(rhs)
 
     def destroy(self) -> None:
@@ -115,16 +125,19 @@ class Multigrid:
     """
 
     def __init__(self, problem: BoxProblem, ksp: PETSc.KSP):
-        problems = [problem]
+        self._matrices: list[NewtonMatrix] = []
+        self._transfers: list[Transfer] = []
+        self._weights: list[Array] = []
         limit = PETSc.Options().getInt("pc_mg_levels", 30)
-        while len(problems) < limit and (coarser := problems[-1].coarser()) is not None:
-            problems.append(coarser)
-        self._transfers = [fine.transfer(coarse.grid) for fine, coarse in zip(problems[:-1], problems[1:], strict=True)]
-        self._matrices = [NewtonMatrix(coarse) for coarse in problems[1:]]
-        self._weights = [transfer.restrict(np.ones(fine.grid.local_size)) for transfer, fine in zip(self._transfers, problems, strict=False)]
+        while len(self._matrices) < limit - 1 and (coarser := problem.coarser()) is not None:
+            points = problem.grid.local_size
+            problem, transfer = coarser
+            self._matrices.append(NewtonMatrix(problem))
+            self._transfers.append(transfer)
+            self._weights.append(transfer.restrict(np.ones(points)))
         pc = ksp.getPC()
         try:
-            pc.setMGLevels(len(problems))
+            pc.setMGLevels(len(self._matrices) + 1)
             for level, (transfer, matrix) in enumerate(zip(self._transfers[::-1], self._matrices[::-1], strict=True)):
                 pc.setMGInterpolation(level + 1, transfer.mat)
                 pc.getMGSmoother(level).setOperators(matrix.mat)
@@ -140,7 +153,8 @@ class Multigrid:
                 shift = transfer.restrict(shift)
             if held is not None:
                 held = transfer.restrict(held.astype(float)) >= 0.5 * weight
-            matrix.update(v, shift, held)
+            matrix.linearise(v)
+            matrix.update(shift, held)
 
     def destroy(self) -> None:
         for matrix in self._matrices:

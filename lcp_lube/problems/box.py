@@ -16,6 +16,7 @@ from ..parallel import Array, Reduce
 from .certificate import Certificate, certificate_tol
 from .grid import Grid
 from .solution import Fields, Outcome
+from .transfer import Transfer
 
 
 class Equations(Protocol):
@@ -30,7 +31,7 @@ class Equations(Protocol):
         ...
 
     def scale(self, v: Array) -> float:
-        """How large the terms of f(v) are: a residual counts as small against this. Collective."""
+        """Mean size of the terms of f(v): a residual counts as small against this. Collective."""
         ...
 
     def destroy(self) -> None: ...
@@ -88,27 +89,24 @@ class BoxProblem:
         """f'(v); the next call overwrites it. Collective."""
         return self.equations.jacobian(v)
 
-    def jacobian_diagonal(self, v: Array) -> Array:
-        """Diagonal of f'(v). Collective."""
-        diagonal = self.jacobian(v).getDiagonal()
-        values = diagonal.array_r.copy()
-        diagonal.destroy()
-        return values
-
     def natural_residual(self, v: Array, f: Array, v_scale: float = 1.0, f_scale: float | Array = 1.0) -> Array:
-        """mid((v - u)/v_scale, f/f_scale, (v - l)/v_scale): zero exactly at the solutions, at least the violation of a bound."""
-        return np.clip(f / f_scale, (v - self.upper) / v_scale, (v - self.lower) / v_scale)
+        """mid((v - u)/v_scale, f/f_scale, (v - l)/v_scale): zero at the solutions alone, no less than a bound is violated."""
+        middle = f / f_scale
+        np.minimum(middle, (v - self.lower) / v_scale, out=middle)
+        return np.maximum(middle, (v - self.upper) / v_scale, out=middle)
 
     def scales(self, v: Array) -> tuple[float, float]:
-        """max |v| and the size of the terms of f; 1 in place of 0. Collective."""
+        """max |v| and the mean size of the terms of f; 1 in place of 0. Collective."""
         return self.reduce.max(np.abs(v)) or 1.0, self.equations.scale(v) or 1.0
 
     def certify(self, fields: Fields, eps1: float) -> Certificate:
         """Certificate of v, from f and the bounds alone. Collective.
 
-        residual: largest natural residual, v measured against max |v| and f against the size of its terms (on fine grids
-        f itself, being of order dx dy, is small for any smooth v);
-        bound_violation: largest violation of a bound against max |v|, which residual contains.
+        residual: mean of |natural residual|, v measured against max |v| and f against the mean size of its terms: the forces
+        that nothing balances against all forces. A force on one point moves v by no more than it is large (times a
+        logarithm of the grid), so it is their sum that bounds the error; and f alone, of order dx dy, would be small for
+        any smooth v on a fine grid.
+        bound_violation: largest violation of a bound against max |v|.
         """
         v, red = fields["v"], self.reduce
         f = self.residual(v)
@@ -116,7 +114,7 @@ class BoxProblem:
         outside = np.maximum(np.maximum(self.lower - v, v - self.upper), 0.0)
         return Certificate(
             measures={
-                "residual": red.max(np.abs(self.natural_residual(v, f, v_scale, f_scale))),
+                "residual": red.sum(np.abs(self.natural_residual(v, f, v_scale, f_scale))) / self.unknowns,
                 "bound_violation": red.max(outside) / v_scale,
             },
             tol=certificate_tol(eps1),
@@ -140,8 +138,11 @@ class BoxProblem:
         """Without a grid behind the unknowns there is no coarser problem to start from."""
         raise InputError("--nested: this problem has no coarser grids")
 
-    def coarser(self) -> "BoxProblem | None":
-        """The same problem on a coarser grid, for multigrid; None if there is none. This problem destroys it."""
+    def coarser(self) -> "tuple[BoxProblem, Transfer] | None":
+        """The same problem on a coarser grid, and the interpolation from there; None if there is none. For multigrid.
+
+        Both belong to this problem, which destroys them. Collective.
+        """
         return None
 
     def explain(self, outcome: Outcome, message: str) -> tuple[Outcome, str]:

@@ -36,9 +36,17 @@ class ObstacleEquations:
         for option in (PETSc.Mat.Option.SYMMETRIC, PETSc.Mat.Option.SYMMETRY_ETERNAL):
             self._jacobian.setOption(option, True)
         self._diagonal = self._jacobian.createVecLeft()
+        self._last: tuple[Array, Array, Array] | None = None
+
+    def _terms(self, v: Array) -> tuple[Array, Array]:
+        """A v - b and dx dy g(v), kept for the next question about the same array."""
+        if self._last is None or self._last[0] is not v:
+            self._last = (v, self.semilinear.flow(v) - self.b, self.semilinear.supply(v))
+        return self._last[1:]
 
     def residual(self, v: Array) -> Array:
-        return self.semilinear.residual(v) - self.b
+        flow, supply = self._terms(v)
+        return flow - supply
 
     def jacobian(self, v: Array) -> PETSc.Mat:
         self._diagonal.setArray(self.semilinear.jacobian_diagonal(v))
@@ -47,9 +55,9 @@ class ObstacleEquations:
         return self._jacobian
 
     def scale(self, v: Array) -> float:
-        """max |A v - b| + max |dx dy g(v)|: the two sides of the equation."""
-        largest = self.semilinear.reduce.max
-        return largest(np.abs(self.semilinear.flow(v) - self.b)) + largest(np.abs(self.semilinear.supply(v)))
+        """Mean of |A v - b| + |dx dy g(v)|: the two sides of the equation."""
+        flow, supply = self._terms(v)
+        return self.semilinear.reduce.sum(np.abs(flow) + np.abs(supply)) / self.semilinear.unknowns
 
     def destroy(self) -> None:
         for obj in (self._diagonal, self._jacobian):
@@ -92,7 +100,7 @@ class ObstacleProblem(BoxProblem):
         equations = ObstacleEquations(SemilinearProblem(grid, Bratu(lam)), boundary)
         least, most = grid.reduce.min(equations.b), grid.reduce.max(equations.b)
         self.homogeneous = least == most == 0.0
-        square = np.isclose(*grid.lengths, rtol=1e-12)
+        square = np.isclose(grid.lengths[0], grid.lengths[1], rtol=1e-12)
         self.turning_point = TURNING_POINT / grid.lengths[0] ** 2 if square and least >= 0 else None
         self._beyond = self.turning_point is not None and lam > self.turning_point
         self._bounded = grid.reduce.max(u) < np.inf
@@ -130,15 +138,15 @@ class ObstacleProblem(BoxProblem):
             "start nearer to v_upper with --set v0=..."
         )
 
-    def coarser(self) -> "ObstacleProblem | None":
+    def coarser(self) -> "tuple[ObstacleProblem, Transfer] | None":
         shape = tuple((n - 1) // 2 for n in self.grid.shape)
         if self._coarser is None and min(shape) >= max(COARSEST, self.grid.comm.size):
             grid = Grid(shape, self.grid.lengths, self.grid.dm.comm, self.grid.origin)
             self._coarser = ObstacleProblem(grid, self.lam, *self._data, coarse=True)
-        return self._coarser
+        return None if self._coarser is None else (self._coarser, self._interpolation(self._coarser.grid))
 
-    def transfer(self, coarse: Grid) -> Transfer:
-        """Bilinear interpolation from a coarser grid, zero on the boundary; made once. This problem destroys it. Collective."""
+    def _interpolation(self, coarse: Grid) -> Transfer:
+        """Bilinear interpolation from a coarser grid, zero on the boundary; made once. Collective."""
         if self._transfer is not None and self._transfer.coarse_shape != coarse.shape:
             self._transfer.destroy()
             self._transfer = None
@@ -149,7 +157,7 @@ class ObstacleProblem(BoxProblem):
     def prolong(self, coarse: "ObstacleProblem", fields: Fields, interior: bool) -> Fields:
         """v from a coarser grid, interpolated bilinearly and moved into the bounds. Collective."""
         if self.homogeneous:
-            v = self.transfer(coarse.grid)(fields["v"])
+            v = self._interpolation(coarse.grid)(fields["v"])
         else:
             transfer = Transfer(coarse.grid, self.grid)
             v = transfer(fields["v"])

@@ -39,7 +39,7 @@ class InteriorOptions:
 
     z0: start of z1 and z2. sigma_max: sigma = min(sigma_max, mu). forcing: inner solves to ||residual|| <= forcing mu.
     boundary: the part of the way to the boundary s, z = 0 that a step may go. beta: of the decrease test; halvings: cuts of
-    alpha before the run counts as failed. inside: at least this part of the box (of 1, if wider) between the start and the bounds.
+    alpha before the run counts as failed. inside: the start keeps this part of the box (of 1, if wider) off the bounds.
     """
 
     z0: float = 1.0
@@ -88,7 +88,7 @@ class Interior:
         l, u = problem.lower, problem.upper
         self._has = np.isfinite(l), np.isfinite(u)
         if problem.reduce.sum((l == u).astype(float)):
-            raise InputError("--method interior: v_lower = v_upper at some points, the box has no inside; active-set can do that")
+            raise InputError("--method interior: v_lower = v_upper at some points, no inside to start in; active-set can")
         margin = options.inside * np.minimum(u - l, 1.0)
         v = np.clip(start["v"] if start else problem.v0, l + margin, u - margin)
         s1, s2 = (np.where(has, s, 1.0) for has, s in zip(self._has, (v - l, u - v), strict=True))
@@ -133,7 +133,8 @@ class Interior:
         size = reduce.norm(rhs)
         wanted = o.forcing * (mu if self._pairs else size)
         rtol = float(np.clip(wanted / size, *RTOL)) if size > 0 else RTOL[1]
-        dv, iterations = self.system.solve(at.v, rhs, rtol, shift=at.z1 / at.s1 + at.z2 / at.s2)
+        self.system.linearise(at.v)
+        dv, iterations = self.system.solve(rhs, rtol, shift=at.z1 / at.s1 + at.z2 / at.s2)
         ds1, ds2 = np.where(has1, b4 + dv, 0.0), np.where(has2, b5 - dv, 0.0)
         step = Point(dv, ds1, ds2, (b2 - at.z1 * ds1) / at.s1, (b3 - at.z2 * ds2) / at.s2)
 
