@@ -123,11 +123,14 @@ class Krylov:
         options, name = PETSc.Options(), "mat_mumps_icntl_14"
         before = options.getString(name, "")
         options.setValue(name, str(reserve))
+        operator = self.ksp.getOperators()[0]
         pc.reset()
+        self.ksp.setOperators(operator)
         self.ksp.setUp()
         options.delValue(name)
         if before:
             options.setValue(name, before)
+            options.getString(name)  # read, as it was
         return True
 
     def destroy(self) -> None:
