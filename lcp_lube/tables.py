@@ -1,5 +1,6 @@
 """The published tables, run again: a printed row becomes a command line, its numbers stand beside the printed ones."""
 
+import math
 import re
 import shlex
 from collections.abc import Callable
@@ -8,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 
 from .arguments import parse
 from .cli import say, solution_of
@@ -22,7 +24,7 @@ from .registry import PACKAGE
 PUBLISHED = next((d for d in (PACKAGE / "published", PACKAGE.parent / "benchmarks" / "published") if d.is_dir()), PACKAGE)
 
 KEY = ("command", "ranks")
-RECORD = """outcome iterations backtracking centrality linear_iterations c1 c2 min_p min_r residual complementarity
+RECORD = """outcome iterations backtracking centrality linear_iterations first_linear c1 c2 min_p min_r residual complementarity
     mass_defect time_s linear_s machine petsc message""".split()  # noqa: SIM905
 
 # A printed column and the column of our record that it is compared with; other columns only name the row.
@@ -31,6 +33,7 @@ MEASURED = {
     "back": "backtracking",
     "cent": "centrality",
     "linear_it": "linear_iterations",
+    "first_it": "first_linear",  # linear iterations of the first outer step
     "gmres": "linear_iterations",
     "c1": "c1",
     "c2": "c2",
@@ -50,6 +53,7 @@ class Spec:
     rows : makes one row a run of the printed csv.
     points : numbers i of the points x_i = i dx (1D) whose pressure, in the problem's unit, is printed as p_i.
     quick : --quick leaves rows with a larger n out.
+    system : the matrix that the inner solver sees.
     note : said under the table.
     """
 
@@ -58,6 +62,7 @@ class Spec:
     rows: Callable[[list[Row]], list[Row]] = list
     points: tuple[int, ...] = ()
     quick: float = np.inf
+    system: str = "full"
     note: str = "benchmarks/README.md explains what differs."
 
 
@@ -104,10 +109,68 @@ MEZZADRI = {
     ),
 }
 
+
+def _these_ranks(printed: list[Row]) -> list[Row]:
+    """The rows that were printed for as many processors p as this run has ranks; n points are `side` x `side`."""
+    ranks = MPI.COMM_WORLD.size
+    rows = [{**row, "side": f"{math.isqrt(int(row['n']))}"} for row in printed if int(row["p"]) == ranks]
+    if not rows:
+        known = ", ".join(sorted({row["p"] for row in printed}, key=int))
+        raise InputError(f"this table is printed for {known} processors: run it on as many ranks, not on {ranks}")
+    return rows
+
+
+def _cimmino(printed: list[Row]) -> list[Row]:
+    """Table 3. Bratu's count is that of the first Newton step; for the other problem it is taken for the sum."""
+    settings = {"bratu": "lambda=5", "poisson_cubic": "peak=0.0625"}
+    return [
+        {
+            **{name: row[name] for name in ("problem", "n", "p", "side")},
+            "set": settings[row["problem"]],
+            "it": row["newton_it"],
+            "first_it": row["cg_it"] if row["problem"] == "bratu" else "",
+            "linear_it": row["cg_it"] if row["problem"] != "bratu" else "",
+            "time_s": row["time_s"],
+        }
+        for row in _these_ranks(printed)
+    ]
+
+
+def _row_a_preconditioner(printed: list[Row]) -> list[Row]:
+    """Table 4: a row a recipe; FSAI, which is not printed, beside the two that are."""
+    columns = {"ainv": "ainv", "bcgs_jacobi": "jacobi", "fsai": ""}
+    measured = {"it": "nonlinear_it", "linear_it": "linear_it", "time_s": "time_s"}
+    return [
+        {
+            **{name: row[name] for name in ("n", "p", "side")},
+            "recipe": recipe,
+            **{ours: row.get(f"{column}_{theirs}", "") for ours, theirs in measured.items()},
+        }
+        for row in _these_ranks(printed)
+        for recipe, column in columns.items()
+    ]
+
+
+BERGAMASCHI = {
+    3: Spec(
+        "Newton with block Cimmino, five orthogonal blocks of rows or more (4096 points)",
+        "solve {problem} --n {side} --set {set} --recipe cimmino --set newton.eta=1e-5 --eps1 1e-9 --eps2 0.1",
+        rows=_cimmino,
+        system="jacobian",
+    ),
+    4: Spec(
+        "inexact Newton with AINV and with Jacobi (Bratu, lambda = 1)",
+        "solve bratu --n {side} --set lambda=1 --recipe {recipe} --set newton.eta=1e-3 --eps1 1e-9 --eps2 0.1",
+        rows=_row_a_preconditioner,
+        quick=4096,
+        system="jacobian",
+    ),
+}
+
 # The papers by the name that --paper takes: folder of the printed figures, and tables by number.
 PAPERS: dict[str, tuple[str, dict[int, Spec]]] = {
     "mezzadri": ("mezzadri_galligani_2018", MEZZADRI),
-    "bergamaschi": ("bergamaschi_zilli", {}),
+    "bergamaschi": ("bergamaschi_zilli", BERGAMASCHI),
 }
 
 
@@ -134,7 +197,7 @@ def find_table(paper: str, number: int) -> tuple[Spec, list[Row]]:
 
 def row_command(spec: Spec, printed: Row) -> str:
     """The command line that runs a printed row; names of methods are in lower case here."""
-    return f"lcp-lube {spec.command} --system full --no-nested".format(
+    return f"lcp-lube {spec.command} --system {spec.system} --no-nested".format(
         **{**printed, "method": printed.get("method", "").lower()}
     )
 
@@ -203,6 +266,7 @@ def run_command(command: str, points: tuple[int, ...] = ()) -> dict[str, Any]:
             **data,
             "time_s": f"{times['total']:.4f}",
             "linear_s": f"{times['linear']:.4f}",
+            "first_linear": solution.steps[0].linear_iterations if solution.steps else None,
             "machine": machine(),
             "petsc": data["versions"]["petsc"],
             **{f"p_{i}": _pressure(solution, i) for i in points},
