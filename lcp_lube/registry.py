@@ -83,9 +83,27 @@ METHODS: dict[str, MethodEntry] = {
     "interior": MethodEntry(
         "lcp_lube.solvers.interior:build",
         "inexact interior point of Bergamaschi and Zilli for box-constrained problems",
-        kinds=("box",),
+        kinds=("box", "mixed", "user"),
         systems=("jacobian",),
         eps=(8e-8, inf),
+        variants=dict.fromkeys(
+            ("mixed", "user"),
+            MethodEntry(
+                "lcp_lube.solvers.mixed_interior:build",
+                "inexact interior point of Bergamaschi and Zilli, free unknowns among the bounded ones",
+                kinds=("mixed", "user"),
+                systems=("jacobian",),
+                eps=(1e-8, inf),
+                fallback="semismooth",
+            ),
+        ),
+    ),
+    "semismooth": MethodEntry(
+        "lcp_lube.solvers.semismooth:build",
+        "Fischer-Burmeister Newton for bounds of any kind, with proximal steps where it stalls",
+        kinds=("user", "mixed", "box"),
+        systems=("jacobian",),
+        eps=(1e-10, inf),
     ),
     "fbn-a": MethodEntry("lcp_lube.solvers.fischer:build_armijo", "Fischer-Burmeister Newton, Armijo rule on ||F||^2/2"),
     "fbn-i": MethodEntry("lcp_lube.solvers.fischer:build_inexact", "Fischer-Burmeister Newton, inexact decrease of ||F||"),
@@ -98,7 +116,13 @@ METHODS: dict[str, MethodEntry] = {
 }
 
 # What 'auto' takes for a kind of problem.
-DEFAULT_METHOD = {"lubrication": "active-set", "box": "active-set", "equations": "newton"}
+DEFAULT_METHOD = {
+    "lubrication": "active-set",
+    "box": "active-set",
+    "equations": "newton",
+    "mixed": "interior",
+    "user": "semismooth",
+}
 
 SYSTEMS: dict[str, Entry] = {
     "full": Entry("lcp_lube.linear.newton_matrix:FullSystem", "the 2n-by-2n matrix [A B; R P] of the papers"),
@@ -110,9 +134,11 @@ SYSTEMS: dict[str, Entry] = {
 FAMILIES: dict[str, Entry] = {
     "slider": Entry("lcp_lube.scene:SliderScene", "slider with one wave of the film (the published problems)"),
     "textured": Entry("lcp_lube.scenes_textured:TexturedScene", "flat slider with square dimples"),
+    "journal": Entry("lcp_lube.scenes_journal:JournalScene", "journal bearing with an axial groove at the widest gap"),
     "rough": Entry("lcp_lube.scenes_textured:RoughScene", "slider with one wave and a random surface"),
     "bratu": Entry("lcp_lube.scenes_semilinear:BratuScene", "Bratu's equation on the unit square"),
     "obstacle": Entry("lcp_lube.scenes_obstacle:ObstacleScene", "Bratu's equation between two obstacles"),
+    "ehl_line": Entry("lcp_lube.scenes_ehl:EhlLineScene", "elastohydrodynamic line contact"),
     "poisson_cubic": Entry("lcp_lube.scenes_semilinear:PoissonCubicScene", "Poisson's equation with a cubic term"),
 }
 

@@ -92,3 +92,28 @@ class Wave:
     def breakpoints(self) -> tuple[float, ...]:
         """Return the two ends (kinks) and the middle (extremum) of the wave, x in m."""
         return (self.start, self.start + self.length / 2, self.start + self.length)
+
+
+@dataclass(frozen=True)
+class JournalGap:
+    """h = c (1 + eccentricity cos phi), phi = 2 pi x/L: a journal's gap, unwrapped from its widest place.
+
+    Parameters
+    ----------
+    c : radial clearance (m). eccentricity : 0 <= eccentricity < 1. L : circumference (m).
+    """
+
+    c: float
+    eccentricity: float
+    L: float
+
+    def __call__(self, x: ArrayLike, y: ArrayLike | None = None, /) -> Array:
+        """Return h (m) at x and y (m), with the broadcast shape of both; the film does not depend on y."""
+        # 1 + e cos phi = (1 - e) + 2 e cos^2(phi/2) keeps its digits next to h_min.
+        half = np.cos(np.pi * np.asarray(x, dtype=float) / self.L)
+        h = self.c * ((1.0 - self.eccentricity) + 2.0 * self.eccentricity * half**2)
+        return h if y is None else np.broadcast_arrays(h, np.asarray(y))[0].copy()
+
+    def breakpoints(self) -> tuple[float, ...]:
+        """Return the two ends and the narrowest place, x in m."""
+        return (0.0, 0.5 * self.L, self.L)

@@ -52,6 +52,7 @@ class LubricationProblem:
         self.grid, self.scheme, self.film = grid, scheme, film
         self.mu, self.U, self.p_unit, self.p_sides, self.p_c = mu, U, p_unit, p_sides, p_c
         self.exact = exact
+        self.extras: Callable[[LubricationProblem, Array, Array], dict[str, float]] | None = None
         self.reduce = grid.reduce
         self.A = assemble(grid, scheme.pressure_entries())
         self.B = assemble(grid, scheme.void_entries())
@@ -122,8 +123,9 @@ class LubricationProblem:
         )
 
     def quantities(self, fields: Fields) -> dict[str, Any]:
-        """Load, friction, largest pressure, cavitated share, fronts; see `quantities.quantities`. Collective."""
-        return quantities(self, fields["p"], fields["r"])
+        """Load, friction, largest pressure, cavitated share, fronts, and the scene's own `extras`. Collective."""
+        p, r = fields["p"], fields["r"]
+        return {**quantities(self, p, r), **(self.extras(self, p, r) if self.extras else {})}
 
     def physical(self, fields: Fields) -> dict[str, tuple[Array, str]]:
         """Absolute pressure in Pa, void fraction, film in m."""

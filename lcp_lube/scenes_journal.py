@@ -1,0 +1,98 @@
+"""Journal bearings, unwrapped from one axial groove at the widest gap to the same groove again."""
+
+import math
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from .parallel import Array
+from .problems.exact import ExactSolution, exact_solution
+from .problems.film import JournalGap
+from .problems.problem import LubricationProblem
+from .problems.reynolds import sides
+from .scene import LubricationScene, Positive
+
+
+class JournalScene(LubricationScene):
+    """A journal of diameter D turning in a bush of width B: x = D phi/2 from the groove at h_max, y along the axis.
+
+    h = c (1 + eccentricity cos phi), c = psi D/2; the groove keeps p = p_a = p_b and no void, the ends p = p_side. L, width, U
+    and p_unit follow from D, width_over_diameter, omega and psi; dimension 1 is the infinitely long bearing.
+    """
+
+    dimension: Literal[1, 2] = 2
+    eccentricity: Annotated[float, Field(ge=0, lt=1, description="relative eccentricity")] = 0.5
+    width_over_diameter: Positive = Field(1.0, description="B/D (2D)")
+    D: Positive = Field(0.1, description="diameter, m")
+    psi: Annotated[float, Field(gt=0, lt=1, description="relative clearance c/(D/2)")] = 1e-3
+    omega: Positive = Field(100.0, description="angular velocity, rad/s")
+    mu: Positive = 0.02
+    L: Positive = Field(1.0, description="follows from D")
+    U: Positive = Field(1.0, description="follows from D and omega")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _derived(cls, data: Any) -> Any:
+        for key in ("L", "U", "width", "p_unit"):
+            if key in data:
+                raise ValueError(f"{key} = {data[key]}: follows from D, width_over_diameter, omega, psi and mu in this scene")
+        fields = cls.model_fields
+        D, omega, mu, psi = (data.get(key, fields[key].default) for key in ("D", "omega", "mu", "psi"))
+        ratio = data.get("width_over_diameter", fields["width_over_diameter"].default)
+        try:
+            derived = {"L": math.pi * D, "U": 0.5 * D * omega, "p_unit": mu * omega / psi**2}
+            if data.get("dimension", 2) == 2:
+                derived["width"] = ratio * D
+        except (TypeError, ZeroDivisionError, OverflowError):
+            return data  # the fields' own checks say what is wrong
+        return {**data, **{key: value for key, value in derived.items() if value > 0 and math.isfinite(value)}}
+
+    @property
+    def gap(self) -> JournalGap:
+        return JournalGap(0.5 * self.psi * self.D, self.eccentricity, self.L)
+
+    def exact(self) -> ExactSolution | None:
+        if self.dimension == 2:
+            return None
+        return exact_solution(self.gap, self.L, self.mu, self.U, self.p_a, self.p_b)
+
+    def build(self, comm: Any = None) -> LubricationProblem:
+        problem = super().build(comm)
+        problem.extras = self._bearing_numbers
+        return problem
+
+    def _bearing_numbers(self, problem: LubricationProblem, p: Array, r: Array) -> dict[str, float]:
+        """Sommerfeld number W psi^2/(B D mu omega), attitude angle, side leakage and Q/((D/2)^3 psi omega). Collective."""
+        grid = problem.grid
+        phi = 2.0 * np.pi * np.broadcast_to(grid.x, grid.box).ravel() / self.L
+        width = self.width if grid.dim == 2 and self.width else 1.0
+        groove = 0.5 * (self.p_a + self.p_b) * (grid.shape[1] if grid.dim == 2 else 1)
+        # Towards the narrowest gap, and across: the film's force on the journal, trapezoidal along x.
+        towards = grid.cell * (-problem.reduce.dot(p, np.cos(phi)) * problem.p_unit - groove)
+        across = grid.cell * problem.reduce.dot(p, np.sin(phi)) * problem.p_unit
+        load = math.hypot(towards, across)
+        numbers = {
+            "sommerfeld": load * self.psi**2 / (width * self.D * self.mu * self.omega),
+            "attitude_deg": math.degrees(math.atan2(across, towards)),
+            "bearing_load": load,
+        }
+        if grid.dim == 2:
+            leakage = self._leakage(problem, p)
+            numbers["side_leakage"] = leakage
+            numbers["side_leakage_number"] = leakage / ((0.5 * self.D) ** 3 * self.psi * self.omega)
+        return numbers
+
+    def _leakage(self, problem: LubricationProblem, p: Array) -> float:
+        """Volume flow out of both ends, m3/s: through the last faces, and what the half cells beyond them squeeze out.
+
+        Those faces stand half a spacing inside; in the full film the Couette flow that a half cell loses leaves by the end.
+        """
+        grid, s = problem.grid, problem.scheme
+        field = p.reshape(grid.box)
+        out = np.zeros(grid.box)
+        for at_end, k, p_end in zip(sides(grid)[2:], (s.k_S, s.k_N), problem.p_sides[2:], strict=True):
+            through = k * (field - p_end / problem.p_unit)
+            squeezed = np.where(field > 0, 0.5 * (s.couette_W - s.couette_E), 0.0)
+            out += np.where(at_end, through + squeezed, 0.0)
+        return 0.5 * grid.spacing[1] * problem.reduce.sum(out)
