@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import InputError
 from ..linear.stages import Stages
 from ..linear.system import System, make_system
+from ..parallel import Array
 from ..problems.problem import LubricationProblem
 from ..problems.solution import Fields, Step
 from .din import DIN, DinOptions
@@ -63,9 +64,8 @@ class DinPc(DIN):
             alpha = feasible(reduce, (p, dp / near), (r, dr / near))  # near times the step to the boundary, at most 1
 
             def central(alpha: float) -> bool:
-                trial_p, trial_r = p + alpha * dp, r + alpha * dr
-                F1 = self.problem.flow(trial_p, trial_r)
-                return self.central.holds(trial_p * trial_r, reduce.norm(F1))
+                trial: tuple[Array, Array] = (p + alpha * dp, r + alpha * dr)
+                return self.central.holds(trial[0] * trial[1], reduce.norm(self.problem.flow(*trial)))
 
             alpha, cuts = halve_until(central, alpha)
             self.p, self.r = p + alpha * dp, r + alpha * dr
