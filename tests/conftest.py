@@ -20,6 +20,7 @@ ENVIRONMENT = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_CO
     "OMPI_ALLOW_RUN_AS_ROOT": "1",
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
     "OMPI_MCA_rmaps_base_oversubscribe": "1",
+    "OMPI_MCA_mpi_yield_when_idle": "1",
     "PYTHONPATH": os.pathsep.join(filter(None, [str(TESTS.parent), os.environ.get("PYTHONPATH", "")])),
 }
 os.environ.setdefault("OMP_NUM_THREADS", "1")

@@ -23,7 +23,7 @@ def example(name: str) -> argparse.Namespace:
     method = "active-set" if system == "cavity" else "din"
     scene = "problem4 --nx 13 --ny 11" if "2D" in line or system == "cavity" else "problem1 --n 21"
     words = SUITED.get(name, f"{scene} --method {method} --system {system} --no-nested").split()
-    return parse(["solve", *words, "--recipe", name])
+    return parse(["solve", *words, "--recipe", name, "--max-it", "120"])
 
 
 def one_rank(name: str) -> bool:
