@@ -21,6 +21,8 @@ from .method_options import make_options
 from .newton import Stopping
 from .steplength import StepLengthError, armijo, halve_until, inexact_decrease
 
+SMALL = np.finfo(float).tiny / np.finfo(float).eps
+
 Trial = tuple[Array, Array, Array, Array]  # p, r, F1, F2
 
 
@@ -37,10 +39,10 @@ def derivatives(p: Array, r: Array) -> tuple[Array, Array]:
     """D_p = p/s - 1 and D_r = r/s - 1 with s = sqrt(p^2 + r^2).
 
     Where p = r = 0, phi has no derivative; (1/sqrt 2 - 1, 1/sqrt 2 - 1) is the element of its generalised Jacobian
-    {(a - 1, b - 1): a^2 + b^2 <= 1} that the approach along p = r gives.
+    {(a - 1, b - 1): a^2 + b^2 <= 1} that the approach along p = r gives. Numbers too small for s to have its digits count as 0.
     """
     s = np.hypot(p, r)
-    origin = s == 0.0
+    origin = s < SMALL
     s = np.where(origin, 1.0, s)
     return np.where(origin, np.sqrt(0.5), p / s) - 1.0, np.where(origin, np.sqrt(0.5), r / s) - 1.0
 
