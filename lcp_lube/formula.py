@@ -72,7 +72,7 @@ class Formula:
 
 def _check(value: Any) -> Any:
     """A number as a number, a text as it is if it is a formula; pydantic prints what InputError says."""
-    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)) or value != value:
         raise InputError("a number or a formula in x and y, as text, is needed")
     if isinstance(value, str):
         Formula(value)

@@ -8,7 +8,7 @@ from pydantic import Field, PrivateAttr, field_validator, model_validator
 from .formula import Formula, FormulaText
 from .problems.grid import Grid
 from .problems.obstacle import ObstacleProblem
-from .scene import Count, Scene
+from .scene import Scene
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Surface = Annotated[float | str, FormulaText]
@@ -30,8 +30,8 @@ class ObstacleScene(Scene):
     x: tuple[Finite, Finite] = Field((0.0, 1.0), description="the rectangle's sides")
     y: tuple[Finite, Finite] = Field((0.0, 1.0), description="the rectangle's sides")
     n: int = Field(64, description="interior points a side")
-    nx: Count | None = Field(None, description="interior points in x; default n")
-    ny: Count | None = Field(None, description="interior points in y; default n")
+    nx: int | None = Field(None, description="interior points in x; default n")
+    ny: int | None = Field(None, description="interior points in y; default n")
     _coarse: bool = PrivateAttr(False)
 
     @field_validator("n", "nx", "ny")

@@ -91,7 +91,8 @@ class BoxProblem:
 
     def natural_residual(self, v: Array, f: Array, v_scale: float = 1.0, f_scale: float | Array = 1.0) -> Array:
         """mid((v - u)/v_scale, f/f_scale, (v - l)/v_scale): zero at the solutions alone, no less than a bound is violated."""
-        middle = f / f_scale
+        with np.errstate(invalid="ignore"):  # where f has overflowed; the outer loop ends the run
+            middle = f / f_scale
         np.minimum(middle, (v - self.lower) / v_scale, out=middle)
         return np.maximum(middle, (v - self.upper) / v_scale, out=middle)
 

@@ -20,9 +20,9 @@ from .transfer import Transfer
 
 Surface = Callable[[Array, Array], Array]
 
-# Largest lambda for which -Lap v = lambda e^v, v = 0 on the boundary of the unit square, has a solution. The five-point
-# formula's is smaller by about 1.5 h^2 (6.80674, 6.80777, 6.80803 for n = 32, 64, 128).
-TURNING_POINT = 6.808124
+# Largest lambda for which -Lap v = lambda e^v, v = 0 on the boundary of the unit square, has a solution; the five-point
+# formula's is smaller by 1.5 h^2 (6.80674, 6.80777, 6.80803 for n = 32, 64, 128).
+TURNING_POINT, FIVE_POINT = 6.808124, 1.5
 COARSEST = 8  # points a side of multigrid's coarsest grid, at least (and as many as there are ranks)
 
 
@@ -101,13 +101,16 @@ class ObstacleProblem(BoxProblem):
         least, most = grid.reduce.min(equations.b), grid.reduce.max(equations.b)
         self.homogeneous = least == most == 0.0
         square = np.isclose(grid.lengths[0], grid.lengths[1], rtol=1e-12)
-        self.turning_point = TURNING_POINT / grid.lengths[0] ** 2 if square and least >= 0 else None
+        L, h = grid.lengths[0], max(grid.spacing)
+        self.turning_point = (TURNING_POINT - FIVE_POINT * (h / L) ** 2) / L**2 if square and least >= 0 else None
         self._beyond = self.turning_point is not None and lam > self.turning_point
         self._bounded = grid.reduce.max(u) < np.inf
         if v0 is not None:
             start = v0(grid.x, grid.y).ravel()
         else:
-            start = u if self._beyond and self._bounded else np.full(grid.local_size, 0.01)
+            # The same choice on every grid, or nested iteration would begin on another branch.
+            contact = self._bounded and self.turning_point is not None and lam > TURNING_POINT / L**2
+            start = u if contact else np.full(grid.local_size, 0.01)
         self._coarser: ObstacleProblem | None = None
         self._transfer: Transfer | None = None
         super().__init__(grid, equations, l, u, start)
