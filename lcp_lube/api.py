@@ -19,6 +19,7 @@ from .solvers.newton import Monitor, Stopping, iterate
 COARSE_EPS = 1e-4
 
 
+@np.errstate(over="ignore", invalid="ignore")  # iterates that overflow are an outcome, not a warning
 def solve(
     scene: Scene,
     *,

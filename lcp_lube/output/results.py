@@ -15,6 +15,7 @@ from .. import __version__
 from ..problems.solution import Solution
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def as_dict(solution: Solution) -> dict[str, Any]:
     """The keys of the command line's --json, in their order. Collective; the same on every rank."""
     problem, grid = solution.problem, solution.problem.grid
