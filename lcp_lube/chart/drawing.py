@@ -56,7 +56,7 @@ def new_figure(height: float, sentence: str) -> Figure:
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    text = textwrap.fill(sentence, 116)
+    text = textwrap.fill(sentence, 120)
     below = (0.14 * (text.count("\n") + 1) + 0.08) / height
     figure = Figure(figsize=(WIDTH, height), layout=ConstrainedLayoutEngine(rect=(0.0, below, 1.0, 1.0 - below)))
     figure.text(0.01, 0.06 / height, text, va="bottom", ha="left", linespacing=1.15)

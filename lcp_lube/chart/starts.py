@@ -8,9 +8,8 @@ from ..cli import say
 from ..output.resumable import ResumableCsv
 from ..problems.solution import Outcome
 from ..scene import load_scene
-from ..solvers.din import MU_RULES
 from .experiment import open_store, run
-from .starts_picture import draw_lines, draw_maps, lines_sentence, map_sentence
+from .starts_picture import draw_lines, draw_maps, lines_sentence, map_sentence, rule
 
 SCENES = ("problem1", "problem2", "problem3")
 DECADES = range(-15, 4)  # p0 = r0 = 10^k; p0 in the problem's unit, MPa
@@ -18,7 +17,10 @@ GRID = range(-15, 4, 2)  # p0 x r0
 N = 100  # the table's grid
 LAPACK, SPARSE = "lu", "superlu"  # pivoting by rows in dense LU, which the table's rows were run with, and in SuperLU
 
-KEY = ("scene", "n", "recipe", "mu", "p0", "r0", "ranks")
+# Rules for mu with the paper's step-length conditions; and the default one without centrality.
+RULES = (("mu1", "FCB"), ("mu2", "FCB"), ("adaptive", "FCB"), ("mu2", "FB"))
+
+KEY = ("scene", "n", "recipe", "mu", "conditions", "p0", "r0", "ranks")
 
 
 def starts(quick: bool) -> Iterator[dict[str, Any]]:
@@ -30,9 +32,9 @@ def starts(quick: bool) -> Iterator[dict[str, Any]]:
     }
     for scene in scenes:
         for recipe, exponents in pairs.items():
-            for mu in MU_RULES:
-                for k, l in exponents:
-                    yield {"scene": scene, "n": n, "recipe": recipe, "mu": mu, "p0": f"1e{k}", "r0": f"1e{l}"}
+            for mu, conditions in RULES:
+                fixed = {"scene": scene, "n": n, "recipe": recipe, "mu": mu, "conditions": conditions}
+                yield from ({**fixed, "p0": f"1e{k}", "r0": f"1e{l}"} for k, l in exponents)
 
 
 def chart(quick: bool = False, results: Path = Path("lcp_lube_results")) -> int:
@@ -77,9 +79,9 @@ def _row(store: ResumableCsv, start: dict[str, Any]) -> dict[str, str]:
         method="din",
         system="full",
         recipe_name=start["recipe"],
-        options={"p0": float(start["p0"]), "r0": float(start["r0"]), "mu": start["mu"]},
+        options={name: start[name] for name in ("mu", "conditions")} | {name: float(start[name]) for name in ("p0", "r0")},
     )
     row = store.add({**values, **key})
     if row["outcome"] != Outcome.CONVERGED:
-        say(f"{start['scene']} {start['recipe']} {start['mu']} p0 {start['p0']} r0 {start['r0']}: {row['message']}")
+        say(f"{start['scene']} {start['recipe']} {rule(row)} p0 {start['p0']} r0 {start['r0']}: {row['message']}")
     return row

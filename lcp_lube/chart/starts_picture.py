@@ -17,6 +17,7 @@ from .drawing import look, new_figure, save
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
 # A marker for each way to fail.
 FAILURES = {
@@ -36,6 +37,19 @@ def unique(rows: Sequence[Row], name: str) -> list[str]:
 def chosen(rows: Sequence[Row], **values: str) -> list[Row]:
     """The rows with these values."""
     return [row for row in rows if all(row[name] == value for name, value in values.items())]
+
+
+def rule(row: Row) -> str:
+    """Name of the rule that a run follows: that for mu, and the conditions on the step where they are not the paper's."""
+    return row["mu"] if row["conditions"] == "FCB" else f"{row['mu']}, {row['conditions']}"
+
+
+def by_rule(rows: Sequence[Row]) -> dict[str, list[Row]]:
+    """The rows of each rule."""
+    rules: dict[str, list[Row]] = {}
+    for row in rows:
+        rules.setdefault(rule(row), []).append(row)
+    return rules
 
 
 def converged(row: Row) -> bool:
@@ -65,40 +79,34 @@ def grid_starts(rows: Sequence[Row]) -> list[Row]:
 
 def lines_sentence(rows: Sequence[Row]) -> str:
     """Rule by rule, from which equal starts DIN fails, for each inner solver."""
-    rows = equal_starts(rows)
     sentences = []
-    for mu in unique(rows, "mu"):
-        mine = chosen(rows, mu=mu)
+    for name, mine in by_rule(equal_starts(rows)).items():
         failed = [row for row in mine if not converged(row)]
         if not failed:
             most = max(int(row["iterations"]) for row in mine)
-            sentences.append(f"{mu}: all {len(mine)} starts converge, in {most} iterations at most.")
+            sentences.append(f"{name}: all {len(mine)} converge, in {most} iterations at most.")
             continue
-        where = []
-        for recipe in unique(rows, "recipe"):
-            failing = [decade(row, "p0") for row in chosen(failed, recipe=recipe)]
-            if failing:
-                where.append(f"1e{max(failing)} with recipe {recipe}")
-        creeping = sum(float(row["c2"] or "nan") < 1e-6 for row in failed)
-        sentences.append(
-            f"{mu}: {len(failed)} of {len(mine)} starts fail, the largest {' and '.join(where)}; {creeping} of them have come "
-            f"to creep, with ||alpha d|| below 1e-6 and ||F|| not yet small."
-        )
+        largest = {
+            recipe: max(decade(row, "p0") for row in chosen(failed, recipe=recipe)) for recipe in unique(failed, "recipe")
+        }
+        where = " and ".join(f"1e{k} with recipe {recipe}" for recipe, k in largest.items())
+        sentences.append(f"{name}: {len(failed)} of {len(mine)} fail, the largest {where}.")
     return f"Starts p0 = r0. {' '.join(sentences)}"
 
 
 def map_sentence(rows: Sequence[Row]) -> str:
-    """How many starts of the grid converge by each rule, and how far apart p0 and r0 may be."""
-    rows = grid_starts(rows)
-    counts = ", ".join(f"{sum(map(converged, chosen(rows, mu=mu)))} by {mu}" for mu in unique(rows, "mu"))
-    each = len(rows) // len(unique(rows, "mu"))
-    farthest = max((apart(row) for row in rows if converged(row)), default=0)
-    text = f"Numbers: iterations. Of {each} starts converge {counts}; none with p0 and r0 more than {farthest} decades apart."
-    steady = unique([row for row in rows if row["mu"] != "mu1"], "mu")
-    failing = [apart(row) for row in rows if row["mu"] in steady and not converged(row)]
-    if failing and min(failing) > 0:
-        text += f" By {' and '.join(steady)} all converge that are less than {min(failing)} decades apart."
-    return text
+    """Rule by rule, how many starts of the grid converge, and how far apart p0 and r0 may be."""
+    parts = []
+    for name, mine in by_rule(grid_starts(rows)).items():
+        failing = min((apart(row) for row in mine if not converged(row)), default=None)
+        farthest = max((apart(row) for row in mine if converged(row)), default=None)
+        said = f"{name}: {sum(map(converged, mine))} of {len(mine)} converge"
+        if failing:
+            said += f", all those less than {failing} decades apart"
+        if failing is not None and farthest is not None:
+            said += f", none more than {farthest} decades apart"
+        parts.append(said)
+    return f"Numbers: iterations. Starts p0, r0 by {'; by '.join(parts)}."
 
 
 def draw_lines(rows: Sequence[Row], path: Path, comm: MPI.Comm) -> None:
@@ -114,14 +122,14 @@ def draw_maps(rows: Sequence[Row], path: Path, comm: MPI.Comm) -> None:
 def lines(rows: Sequence[Row]) -> Figure:
     """A column a scene, a row an inner solver, a line a rule; failures where their iterations ended."""
     sentence, rows = lines_sentence(rows), equal_starts(rows)
-    scenes, recipes, rules = (unique(rows, name) for name in ("scene", "recipe", "mu"))
+    scenes, recipes = unique(rows, "scene"), unique(rows, "recipe")
     figure = new_figure(1.3 + 1.9 * len(recipes), sentence)
     grid = figure.subplots(len(recipes), len(scenes), sharex=True, sharey=True, squeeze=False)
     for recipe, row_of_axes in zip(recipes, grid, strict=True):
         for scene, axes in zip(scenes, row_of_axes, strict=True):
-            for number, mu in enumerate(rules):
-                _rule(axes, chosen(rows, scene=scene, recipe=recipe, mu=mu), number)
-            axes.set(xscale="log", ylim=(0, None))
+            for number, (name, mine) in enumerate(by_rule(chosen(rows, scene=scene, recipe=recipe)).items()):
+                _rule(axes, mine, number, name)
+            axes.set(xscale="log", ylim=(0, None), xticks=[10.0**k for k in range(-15, 4, 6)])
             axes.grid(which="major", color="0.9", lw=0.6)
         row_of_axes[0].set_ylabel(f"recipe {recipe}\niterations")
     for scene, axes in zip(scenes, grid[0], strict=True):
@@ -129,49 +137,46 @@ def lines(rows: Sequence[Row]) -> Figure:
     for axes in grid[-1]:
         axes.set_xlabel("p0 in MPa = r0")
     handles, labels = grid[0, 0].get_legend_handles_labels()
-    figure.legend(
-        handles + _failure_handles(rows), labels + _failure_labels(rows), loc="outside upper center", ncols=len(rules) + 2
-    )
+    marks, said = _failures(rows)
+    figure.legend(handles + marks, labels + said, loc="outside upper center", ncols=len(labels) + len(said))
     return figure
 
 
-def _rule(axes: Axes, rows: Sequence[Row], number: int) -> None:
+def _rule(axes: Axes, rows: Sequence[Row], number: int, name: str) -> None:
     """A line through the starts that converge; later rules are thinner, so that rules which agree are all seen."""
     x = [float(row["p0"]) for row in rows]
     y = [float(row["iterations"]) if converged(row) else math.nan for row in rows]
-    axes.plot(x, y, **look(number), lw=2.6 - 0.9 * number, ms=5.6 - 1.5 * number, label=rows[0]["mu"])
+    axes.plot(x, y, **look(number), lw=2.6 - 0.7 * number, ms=5.6 - 1.0 * number, label=name)
     for outcome, (mark, _) in FAILURES.items():
         failed = chosen(rows, outcome=outcome)
-        ends = [float(row["iterations"]) for row in failed]
-        axes.plot([float(row["p0"]) for row in failed], ends, color=look(number)["color"], marker=mark, ls="none", ms=5.5)
+        x, y = [float(row["p0"]) for row in failed], [float(row["iterations"]) for row in failed]
+        axes.plot(x, y, color=look(number)["color"], marker=mark, mfc="none", ls="none", ms=6.5 - number)
 
 
-def _failure_labels(rows: Sequence[Row]) -> list[str]:
-    return [label for outcome, (_, label) in FAILURES.items() if chosen(rows, outcome=outcome)]
-
-
-def _failure_handles(rows: Sequence[Row]) -> list:
+def _failures(rows: Sequence[Row]) -> tuple[list[Line2D], list[str]]:
+    """The legend's marks and words for the ways in which some run failed."""
     from matplotlib.lines import Line2D
 
-    marks = [mark for outcome, (mark, _) in FAILURES.items() if chosen(rows, outcome=outcome)]
-    return [Line2D([], [], color="0.3", marker=mark, ls="none", ms=5.5) for mark in marks]
+    seen = [failure for outcome, failure in FAILURES.items() if chosen(rows, outcome=outcome)]
+    return [Line2D([], [], color="0.3", marker=mark, mfc="none", ls="none") for mark, _ in seen], [label for _, label in seen]
 
 
 def maps(rows: Sequence[Row]) -> Figure:
-    """A column a rule, a row a scene; a cell's colour and number are its iterations, a mark says how it failed."""
+    """A column a scene, a row a rule; a cell's colour and number are its iterations, a mark says how it failed."""
     sentence, rows = map_sentence(rows), grid_starts(rows)
-    scenes, rules = unique(rows, "scene"), unique(rows, "mu")
-    figure = new_figure(0.9 + 2.05 * len(scenes), sentence)
-    grid = figure.subplots(len(scenes), len(rules), sharex=True, sharey=True, squeeze=False)
-    for scene, row_of_axes in zip(scenes, grid, strict=True):
-        for mu, axes in zip(rules, row_of_axes, strict=True):
-            _map(axes, chosen(rows, scene=scene, mu=mu))
-        row_of_axes[0].set_ylabel(f"{scene}\nr0")
-    for mu, axes in zip(rules, grid[0], strict=True):
-        axes.set_title(mu, fontweight="bold")
+    scenes, rules = unique(rows, "scene"), by_rule(rows)
+    figure = new_figure(1.0 + 2.0 * len(rules), sentence)
+    grid = figure.subplots(len(rules), len(scenes), sharex=True, sharey=True, squeeze=False)
+    for (name, mine), row_of_axes in zip(rules.items(), grid, strict=True):
+        for scene, axes in zip(scenes, row_of_axes, strict=True):
+            _map(axes, chosen(mine, scene=scene))
+        row_of_axes[0].set_ylabel(f"{name}\nr0")
+    for scene, axes in zip(scenes, grid[0], strict=True):
+        axes.set_title(scene, fontweight="bold")
     for axes in grid[-1]:
         axes.set_xlabel("p0 in MPa")
-    figure.legend(_failure_handles(rows), _failure_labels(rows), loc="outside upper right", ncols=len(FAILURES))
+    marks, said = _failures(rows)
+    figure.legend(marks, said, loc="outside upper right", ncols=len(said) or 1)
     return figure
 
 
