@@ -10,6 +10,7 @@ from typing import Any
 __version__ = "0.1.0"
 
 _PUBLIC = {
+    "Complementarity": "lcp_lube.complementarity",
     "InputError": "lcp_lube.errors",
     "Scene": "lcp_lube.scene",
     "load_scene": "lcp_lube.scene",

@@ -102,7 +102,8 @@ def solve(
         rescue = METHODS[entry.fallback]
         # Interior methods converge from anywhere, and only direct inner solves keep up with them on films like this one.
         with recipe(default_recipe(problem, rescue.systems[0], large=False)[0]):
-            run = rescue.load()(problem, stages, rescue.systems[0], {}, stopping)
+            # An interior method begins anew; another may take up what was reached.
+            run = rescue.load()(problem, stages, rescue.systems[0], {}, stopping, None if rescue.interior else fields)
             try:
                 failure = message
                 outcome, message, more = iterate(run, stopping, monitor)

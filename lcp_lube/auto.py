@@ -83,6 +83,8 @@ def default_recipe(problem: Problem, system: str, large: bool) -> tuple[str, str
     if problem.kind == "box" and large:
         return "multigrid", "a large problem with coarser grids: multigrid costs the same per point on every grid"
     ranks = problem.grid.comm.size
+    if getattr(problem, "dense", False):
+        return ("redundant_lu" if ranks > 1 else "dense_lu"), "a dense Jacobian: LAPACK"
     if problem.grid.dim == 1 and system == "reduced" and ranks == 1:
         return "banded", "tridiagonal, an M-matrix: elimination in natural order, without pivoting or fill"
     names = ("mumps", "superlu_dist") if ranks > 1 else ("superlu", "umfpack", "mumps")
