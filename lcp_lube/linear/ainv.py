@@ -76,7 +76,7 @@ def factorise(A: sp.csr_matrix, drop: float) -> tuple[sp.csr_matrix, sp.csr_matr
     Returns
     -------
     Z, DW : n-by-n.
-    failed : column without a usable pivot, -1 if there is none; Z and DW are then not to be used.
+    failed : column without a usable pivot, -1 if there is none; Z and DW are then empty.
     """
     n = A.shape[0]
     row, column = scaling(A)
@@ -87,15 +87,17 @@ def factorise(A: sp.csr_matrix, drop: float) -> tuple[sp.csr_matrix, sp.csr_matr
 
     def unit_upper(left: sp.csr_matrix, right: sp.csr_matrix) -> tuple[sp.csc_matrix, Array, int]:
         pointers, rows, values, pivots, failed = run(*_index64(left), left.data, *_index64(right), drop)
-        return sp.csc_matrix((values, rows, pointers), shape=(n, n)), pivots, int(failed)
+        if failed >= 0:
+            return sp.csc_matrix((n, n)), pivots, int(failed)
+        return sp.csc_matrix((values, rows, pointers), shape=(n, n)), pivots, -1
 
     Z, pivots, failed = unit_upper(scaled, transposed)
-    if symmetric or failed >= 0:
-        W = Z
-    else:
+    W = Z
+    if not symmetric and failed < 0:
         W, _, failed = unit_upper(transposed, scaled)
-    one, inverse = np.ones(n), 1.0 / np.where(pivots == 0.0, 1.0, pivots)
-    return scale(Z.tocsr(), column, one), scale(W.T, inverse, row), failed
+    if failed >= 0:
+        return sp.csr_matrix((n, n)), sp.csr_matrix((n, n)), failed
+    return scale(Z.tocsr(), column, np.ones(n)), scale(W.T, 1.0 / pivots, row), failed
 
 
 def biconjugate(
