@@ -6,6 +6,7 @@ import shlex
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,7 @@ PUBLISHED = next((d for d in (PACKAGE / "published", PACKAGE.parent / "benchmark
 
 KEY = ("command", "ranks")
 RECORD = """outcome iterations backtracking centrality linear_iterations first_linear c1 c2 min_p min_r residual complementarity
-    mass_defect time_s linear_s machine petsc message""".split()  # noqa: SIM905
+    mass_defect cpu_s time_s linear_s machine petsc message""".split()  # noqa: SIM905
 
 # A printed column and the column of our record that it is compared with; other columns only name the row.
 MEASURED = {
@@ -38,7 +39,7 @@ MEASURED = {
     "c1": "c1",
     "c2": "c2",
     "wrong_solution": "outcome",
-    "time_s": "time_s",
+    "time_s": "cpu_s",
 }
 
 
@@ -137,7 +138,7 @@ def _cimmino(printed: list[Row]) -> list[Row]:
 
 
 def _row_a_preconditioner(printed: list[Row]) -> list[Row]:
-    """Table 4: a row a recipe; FSAI, which is not printed, beside the two that are."""
+    """Tables 4 and 5: a row a recipe; FSAI, which is not printed, beside the two that are."""
     columns = {"ainv": "ainv", "bcgs_jacobi": "jacobi", "fsai": ""}
     measured = {"it": "nonlinear_it", "linear_it": "linear_it", "time_s": "time_s"}
     return [
@@ -151,7 +152,28 @@ def _row_a_preconditioner(printed: list[Row]) -> list[Row]:
     ]
 
 
+def _obstacle(printed: list[Row]) -> list[Row]:
+    """Table 1, and below it what is not printed: lambda = 10 from a start that reaches the contact with the upper bound."""
+    measured = {"it": "nonlinear_it", "linear_it": "linear_it", "time_s": "cpu_s"}
+    rows = [
+        {
+            **{name: row[name] for name in ("lambda", "n")},
+            "side": f"{math.isqrt(int(row['n']))}",
+            "v0": "1",
+            **{ours: row[theirs] for ours, theirs in measured.items()},
+        }
+        for row in printed
+    ]
+    return [*rows, *({**rows[-1], "v0": v0, "it": "", "linear_it": "", "time_s": ""} for v0 in ("2", "3"))]
+
+
 BERGAMASCHI = {
+    1: Spec(
+        "inexact interior point, BiCGStab with Jacobi (obstacle Bratu)",
+        "solve obstacle_bratu --n {side} --set lambda={lambda} --set v0={v0} --method interior --recipe bcgs_jacobi",
+        rows=_obstacle,
+        system="jacobian",
+    ),
     3: Spec(
         "Newton with block Cimmino, five orthogonal blocks of rows or more (4096 points)",
         "solve {problem} --n {side} --set {set} --recipe cimmino --set newton.eta=1e-5 --eps1 1e-9 --eps2 0.1",
@@ -163,6 +185,13 @@ BERGAMASCHI = {
         "solve bratu --n {side} --set lambda=1 --recipe {recipe} --set newton.eta=1e-3 --eps1 1e-9 --eps2 0.1",
         rows=_row_a_preconditioner,
         quick=4096,
+        system="jacobian",
+    ),
+    5: Spec(
+        "inexact interior point with AINV and with Jacobi (obstacle Bratu, lambda = 1)",
+        "solve obstacle_bratu --n {side} --set lambda=1 --set v0=1 --method interior --recipe {recipe}",
+        rows=_row_a_preconditioner,
+        quick=16384,
         system="jacobian",
     ),
 }
@@ -225,8 +254,9 @@ def run_published_table(paper: str, number: int, quick: bool = False, results: P
         [*KEY, *(f"p_{i}" for i in spec.points), *RECORD],
         KEY,
     )
-    say(f"{paper} table {number}: {spec.title}. ours = printed where they match, ours != printed where they differ.")
     layout = _Layout(rows)
+    seconds = "; seconds of the processor (printed ones in brackets)" if "time_s" in layout.measured else ""
+    say(f"{paper} table {number}: {spec.title}. ours = printed where they match, ours != printed where they differ{seconds}.")
     say(layout.head())
     known = refused = 0
     for printed in runs:
@@ -255,15 +285,18 @@ def run_command(command: str, points: tuple[int, ...] = ()) -> dict[str, Any]:
     dict : the columns RECORD, and p_i in the problem's unit for the points asked for; outcome 'refused' and a message
     alone where the run could not start.
     """
+    begin = process_time()
     try:
         solution = solution_of(parse(shlex.split(command)[1:]))
     except InputError as error:
         return {"outcome": "refused", "message": str(error)}
+    cpu_s = process_time() - begin
     try:
         data = as_dict(solution)
         times = data.pop("time_s")
         return {
             **data,
+            "cpu_s": f"{cpu_s:.4f}",
             "time_s": f"{times['total']:.4f}",
             "linear_s": f"{times['linear']:.4f}",
             "first_linear": solution.steps[0].linear_iterations if solution.steps else None,
@@ -327,7 +360,9 @@ def _ours(name: str, record: Row) -> str:
     value = record[MEASURED.get(name, name)]
     if name == "wrong_solution":
         return "yes" if value == "wrong_solution" else "no"
-    return "maxit" if name == "it" and record["outcome"] == "max_iterations" else value
+    if name == "it":
+        return {"max_iterations": "maxit", "step_length": "fail"}.get(record["outcome"], value)
+    return value
 
 
 def _rounded(value: str, printed: str) -> str:

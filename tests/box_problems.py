@@ -45,9 +45,6 @@ def affine(M, q, lower, upper, v0=None) -> BoxProblem:
     """The affine problem on a line of points that means nothing."""
     n = len(q)
     grid = Grid((n,), (1.0,), PETSc.COMM_SELF)
-    return BoxProblem(
-        grid,
-        Affine(M, q),
-        *(np.broadcast_to(np.asarray(b, float), n) for b in (lower, upper)),
-        np.zeros(n) if v0 is None else v0,
-    )
+    start = np.zeros(n) if v0 is None else v0
+    l, u = (np.broadcast_to(np.asarray(bound, dtype=float), n) for bound in (lower, upper))
+    return BoxProblem(grid, Affine(M, q), l, u, start)
