@@ -7,6 +7,7 @@ from time import perf_counter, process_time
 from typing import Any
 
 from ..api import solve
+from ..compare import exact_errors
 from ..errors import InputError
 from ..linear.options import LATE, set_names
 from ..output.results import as_dict, machine, versions
@@ -39,7 +40,7 @@ class _Enough(Exception):
 
 
 def run(scene: Scene, krylov_limit: float = float("inf"), **choices: Any) -> dict[str, Any]:
-    """One run, however it ends: RECORD, `wall_s`, `cpu_s` (this rank's) and the rest of the JSON's keys. Collective.
+    """One run, however it ends: RECORD, `wall_s`, `cpu_s` (this rank's), errors and the rest of the JSON's keys. Collective.
 
     Parameters
     ----------
@@ -74,8 +75,9 @@ def run(scene: Scene, krylov_limit: float = float("inf"), **choices: Any) -> dic
             "c1": steps[-1].norm,
             "c2": steps[-1].step_norm,
         }
-    cpu_s = process_time() - cpu_begin
+    clocks = {"wall_s": solution.times["total"], "cpu_s": process_time() - cpu_begin}
     try:
-        return {**environment, **as_dict(solution), "wall_s": solution.times["total"], "cpu_s": cpu_s}
+        data = as_dict(solution)
+        return {**environment, **data, **exact_errors(solution.problem, data), **clocks}
     finally:
         solution.destroy()

@@ -34,7 +34,7 @@ RECIPES: dict[str, tuple[str | None, ...]] = {
 }
 
 REPEATS = 3  # of which the median counts
-LONG = 10.0  # seconds; a longer run is not repeated
+LONG = 2.0  # seconds; a longer run is not repeated: its clock is steady enough
 KRYLOV_MOST = 100_000  # iterations; the paper's longest run takes 28,000
 
 KEY = ("scene", "data", "n", "method", "nested", "system", "recipe", "eps", "ranks")
@@ -171,13 +171,8 @@ def measure(scene: LubricationScene, exact: ExactSolution, configuration: Config
     while len(runs) < (repeats if MPI.COMM_WORLD.bcast(runs[0]["wall_s"]) < LONG else 1):
         runs.append(run(scene, KRYLOV_MOST, **choices))
     values = {**runs[0], **{clock: f"{median(a_run[clock] for a_run in runs):.6f}" for clock in CLOCKS}, "runs": len(runs)}
-    if values.get("load") is None:
-        return values
-    discrete = run(scene, method="active-set")
-    ambient = scene.p_c * scene.L
-    values["load_error"] = f"{abs(values['load'] - ambient - exact.load) / exact.load:.4e}"
-    if discrete["converged"]:
-        values["iteration_error"] = f"{abs(values['load'] - discrete['load']) / exact.load:.4e}"
-    if values["rupture"] is not None and exact.rupture is not None:
-        values["rupture_error"] = f"{abs(values['rupture'] - exact.rupture) / scene.L:.4e}"
-    return values
+    if values.get("load") is not None:
+        discrete = run(scene, method="active-set")
+        if discrete["converged"]:
+            values["iteration_error"] = abs(values["load"] - discrete["load"]) / exact.load
+    return {name: f"{value:.4e}" if name.endswith("_error") else value for name, value in values.items()}
