@@ -78,7 +78,7 @@ def plan(
 def default_recipe(problem: Problem, system: str, large: bool) -> tuple[str, str]:
     """The inner solver that this PETSc has for this system, size and number of ranks, and why."""
     has = PETSc.Sys.hasExternalPackage
-    if problem.kind == "lubrication" and system in ("reduced", "cavity") and large and has("hypre"):
+    if problem.kind in ("lubrication", "equations") and system != "full" and large and has("hypre"):
         return "bcgs_amg", "a large 2D M-matrix: multigrid costs the same per point on every grid"
     if problem.kind == "box" and large:
         return "multigrid", "a large problem with coarser grids: multigrid costs the same per point on every grid"
