@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 TESTS = Path(__file__).parent
 # A singleton's MPI leaves traces in the environment that would confuse a job started from it.
@@ -24,6 +25,10 @@ ENVIRONMENT = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_CO
     "PYTHONPATH": os.pathsep.join(filter(None, [str(TESTS.parent), os.environ.get("PYTHONPATH", "")])),
 }
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+# The same examples in every run; HYPOTHESIS_PROFILE=default looks for new ones.
+settings.register_profile("fixed", derandomize=True, deadline=None, database=None)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "fixed"))
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Run under mpiexec by the tests: checks of distributed grids, then solves whose records and fields go to a folder.
 
-    mpiexec -n 3 python tests/mpi_job.py OUT     writes OUT/record.json and OUT/fields.npz
+mpiexec -n 3 python tests/mpi_job.py OUT     writes OUT/record.json and OUT/fields.npz
 """
 
 import json
@@ -108,8 +108,8 @@ def main(out: Path) -> None:
 
     shapes: list[tuple[int, ...]] = [(3,), (10,), (101,), (5, 3), (3, 7), (7, 5), (53, 41)]
     faults = MPI.COMM_WORLD.allgather([fault for shape in shapes for fault in check_grid(shape)])
-    record: dict[str, Any] = {"grid_faults": sum(faults, [])}
-    fields = {}
+    record: dict[str, Any] = {"grid_faults": [fault for rank in faults for fault in rank]}
+    fields: dict[str, np.ndarray] = {}
     for name, case in DIRECT.items():
         record[name], found = run(*case)
         fields |= {f"{name}_{field}": values for field, values in found.items()}

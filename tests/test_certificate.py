@@ -1,0 +1,85 @@
+"""The certificate: from the problem's data alone, it holds for solutions and for nothing else."""
+
+import numpy as np
+import pytest
+from films import make_problem
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lcp_lube import load_scene, solve
+from lcp_lube.problems.certificate import Certificate, certificate_tol
+from lcp_lube.problems.film import Wave
+
+
+@pytest.fixture(scope="module")
+def solution():
+    found = solve(load_scene("problem2", {"n": 60}), method="active-set", nested=False)
+    assert found.converged
+    yield found
+    found.destroy()
+
+
+def test_holds_for_the_solution(solution):
+    certificate = solution.certificate
+    assert certificate.holds and certificate.failure == ""
+    assert set(certificate.measures) == {"residual", "complementarity", "mass_defect"}
+    assert max(certificate.measures.values()) < 1e-10
+    assert certificate.extremes["min_p"] == pytest.approx(0, abs=1e-3)  # Pa
+    assert certificate.extremes["min_r"] == pytest.approx(0, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    "spoil, broken",
+    [
+        (lambda p, r: (p * 1.01, r), "residual"),
+        (lambda p, r: (p, r * 1.1), "residual"),
+        (lambda p, r: (p - 0.1, r), "complementarity"),
+        (lambda p, r: (p, r - 0.01), "complementarity"),
+        (lambda p, r: (p + 0.1, r + 0.1), "complementarity"),
+        (lambda p, r: (np.append(p[:-1], p[-1] + 0.5), r), "mass_defect"),
+        (lambda p, r: (0 * p, 0 * r), "residual"),
+        (lambda p, r: (np.where(p == p.max(), np.nan, p), r), "complementarity"),
+        (lambda p, r: (p, np.where(r == r.max(), np.nan, r)), "complementarity"),
+        (lambda p, r: (p, np.where(r == r.max(), np.inf, r)), "residual"),
+        (lambda p, r: (1e200 * p, r), "residual"),
+    ],
+)
+def test_fails_for_what_is_no_solution(solution, spoil, broken):
+    p, r = spoil(solution.p.copy(), solution.r.copy())
+    with np.errstate(all="ignore"):
+        certificate = solution.problem.certify({"p": p, "r": r}, 1e-8)
+    assert not certificate.holds and broken in certificate.failure
+
+
+@given(st.integers(0, 59), st.floats(1e-3, 1e3))
+def test_fails_for_one_wrong_point(solution, k, size):
+    """A single pressure moved by a thousandth of the largest is seen."""
+    p = solution.p.copy()
+    p[k] += size * p.max()
+    assert not solution.problem.certify({"p": p, "r": solution.r}, 1e-8).holds
+
+
+def test_does_not_depend_on_units():
+    """The same fields in another pressure unit: the same measures."""
+    film = Wave("sinusoid", "convergent-divergent", 15e-6, 25e-6, 0, 0.1)
+    random = np.random.default_rng(0)
+    p, r = random.uniform(0, 5, 20), random.uniform(0, 0.5, 20)
+    measures = []
+    for unit in (1e6, 1e3):
+        problem = make_problem((20,), film, p_sides=(1e6, 2e5, 0, 0), p_unit=unit)
+        measures.append(problem.certify({"p": p * 1e6 / unit, "r": r}, 1e-8).measures)
+        problem.destroy()
+    assert measures[0] == pytest.approx(measures[1], rel=1e-9)
+
+
+def test_tolerance_follows_eps1_by_one_rule():
+    assert certificate_tol(1e-8) == pytest.approx(1e-4)
+    assert certificate_tol(1e-4) == pytest.approx(1e-2)
+    assert certificate_tol(0.5) == 1e-2  # nobody would call more a solution
+    assert certificate_tol(1e-30) == 1e-7  # rounding
+
+
+def test_failure_names_what_is_broken():
+    certificate = Certificate({"residual": 1.0, "complementarity": 1e-9, "mass_defect": float("nan")}, 1e-4)
+    assert certificate.failure == "residual 1.00e+00 > 1.0e-04, mass_defect nan > 1.0e-04"
+    assert Certificate({}, 1e-4).holds
