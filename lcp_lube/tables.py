@@ -100,7 +100,11 @@ MEZZADRI = {
         points=(70, 71, 72, 73, 74, 75),
     ),
     8: Spec("DIN with LAPACK's dense LU (problem 1)", f"solve problem1 --n {{n}} --recipe lu {_LOOSE}"),
-    9: Spec("DIN with sparse direct solvers (problem 1)", f"solve problem1 --n {{n}} --recipe {{solver}} {_LOOSE}"),
+    9: Spec(
+        "DIN with sparse direct solvers (problem 1)",
+        f"solve problem1 --n {{n}} --recipe {{solver}} {_LOOSE}",
+        quick=1000,
+    ),
     10: Spec("DIN with ILU(0) (problem 1)", f"solve problem1 --n {{n}} --recipe {{solver}} {_LOOSE}", quick=1000),
     11: Spec(
         "DIN on the square, n x n (problem 4)",
