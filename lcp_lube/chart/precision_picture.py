@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,17 +18,20 @@ if TYPE_CHECKING:
 
 LEVELS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 
-# Panels from top to bottom, by what the inner solver sees.
-PANELS: dict[str, Callable[[Row], bool]] = {
-    "2n system, direct": lambda row: row["nested"] != "True" and row["system"] == "full" and row["ksp_type"] == "preonly",
-    "2n system, Krylov": lambda row: row["nested"] != "True" and row["system"] == "full" and row["ksp_type"] != "preonly",
-    "n-by-n system": lambda row: row["nested"] != "True" and row["system"] != "full",
-    "nested iteration": lambda row: row["nested"] == "True",
-}
+PANELS = ("2n system, direct solver", "2n system, Krylov solver", "n-by-n system", "nested iteration")  # from top to bottom
 AXES = {
     "load": "relative error of the load",
     "rupture": "error of the rupture point / L",
 }
+
+
+def panel(row: Row) -> str:
+    """Which of PANELS a run belongs to, by what its inner solver sees."""
+    if row["nested"] == "True":
+        return PANELS[3]
+    if row["system"] != "full":
+        return PANELS[2]
+    return PANELS[0] if row["ksp_type"] == "preonly" else PANELS[1]
 
 
 def seconds(row: Row) -> float:
@@ -61,7 +65,7 @@ def front(rows: Sequence[Row], quantity: str) -> list[Row]:
 def cheapest(rows: Sequence[Row]) -> list[str]:
     """Lines of a table: for each scene and method the seconds of its fastest run within each of LEVELS, and which one it is."""
     lines = []
-    for scene in dict.fromkeys(row["scene"] for row in rows):
+    for scene in _scenes(rows):
         head = f"{scene}: seconds of the fastest run whose load is within"
         lines.append(head + "".join(f"{_percent(level):>10}" for level in LEVELS))
         mine = [row for row in rows if row["scene"] == scene]
@@ -76,9 +80,9 @@ def cheapest(rows: Sequence[Row]) -> list[str]:
     return lines
 
 
-def fastest(rows: Sequence[Row], level: float) -> Row | None:
-    """The run of least seconds whose load's error is at most `level`."""
-    return next((row for row in front(rows, "load") if (error(row, "load") or 0.0) <= level), None)
+def fastest(rows: Sequence[Row], level: float, quantity: str = "load") -> Row | None:
+    """The run of least seconds whose error is at most `level`."""
+    return next((row for row in front(rows, quantity) if (error(row, quantity) or 0.0) <= level), None)
 
 
 def describe(row: Row) -> str:
@@ -99,7 +103,7 @@ def draw(rows: Sequence[Row], quantity: str, path: Path, comm: MPI.Comm) -> None
 
 def picture(rows: Sequence[Row], quantity: str) -> Figure:
     """A column a scene, a row a kind of inner solve; lines join a method's fastest runs over the grids."""
-    scenes = list(dict.fromkeys(row["scene"] for row in rows))
+    scenes = _scenes(rows)
     names = list(dict.fromkeys(row["method"] for row in rows))
     figure = new_figure(8.8, caption(rows, quantity))
     grid = figure.subplots(len(PANELS), len(scenes), sharex=True, sharey=True, squeeze=False)
@@ -107,9 +111,9 @@ def picture(rows: Sequence[Row], quantity: str) -> Figure:
     failed_at = 4 * max(accurate, default=1.0)
     for column, scene in enumerate(scenes):
         mine = [row for row in rows if row["scene"] == scene]
-        for (title, belongs), axes in zip(PANELS.items(), grid[:, column], strict=True):
+        for title, axes in zip(PANELS, grid[:, column], strict=True):
             _front_line(axes, front(mine, quantity), quantity)
-            inside = [row for row in mine if belongs(row)]
+            inside = [row for row in mine if panel(row) == title]
             for number, name in enumerate(names):
                 _series(axes, [row for row in inside if row["method"] == name], quantity, number, failed_at)
             axes.set(xscale="log", yscale="log")
@@ -118,7 +122,7 @@ def picture(rows: Sequence[Row], quantity: str) -> Figure:
                 axes.set_ylabel(f"{title}\n{AXES[quantity]}")
         grid[0, column].set_title(scene, fontweight="bold")
         grid[-1, column].set_xlabel("seconds")
-    figure.legend(handles=_legend(names, rows), loc="outside upper center", ncols=4)
+    figure.legend(handles=_legend(names, rows), loc="outside upper center", ncols=5)
     return figure
 
 
@@ -158,17 +162,19 @@ def _legend(names: Sequence[str], rows: Sequence[Row]) -> list[Any]:
     ]
 
 
-def caption(rows: Sequence[Row], quantity: str) -> str:
-    """What the picture shows, counted from the rows."""
-    failures = [row for row in rows if row["outcome"] != "converged"]
+def caption(rows: Sequence[Row], quantity: str, level: float = 1e-4) -> str:
+    """What the picture shows, from the rows: the cheapest run for one accuracy, and which inner solves fail."""
     sizes = sorted({int(row["n"]) for row in rows})
-    text = (
-        f"Points: n = {', '.join(map(str, sizes))}; of a method's recipes the fastest one, median of {max_runs(rows)} runs. "
-        f"{len(failures)} of {len(rows)} runs failed"
-    )
-    return text + "."
+    text = f"Markers: n = {', '.join(map(str, sizes))}, of a method's recipes the fastest one."
+    bests = {scene: fastest([row for row in rows if row["scene"] == scene], level, quantity) for scene in _scenes(rows)}
+    said = "; ".join(f"{scene}: {describe(best)}" for scene, best in bests.items() if best)
+    if said:
+        text += f" Fastest within {_percent(level)}: {said}."
+    failed = [row for row in rows if row["outcome"] != "converged"]
+    counts = Counter(map(panel, failed))
+    where = ", ".join(f"{counts[title]} with {title}" for title in PANELS if title in counts)
+    return f"{text} {len(failed)} of {len(rows)} runs failed{': ' * bool(where)}{where}."
 
 
-def max_runs(rows: Sequence[Row]) -> int:
-    """How many runs the medians are of, at most."""
-    return max((int(row["runs"]) for row in rows), default=0)
+def _scenes(rows: Sequence[Row]) -> list[str]:
+    return list(dict.fromkeys(row["scene"] for row in rows))
