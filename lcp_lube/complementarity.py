@@ -1,10 +1,10 @@
 """A complementarity problem of the user's own, for `solve`: F, its Jacobian, bounds, a start.
 
-    import numpy as np
-    from lcp_lube import Complementarity, solve
+import numpy as np
+from lcp_lube import Complementarity, solve
 
-    problem = Complementarity(lambda x: (x - 1) ** 2 - 1.01, lambda x: np.diag(2 * (x - 1)), lower=[0], upper=[np.inf], x0=[0])
-    print(solve(problem).fields["v"])       # [2.00498756]
+problem = Complementarity(lambda x: (x - 1) ** 2 - 1.01, lambda x: np.diag(2 * (x - 1)), lower=[0], upper=[np.inf], x0=[0])
+print(solve(problem).fields["v"])       # [2.00498756]
 """
 
 from collections.abc import Callable
@@ -56,10 +56,11 @@ class Complementarity(Scene):
         name: str = "user",
     ):
         parts = [_vector(value, label) for value, label in ((lower, "lower"), (upper, "upper"), (x0, "x0"))]
-        if len({part.size for part in parts}) > 1:
-            raise InputError(f"lower, upper and x0 have {', '.join(str(part.size) for part in parts)} entries: one number is needed")
-        size = parts[2].size if n is None else n
-        super().__init__(family="user", name=name, F=F, J=J, lower=parts[0], upper=parts[1], x0=parts[2], n=size)
+        sizes = [part.size for part in parts]
+        if len(set(sizes)) > 1 or not sizes[0]:
+            raise InputError(f"lower, upper and x0 have {sizes} entries: the same number is needed, at least 1")
+        data = {"lower": parts[0], "upper": parts[1], "x0": parts[2], "n": sizes[0] if n is None else n}
+        super().__init__(**{"family": "user", "name": name, "F": F, "J": J, **data})
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -139,7 +140,7 @@ class Callbacks:
         try:
             self._mat.setValuesCSR(csr.indptr.astype(PETSc.IntType), csr.indices.astype(PETSc.IntType), csr.data.astype(float))
         except PETSc.Error:
-            raise InputError("J(x) has entries where the first one had none: store its zeros, or return a dense array") from None
+            raise InputError("J(x) has entries where the first one had none: store its zeros too, or let J be dense") from None
         self._mat.assemble()
         return self._mat
 
@@ -168,10 +169,21 @@ class UserProblem(BoxProblem):
         self.dense = "dense" in self.jacobian(self.v0).getType()
 
     def certify(self, fields: Fields, eps1: float) -> Certificate:
-        """Certificate of v: residual, the largest natural residual |mid(v - u, F, v - l)|, in the units of F and v. Collective."""
+        """Certificate of v, in the units of F. Collective.
+
+        residual: largest natural residual |mid(v - u, F, v - l)|;
+        rounding: the machine's epsilon times ||F'|| ||v|| (largest row sum, largest entry), below which F says nothing:
+        iterates that run off to infinity may have F = 0 by rounding alone.
+        """
         v = fields["v"]
-        largest = self.reduce.max(np.abs(self.natural_residual(v, self.residual(v))))
-        return Certificate({"residual": largest}, certificate_tol(eps1))
+        rows = self.jacobian(v).norm(PETSc.NormType.NORM_INFINITY)
+        return Certificate(
+            measures={
+                "residual": self.reduce.max(np.abs(self.natural_residual(v, self.residual(v)))),
+                "rounding": float(np.finfo(float).eps) * rows * self.reduce.max(np.abs(v)),
+            },
+            tol=certificate_tol(eps1),
+        )
 
 
 def _vector(value: Any, label: str) -> Array:

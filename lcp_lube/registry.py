@@ -63,7 +63,7 @@ METHODS: dict[str, MethodEntry] = {
     "active-set": MethodEntry(
         "lcp_lube.solvers.active_set:build",
         "semismooth Newton in z = p or -r: finitely many steps to the exact discrete solution",
-        kinds=("lubrication", "box"),
+        kinds=("lubrication", "box", "mixed", "user"),
         systems=("reduced", "full", "cavity"),
         nested=True,
         interior=False,
@@ -77,7 +77,19 @@ METHODS: dict[str, MethodEntry] = {
                 nested=True,
                 interior=False,
                 eps=(1e-8, inf),
-            )
+            ),
+            **dict.fromkeys(
+                ("mixed", "user"),
+                MethodEntry(
+                    "lcp_lube.solvers.box_active_set:build",
+                    "semismooth Newton: unknowns at a bound held, a Newton step for the others",
+                    kinds=("mixed", "user"),
+                    systems=("jacobian",),
+                    interior=False,
+                    eps=(1e-10, inf),
+                    fallback="semismooth",
+                ),
+            ),
         },
     ),
     "interior": MethodEntry(

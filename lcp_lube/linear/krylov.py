@@ -6,6 +6,7 @@ from petsc4py import PETSc
 from ..errors import InputError
 from .options import explain_error, set_names
 
+ZERO_PIVOT = (71, 81)  # PETSc's codes for LU and Cholesky: the matrix is singular, not the options wrong
 MAX_INNER_ITERATIONS = 10_000  # the paper's limit; -ksp_max_it overrides it
 MUMPS_SHORT = (-8, -9, -11, -14, -15, -17, -18, -19, -20)  # INFOG(1): a workspace or buffer is too small
 MUMPS_LARGEST_RESERVE = 2000
@@ -77,7 +78,7 @@ class Krylov:
             self.ksp.setUp()
             self.ksp.setUpOnBlocks()
         except PETSc.Error as error:
-            if self._ready:
+            if self._ready or error.ierr in ZERO_PIVOT:
                 raise LinearSolverError(explain_error(error)) from None
             raise InputError(explain_error(error)) from None
         self._ready = True

@@ -22,6 +22,8 @@ from .certificate import Certificate, certificate_tol
 from .grid import Grid
 from .solution import Fields
 
+BLOCK = 16  # columns
+
 
 class LineContact:
     """The n equations and their dense Jacobian, by rows of this rank; the last unknown is k, at the place of p_n = 0.
@@ -43,6 +45,8 @@ class LineContact:
         # d ln|d|/pi for i - j from -(first + count) to n - first: row j of the kernel is a stretch of n + 1 of them.
         d = (np.arange(-(first + count), n - first + 1) - 0.5) * self.dx
         self._kernel = d * np.log(np.abs(d)) / np.pi
+        # dh_j/dp_m but for the ends' weights: column m of the own faces is a stretch of these, from the end.
+        self._differences = (self._kernel[:-2] - self._kernel[2:])[::-1].copy()
         self._rows = np.arange(count - self.has_k)
         size = (count, n)
         self.mat = PETSc.Mat().createDense((size, size), comm=grid.dm.comm)
@@ -89,7 +93,7 @@ class LineContact:
         """dF/dv, dense. Collective.
 
         dq_j/dp_m = (lambda - 3 q^_j/h_j) dh_j/dp_m + (what p_j and p_{j+1} add), q^ = h^3 exp(-alpha p) dp/dx, where
-        dh_j/dp_m = w_{m-1} K_{m-1-j} - w_{m+1} K_{m+1-j} is one matrix of differences along the kernel's diagonals.
+        dh_j/dp_m = w_{m-1} K_{m-1-j} - w_{m+1} K_{m+1-j} is constant along diagonals, so it needs no matrix of its own.
         """
         p, k = self.split(v)
         h = self.gap(p, k)
@@ -99,15 +103,13 @@ class LineContact:
         by_right = self.scale_of_rows * mobility * (-1.0 / self.dx + 0.5 * self.alpha * slope)
         n, first, rows = self.grid.size, self.grid.x_start, self._rows
         J = self.mat.getDenseArray()  # column-major: its transpose is filled along memory
-        # K_{i-j} for i = 0 ... n and the own faces j, a view of the kernel without copies.
-        kernel = np.lib.stride_tricks.sliding_window_view(self._kernel, by_h.size)[:, ::-1]
-        gap_by_p = kernel[:-2] - kernel[2:]
-        gap_by_p[0] -= 0.5 * kernel[0]
-        gap_by_p[-1] += 0.5 * kernel[n]
-        np.multiply(gap_by_p[:, 1:], by_h[1:], out=J.T[: n - 1])
-        gap_by_p[:, :-1] *= by_h[:-1]
-        J.T[: n - 1] -= gap_by_p[:, :-1]
-        del gap_by_p
+        columns = np.lib.stride_tricks.sliding_window_view(self._differences, by_h.size)[::-1]
+        for block in np.split(np.arange(n - 1), range(BLOCK, n - 1, BLOCK)):  # a few columns at a time stay in the cache
+            part = slice(block[0], block[-1] + 1)
+            np.multiply(columns[part, 1:], by_h[1:], out=J.T[part])
+            J.T[part] -= columns[part, :-1] * by_h[:-1]
+        J[:, 0] -= 0.5 * np.diff(by_h * self._kernel[by_h.size - 1 :: -1])
+        J[:, n - 2] += 0.5 * np.diff(by_h * self._kernel[n:][::-1])
         J[:, n - 1] = np.diff(by_h)
         at = first + rows  # column of p_i in row i, for the own pressures
         J[rows, at] += by_left[1:][rows] - by_right[:-1][rows]

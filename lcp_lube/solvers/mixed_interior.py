@@ -17,10 +17,13 @@ from ..linear.box_system import BoxSystem
 from ..linear.stages import Stages
 from ..parallel import Array
 from ..problems.box import BoxProblem
-from ..problems.solution import Fields
+from ..problems.solution import Fields, Step
 from .interior import Interior, InteriorOptions
 from .method_options import make_options
 from .newton import Stopping
+from .steplength import StepLengthError
+
+STUCK = 1e-9  # steps shorter than this lead nowhere
 
 
 @dataclass(frozen=True)
@@ -67,6 +70,18 @@ class MixedInterior(Interior):
         self.at = replace(self.at, z1=z1, z2=z2)
         self.H = self._H(self.at)
         self.norm = problem.reduce.norm(*self.H)
+
+    def advance(self) -> Step:
+        """As `Interior.advance`. Collective.
+
+        Raises
+        ------
+        StepLengthError : also where the bounds leave no room for a step, as where f is not monotone and H has a local minimum.
+        """
+        step = super().advance()
+        if step.alpha < STUCK:
+            raise StepLengthError(f"the bounds leave room for {step.alpha:.1e} of it")
+        return step
 
 
 def build(
