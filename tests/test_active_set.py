@@ -76,7 +76,7 @@ def test_fallback_takes_over_and_says_so():
 def test_fallback_from_a_cycling_start(monkeypatch):
     from lcp_lube.solvers.active_set import ActiveSetOptions
 
-    monkeypatch.setattr(ActiveSetOptions.__init__, "__defaults__", (1.0, 4, 1, 1e-8))  # give up after one step
+    monkeypatch.setattr(ActiveSetOptions.__init__, "__defaults__", (1.0, 4, 1, 1e-8, 16))  # give up after one step
     solution = run("problem3", {"n": 60}, method="active-set")
     assert solution.converged and "din-pc took over" in solution.message
     solution.destroy()

@@ -6,8 +6,10 @@ With p = max(z, 0) and r = s max(-z, 0), s > 0, complementarity holds for every 
 
 piecewise linear, with Jacobian J(theta) for theta = 1 where z >= 0 and 0 elsewhere. A full step lands on the solution of one
 linear piece; where the signs of z come out as they went in, that is the exact discrete solution, so the iteration ends after
-finitely many steps or cycles. Plain steps cycle on some rough films, and a line search at every step is worse: it forbids
-the rise of ||G|| through which the method gets out of a poor start. Damping only once ||G|| has stalled cured the cycles.
+finitely many steps or cycles. From a coarser grid's answer, nonlinear Gauss-Seidel sweeps (`relaxation`) before the first step
+and after each one put the fronts right to the cell, which saves two to four steps of five to seven. Plain steps cycle on
+some rough films, and a line search at every step is worse: it forbids the rise of ||G|| through which the method gets out of
+a poor start. Damping only once ||G|| has stalled cured the cycles.
 """
 
 from dataclasses import dataclass
@@ -24,6 +26,7 @@ from ..problems.problem import LubricationProblem
 from ..problems.solution import Fields, Step
 from .method_options import make_options
 from .newton import Stopping
+from .relaxation import Relaxation, relaxation
 from .steplength import StepLengthError
 
 EPS = float(np.finfo(float).eps)
@@ -33,12 +36,14 @@ DAMPED_STEPS = (0.7, 0.5, 0.3, 0.2, 0.1, 0.05)
 @dataclass(frozen=True)
 class ActiveSetOptions:
     """patience: steps without a fall of ||G|| by 10 % before a step is damped; give_up: steps after which it is taken to
-    cycle; p0: full film at this p (p_unit) at the start; rtol: smallest relative tolerance of iterative inner solves."""
+    cycle; p0: full film at this p (p_unit) at the start; rtol: smallest relative tolerance of iterative inner solves; sweeps:
+    of relaxation before the first step from a given start, and after each step."""
 
     p0: float = 1.0
     patience: int = 4
     give_up: int = 100
     rtol: float = 1e-8
+    sweeps: int = 16
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.p0) and self.p0 > 0):
@@ -46,6 +51,8 @@ class ActiveSetOptions:
         for name in ("patience", "give_up"):
             if getattr(self, name) < 1:
                 raise InputError(f"active-set.{name} = {getattr(self, name)}: at least 1 is needed")
+        if self.sweeps < 0:
+            raise InputError(f"active-set.sweeps = {self.sweeps}: at least 0 is needed")
         if not 0 < self.rtol < 1:
             raise InputError(f"active-set.rtol = {self.rtol}: allowed are numbers between 0 and 1")
 
@@ -74,6 +81,8 @@ class ActiveSet:
         self.z = start["p"] - start["r"] / self.s if start else np.full(problem.grid.local_size, options.p0)
         self.G = self._residual(self.z)
         self.norm = self._norm(self.z, self.G)
+        self._relaxation: Relaxation | None = relaxation(problem) if start and options.sweeps else None
+        self._relax()
         self._best, self._stalled, self._taken = self.norm, 0, 0
 
     @property
@@ -95,6 +104,18 @@ class ActiveSet:
 
     def _residual(self, z: Array) -> Array:
         return self.problem.flow(np.maximum(z, 0.0), self.s * np.maximum(-z, 0.0))
+
+    def _relax(self) -> None:
+        """Sweeps from z, kept if ||G|| falls by them."""
+        if self._relaxation is None or self.norm <= self.eps1:
+            return
+        fields = self.fields
+        p, r = self._relaxation(fields["p"], fields["r"], self.options.sweeps)
+        z = p - r / self.s
+        G = self._residual(z)
+        norm = self._norm(z, G)
+        if norm < self.norm:
+            self.z, self.G, self.norm = z, G, norm
 
     def advance(self) -> Step:
         """One Newton step; damped by the best of DAMPED_STEPS if ||G|| has stalled. StepLengthError after give_up steps.
@@ -127,9 +148,11 @@ class ActiveSet:
             changed = self.problem.reduce.sum((full != (z >= 0)).astype(float))
             step_norm = alpha * self.problem.reduce.norm(d) if changed or alpha < 1.0 else 0.0
             self.z, self.G, self.norm = z, G, norm
-            self._stalled = 0 if norm <= 0.9 * self._best else self._stalled + 1
-            self._best = min(self._best, norm)
-        return Step(norm, step_norm, alpha, linear_iterations, backtracking=cuts, rtol=rtol)
+        with self.system.stages("relaxation"):
+            self._relax()
+        self._stalled = 0 if self.norm <= 0.9 * self._best else self._stalled + 1
+        self._best = min(self._best, self.norm)
+        return Step(self.norm, step_norm, alpha, linear_iterations, backtracking=cuts, rtol=rtol)
 
 
 def build(
