@@ -171,11 +171,25 @@ def _obstacle(printed: list[Row]) -> list[Row]:
     return [*rows, *({**rows[-1], "v0": v0, "it": "", "linear_it": "", "time_s": ""} for v0 in ("2", "3"))]
 
 
+def _line_contact(printed: list[Row]) -> list[Row]:
+    """Table 2, and below it what is not printed: ||H|| in flows instead of their divergence, and Jacobians kept for 3 steps."""
+    rows = [{"n": row["n"], "rows": "divergence", "keep": "1", "eps1": "2e-7"} for row in printed]
+    own = [{"n": row["n"], "rows": "flow", "keep": keep, "eps1": "1e-9"} for keep in "13" for row in printed]
+    measured = [{"it": row["nonlinear_it"], "time_s": row["cpu_s"]} for row in printed]
+    return [a | b for a, b in zip(rows + own, measured + len(own) * [{"it": "", "time_s": ""}], strict=True)]
+
+
 BERGAMASCHI = {
     1: Spec(
         "inexact interior point, BiCGStab with Jacobi (obstacle Bratu)",
         "solve obstacle_bratu --n {side} --set lambda={lambda} --set v0={v0} --method interior --recipe bcgs_jacobi",
         rows=_obstacle,
+        system="jacobian",
+    ),
+    2: Spec(
+        "inexact interior point with LAPACK's LU of the dense Jacobian (elastohydrodynamic line contact)",
+        "solve ehl_line --n {n} --method interior --set rows={rows} --set interior.keep={keep} --eps1 {eps1} --eps2 0.99",
+        rows=_line_contact,
         system="jacobian",
     ),
     3: Spec(

@@ -141,7 +141,8 @@ def _save_npz(solution: Solution, fields: dict[str, tuple[Array, str]], target: 
     grid = solution.problem.grid
     arrays = {name: gather(grid, values) for name, (values, _) in fields.items()}
     arrays |= dict(zip("xy", coordinates(grid), strict=False))
-    units = {name: unit for name, (_, unit) in fields.items()} | dict.fromkeys("xy"[: grid.dim], "m")
+    units = {name: unit for name, (_, unit) in fields.items()}
+    units |= dict.fromkeys("xy"[: grid.dim], "m" if any(units.values()) else "")  # dimensionless problems have no metres
     result = json.dumps(finite(as_dict(solution)))
     if grid.comm.rank > 0:
         return

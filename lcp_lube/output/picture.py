@@ -61,7 +61,7 @@ def title(picture: Picture) -> str:
     if not solution.converged:
         return f"{parts[0]}: NOT a solution, {solution.outcome.sentence}"
     if values.get("p_max") is not None:
-        parts.append(f"$p_{{max}}$ {quantity(values['p_max'], 'Pa')}")
+        parts.append(f"$p_{{max}}$ {quantity(values['p_max'], picture.fields['p'][1])}".rstrip())
     if values.get("load") is not None:
         parts.append(f"load {quantity(values['load'], 'N/m' if picture.y.size == 0 else 'N')}")
     if values.get("cavitated_fraction") is not None:
