@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
@@ -188,7 +189,16 @@ def csr(rows: NDArray, columns: NDArray, first: int, count: int) -> tuple[NDArra
 
 def assemble(grid: Grid, entries: list[tuple[int, int, Array]]) -> PETSc.Mat:
     """A distributed n-by-n AIJ matrix from stencil entries."""
-    rows, columns, values = (np.concatenate(parts) for parts in zip(*coo(grid, entries), strict=True))
-    pointers, columns, order = csr(rows, columns, grid.first, grid.local_size)
+    number = grid.neighbours().astype(PETSc.IntType)
+    ny, nx = grid.box
+    # Columns ascend with (dj, di) inside a rank; only at its edges do they have to be sorted.
+    ordered = sorted(entries, key=lambda entry: entry[:2])
+    columns = np.stack([number[1 + dj : 1 + dj + ny, 1 + di : 1 + di + nx] for dj, di, _ in ordered], axis=-1)
+    inside = columns >= 0
+    values = np.stack([np.broadcast_to(values, grid.box) for *_, values in ordered], axis=-1)[inside]
+    pointers = np.zeros(ny * nx + 1, dtype=PETSc.IntType)
+    np.cumsum(inside.sum(axis=-1).ravel(), out=pointers[1:])
+    rows = scipy.sparse.csr_matrix((values, columns[inside], pointers), shape=(ny * nx, grid.size))
+    rows.sort_indices()
     size = (grid.local_size, grid.size)
-    return PETSc.Mat().createAIJ((size, size), csr=(pointers, columns, values[order]), comm=grid.dm.comm)
+    return PETSc.Mat().createAIJ((size, size), csr=(rows.indptr, rows.indices, rows.data), comm=grid.dm.comm)

@@ -1,6 +1,6 @@
 """Primal-dual active set for l <= v <= u and f(v): the semismooth Newton method for the natural residual.
 
-    R(v) = mid(v - u, D^-1 f(v), v - l) = 0,   D = diag f'(v) (1 where that is not positive).
+    R(v) = mid(v - u, D^-1 f(v), v - l) = 0,   D = diag f' at the start (1 where that is not positive).
 
 Points where the middle value is v - l or v - u are held at the bound, the others take a Newton step for f. Where the
 bounds in contact come out as they went in, this is Newton's method and converges as fast. The start is a coarser grid's
@@ -24,8 +24,9 @@ from .method_options import make_options
 from .newton import Stopping
 from .steplength import halve_until, inexact_decrease
 
-Trial = tuple[Array, Array]  # v, f(v)
+Trial = tuple[Array, Array, Array]  # v, f(v), R(v)
 HALVINGS = 12
+NEAR = 1e-2  # steps below this part of max |v| leave the size of f's terms as it is
 
 
 @dataclass(frozen=True)
@@ -44,18 +45,21 @@ class BoxActiveSetOptions:
 class BoxActiveSet:
     """The iterates v; `newton.iterate` runs it.
 
-    `norm` is the largest natural residual with f measured against the size of its terms and v against max |v|, as the
-    certificate has it; steps are measured against max |v|.
+    `norm` is max |D R(v)| against the mean size of the terms of f; steps are measured against max |v|.
 
     Parameters
     ----------
-    start : field v, moved into the bounds; default problem.v0.
+    start : field v, moved into the bounds; default problem.v0. D is that of the start.
     """
 
     def __init__(self, problem: BoxProblem, system: BoxSystem, options: BoxActiveSetOptions, start: Fields | None = None):
         self.problem, self.system, self.options = problem, system, options
         self.v = np.clip(start["v"], problem.lower, problem.upper) if start else problem.v0
+        diagonal = system.linearise(self.v)
+        self.D = np.where(diagonal > 0, diagonal, 1.0)
         self.f = problem.residual(self.v)
+        self.R = problem.natural_residual(self.v, self.f, f_scale=self.D)
+        self._scale = problem.equations.scale(self.v)
         self.norm = self._norm()
 
     @property
@@ -70,38 +74,36 @@ class BoxActiveSet:
         self.system.destroy()
 
     def _norm(self) -> float:
-        residual = self.problem.natural_residual(self.v, self.f, *self.problem.scales(self.v))
-        return self.problem.reduce.max(np.abs(residual))
+        if not np.isfinite(self._scale):  # f has overflowed, where R may still be the distance to a bound
+            return float("inf")
+        return self.problem.reduce.max(np.abs(self.D * self.R)) / (self._scale or 1.0)
 
     def advance(self) -> Step:
         """One Newton step on the points that touch no bound, halved until ||R|| decreases. Collective."""
         problem, reduce, o = self.problem, self.problem.reduce, self.options
-        v, f = self.v, self.f
-        D = self.system.linearise(v)
-        D = np.where(D > 0, D, 1.0)
-        to_lower, to_upper, newton = v - problem.lower, v - problem.upper, f / D
-        rhs = np.where(newton >= to_lower, -to_lower, np.where(newton <= to_upper, -to_upper, -f))
-        held = (newton >= to_lower) | (newton <= to_upper)
+        v, newton = self.v, self.f / self.D
+        held = (newton >= v - problem.lower) | (newton <= v - problem.upper)
         # Superlinear: an inner solve need not be better than the linearisation, which errs by the square.
         rtol = min(o.rtol, max(0.1 * self.norm, 1e-3 * o.rtol))
-        d, iterations = self.system.solve(rhs, rtol, held=held)
+        self.system.linearise(v)
+        d, iterations = self.system.solve(-np.where(held, self.R, self.f), rtol, held=held)
 
         @lru_cache(maxsize=1)
         def trial(alpha: float) -> Trial:
             at = np.clip(v + alpha * d, problem.lower, problem.upper)
-            return at, problem.residual(at)
-
-        def size(v: Array, f: Array) -> float:
-            return reduce.norm(problem.natural_residual(v, f, f_scale=D))
+            f = problem.residual(at)
+            return at, f, problem.natural_residual(at, f, f_scale=self.D)
 
         with self.system.stages("step length"):
-            before = size(v, f)
+            before = reduce.norm(self.R)
             alpha, cuts = halve_until(
-                lambda alpha: inexact_decrease(before, size(*trial(alpha)), alpha, 0.0, o.beta), 1.0, most=HALVINGS
+                lambda alpha: inexact_decrease(before, reduce.norm(trial(alpha)[2]), alpha, 0.0, o.beta), 1.0, most=HALVINGS
             )
-            self.v, self.f = trial(alpha)
-            self.norm = self._norm()
+            self.v, self.f, self.R = trial(alpha)
             step_norm = reduce.max(np.abs(self.v - v)) / (reduce.max(np.abs(self.v)) or 1.0)
+            if step_norm > NEAR:
+                self._scale = problem.equations.scale(self.v)
+            self.norm = self._norm()
         return Step(self.norm, step_norm, alpha, iterations, backtracking=cuts, rtol=rtol)
 
 
