@@ -78,7 +78,9 @@ class AugmentationPC:
         total = self._W + self._R
         smallest = fields.reduce.min(total if self._form == "full" else self._W)
         if not smallest > 0.0:
-            raise LinearSolverError(f"augmentation ({self._form}): smallest entry of the weight {smallest}, not positive")
+            raise LinearSolverError(
+                f"augmentation ({self._form}): smallest entry of the weight {smallest + 0.0:.3g}, not positive"
+            )
         # Columns of S are blended as theta A - rest B; p = theta y.
         size = total if self._scale else self._W
         self._theta, self._rest = self._W / size, self._R / size
