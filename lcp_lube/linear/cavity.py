@@ -13,6 +13,8 @@ The KSP sees S diag(w), w the near-null vector of S (`nearnull`): row and column
 multigrid wants them, whatever the fronts look like.
 """
 
+from importlib.util import find_spec
+
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
@@ -21,6 +23,7 @@ from scipy.sparse import coo_array
 from ..errors import InputError
 from ..parallel import Array
 from ..problems.problem import LubricationProblem
+from .cavity_rows import schur_rows
 from .krylov import Krylov
 from .nearnull import COARSEST, NearNull
 from .stages import Stages
@@ -69,17 +72,12 @@ class CavitySystem:
             local = int(full.sum())
             first = int(grid.comm.exscan(local) or 0)
             total = int(reduce.sum(np.array([float(local)])))
-            rows, columns, values = self._entries(full, target, first)
-            S = coo_array((values, (rows, columns)), shape=(local, total)).tocsr()
-            S.sort_indices()
+            pointers, columns, values = self._rows(full, target, first, local, total)
             kept = target >= 0
             rhs = np.bincount(target[kept], weights=f1[kept], minlength=local)
             self._release()
-            self._mat = PETSc.Mat().createAIJ(
-                ((local, total), (local, total)),
-                csr=(S.indptr.astype(PETSc.IntType), S.indices.astype(PETSc.IntType), S.data),
-                comm=grid.dm.comm,
-            )
+            sizes = ((local, total), (local, total))
+            self._mat = PETSc.Mat().createAIJWithArrays(sizes, (pointers, columns, values), comm=grid.dm.comm)
             x, b = self._mat.createVecs()
             b.setArray(rhs)
         with self.stages("near-null"):
@@ -108,10 +106,15 @@ class CavitySystem:
         found = np.take_along_axis(number, np.minimum(downstream, nx - 1), axis=1)
         return np.where(downstream < nx, found, -1).ravel()
 
-    def _entries(self, full: NDArray[np.bool_], target: NDArray[np.int64], first: int) -> tuple[NDArray, NDArray, Array]:
-        """Rows (local), columns (global) and values of S; several to a place add up."""
+    def _rows(
+        self, full: NDArray[np.bool_], target: NDArray[np.int64], first: int, local: int, total: int
+    ) -> tuple[NDArray, NDArray, Array]:
+        """S in CSR form: pointers, columns (global, sorted) and values. Compiled where numba is, array arithmetic elsewhere."""
         numbers = np.where(full, first + np.cumsum(full) - 1.0, -1.0)
-        framed = np.nan_to_num(self.problem.grid.ghosted(numbers), nan=-1.0).ravel().astype(np.int64)
+        framed = np.nan_to_num(self.problem.grid.ghosted(numbers), nan=-1.0).astype(np.int64)
+        if find_spec("numba"):
+            return schur_rows(self.problem.scheme, framed, PETSc.IntType)
+        framed = framed.ravel()
         rows, columns, values = [], [], []
         for value, place in self._offsets:
             column = framed[place]
@@ -119,7 +122,10 @@ class CavitySystem:
             rows.append(target[used])
             columns.append(column[used])
             values.append(value[used])
-        return np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
+        entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+        S = coo_array(entries, shape=(local, total)).tocsr()
+        S.sort_indices()
+        return S.indptr.astype(PETSc.IntType), S.indices.astype(PETSc.IntType), S.data
 
     def _void(self, full: NDArray[np.bool_], balance: Array) -> Array:
         """dr of the cavitated cells from what A dp leaves of f1: b_C dr adds up along each run."""

@@ -32,12 +32,14 @@ class NearNull:
         size = S.getSize()[0]
         while size > COARSEST:
             i, j = i // 2, j // 2
-            code = j * (int(i.max(initial=0)) + 1) + i
-            kinds, aggregate = np.unique(code, return_inverse=True)
-            first = np.zeros(kinds.size, dtype=np.int64)
-            first[aggregate[::-1]] = np.arange(aggregate.size)[::-1]
-            i, j = i[first], j[first]
-            P = _aggregation(aggregate, kinds.size, S.comm)
+            width = int(i.max(initial=0)) + 1
+            block = j * width + i
+            used = np.zeros(int(block.max(initial=0)) + 1, dtype=bool)
+            used[block] = True
+            aggregate = (np.cumsum(used) - 1)[block]
+            blocks = np.flatnonzero(used)
+            i, j = blocks % width, blocks // width
+            P = _aggregation(aggregate, int(used.sum()), S.comm)
             coarse = P.getSize()[1]
             self._prolongations.append(P)
             if coarse >= 0.7 * size:
@@ -90,4 +92,4 @@ def _aggregation(aggregate: np.ndarray, count: int, comm: PETSc.Comm) -> PETSc.M
     first = int(comm.tompi4py().exscan(count) or 0)
     pointers = np.arange(n + 1, dtype=PETSc.IntType)
     columns = (first + aggregate).astype(PETSc.IntType)
-    return PETSc.Mat().createAIJ(((n, None), (count, None)), csr=(pointers, columns, np.ones(n)), comm=comm)
+    return PETSc.Mat().createAIJWithArrays(((n, None), (count, None)), (pointers, columns, np.ones(n)), comm=comm)

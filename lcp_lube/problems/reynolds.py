@@ -201,4 +201,4 @@ def assemble(grid: Grid, entries: list[tuple[int, int, Array]]) -> PETSc.Mat:
     rows = scipy.sparse.csr_matrix((values, columns[inside], pointers), shape=(ny * nx, grid.size))
     rows.sort_indices()
     size = (grid.local_size, grid.size)
-    return PETSc.Mat().createAIJ((size, size), csr=(rows.indptr, rows.indices, rows.data), comm=grid.dm.comm)
+    return PETSc.Mat().createAIJWithArrays((size, size), (rows.indptr, rows.indices, rows.data), comm=grid.dm.comm)

@@ -25,6 +25,8 @@ class Relaxation:
 
     def __init__(self, problem: LubricationProblem):
         self.problem = problem
+        s = problem.scheme
+        self._over_a, self._over_b = 1.0 / (s.k_W + s.k_E + s.k_S + s.k_N), 1.0 / s.b_C
 
     def __call__(self, p: Array, r: Array, sweeps: int) -> tuple[Array, Array]:
         """p and r after so many sweeps, to and fro in y. Collective."""
@@ -33,7 +35,8 @@ class Relaxation:
         for k in range(sweeps):
             if k == 0 or not alone:
                 framed_p, framed_r = (np.nan_to_num(grid.ghosted(field), nan=0.0) for field in (p, r))
-            compiled(_sweep)(framed_p, framed_r, s.k_W, s.k_E, s.k_S, s.k_N, s.b_C, s.b_W, s.c, k % 2 == 1)
+            coefficients = (s.k_W, s.k_E, s.k_S, s.k_N, s.b_W, s.c, self._over_a, self._over_b)
+            compiled(_sweep)(framed_p, framed_r, *coefficients, k % 2 == 1)
             if not alone or k == sweeps - 1:
                 p, r = (framed[1:-1, 1:-1].ravel() for framed in (framed_p, framed_r))
         return p, r
@@ -46,12 +49,16 @@ def _sweep(
     k_E: Array,
     k_S: Array,
     k_N: Array,
-    b_C: Array,
     b_W: Array,
     c: Array,
+    over_a: Array,
+    over_b: Array,
     down: bool,
 ) -> None:
-    """One sweep in place; p and r have a frame of neighbours, the coefficients (`BoxScheme`) have none."""
+    """One sweep in place; p and r have a frame of neighbours, the coefficients (`BoxScheme`) have none.
+
+    over_a, over_b: one over the diagonals of A and B.
+    """
     ny, nx = c.shape
     for line in range(ny):
         j = ny - line if down else line + 1
@@ -60,8 +67,8 @@ def _sweep(
             t = c[m, l] + k_W[m, l] * p[j, i - 1] + k_E[m, l] * p[j, i + 1] + k_S[m, l] * p[j - 1, i] + k_N[m, l] * p[j + 1, i]
             t -= b_W[m, l] * r[j, i - 1]
             if t > 0.0:
-                p[j, i] = t / (k_W[m, l] + k_E[m, l] + k_S[m, l] + k_N[m, l])
+                p[j, i] = t * over_a[m, l]
                 r[j, i] = 0.0
             else:
                 p[j, i] = 0.0
-                r[j, i] = t / b_C[m, l]
+                r[j, i] = t * over_b[m, l]
