@@ -6,8 +6,9 @@ there is one, has f'(v*) positive semidefinite. While v_k <= v*, f'(v_k) >= f'(v
 
     d_k = -f'(v_k)^-1 f(v_k) >= 0,   f(v_{k+1}) <= 0   and   v_{k+1} <= v*:
 
-the iterates climb to v* (Ortega and Rheinboldt, Iterative Solution of Nonlinear Equations, 13.3). A step that turns
-downwards therefore shows that no solution exists.
+the iterates climb to v* (Ortega and Rheinboldt, Iterative Solution of Nonlinear Equations, 13.3). A step d with
+d' f'(v_k) d < 0 therefore shows that no solution exists; it turns up because beyond the turning point the climb goes on until
+f' has a negative eigenvalue. (With inexact steps all this holds up to their errors.)
 """
 
 from dataclasses import dataclass
@@ -25,9 +26,6 @@ from ..problems.solution import Fields, Step
 from .method_options import make_options
 from .newton import NoSolutionError, Stopping
 from .steplength import halve_until, inexact_decrease
-
-TURNED = 0.1  # a step down is a turn if it undoes this much of the last one: far more than inexact solves can do,
-ROUNDING = 1e-6  # and this much of v
 
 
 @dataclass(frozen=True)
@@ -53,7 +51,6 @@ class PlainNewton:
         self.problem, self.stages, self.options = problem, stages, options
         self.v = start["v"].copy() if start else np.full(problem.grid.local_size, problem.v0)
         self.climbing = problem.source.convex and start is None and problem.v0 <= 0
-        self._last = 0.0  # sum of the last step
         with stages("assembly"):
             self.mat = problem.A.duplicate(copy=True)
             self.mat.setAttr("problem", problem)
@@ -78,7 +75,7 @@ class PlainNewton:
         Raises
         ------
         LinearSolverError : breakdown, a failed factorisation, or a result that is not finite.
-        NoSolutionError : climbing, and the KSP met a direction in which f' is not positive.
+        NoSolutionError : climbing, and f' is not positive definite, as d or a direction inside the KSP shows.
         """
         with self.stages("Jacobian"):
             self._x.setArray(self.problem.jacobian_diagonal(self.v))
@@ -91,21 +88,26 @@ class PlainNewton:
             except LinearSolverError:
                 indefinite = PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_MAT
                 if self.climbing and self.krylov.ksp.getConvergedReason() == indefinite:
-                    raise NoSolutionError(f"{self.problem.source.no_solution}: f' is no longer positive definite") from None
+                    raise self._no_solution() from None
                 raise
-        return self._x.array_r.copy(), iterations
+        d = self._x.array_r.copy()
+        # A KSP that stopped early has no d to prove anything by.
+        self.climbing = self.climbing and self.krylov.ksp.getConvergedReason() > 0
+        if self.climbing:
+            self.mat.mult(self._x, self._b)
+            if self._b.dot(self._x) < 0:
+                raise self._no_solution()
+        return d, iterations
+
+    def _no_solution(self) -> NoSolutionError:
+        return NoSolutionError(f"{self.problem.source.no_solution}: f' lost its definiteness on Newton's climb from below")
 
     def advance(self) -> Step:
         """One step. Collective."""
         problem, reduce, norm = self.problem, self.problem.reduce, self.norm
         d, iterations = self.direction()
         alpha, cuts = 1.0, 0
-        if self.climbing:
-            rise = reduce.sum(d)
-            if -rise > max(TURNED * self._last, ROUNDING * reduce.sum(np.abs(self.v))):
-                raise NoSolutionError(f"{problem.source.no_solution}: Newton's climb from below has turned downwards")
-            self._last = rise
-        else:
+        if not self.climbing:
             eta = 0.0 if self.krylov.direct else self.options.eta
             # f itself is no more accurate than this: below it nothing can be asked to decrease.
             rounding = float(np.finfo(float).eps) * problem.diagonal * reduce.norm(self.v)
