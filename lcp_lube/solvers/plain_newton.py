@@ -6,9 +6,9 @@ there is one, has f'(v*) positive semidefinite. While v_k <= v*, f'(v_k) >= f'(v
 
     d_k = -f'(v_k)^-1 f(v_k) >= 0,   f(v_{k+1}) <= 0   and   v_{k+1} <= v*:
 
-the iterates climb to v* (Ortega and Rheinboldt, Iterative Solution of Nonlinear Equations, 13.3). A step d with
-d' f'(v_k) d < 0 therefore shows that no solution exists; it turns up because beyond the turning point the climb goes on until
-f' has a negative eigenvalue. (With inexact steps all this holds up to their errors.)
+the iterates climb to v* (Ortega and Rheinboldt, Iterative Solution of Nonlinear Equations, 13.3). A vector d with
+d' f'(v_k) d < 0 therefore shows that no solution exists. Tried are each step, since beyond the turning point the climb goes on
+until f' has a negative eigenvalue, and the first eigenvector of A. (With inexact steps all this holds up to their errors.)
 """
 
 from dataclasses import dataclass
@@ -51,6 +51,9 @@ class PlainNewton:
         self.problem, self.stages, self.options = problem, stages, options
         self.v = start["v"].copy() if start else np.full(problem.grid.local_size, problem.v0)
         self.climbing = problem.source.convex and start is None and problem.v0 <= 0
+        grid = problem.grid
+        x, y = ((points - o) / side for points, o, side in zip((grid.x, grid.y), grid.origin, grid.lengths, strict=True))
+        self._bump = (np.sin(np.pi * x) * np.sin(np.pi * y)).ravel()  # A's first eigenvector
         with stages("assembly"):
             self.mat = problem.A.duplicate(copy=True)
             self.mat.setAttr("problem", problem)
@@ -93,11 +96,15 @@ class PlainNewton:
         d = self._x.array_r.copy()
         # A KSP that stopped early has no d to prove anything by.
         self.climbing = self.climbing and self.krylov.ksp.getConvergedReason() > 0
-        if self.climbing:
-            self.mat.mult(self._x, self._b)
-            if self._b.dot(self._x) < 0:
-                raise self._no_solution()
+        if self.climbing and min(self._curvature(d), self._curvature(self._bump)) < 0:
+            raise self._no_solution()
         return d, iterations
+
+    def _curvature(self, d: Array) -> float:
+        """d' f'(v) d. Collective."""
+        self._x.setArray(d)
+        self.mat.mult(self._x, self._b)
+        return float(self._b.dot(self._x))
 
     def _no_solution(self) -> NoSolutionError:
         return NoSolutionError(f"{self.problem.source.no_solution}: f' lost its definiteness on Newton's climb from below")
