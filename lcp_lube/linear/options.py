@@ -122,8 +122,8 @@ def explain_error(error: PETSc.Error) -> str:
         legal = found[3].split()
         return f"{found[2]} {found[1]}: allowed are {', '.join(legal)}{nearest(found[1], legal)}"
     if found := re.search(r"factorization type (\S+) and matrix type mpi", text):
-        other = "bjacobi has one inside each rank" if found[1] in ("ILU", "ICC") else "mumps and superlu_dist have one"
-        return f"PETSc has no {found[1]} of its own for several ranks; the recipes {other}"
+        other = "recipe bjacobi has one inside each rank" if found[1] in ("ILU", "ICC") else "recipes mumps and superlu_dist do"
+        return f"PETSc has no {found[1]} of its own for several ranks; the {other}"
     if found := re.search(r"MatSolverType (\S+) does not support matrix type mpi", text):
         return f"{option(found[1])}: for one rank only; for several there are the recipes mumps and superlu_dist"
     for pattern, enum in KINDS:
