@@ -99,6 +99,30 @@ def test_nested_iteration_ends_where_one_grid_does():
     nested.destroy()
 
 
+@pytest.mark.parametrize("name, changes", [("problem4", {"n": 151}), ("rough", {"n": 103}), ("problem3", {"n": 3001})])
+def test_sweeps_save_steps(name, changes):
+    """At most 3 steps on the finest grid with the sweeps, the same answer as without them."""
+    pytest.importorskip("numba")
+    ours, plain = (run(name, changes, nested=True, options={"sweeps": k}) for k in (16, 0))
+    assert ours.converged and plain.converged
+    assert ours.iterations <= 3 and ours.iterations <= plain.iterations
+    np.testing.assert_allclose(ours.p, plain.p, atol=1e-6)
+    ours.destroy()
+    plain.destroy()
+
+
+def test_sweeps_converge_by_themselves():
+    """Nonlinear Gauss-Seidel on an M-function: ||G|| falls to rounding."""
+    pytest.importorskip("numba")
+    from lcp_lube.solvers.relaxation import Relaxation
+
+    problem = load_scene("problem4", {"nx": 12, "ny": 9}).build()
+    p, r = Relaxation(problem)(np.ones(108), np.zeros(108), 2000)
+    assert problem.reduce.norm(problem.flow(p, r)) < 1e-12 * problem.reduce.norm(problem.c)
+    assert (p >= 0).all() and (r >= 0).all() and not (p * r).any()
+    problem.destroy()
+
+
 @pytest.mark.parametrize("method", ["din", "din-pc"])
 def test_interior_methods_start_inside_on_the_next_grid(method):
     solution = run("problem2", {"n": 211}, method=method, nested=True)

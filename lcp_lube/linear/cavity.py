@@ -31,6 +31,17 @@ from .stages import Stages
 CYCLES = 1  # from w = 1 or the last w; more of them gain nothing (benchmarks/README.md)
 
 
+def _solve(krylov: Krylov, rhs: Array, rtol: float) -> tuple[int, Array]:
+    """Iterations and the solution's values on this rank. Collective."""
+    x, b = krylov.mat.createVecs()
+    b.setArray(rhs)
+    iterations = krylov.solve(b, x, rtol)
+    values = x.array_r.copy()
+    x.destroy()
+    b.destroy()
+    return iterations, values
+
+
 class CavitySystem:
     """Steps of the active-set method (theta in {0, 1}) through a KSP on the Schur complement of the full film.
 
@@ -54,6 +65,7 @@ class CavitySystem:
                 for dj, di, value in scheme.pressure_entries()
             ]
             self._b_C = scheme.b_C.ravel()
+        self._full = np.zeros(grid.local_size, dtype=bool)  # the cells of the last set-up
         self._w = np.ones(grid.local_size)  # near-null vector of the last S, 1 where there was none
         self._column, self._line = (a.ravel() for a in np.broadcast_arrays(np.arange(nx)[None, :], np.arange(ny)[:, None]))
         self.krylov: Krylov | None = None
@@ -65,37 +77,46 @@ class CavitySystem:
 
     def solve(self, D_p: Array, D_r: Array, f1: Array, f2: Array, rtol: float) -> tuple[Array, Array, int]:
         """dp, dr and the number of linear iterations, for D_r = theta in {0, 1}, D_p = 1 - theta and f2 = 0. Collective."""
-        grid, reduce = self.problem.grid, self.problem.reduce
+        reduce = self.problem.reduce
         with self.stages("Jacobian"):
             full = D_r > 0
             target = self._targets(full)
-            local = int(full.sum())
-            first = int(grid.comm.exscan(local) or 0)
-            total = int(reduce.sum(np.array([float(local)])))
-            pointers, columns, values = self._rows(full, target, first, local, total)
             kept = target >= 0
-            rhs = np.bincount(target[kept], weights=f1[kept], minlength=local)
+            rhs = np.bincount(target[kept], weights=f1[kept], minlength=int(full.sum())).astype(float, copy=False)
+            changed, total = (reduce.sum(mask.astype(float)) for mask in (full != self._full, full))
+        if changed or self.krylov is None:
             self._release()
-            sizes = ((local, total), (local, total))
-            self._mat = PETSc.Mat().createAIJWithArrays(sizes, (pointers, columns, values), comm=grid.dm.comm)
-            x, b = self._mat.createVecs()
-            b.setArray(rhs)
-        with self.stages("near-null"):
-            if total > COARSEST:
-                hierarchy = NearNull(self._mat, self._column[full], self._line[full])
-                self._w[full] = hierarchy.improve(self._w[full], CYCLES)
-                hierarchy.destroy()
-                x.setArray(self._w[full])
-                self._mat.diagonalScale(None, x)
+            self._full = full
+            self._mat = self._assemble(full, target)
+            with self.stages("near-null"):
+                if total > COARSEST:
+                    self._scale(self._mat, full)
+            with self.stages("KSP"):
+                self.krylov = Krylov(self._mat)
         with self.stages("KSP"):
-            self.krylov = Krylov(self._mat)
-            iterations = self.krylov.solve(b, x, rtol)
+            iterations, y = _solve(self.krylov, rhs, rtol)
         dp = np.zeros_like(f1)
-        dp[full] = self._w[full] * x.array_r
-        x.destroy()
-        b.destroy()
+        dp[full] = self._w[full] * y
         with self.stages("Jacobian"):
             return dp, self._void(full, f1 - self.problem.multiply(self.problem.A, dp)), iterations
+
+    def _assemble(self, full: NDArray[np.bool_], target: NDArray[np.int64]) -> PETSc.Mat:
+        """S for these full cells. Collective."""
+        with self.stages("Jacobian"):
+            local, comm = int(full.sum()), self.problem.grid.comm
+            first, total = int(comm.exscan(local) or 0), comm.allreduce(local)
+            rows = self._rows(full, target, first, local, total)
+            return PETSc.Mat().createAIJWithArrays(((local, total), (local, total)), rows, comm=comm)
+
+    def _scale(self, S: PETSc.Mat, full: NDArray[np.bool_]) -> None:
+        """Improve w and multiply the columns of S by it. Collective."""
+        hierarchy = NearNull(S, self._column[full], self._line[full])
+        self._w[full] = hierarchy.improve(self._w[full], CYCLES)
+        hierarchy.destroy()
+        scaling = S.createVecRight()
+        scaling.setArray(self._w[full])
+        S.diagonalScale(None, scaling)
+        scaling.destroy()
 
     def _targets(self, full: NDArray[np.bool_]) -> NDArray[np.int64]:
         """Local full-film number of the cell that each cell's row is added to; -1 for runs that reach the outlet."""
@@ -141,8 +162,8 @@ class CavitySystem:
             self.krylov.destroy()
         if self._mat is not None:
             self._mat.destroy()
+        self.krylov = self._mat = None
 
     def destroy(self) -> None:
         """Free the PETSc objects."""
         self._release()
-        self.krylov = None

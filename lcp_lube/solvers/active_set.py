@@ -129,7 +129,7 @@ class ActiveSet:
         full = self.z >= 0
         cavity = (~full).astype(float)
         # Early steps need signs, not digits; the last one is to bring ||G|| below eps1, and no further.
-        rtol = max(self.options.rtol, min(1e-2, 0.1 * max(self.norm, self.eps1 / self.norm if self.norm else 1.0)))
+        rtol = max(self.options.rtol, min(1e-2, max(0.1 * self.norm, 0.4 * self.eps1 / self.norm if self.norm else 1.0)))
         dp, dr, linear_iterations = self.system.solve(cavity, 1.0 - cavity, -self.G, np.zeros_like(self.G), rtol)
         with self.system.stages("step length"):
             d = np.where(full, dp, -dr / self.s)
