@@ -11,6 +11,7 @@ from .problems.solution import Problem
 from .registry import DEFAULT_METHOD, METHODS
 
 SMALL = 20_000  # points up to which one grid and a direct solver cost less than setting up anything better
+SMALL_BOX = 5_000  # the same where a contact area has to move by a cell a step
 DIN_ONLY = {"r0", "mu", "conditions"}  # flags that only an interior method can heed
 
 
@@ -54,7 +55,8 @@ def plan(
         fitting = [name for name, other in METHODS.items() if problem.kind in other.kinds]
         raise InputError(f"--method {method}: not for scene {scene}; allowed are {', '.join(fitting)}")
     grid = problem.grid
-    large = grid.dim == 2 and grid.size > SMALL
+    small = SMALL_BOX if problem.kind == "box" else SMALL
+    large = grid.dim == 2 and grid.size > small
     if system == "auto":
         system = entry.systems[0]
         if large and "cavity" in entry.systems and grid.box[1] == grid.shape[0] and PETSc.Sys.hasExternalPackage("hypre"):
@@ -64,7 +66,7 @@ def plan(
             )
     _known(system, entry.systems, f"method {method}: --system")
     if nested is None:
-        nested = entry.nested and not entry.interior and grid.size > SMALL
+        nested = entry.nested and not entry.interior and grid.size > small
         if nested:
             why.append("nested: the front found on a coarser grid leaves a few steps on this one")
     elif nested and not entry.nested:
