@@ -21,9 +21,9 @@ def example(name: str) -> argparse.Namespace:
     line = recipe_line(name)
     system = next((word for word in ("reduced", "cavity") if f"{word} system" in line), "full")
     method = "active-set" if system == "cavity" else "din"
-    scene = "problem4 --nx 13 --ny 11" if "2D" in line or system == "cavity" else "problem1 --n 21"
+    scene = "problem4 --nx 9 --ny 8" if "2D" in line or system == "cavity" else "problem1 --n 13"
     words = SUITED.get(name, f"{scene} --method {method} --system {system} --no-nested").split()
-    return parse(["solve", *words, "--recipe", name, "--max-it", "120"])
+    return parse(["solve", *words, "--recipe", name, "--max-it", "60", "--eps1", "1e-4", "--eps2", "1e-4"])
 
 
 def one_rank(name: str) -> bool:

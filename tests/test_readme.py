@@ -1,0 +1,63 @@
+"""Every command and every program of the README runs as it stands there."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+README = Path(__file__).parent.parent / "README.md"
+BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```", README.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+LINES = [line for kind, block in BLOCKS if kind == "sh" for line in block.splitlines()]
+COMMANDS = [line for line in LINES if re.match(r"(mpiexec .*)?lcp-lube ", line)]
+PROGRAMS = [block for kind, block in BLOCKS if kind == "python"]
+SCENES = [block for kind, block in BLOCKS if kind == "toml"]
+# What set-up is made of; run by `make`, not here.
+SETUP = r"make( |$)|conda |pip |python3 -m venv |export |source |git |sudo |apt"
+
+
+@pytest.fixture
+def environment(tmp_path):
+    """With `lcp-lube` on the path, installed or not."""
+    shim = tmp_path / "bin" / "lcp-lube"
+    shim.parent.mkdir()
+    shim.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m lcp_lube "$@"\n')
+    shim.chmod(0o755)
+    return {"PATH": f"{shim.parent}{os.pathsep}{os.environ['PATH']}"}
+
+
+def run(command, tmp_path, environment):
+    from conftest import ENVIRONMENT
+
+    return subprocess.run(
+        command, cwd=tmp_path, env={**ENVIRONMENT, **environment}, capture_output=True, text=True, timeout=240, check=False
+    )
+
+
+def test_nothing_in_the_readme_is_overlooked():
+    """Each line of a shell block is run here or belongs to the set-up."""
+    assert COMMANDS and PROGRAMS and SCENES
+    assert [line for line in LINES if line and line not in COMMANDS and not re.match(SETUP, line)] == []
+
+
+@pytest.mark.parametrize("line", COMMANDS)
+def test_commands(line, tmp_path, environment):
+    done = run(["sh", "-c", line], tmp_path, environment)
+    assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
+    for name in re.findall(r"(?:--plot|--output) (\S+)", line):
+        assert (tmp_path / name).stat().st_size > 0
+
+
+@pytest.mark.parametrize("block", PROGRAMS)
+def test_programs(block, tmp_path, environment):
+    done = run([sys.executable, "-W", "error", "-c", block], tmp_path, environment)
+    assert done.returncode == 0, f"{done.stdout}\n{done.stderr}"
+
+
+@pytest.mark.parametrize("block", SCENES)
+def test_scenes(block, tmp_path, environment):
+    (tmp_path / "my.toml").write_text(block)
+    done = run(["lcp-lube", "solve", "my.toml"], tmp_path, environment)
+    assert done.returncode == 0, done.stderr
