@@ -58,16 +58,14 @@ def matrix(mat: PETSc.Mat) -> sp.csr_matrix:
 def scipy_active_set(problem: LubricationProblem, ordering: str = "COLAMD") -> Answer:
     """Full film first; then cells with p < 0 cavitate and cells with r < 0 fill, all at once, until none changes."""
     A, B, c = matrix(problem.A), matrix(problem.B), problem.c
-    full = np.ones(problem.size)
-    for step in range(1, MAX_IT + 1):
+    full, steps, changed = np.ones(problem.size), 0, True
+    while changed and steps < MAX_IT:
         J = (A @ sp.diags(full) - B @ sp.diags(1.0 - full)).tocsc()
         J.eliminate_zeros()
         z = splu(J, permc_spec=ordering).solve(c)
-        now = (z >= 0).astype(float)
-        if (now == full).all():
-            break
-        full = now
-    return Answer(np.maximum(z, 0.0), np.maximum(-z, 0.0), step, "" if (now == full).all() else f"{MAX_IT} steps")
+        steps, changed = steps + 1, bool(((z >= 0) != full).any())
+        full = (z >= 0).astype(float)
+    return Answer(np.maximum(z, 0.0), np.maximum(-z, 0.0), steps, f"cells still change after {MAX_IT} steps" if changed else "")
 
 
 class MixedForm:

@@ -132,14 +132,16 @@ def parse(own: list[str]) -> argparse.Namespace:
     _results_option(table)
 
     chart = command("chart", "long experiments: the runs in a csv, the pictures drawn from it")
-    charts = chart.add_subparsers(dest="chart", required=True, metavar="precision|stability", parser_class=Parser)
+    charts = chart.add_subparsers(dest="chart", required=True, metavar="precision|stability|scaling", parser_class=Parser)
     text = "error against the exact solution and what it costs, for every method, system and recipe"
     precision = charts.add_parser("precision", help=text, description=text, allow_abbrev=False)
     precision.add_argument("scenes", nargs="*", metavar="SCENE", help="with an exact solution; default problem1 to problem3")
     text = "where methods fail: " + "; ".join(f"{name}, {entry.line}" for name, entry in STABILITY.items())
     stability = charts.add_parser("stability", help=text, description=text, allow_abbrev=False)
     stability.add_argument("maps", nargs="*", metavar="MAP", help=f"any of {', '.join(STABILITY)}; default all")
-    for parser_of_chart in (precision, stability):
+    text = "a whole solve's cost by grid and by ranks: run it under mpiexec -n 1, 2, 4, ... in turn"
+    scaling = charts.add_parser("scaling", help=text, description=text, allow_abbrev=False)
+    for parser_of_chart in (precision, stability, scaling):
         parser_of_chart.add_argument("--quick", action="store_true", help="a small chart in seconds, with a csv of its own")
         _results_option(parser_of_chart)
 

@@ -149,6 +149,10 @@ def run_chart(args: argparse.Namespace) -> int:
         from .chart.precision import chart
 
         return chart(args.scenes, quick=args.quick, results=args.results)
+    if args.chart == "scaling":
+        from .chart import scaling
+
+        return scaling.chart(quick=args.quick, results=args.results)
     for name in args.maps:
         if name not in STABILITY:
             raise InputError(f"chart stability {name}: allowed are {', '.join(STABILITY)}{nearest(name, STABILITY)}")
