@@ -33,6 +33,7 @@ class FullSystem:
             self._rows = own_r
             self._pointers = np.arange(0, 2 * nl + 1, 2, dtype=PETSc.IntType)
             self._columns = np.stack([own_p, own_r], axis=1).ravel()
+            self._values = np.ones(2 * nl)
             rows, columns, values = [], [], []
             for entries, field in ((problem.scheme.pressure_entries(), 0), (problem.scheme.void_entries(), 1)):
                 for i, j, v in coo(grid, entries):
@@ -41,7 +42,7 @@ class FullSystem:
                     values.append(v)
             rows.append(np.repeat(own_r, 2))
             columns.append(self._columns)
-            values.append(np.ones(2 * nl))
+            values.append(self._values)
             pointers, sorted_columns, order = csr(np.concatenate(rows), np.concatenate(columns), 2 * grid.first, 2 * nl)
             size = (2 * nl, 2 * grid.size)
             self.mat = PETSc.Mat().createAIJ(
@@ -65,15 +66,17 @@ class FullSystem:
         LinearSolverError : breakdown, a failed factorisation, or a result that is not finite.
         """
         with self.stages("Jacobian"):
-            values = np.stack([D_p, D_r], axis=1).ravel()
-            self.mat.setValuesIJV(self._pointers, self._columns, values, rowmap=self._rows)
+            self._values[0::2], self._values[1::2] = D_p, D_r
+            self.mat.setValuesIJV(self._pointers, self._columns, self._values, rowmap=self._rows)
             self.mat.assemble()
         return self.resolve(f1, f2, rtol)
 
     def resolve(self, f1: Array, f2: Array, rtol: float) -> tuple[Array, Array, int]:
         """Solve once more with the matrix of the last `solve`: a factorisation is not repeated. Collective."""
         nl = f1.size
-        self._b.setArray(np.concatenate([f1, f2]))
+        b = self._b.array_w
+        b[:nl], b[nl:] = f1, f2
+        del b  # gives the array back to the vector
         with self.stages("KSP"):
             iterations = self.krylov.solve(self._b, self._x, rtol)
         x = self._x.array_r.copy()

@@ -57,6 +57,7 @@ class LubricationProblem:
         self.A = assemble(grid, scheme.pressure_entries())
         self.B = assemble(grid, scheme.void_entries())
         self.c = scheme.c.ravel()
+        self._x, self._y = self.A.createVecs()  # `multiply` lends them its arrays
 
     @property
     def unknowns(self) -> int:
@@ -70,11 +71,11 @@ class LubricationProblem:
     def multiply(self, mat: PETSc.Mat, a: Array) -> Array:
         """mat @ a for one of A, B and an array of owned points. Collective."""
         out = np.empty(self.grid.local_size)
-        x = PETSc.Vec().createWithArray(np.ascontiguousarray(a), size=(a.size, self.size), comm=mat.comm)
-        y = PETSc.Vec().createWithArray(out, size=(out.size, self.size), comm=mat.comm)
-        mat.mult(x, y)
-        x.destroy()
-        y.destroy()
+        self._x.placeArray(np.ascontiguousarray(a))
+        self._y.placeArray(out)
+        mat.mult(self._x, self._y)
+        self._x.resetArray()
+        self._y.resetArray()
         return out
 
     def flow(self, p: Array, r: Array) -> Array:
@@ -150,6 +151,6 @@ class LubricationProblem:
 
     def destroy(self) -> None:
         """Free the PETSc objects."""
-        self.A.destroy()
-        self.B.destroy()
+        for obj in (self.A, self.B, self._x, self._y):
+            obj.destroy()
         self.grid.destroy()

@@ -17,9 +17,8 @@ def feasible(reduce: Reduce, *pairs: tuple[Array, Array]) -> float:
     """F: the largest step alpha in [0, 1] that keeps every x + alpha dx >= 0, for pairs (x, dx) with x >= 0. Collective."""
     limit = 1.0
     for x, dx in pairs:
-        falling = dx < 0
-        if falling.any():
-            limit = min(limit, float(np.min(x[falling] / -dx[falling])))
+        bounds = np.divide(x, -dx, out=np.full_like(x, np.inf), where=dx < 0)
+        limit = min(limit, float(np.min(bounds, initial=np.inf)))
     return max(reduce.min(np.array([limit])), 0.0)  # rounding may have left an x at -1e-25
 
 
