@@ -209,6 +209,7 @@ AUG, SAD = AUGMENTATION, SADDLE
         ({**AUG, "system": "reduced"}, "it needs a matrix of the two fields p and r"),
         ({**SAD, "mat_type": "dense"}, "it needs a matrix of the two fields p and r"),
         ({**SAD, "pc_python_type": "lcp_lube.linear.saddle.SadlePC"}, "-pc_python_type lcp_lube.linear.saddle.SadlePC: "),
+        ({"pc_type": "fieldsplit", "system": "reduced"}, "-pc_type fieldsplit: it needs a matrix of two fields"),
         ({"pc_type": "fieldsplit", "fieldsplit_order": "r,q"}, "-fieldsplit_order r,q: allowed are p,r in any order"),
     ],
 )

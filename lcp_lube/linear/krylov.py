@@ -69,7 +69,9 @@ class Krylov:
                 operator = self.mat.convert(self._kind, self._converted)
             self.ksp.setOperators(operator)
             pc = self.ksp.getPC()
-            if not self._ready and pc.getType() == PETSc.PC.Type.FIELDSPLIT and self.fields:
+            if not self._ready and pc.getType() == PETSc.PC.Type.FIELDSPLIT:
+                if not self.fields:
+                    raise InputError("-pc_type fieldsplit: it needs a matrix of two fields, as --system full has it")
                 # Which field is solved or eliminated first is an option of ours: PETSc has none, it goes by the calls' order.
                 order = PETSc.Options().getString("fieldsplit_order", ",".join(self.fields))
                 if sorted(order.split(",")) != sorted(self.fields):
