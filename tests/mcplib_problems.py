@@ -222,20 +222,48 @@ def pies() -> Case:
     return Case(F, np.array(low), np.array(high), {"1": np.array(start, dtype=float)}, complex_step(F), check)
 
 
+def laplacian(n: int) -> sp.csr_array:
+    """The five-point matrix (4, -1) on n x n points."""
+    line = sp.diags_array([-np.ones(n - 1), 2 * np.ones(n), -np.ones(n - 1)], offsets=[-1, 0, 1])
+    return sp.csr_array(sp.kron(line, sp.eye_array(n)) + sp.kron(sp.eye_array(n), line))
+
+
 def obstacle() -> Case:
     """A membrane pushed up between two bumpy obstacles on 50 x 50 points (Ciarlet; MCPLIB); J is sparse."""
     n = 50
     d = 1.0 / (n + 1)
     x, y = np.meshgrid(*2 * [np.arange(1, n + 1) * d], indexing="ij")
     bump = (np.sin(9.2 * x) * np.sin(9.3 * y)).ravel()
-    line = sp.diags_array([-np.ones(n - 1), 2 * np.ones(n), -np.ones(n - 1)], offsets=[-1, 0, 1])
-    A = (sp.kron(line, sp.eye_array(n)) + sp.kron(sp.eye_array(n), line)).tocsr()
-    lower = bump**3
-    start = np.maximum(lower, 0.0)
-    return Case(lambda v: A @ v - d * d, lower, bump**2 + 0.2, {"1": start}, lambda v: A)
+    A, lower = laplacian(n), bump**3
+    return Case(lambda v: A @ v - d * d, lower, bump**2 + 0.2, {"1": np.maximum(lower, 0.0)}, lambda v: A)
+
+
+BALL_RADIUS, BALL_A, BALL_B = 0.697965148223374, 0.680259411891719, 0.471519893402112
+
+
+def ball() -> Case:
+    """A membrane over a ball, exact solution known (PETSc's snes/tutorials/ex9, Bueler), on 63 x 63 points of [-2, 2]^2."""
+    n = 63
+    d = 4.0 / (n + 1)
+    axis = -2.0 + d * np.arange(n + 2)
+    r = np.hypot(*np.meshgrid(axis, axis, indexing="ij"))
+    cap = np.sqrt(1.0 - np.minimum(r, 0.9) ** 2)
+    psi = np.where(r <= 0.9, cap, np.sqrt(0.19) - 0.9 / np.sqrt(0.19) * (r - 0.9))  # from radius 0.9 its tangent cone
+    exact = np.where(r <= BALL_RADIUS, psi, BALL_B - BALL_A * np.log(np.maximum(r, BALL_RADIUS)))
+    inside = exact[1:-1, 1:-1].ravel()
+    edge = exact.copy()
+    edge[1:-1, 1:-1] = 0.0
+    boundary = (edge[:-2, 1:-1] + edge[2:, 1:-1] + edge[1:-1, :-2] + edge[1:-1, 2:]).ravel()
+    A, lower, radius = laplacian(n), psi[1:-1, 1:-1].ravel(), r[1:-1, 1:-1].ravel()
+
+    def check(v: Vector) -> bool:
+        contact = A @ v - boundary > v - lower
+        return bool(abs(radius[contact].max() - BALL_RADIUS) < d and np.abs(v - inside).max() < 0.5 * d * d)
+
+    return Case(lambda v: A @ v - boundary, lower, np.full(n * n, INF), {"1": np.maximum(lower, 0.0)}, lambda v: A, check)
 
 
 CASES: dict[str, Callable[[], Case]] = {
     case.__name__: case
-    for case in (billups, josephy, kojshin, nash5, nash10, explcp, munson1, mathiesen, transport, choi, pies, obstacle)
+    for case in (billups, josephy, kojshin, nash5, nash10, explcp, munson1, mathiesen, transport, choi, pies, obstacle, ball)
 }

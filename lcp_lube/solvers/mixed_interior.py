@@ -41,30 +41,51 @@ class MixedInteriorOptions(InteriorOptions):
 
 
 class KeptJacobian:
-    """A problem whose Jacobian is evaluated only at every keep-th call; the rest is the problem's own.
+    """A problem whose Jacobian serves `keep` calls before it is evaluated anew; the rest is the problem's own.
 
-    Its first call, before the first step, serves the layout of the Newton matrix and does not count.
+    The first call, before the first step, gives the Newton matrix its layout and does not count.
     """
 
     def __init__(self, problem: BoxProblem, keep: int):
-        self._problem, self._keep, self._calls = problem, keep, -1
+        self._problem, self._keep = problem, keep
+        self._mat: PETSc.Mat | None = None
+        self._age = keep  # calls served by the one at hand
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._problem, name)
 
     def jacobian(self, v: Array) -> PETSc.Mat:
         """f' at the v of this call or of an earlier one. Collective."""
-        if self._calls < 0 or self._calls % self._keep == 0:
+        layout = self._mat is None
+        if self._age >= self._keep:
             self._mat = self._problem.jacobian(v)
-        self._calls += 1
+            self._age = 0
+        self._age = self._keep if layout else self._age + 1
         return self._mat
+
+    @property
+    def old(self) -> bool:
+        """Whether the last call was served by an earlier one's Jacobian."""
+        return self._age > 1
+
+    def expire(self) -> None:
+        """Evaluate at the next call."""
+        self._age = self._keep
 
 
 class MixedInterior(Interior):
-    """The iterates of the interior point method from z = max(+-f(v), z0)."""
+    """The iterates of the interior point method from z = max(+-f(v), z0), with Jacobians that may be kept."""
 
-    def __init__(self, problem: BoxProblem, system: BoxSystem, options: MixedInteriorOptions, start: Fields | None = None):
+    def __init__(
+        self,
+        problem: BoxProblem,
+        system: BoxSystem,
+        kept: KeptJacobian,
+        options: MixedInteriorOptions,
+        start: Fields | None = None,
+    ):
         super().__init__(problem, system, options, start)
+        self.kept = kept
         f = problem.residual(self.at.v)
         z1, z2 = (np.where(has, np.maximum(force, options.z0), 0.0) for has, force in zip(self._has, (f, -f), strict=True))
         self.at = replace(self.at, z1=z1, z2=z2)
@@ -72,13 +93,21 @@ class MixedInterior(Interior):
         self.norm = problem.reduce.norm(*self.H)
 
     def advance(self) -> Step:
-        """As `Interior.advance`. Collective.
+        """As `Interior.advance`; a step that a kept Jacobian fails to give is made with a new one. Collective.
 
         Raises
         ------
         StepLengthError : also where the bounds leave no room for a step, as where f is not monotone and H has a local minimum.
         """
-        step = super().advance()
+        try:
+            step = super().advance()
+        except StepLengthError:
+            if not self.kept.old:
+                raise
+            self.kept.expire()
+            step = super().advance()
+        if step.backtracking:
+            self.kept.expire()
         if step.alpha < STUCK:
             raise StepLengthError(f"the bounds leave room for {step.alpha:.1e} of it")
         return step
@@ -99,5 +128,6 @@ def build(
     InputError : an unknown option or a value out of range.
     """
     settings = make_options(MixedInteriorOptions, "interior", options)
-    kept: Any = KeptJacobian(problem, settings.keep)
-    return MixedInterior(problem, BoxSystem(kept, stages), settings, start)
+    kept = KeptJacobian(problem, settings.keep)
+    seen_by_system: Any = kept
+    return MixedInterior(problem, BoxSystem(seen_by_system, stages), kept, settings, start)
