@@ -84,7 +84,7 @@ def main() -> None:
     steps, outcomes, helped = [], Counter[str](), 0
     with args.output.open("w", newline="") as file:
         writer = csv.writer(file)
-        writer.writerow(["seed", "kind", "n", "ratio", "U", "p", "outcome", "iterations", "damped", "helped", "message"])
+        writer.writerow(["seed", "kind", "n", "ratio", "U", "p", "outcome", "iterations", "helped", "message"])
         for seed in range(args.seed, args.seed + args.films):
             case = scene(seed)
             solution = solve(case, method="active-set", recipe_name="umfpack", nested=False)
@@ -92,10 +92,9 @@ def main() -> None:
             steps.append(solution.iterations)
             outcomes[str(solution.outcome)] += 1
             helped += took_over
-            damped = sum(step.alpha < 1 for step in solution.steps)
             data = [seed, case.kind, case.n, f"{case.ratio:.4g}", f"{case.U:.4g}", f"{case.p_a:.4g}", solution.outcome]
             writer.writerow(
-                [*data, solution.iterations, damped, int(took_over), "" if solution.converged else solution.message]
+                [*data, solution.iterations, int(took_over), "" if solution.converged else solution.message]
             )
             solution.destroy()
     percentiles = np.percentile(steps, [50, 90, 99, 100]).astype(int)

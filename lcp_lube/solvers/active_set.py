@@ -7,9 +7,11 @@ With p = max(z, 0) and r = s max(-z, 0), s > 0, complementarity holds for every 
 piecewise linear, with Jacobian J(theta) for theta = 1 where z >= 0 and 0 elsewhere. A full step lands on the solution of one
 linear piece; where the signs of z come out as they went in, that is the exact discrete solution, so the iteration ends after
 finitely many steps or cycles. From a coarser grid's answer, nonlinear Gauss-Seidel sweeps (`relaxation`) before the first step
-and after each one put the fronts right to the cell, which saves two to four steps of five to seven. Plain steps cycle on
-some rough films, and a line search at every step is worse: it forbids the rise of ||G|| through which the method gets out of
-a poor start. Damping only once ||G|| has stalled cured the cycles.
+and after each one put the fronts right to the cell, which saves two to four steps of five to seven.
+
+Plain steps cycle on some rough films, and a line search at every step is worse: it forbids the rise of ||G|| through which the
+method gets out of a poor start. Here, once ||G|| has stalled, sweeps take over for a while, twice as many each time: they
+converge from any start, as G is an M-function, so the method cannot cycle for ever.
 """
 
 from dataclasses import dataclass
@@ -30,14 +32,14 @@ from .relaxation import Relaxation, relaxation
 from .steplength import StepLengthError
 
 EPS = float(np.finfo(float).eps)
-DAMPED_STEPS = (0.7, 0.5, 0.3, 0.2, 0.1, 0.05)
+RESCUE_SWEEPS, MOST_SWEEPS = 16, 2**14  # once stalled: at first, and at most
 
 
 @dataclass(frozen=True)
 class ActiveSetOptions:
-    """patience: steps without a fall of ||G|| by 10 % before a step is damped; give_up: steps after which it is taken to
+    """patience: steps without a fall of ||G|| by 10 % before sweeps take over; give_up: steps after which it is taken to
     cycle; p0: full film at this p (p_unit) at the start; rtol: smallest relative tolerance of iterative inner solves; sweeps:
-    of relaxation before the first step from a given start, and after each step."""
+    of relaxation before the first step from a given start, and after each step; 0: none at all, also when stalled."""
 
     p0: float = 1.0
     patience: int = 4
@@ -81,9 +83,10 @@ class ActiveSet:
         self.z = start["p"] - start["r"] / self.s if start else np.full(problem.grid.local_size, options.p0)
         self.G = self._residual(self.z)
         self.norm = self._norm(self.z, self.G)
-        self._relaxation: Relaxation | None = relaxation(problem) if start and options.sweeps else None
-        self._relax()
-        self._best, self._stalled, self._taken = self.norm, 0, 0
+        self._relaxation: Relaxation | None = relaxation(problem) if options.sweeps else None
+        self._sweeps = options.sweeps if start else 0
+        self._relax(self._sweeps)
+        self._best, self._stalled, self._rescue, self._taken = self.norm, 0, RESCUE_SWEEPS, 0
 
     @property
     def fields(self) -> Fields:
@@ -105,23 +108,26 @@ class ActiveSet:
     def _residual(self, z: Array) -> Array:
         return self.problem.flow(np.maximum(z, 0.0), self.s * np.maximum(-z, 0.0))
 
-    def _relax(self) -> None:
-        """Sweeps from z, kept if ||G|| falls by them."""
-        if self._relaxation is None or self.norm <= self.eps1:
+    def _relax(self, sweeps: int, always: bool = False) -> None:
+        """Sweeps from z, kept if ||G|| falls by them, or always."""
+        if self._relaxation is None or not sweeps or self.norm <= self.eps1:
             return
         fields = self.fields
-        p, r = self._relaxation(fields["p"], fields["r"], self.options.sweeps)
+        p, r = self._relaxation(fields["p"], fields["r"], sweeps)
         z = p - r / self.s
         G = self._residual(z)
         norm = self._norm(z, G)
-        if norm < self.norm:
+        if norm < self.norm or always:
             self.z, self.G, self.norm = z, G, norm
 
     def advance(self) -> Step:
-        """One Newton step; damped by the best of DAMPED_STEPS if ||G|| has stalled. StepLengthError after give_up steps.
+        """One full Newton step, and sweeps: a few from a coarser grid's answer, many if ||G|| has stalled.
 
-        The step's norm counts as zero when no sign of z changed in a full step: the next one would solve the same linear
-        system again.
+        The step's norm counts as zero when no sign of z changed: the next step would solve the same linear system again.
+
+        Raises
+        ------
+        StepLengthError : after give_up steps.
         """
         if self._taken == self.options.give_up:
             raise StepLengthError(f"||G|| is at {self.norm:.1e} of ||c|| after {self._taken} steps: they seem to cycle")
@@ -133,26 +139,20 @@ class ActiveSet:
         dp, dr, linear_iterations = self.system.solve(cavity, 1.0 - cavity, -self.G, np.zeros_like(self.G), rtol)
         with self.system.stages("step length"):
             d = np.where(full, dp, -dr / self.s)
-            alpha, cuts = 1.0, 0
-            z = self.z + d
-            G = self._residual(z)
-            norm = self._norm(z, G)
-            if self._stalled >= self.options.patience:
-                trials = [(norm, 1.0, z, G)]
-                for damped in DAMPED_STEPS:
-                    trial = self.z + damped * d
-                    residual = self._residual(trial)
-                    trials.append((self._norm(trial, residual), damped, trial, residual))
-                norm, alpha, z, G = min(trials, key=lambda t: t[0])
-                cuts, self._stalled = len(trials) - 1, 0
-            changed = self.problem.reduce.sum((full != (z >= 0)).astype(float))
-            step_norm = alpha * self.problem.reduce.norm(d) if changed or alpha < 1.0 else 0.0
-            self.z, self.G, self.norm = z, G, norm
+            self.z = self.z + d
+            self.G = self._residual(self.z)
+            self.norm = self._norm(self.z, self.G)
+            changed = self.problem.reduce.sum((full != (self.z >= 0)).astype(float))
+            step_norm = self.problem.reduce.norm(d) if changed else 0.0
         with self.system.stages("relaxation"):
-            self._relax()
+            if self._stalled >= self.options.patience:
+                self._relax(self._rescue, always=True)
+                self._stalled, self._rescue = 0, min(2 * self._rescue, MOST_SWEEPS)
+            else:
+                self._relax(self._sweeps)
         self._stalled = 0 if self.norm <= 0.9 * self._best else self._stalled + 1
         self._best = min(self._best, self.norm)
-        return Step(self.norm, step_norm, alpha, linear_iterations, backtracking=cuts, rtol=rtol)
+        return Step(self.norm, step_norm, 1.0, linear_iterations, rtol=rtol)
 
 
 def build(
