@@ -29,7 +29,8 @@ class Complementarity(Scene):
     Parameters
     ----------
     F : x -> F(x), arrays of shape (n,).
-    J : x -> F'(x): an (n, n) array, a SciPy sparse array whose pattern stays the same, or a PETSc matrix.
+    J : x -> F'(x): an (n, n) array, a SciPy sparse array, or a PETSc matrix with its whole diagonal stored (its rows where
+        lower = upper are overwritten); a sparse one has the same pattern every time.
     lower, upper : bounds, shape (n,); -inf and inf where there are none (both: x_i is free, and F_i(x) = 0 an equation).
     x0 : start, shape (n,); moved into the bounds.
 
@@ -194,6 +195,8 @@ def _vector(value: Any, label: str) -> Array:
     InputError : not a sequence of real numbers.
     """
     try:
+        if np.iscomplexobj(value):
+            raise TypeError
         vector = np.array(value, dtype=float)
     except (TypeError, ValueError):
         raise InputError(f"{label}: a sequence of real numbers is needed") from None
