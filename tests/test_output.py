@@ -255,7 +255,9 @@ def test_pictures_are_files_of_their_kind_and_reproducible(
     for path in paths:
         plot(solution, path)
     assert paths[0].read_bytes().startswith(magic)
-    assert paths[0].read_bytes() == paths[1].read_bytes()
+    # But for the names that matplotlib gives to clip paths in SVG: they depend on when objects are freed.
+    first, second = (re.sub(rb"#?p[0-9a-f]{10}", b"", path.read_bytes()) for path in paths)
+    assert first == second
 
 
 def drawn(axes: Any, label: str) -> tuple[np.ndarray, np.ndarray]:
