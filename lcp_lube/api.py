@@ -62,7 +62,7 @@ def solve(
     entry = METHODS[chosen.method].of(problem.kind)
     if not isinstance(stopping, Stopping):
         stopping = Stopping(**{**dict(zip(("eps1", "eps2"), entry.eps, strict=True)), **(stopping or {})})
-    shapes = level_shapes(scene.shape) if chosen.nested else [scene.shape]
+    shapes = level_shapes(scene.shape, problem.grid.comm.size) if chosen.nested else [scene.shape]
     start: Fields | None = None
     coarse: Problem | None = None
     levels = []

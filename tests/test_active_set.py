@@ -132,6 +132,7 @@ def test_interior_methods_start_inside_on_the_next_grid(method):
 
 def test_level_shapes():
     assert level_shapes((1023, 511)) == [(63, 31), (127, 63), (255, 127), (511, 255), (1023, 511)]
+    assert level_shapes((1023, 511), ranks=100) == [(511, 255), (1023, 511)]
     assert level_shapes((10,)) == [(10,)] and level_shapes((3, 1000)) == [(3, 1000)]
 
 

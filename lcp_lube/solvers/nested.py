@@ -3,9 +3,12 @@
 MIN_POINTS = {1: 50, 2: 24}  # coarsest grid, points a side: small enough to cost nothing, with a front to be found
 
 
-def level_shapes(shape: tuple[int, ...]) -> list[tuple[int, ...]]:
-    """Grids from coarse to fine: (n - 1) // 2 points a side on every coarser one, so that 2^k - 1 points nest."""
+def level_shapes(shape: tuple[int, ...], ranks: int = 1) -> list[tuple[int, ...]]:
+    """Grids from coarse to fine: (n - 1) // 2 points a side on every coarser one, so that 2^k - 1 points nest.
+
+    In 2D each of the ranks keeps two whole x lines, which the cavity system and the dealing out of the points need.
+    """
     shapes = [shape]
-    while min(shapes[0]) // 2 >= MIN_POINTS[len(shape)]:
+    while min(shapes[0]) // 2 >= MIN_POINTS[len(shape)] and (len(shape) == 1 or (shapes[0][1] - 1) // 2 >= 2 * ranks):
         shapes.insert(0, tuple((n - 1) // 2 for n in shapes[0]))
     return shapes
