@@ -13,7 +13,7 @@ from .scene import Finite, NotNegative, Positive, Scene
 class EhlLineScene(Scene):
     """Line contact of two elastic rollers, dimensionless; defaults are Kostreva's data. The Jacobian is dense.
 
-    n counts the unknowns: n - 1 pressures at x_a + i dx, dx = (x_b - x_a)/n, and k.
+    n counts the unknowns: n - 1 pressures at start + i dx, dx = (end - start)/n, and k.
     """
 
     alpha: NotNegative = Field(2.832, description="how fast viscosity grows with pressure")

@@ -205,3 +205,10 @@ def test_bad_scenes(changes, words):
 def test_bad_options(options, words):
     with pytest.raises(InputError, match=words):
         solve(load_scene("ehl_line", {"n": 20}), options=options)
+
+
+def test_no_factors_in_place(petsc_options):
+    """PETSc would overwrite the matrix of the next step."""
+    petsc_options(pc_factor_in_place=None)
+    with pytest.raises(InputError, match="pc_factor_in_place"):
+        solve(load_scene("ehl_line", {"n": 20}))

@@ -37,6 +37,8 @@ class Krylov:
         self._converted = PETSc.Mat() if kind and kind not in ("aij", mat.getType()) else None
         self._kind = kind
         self._fixed_rtol = "ksp_rtol" in given
+        if "pc_factor_in_place" in given:
+            raise InputError("-pc_factor_in_place: the matrix is written anew in every step, factors cannot take its place")
         self.ksp = PETSc.KSP().create(mat.comm)
         self.ksp.setTolerances(max_it=MAX_INNER_ITERATIONS)
         self._ready = False
