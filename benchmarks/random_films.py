@@ -93,9 +93,7 @@ def main() -> None:
             outcomes[str(solution.outcome)] += 1
             helped += took_over
             data = [seed, case.kind, case.n, f"{case.ratio:.4g}", f"{case.U:.4g}", f"{case.p_a:.4g}", solution.outcome]
-            writer.writerow(
-                [*data, solution.iterations, int(took_over), "" if solution.converged else solution.message]
-            )
+            writer.writerow([*data, solution.iterations, int(took_over), "" if solution.converged else solution.message])
             solution.destroy()
     percentiles = np.percentile(steps, [50, 90, 99, 100]).astype(int)
     print(f"{args.films} films: {dict(outcomes)}; the interior method took over {helped} times")

@@ -116,7 +116,7 @@ class Krylov:
         return self.ksp.getConvergedReason()
 
     def _enlarge_mumps(self) -> bool:
-        """If MUMPS ran out of the workspace that it had foreseen, which pivoting can outgrow: provide four times the reserve."""
+        """If MUMPS ran out of the workspace it had foreseen, which pivoting can outgrow: provide four times the reserve."""
         pc = self.ksp.getPC()
         if self.pc_type not in ("lu", "cholesky") or pc.getFactorSolverType() != "mumps":
             return False
