@@ -137,16 +137,11 @@ def test_near_null_vector_of_a_hard_film():
 
 
 @pytest.mark.parametrize("name, changes", [("textured_slider", {"K": 5}), ("rough", {"n": 150, "amplitude": 4e-6})])
-def test_few_krylov_iterations_on_hard_films(name, changes):
+def test_few_krylov_iterations_on_hard_films(name, changes, petsc_options):
     """At most 8 BiCGStab iterations to 1e-8 in every step, where plain multigrid takes ten times that."""
-    solution = solve(
-        load_scene(name, changes),
-        method="active-set",
-        system="cavity",
-        recipe_name="bcgs_amg",
-        nested=False,
-        options={"rtol": 1e-8},
-    )
+    petsc_options(ksp_rtol=1e-8)
+    choices = {"method": "active-set", "system": "cavity", "recipe_name": "bcgs_amg", "nested": False}
+    solution = solve(load_scene(name, changes), **choices)
     assert solution.converged
     assert max(step.linear_iterations for step in solution.steps) <= 8
     solution.destroy()
