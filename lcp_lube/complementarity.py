@@ -75,8 +75,10 @@ class Complementarity(Scene):
         InputError : bounds that cross, a start that is no number, F or J of a wrong shape, parts that don't fit the ranks.
         """
         grid = Grid((self.n,), (self.n + 1.0,), comm or PETSc.COMM_SELF)
-        if self.x0.size != grid.local_size:
-            raise InputError(f"x0 has {self.x0.size} entries, this rank owns {grid.local_size} of {self.n}")
+        sizes = list(zip(grid.comm.allgather(self.x0.size), np.diff(grid.starts), strict=True))
+        for rank, (given, owned) in enumerate(sizes):  # all ranks look at all of them, and raise together
+            if given != owned:
+                raise InputError(f"x0 has {given} entries on rank {rank}, which owns {owned} of {self.n}")
         return UserProblem(grid, Callbacks(grid, self.F, self.J, self.lower, self.upper), self.lower, self.upper, self.x0)
 
 

@@ -120,7 +120,7 @@ def test_fischer_burmeister(a, b):
         ({"F": lambda x: x + 1j}, "real numbers"),
         ({"J": lambda x: M[:2]}, r"shape \(2, 3\)"),
         ({"J": lambda x: sp.csr_array(M[:2])}, r"shape \(2, 3\)"),
-        ({"n": 4}, "owns 4 of 4"),
+        ({"n": 4}, "3 entries on rank 0, which owns 4 of 4"),
     ],
 )
 def test_bad_input(arguments, words):

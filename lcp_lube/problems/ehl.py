@@ -71,10 +71,10 @@ class LineContact:
         """q at the own faces, h^3 exp(-alpha p) there, and dp/dx. Behind x_n, where there is no face, p stays 0."""
         first, count = self.grid.x_start, self.grid.local_size
         left, right = p[first : first + count + 1], np.append(p, 0.0)[first + 1 : first + count + 2]
-        slope = (right - left) / self.dx
-        with np.errstate(over="ignore"):  # inf is what the outer loop then reports
+        with np.errstate(over="ignore", invalid="ignore"):  # inf and NaN are what the outer loop then reports
+            slope = (right - left) / self.dx
             mobility = h**3 * np.exp(-0.5 * self.alpha * (left + right))
-        return self.lam * h - mobility * slope, mobility, slope
+            return self.lam * h - mobility * slope, mobility, slope
 
     def load_defect(self, p: Array) -> float:
         """1 - (2 dx/pi) sum p_i, from the whole of p."""
@@ -180,7 +180,7 @@ class EhlProblem(BoxProblem):
         }
 
     def end_of_contact(self, p: Array, fields: Fields) -> float | None:
-        """x_b: where p = p' = 0, so that sqrt(p) falls linearly to zero; None if the grid has too few points. Collective.
+        """x_b: where p = p' = 0, so that sqrt(p) falls linearly to zero; None with too few points or an overflow. Collective.
 
         From the last four points with p > 0 but one, by least squares: the last one has the discrete front's error. First
         order in dx.
@@ -188,7 +188,7 @@ class EhlProblem(BoxProblem):
         own = slice(self.grid.local_size - self.contact.has_k)
         in_contact = np.flatnonzero(fields["v"][own] > self.residual(fields["v"])[own])
         last = self.reduce.max(self.grid.first + in_contact + 1.0)  # numbers of points, from 1
-        if last < 5:
+        if last < 5 or not np.all(np.isfinite(p)):
             return None
         at = int(last) - np.arange(4, 0, -1)
         t, y = at - last, np.sqrt(np.maximum(p[at], 0.0))
