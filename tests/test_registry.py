@@ -2,6 +2,8 @@
 
 import subprocess
 import sys
+import tomllib
+from pathlib import Path
 
 import pytest
 
@@ -31,6 +33,17 @@ def test_recipes_are_found_where_they_stand():
     assert {"lu", "superlu", "mumps", "gmres_ilu", "bcgs_ilu", "bjacobi"} <= set(registry.recipe_names())
     assert registry.read_recipe("mumps")["pc_factor_mat_solver_type"] == "mumps"
     assert registry.recipe_line("lu").startswith("LAPACK")
+
+
+def test_a_wheel_holds_every_package_scene_and_recipe():
+    """What pyproject.toml lists is what there is; recipes stand at top level and go into the package."""
+    root = Path(lcp_lube.__file__).parent.parent
+    tool = tomllib.loads((root / "pyproject.toml").read_text())["tool"]["setuptools"]
+    packages = {path.parent.relative_to(root) for path in root.glob("lcp_lube/**/__init__.py")}
+    assert {".".join(path.parts) for path in packages} <= set(tool["packages"])
+    assert {"lcp_lube.scenes", "lcp_lube.options"} <= set(tool["packages"])
+    assert tool["package-dir"]["lcp_lube.options"] == "options" and "*.opts" in tool["package-data"]["lcp_lube.options"]
+    assert "*.toml" in tool["package-data"]["lcp_lube.scenes"]
 
 
 def test_recipe_syntax(tmp_path, monkeypatch):
