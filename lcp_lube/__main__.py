@@ -51,7 +51,7 @@ class _Alarm:
         from mpi4py import MPI
 
         self._comm = MPI.COMM_WORLD.Dup()  # of its own: ranks that did not fail wait in some other collective call
-        self.rank = self._comm.rank
+        self.rank, self.alone = self._comm.rank, self._comm.size == 1
 
     def all_arrive(self, seconds: float = 4.0) -> bool:
         """True if every rank calls this within the time. If some do, the lowest of them gives up first, and speaks for all."""
@@ -64,7 +64,7 @@ class _Alarm:
         return True
 
     def end_all(self, status: int) -> None:
-        if self._comm.size > 1:
+        if not self.alone:
             self._comm.Abort(status)
 
 
@@ -73,8 +73,10 @@ def _start(petsc_arguments: list[str]) -> _Alarm:
     import petsc4py
 
     petsc4py.init(["lcp-lube", *petsc_arguments])
-    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # `| head` is no error; PETSc's handler reports a crash
-    return _Alarm()
+    alarm = _Alarm()
+    if alarm.alone:
+        signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # `| head` is no error; PETSc's handler reports a crash
+    return alarm
 
 
 def _reserve_stdout() -> None:
