@@ -184,7 +184,7 @@ def test_unknown_table(cli: Any, tmp_path: Path) -> None:
 
 def test_table_on_two_ranks(cli: Any, tmp_path: Path) -> None:
     """Rank 0 alone prints and writes; MUMPS counts as on one rank; a recipe for one rank is refused, and not kept."""
-    run = cli("table", 9, "--quick", ranks=2)
+    run = cli("table", 9, "--quick", ranks=2, timeout=150)
     assert run.status == 1  # SuperLU's rows did not run
     assert run.out.count("mezzadri table 9") == 1
     assert run.out.count("refused: ") == 2
