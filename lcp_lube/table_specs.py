@@ -71,7 +71,7 @@ MEZZADRI = {
     9: Spec(
         "DIN with sparse direct solvers (problem 1)",
         f"solve problem1 --n {{n}} --recipe {{solver}} {_LOOSE}",
-        quick=1000,
+        quick=100,
     ),
     10: Spec("DIN with ILU(0) (problem 1)", f"solve problem1 --n {{n}} --recipe {{solver}} {_LOOSE}", quick=1000),
     11: Spec(
