@@ -97,7 +97,7 @@ def solve(
                     "time_s": perf_counter() - level_begin,
                 }
             )
-    fields = run.fields
+    fields, took_over = run.fields, None
     if outcome is not Outcome.CONVERGED and entry.fallback and set(options or {}) <= {"p0"}:
         rescue = METHODS[entry.fallback]
         # Interior methods converge from anywhere, and only direct inner solves keep up with them on films like this one.
@@ -110,7 +110,8 @@ def solve(
             finally:
                 run.destroy()
         fields, steps = run.fields, steps + more
-        message = f"{chosen.method} failed ({failure}); {entry.fallback} took over: {message}"
+        took_over = entry.fallback
+        message = f"{chosen.method} failed ({failure}); {took_over} took over: {message}"
     certificate = problem.certify(fields, stopping.eps1)
     if outcome is not Outcome.CONVERGED and isinstance(problem, BoxProblem):
         outcome, message = problem.explain(outcome, message)
@@ -126,6 +127,7 @@ def solve(
         settings={
             "scene": scene.name,
             "method": chosen.method,
+            "took_over": took_over,
             "system": chosen.system,
             "scheme": scene.scheme,
             "recipe": recipe_used,

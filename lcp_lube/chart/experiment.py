@@ -1,6 +1,7 @@
 """What the charts share: where their runs are kept, and one run as a row."""
 
 from collections.abc import Sequence
+from datetime import date
 from importlib.util import find_spec
 from pathlib import Path
 from time import perf_counter, process_time
@@ -15,9 +16,10 @@ from ..output.resumable import ResumableCsv
 from ..problems.solution import Step
 from ..scene import Scene
 
-KRYLOV_LIMIT = "krylov_limit"  # an outcome of the charts, beside those of `Outcome`
+# Outcomes of the charts, beside those of `Outcome`: left by us, and solved, but by the method's fallback.
+KRYLOV_LIMIT, FELL_BACK = "krylov_limit", "fell_back"
 RECORD = """outcome iterations linear_iterations centrality backtracking c1 c2 ksp_type pc_type load rupture min_p min_r
-    machine petsc message""".split()  # noqa: SIM905
+    machine petsc date message""".split()  # noqa: SIM905
 
 
 def open_store(path: Path, key: Sequence[str], columns: Sequence[str]) -> ResumableCsv:
@@ -60,7 +62,7 @@ def run(scene: Scene, krylov_limit: float = float("inf"), **choices: Any) -> dic
             raise _Enough
 
     begin, cpu_begin = perf_counter(), process_time()
-    environment = {"machine": machine(), "petsc": versions()["petsc"]}
+    environment = {"machine": machine(), "petsc": versions()["petsc"], "date": date.today().isoformat()}
     try:
         solution = solve(scene, monitor=monitor, **choices)
     except _Enough:
@@ -78,6 +80,7 @@ def run(scene: Scene, krylov_limit: float = float("inf"), **choices: Any) -> dic
     clocks = {"wall_s": solution.times["total"], "cpu_s": process_time() - cpu_begin}
     try:
         data = as_dict(solution)
-        return {**environment, **data, **exact_errors(solution.problem, data), **clocks}
+        outcome = {"outcome": FELL_BACK} if solution.settings["took_over"] else {}
+        return {**environment, **data, **exact_errors(solution.problem, data), **clocks, **outcome}
     finally:
         solution.destroy()

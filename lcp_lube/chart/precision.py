@@ -16,6 +16,7 @@ from ..cli import say
 from ..errors import InputError
 from ..output.resumable import ResumableCsv
 from ..problems.exact import ExactSolution
+from ..problems.solution import Outcome
 from ..registry import METHODS
 from ..scene import LubricationScene, Scene, load_scene
 from ..solvers.newton import Stopping
@@ -173,6 +174,6 @@ def measure(scene: LubricationScene, exact: ExactSolution, configuration: Config
     values = {**runs[0], **{clock: f"{median(a_run[clock] for a_run in runs):.6f}" for clock in CLOCKS}, "runs": len(runs)}
     if values.get("load") is not None:
         discrete = run(scene, method="active-set")
-        if discrete["converged"]:
+        if discrete["outcome"] == Outcome.CONVERGED:
             values["iteration_error"] = abs(values["load"] - discrete["load"]) / exact.load
     return {name: f"{value:.4e}" if name.endswith("_error") else value for name, value in values.items()}

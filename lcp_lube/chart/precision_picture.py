@@ -51,12 +51,12 @@ def error(row: Row, quantity: str) -> float | None:
 
 
 def front(rows: Sequence[Row], quantity: str) -> list[Row]:
-    """The Pareto front, from fast to accurate: no other run beats one in seconds and, by one part in a hundred, in error."""
+    """The Pareto front, from fast to accurate: no other run beats one in seconds and, by one part in ten, in error."""
     best: list[Row] = []
     least = float("inf")
     for row in sorted(rows, key=lambda row: seconds(row)):
         here = error(row, quantity)
-        if here is not None and here < 0.99 * least:
+        if here is not None and here < 0.9 * least:
             best.append(row)
             least = here
     return best
