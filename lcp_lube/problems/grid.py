@@ -112,8 +112,8 @@ class Grid:
             return np.zeros((1, 1))
         return self.origin[1] + (np.arange(self.y_start, self.y_end) + 1.0)[:, None] * self.spacing[1]
 
-    def ghosted(self, owned: Array) -> Array:
-        """Owned values with one layer of the neighbours' around them, NaN outside the domain.
+    def ghosted(self, owned: Array, outside: float = np.nan) -> Array:
+        """Owned values with one layer of the neighbours' around them, `outside` beyond the domain.
 
         Returns an array of shape (ny_local + 2, nx_local + 2); its corners are not to be used. Collective.
         """
@@ -121,7 +121,7 @@ class Grid:
         target = self.dm.getLocalVec()
         source.setArray(owned)
         self.dm.globalToLocal(source, target)
-        out = self._frame(target.array_r, np.nan)
+        out = self._frame(target.array_r, outside)
         self.dm.restoreGlobalVec(source)
         self.dm.restoreLocalVec(target)
         return out

@@ -1,6 +1,7 @@
 """The door between physics and solvers: the data of A p + B r = c, p r = 0, p, r >= 0, and what certifies an answer."""
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -54,10 +55,21 @@ class LubricationProblem:
         self.exact = exact
         self.extras: Callable[[LubricationProblem, Array, Array], dict[str, float]] | None = None
         self.reduce = grid.reduce
-        self.A = assemble(grid, scheme.pressure_entries())
-        self.B = assemble(grid, scheme.void_entries())
         self.c = scheme.c.ravel()
-        self._x, self._y = self.A.createVecs()  # `multiply` lends them its arrays
+
+    @cached_property
+    def A(self) -> PETSc.Mat:
+        """Assembled at first use, as B is: a method that works on the stencil alone is spared their time and memory."""
+        return assemble(self.grid, self.scheme.pressure_entries())
+
+    @cached_property
+    def B(self) -> PETSc.Mat:
+        return assemble(self.grid, self.scheme.void_entries())
+
+    @cached_property
+    def _vectors(self) -> tuple[PETSc.Vec, PETSc.Vec]:
+        """`multiply` lends them its arrays."""
+        return self.A.createVecs()
 
     @property
     def unknowns(self) -> int:
@@ -70,13 +82,28 @@ class LubricationProblem:
 
     def multiply(self, mat: PETSc.Mat, a: Array) -> Array:
         """mat @ a for one of A, B and an array of owned points. Collective."""
+        x, y = self._vectors
         out = np.empty(self.grid.local_size)
-        self._x.placeArray(np.ascontiguousarray(a))
-        self._y.placeArray(out)
-        mat.mult(self._x, self._y)
-        self._x.resetArray()
-        self._y.resetArray()
+        x.placeArray(np.ascontiguousarray(a))
+        y.placeArray(out)
+        mat.mult(x, y)
+        x.resetArray()
+        y.resetArray()
         return out
+
+    def terms(self, p: Array, r: Array) -> tuple[Array, Array]:
+        """A p and B r: by the matrices where they stand already, else by the stencil. Collective."""
+        if "A" in self.__dict__:
+            return self.multiply(self.A, p), self.multiply(self.B, r)
+        s, out = self.scheme, []
+        for entries, field in ((s.pressure_entries(), p), (s.void_entries(), r)):
+            framed = self.grid.ghosted(field, outside=0.0)
+            total = np.zeros(self.grid.box)
+            ny, nx = self.grid.box
+            for dj, di, value in entries:
+                total += value * framed[1 + dj : 1 + dj + ny, 1 + di : 1 + di + nx]
+            out.append(total.ravel())
+        return out[0], out[1]
 
     def flow(self, p: Array, r: Array) -> Array:
         """F1 = A p + B r - c, the flow balance of every point in m2/s. Collective."""
@@ -90,7 +117,7 @@ class LubricationProblem:
         mass_defect: |flow in - flow out| / flow in, over the whole boundary.
         """
         red, p, r = self.reduce, fields["p"], fields["r"]
-        Ap, Br = self.multiply(self.A, p), self.multiply(self.B, r)
+        Ap, Br = self.terms(p, r)
         scale = red.norm(Ap) + red.norm(Br) + red.norm(self.c)
         p_max = red.max(np.abs(p))
         west, east, south, north = self.boundary_flows(p, r)
@@ -151,6 +178,8 @@ class LubricationProblem:
 
     def destroy(self) -> None:
         """Free the PETSc objects."""
-        for obj in (self.A, self.B, self._x, self._y):
-            obj.destroy()
+        made = self.__dict__
+        for obj in (made.get("A"), made.get("B"), *made.get("_vectors", ())):
+            if obj is not None:
+                obj.destroy()
         self.grid.destroy()
