@@ -31,6 +31,7 @@ def solve(
     monitor: Monitor | None = None,
     comm: PETSc.Comm | None = None,
     nested: bool | None = None,
+    start: tuple[Problem, Fields] | None = None,
 ) -> Solution:
     """Solve a scene and certify the answer. Collective.
 
@@ -45,6 +46,8 @@ def solve(
     monitor : called after every step with its number and record.
     comm : communicator; default all ranks.
     nested : start from the answers on coarser grids; default: where it pays.
+    start : a problem of the same kind on any grid, and fields near the answer, from which its own are interpolated: those of a
+        neighbouring scene. They take the coarser grids' place, unless `nested` asks for these.
 
     Returns
     -------
@@ -58,13 +61,14 @@ def solve(
     stages = Stages()
     with stages("setup"):
         problem = scene.build(comm)
+    if start is not None and nested is None:
+        nested = False
     chosen = plan(problem, scene.name, method, system, recipe_name, nested, options or ())
     entry = METHODS[chosen.method].of(problem.kind)
     if not isinstance(stopping, Stopping):
         stopping = Stopping(**{**dict(zip(("eps1", "eps2"), entry.eps, strict=True)), **(stopping or {})})
     shapes = level_shapes(scene.shape, problem.grid.comm.size) if chosen.nested else [scene.shape]
-    start: Fields | None = None
-    coarse: Problem | None = None
+    near, previous = start, None  # what the next grid starts from, and the problem on the grid before
     levels = []
     with recipe(chosen.recipe) as recipe_used:
         for shape in shapes:
@@ -73,22 +77,22 @@ def solve(
             with stages("setup"):
                 level = problem if finest else scene.with_shape(shape).build(comm)
             with stages("prolongation"):
-                if coarse is not None and start is not None:
-                    start = level.prolong(coarse, start, entry.interior)
-                    coarse.destroy()
+                guess = level.prolong(*near, entry.interior) if near is not None else None
+            if previous is not None:
+                previous.destroy()
             # A coarse answer is a start: its front matters, not its last digits.
             level_stopping = stopping if finest else Stopping(max(COARSE_EPS, stopping.eps1), np.inf, stopping.max_it)
-            run = entry.load()(level, stages, chosen.system, options or {}, level_stopping, start)
+            run = entry.load()(level, stages, chosen.system, options or {}, level_stopping, guess)
             try:
                 outcome, message, steps = iterate(run, level_stopping, monitor)
                 krylov = run.krylov
                 ksp_type, pc_type = (krylov.ksp_type, krylov.pc_type) if krylov else (None, None)
-                start = run.fields
+                near = (level, run.fields)
             finally:
                 run.destroy()
             if not finest and outcome in (Outcome.NOT_FINITE, Outcome.LINEAR_SOLVER):
-                start = None  # nothing to start from: the next grid begins by itself
-            coarse = level
+                near = None  # nothing to start from: the next grid begins by itself
+            previous = level
             levels.append(
                 {
                     **dict(zip(("nx", "ny"), shape, strict=False)),
