@@ -121,6 +121,7 @@ def against_linear(case: Case, repeats: int) -> dict[str, Values]:
     """Whole solves and full-film linear solves in turn."""
     runs = []
     problem = load_scene(case.scene, case.changes).build()
+    assert problem.A.assembled  # made at first use: here, outside the yardstick's time
     for _ in range(repeats):
         values = ours(case)
         _, wall, cpu = timed(lambda: full_film(problem))
@@ -143,6 +144,7 @@ def against_peers(case: Case, repeats: int) -> dict[str, Values]:
                 done.append(ours(case))
                 continue
             problem = load_scene(case.scene, case.changes).build()
+            assert problem.A.assembled and problem.B.assembled  # made at first use: here, outside the peer's time
             done.append(run_peer(name, problem))
             problem.destroy()
     out = {name: medians(done) for name, done in runs.items()}
