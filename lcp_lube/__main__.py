@@ -3,9 +3,9 @@
 import os
 import signal
 import sys
-import time
 import traceback
 
+from . import petsc_start
 from .arguments import parse, split
 from .errors import InputError
 
@@ -20,12 +20,24 @@ def main(argv: list[str] | None = None) -> int:
         return _refuse(error)
     if getattr(args, "json", False):
         _reserve_stdout()
-    alarm = _start(petsc_arguments)
+    try:
+        petsc_start.start(petsc_arguments)
+    except InputError as error:
+        return _refuse(error)
     if args is None:
         return 0
-    from .cli import run
+    from mpi4py import MPI
 
+    from .alarm import Alarm, check_same
+
+    alarm = Alarm()
+    if alarm.alone:
+        signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # `| head` is no error; PETSc's handler reports a crash
     try:
+        from .cli import run
+
+        # After the imports, which take seconds on a busy machine: ranks that refuse do so at nearly the same time.
+        check_same(MPI.COMM_WORLD, "command line", words)
         return run(args)
     except InputError as error:
         return _refuse(error, alone=not alarm.all_arrive())
@@ -33,7 +45,11 @@ def main(argv: list[str] | None = None) -> int:
         short = InputError("not enough memory; fewer points or more ranks are needed")
         return _refuse(short, alone=not alarm.all_arrive())
     except KeyboardInterrupt:
-        print("lcp-lube: interrupted", file=sys.stderr)
+        alone = not alarm.all_arrive()
+        if alone or alarm.rank == 0:
+            print("lcp-lube: interrupted", file=sys.stderr, flush=True)
+        if alone:
+            alarm.end_all(130)
         return 130
     except Exception:
         if alarm.all_arrive() and alarm.rank > 0:
@@ -42,41 +58,6 @@ def main(argv: list[str] | None = None) -> int:
         sys.stderr.flush()
         alarm.end_all(1)
         return 1
-
-
-class _Alarm:
-    """Tells whether all ranks have come to the same place, and ends them all if not."""
-
-    def __init__(self) -> None:
-        from mpi4py import MPI
-
-        self._comm = MPI.COMM_WORLD.Dup()  # of its own: ranks that did not fail wait in some other collective call
-        self.rank, self.alone = self._comm.rank, self._comm.size == 1
-
-    def all_arrive(self, seconds: float = 4.0) -> bool:
-        """True if every rank calls this within the time. If some do, the lowest of them gives up first, and speaks for all."""
-        request = self._comm.Ibarrier()
-        end = time.monotonic() + seconds + min(0.25 * self.rank, 4.0)
-        while not request.Test():
-            if time.monotonic() > end:
-                return False
-            time.sleep(0.01)
-        return True
-
-    def end_all(self, status: int) -> None:
-        if not self.alone:
-            self._comm.Abort(status)
-
-
-def _start(petsc_arguments: list[str]) -> _Alarm:
-    """Initialise MPI and PETSc."""
-    import petsc4py
-
-    petsc4py.init(["lcp-lube", *petsc_arguments])
-    alarm = _Alarm()
-    if alarm.alone:
-        signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # `| head` is no error; PETSc's handler reports a crash
-    return alarm
 
 
 def _reserve_stdout() -> None:
@@ -89,7 +70,8 @@ def _reserve_stdout() -> None:
 
 def _refuse(error: InputError, alone: bool = False) -> int:
     """One line, status 2: from rank 0 if all ranks refuse (before MPI starts they do), else from the one that does."""
-    rank = os.environ.get("OMPI_COMM_WORLD_RANK") or os.environ.get("PMI_RANK") or "0"
+    named = (os.environ.get(name) for name in ("OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK"))
+    rank = next((found for found in named if found), "0")
     if rank == "0" or alone:
         print(f"lcp-lube: {error}", file=sys.stderr, flush=True)
     if alone:

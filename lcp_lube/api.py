@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
+from .alarm import check_same
 from .auto import default_recipe, plan
 from .linear.options import recipe
 from .linear.stages import Stages
@@ -60,6 +61,8 @@ def solve(
     begin = perf_counter()
     stages = Stages()
     with stages("setup"):
+        asked = (scene, method, system, recipe_name, stopping, options, nested, start is None)
+        check_same((comm or PETSc.COMM_WORLD).tompi4py(), f"scene {scene.name} or how to solve it", asked)
         problem = scene.build(comm)
     if start is not None and nested is None:
         nested = False

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import os
 import sys
 from collections.abc import Callable
 from typing import Any
@@ -30,9 +31,18 @@ def run(args: argparse.Namespace) -> int:
 
 
 def say(text: str) -> None:
-    """Print on rank 0."""
+    """Print on rank 0.
+
+    Raises
+    ------
+    InputError : on rank 0, standard output cannot take it (a full disk).
+    """
     if MPI.COMM_WORLD.rank == 0:
-        print(text, flush=True)
+        try:
+            print(text, flush=True)
+        except OSError as error:
+            sys.stdout = open(os.devnull, "w")  # noqa: SIM115  (else Python tries to flush it once more at its end)
+            raise InputError(f"standard output: {error.strerror}") from None
 
 
 def scene_of(args: argparse.Namespace) -> Scene:
@@ -101,15 +111,24 @@ def run_solve(args: argparse.Namespace) -> int:
         if args.explain and MPI.COMM_WORLD.rank == 0:
             print("\n".join(solution.settings["why"]), file=sys.stderr, flush=True)
         data = as_dict(solution)
+        say(json.dumps(finite(data)) if args.json else summary(data))
+        failed = []  # a file that cannot be written costs neither the result nor the other files
         for path in args.output:
-            files.save(solution, path)
+            try:
+                files.save(solution, path)
+            except InputError as error:
+                failed.append(str(error))
         if args.plot:
             from .output.plot import plot
 
-            plot(solution, args.plot)
+            try:
+                plot(solution, args.plot)
+            except InputError as error:
+                failed.append(str(error))
     finally:
         solution.destroy()
-    say(json.dumps(finite(data)) if args.json else summary(data))
+    if failed:
+        raise InputError("; ".join(failed))
     return 0 if solution.converged else 1
 
 

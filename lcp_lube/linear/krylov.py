@@ -5,6 +5,7 @@ from petsc4py import PETSc
 
 from ..errors import InputError
 from .options import explain_error, set_names
+from .threads import one_thread_for_superlu_dist
 
 ZERO_PIVOT = (71, 81)  # PETSc's codes for LU and Cholesky: the matrix is singular, not the options wrong
 MAX_INNER_ITERATIONS = 10_000  # the paper's limit; -ksp_max_it overrides it
@@ -39,6 +40,7 @@ class Krylov:
         self._fixed_rtol = "ksp_rtol" in given
         if "pc_factor_in_place" in given:
             raise InputError("-pc_factor_in_place: the matrix is written anew in every step, factors cannot take its place")
+        one_thread_for_superlu_dist()
         self.ksp = PETSc.KSP().create(mat.comm)
         self.ksp.setTolerances(max_it=MAX_INNER_ITERATIONS)
         self._ready = False

@@ -89,7 +89,8 @@ def check_unread() -> None:
     """
     left = unread()
     if left:
-        raise InputError(f"-{left[0]}: no solver in this run reads this option{nearest(left[0], known_names(), '-')}")
+        near = "" if left[0] in known_names() else nearest(left[0], known_names(), "-")
+        raise InputError(f"-{left[0]}: no solver in this run reads this option{near}")
 
 
 def known_names() -> list[str]:
@@ -131,8 +132,16 @@ def explain_error(error: PETSc.Error) -> str:
             word = found[2].rstrip(".,")
             legal = [value for key, value in vars(enum).items() if not key.startswith("_")]
             return f"{option(word)}: no such {found[1]} in this PETSc{'' if word in legal else nearest(word, legal)}"
-    culprit = next((option(word) + ": " for word in text.split() if word in given.values()), "")
-    return f"{culprit if re.search('Input string|Unknown|Unsupported|Cannot open', text) else ''}PETSc: {text}"
+    words = set(re.findall(r"[a-z]{4,}", text.lower()))
+    culprit = next(
+        (
+            f"-{key} {value}: "
+            for key, value in given.items()
+            if value and (value in text.split() or value.lstrip(":") in text.split() or words & set(key.split("_")))
+        ),
+        "",
+    )
+    return f"{culprit}PETSc: {text}"
 
 
 def petsc_version() -> str:
