@@ -8,12 +8,15 @@ from petsc4py import PETSc
 
 from .alarm import check_same
 from .auto import default_recipe, plan
+from .errors import InputError
 from .linear.options import recipe
 from .linear.stages import Stages
 from .problems.box import BoxProblem
+from .problems.problem import LubricationProblem
 from .problems.solution import Fields, Outcome, Problem, Solution
 from .registry import METHODS
 from .scene import Scene
+from .solvers.enclosure import Enclosure, enclose
 from .solvers.nested import level_shapes
 from .solvers.newton import Monitor, Stopping, iterate
 
@@ -33,6 +36,7 @@ def solve(
     comm: PETSc.Comm | None = None,
     nested: bool | None = None,
     start: tuple[Problem, Fields] | None = None,
+    certify: bool = False,
 ) -> Solution:
     """Solve a scene and certify the answer. Collective.
 
@@ -49,6 +53,7 @@ def solve(
     nested : start from the answers on coarser grids; default: where it pays.
     start : a problem of the same kind on any grid, and fields near the answer, from which its own are interpolated: those of a
         neighbouring scene. They take the coarser grids' place, unless `nested` asks for these.
+    certify : also prove a band around the answer (`Solution.enclosure`), for the price of one linear solve at most.
 
     Returns
     -------
@@ -68,6 +73,8 @@ def solve(
         nested = False
     chosen = plan(problem, scene.name, method, system, recipe_name, nested, options or ())
     entry = METHODS[chosen.method].of(problem.kind)
+    if certify and not isinstance(problem, LubricationProblem):
+        raise InputError(f"--certify: scene {scene.name} is no film with cavitation, for which alone the theorem holds")
     if not isinstance(stopping, Stopping):
         stopping = Stopping(**{**dict(zip(("eps1", "eps2"), entry.eps, strict=True)), **(stopping or {})})
     shapes = level_shapes(scene.shape, problem.grid.comm.size) if chosen.nested else [scene.shape]
@@ -120,6 +127,13 @@ def solve(
         took_over = entry.fallback
         message = f"{chosen.method} failed ({failure}); {took_over} took over: {message}"
     certificate = problem.certify(fields, stopping.eps1)
+    enclosure: Enclosure | None = None
+    if certify and isinstance(problem, LubricationProblem):
+        # By the inner solver that has just solved this problem.
+        system = METHODS[took_over].systems[0] if took_over else chosen.system
+        with recipe(default_recipe(problem, system, large=False)[0] if took_over else chosen.recipe):
+            with stages("certify"):
+                enclosure = enclose(problem, fields, system, Stages())
     if outcome is not Outcome.CONVERGED and isinstance(problem, BoxProblem):
         outcome, message = problem.explain(outcome, message)
     if outcome is Outcome.CONVERGED and not certificate.holds:
@@ -144,4 +158,5 @@ def solve(
         },
         times={**stages.seconds, "total": perf_counter() - begin},
         levels=levels if chosen.nested else [],
+        enclosure=enclosure,
     )

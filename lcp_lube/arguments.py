@@ -113,6 +113,9 @@ def parse(own: list[str]) -> argparse.Namespace:
     _scene_options(solve)
     solve.add_argument("--method", default="auto", help="see 'lcp-lube list'; default auto")
     solve.add_argument("--recipe", help="inner solver: options/NAME.opts; explicit PETSc options win over it")
+    solve.add_argument(
+        "--certify", action="store_true", help="prove how far the answer is from the exact discrete solution at most (films)"
+    )
     solve.add_argument("--output", action="append", default=[], metavar="FILE", help=".npz, .vts (ParaView) or .h5")
     solve.add_argument("--plot", metavar="FILE.png", help="picture of p, r and h")
     solve.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")

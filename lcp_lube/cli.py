@@ -88,6 +88,7 @@ def solution_of(args: argparse.Namespace, monitor: Monitor | None = None) -> Sol
         options=options_of(args, args.method),
         monitor=monitor,
         nested=args.nested,
+        certify=args.certify,
     )
 
 

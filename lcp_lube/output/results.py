@@ -42,6 +42,7 @@ def as_dict(solution: Solution) -> dict[str, Any]:
         **certificate.extremes,
         **certificate.measures,
         "certificate_tol": certificate.tol,
+        **(solution.enclosure.as_dict() if solution.enclosure else {}),
         **({"levels": solution.levels} if solution.levels else {}),
         "memory_mb": peak_memory(solution),
         "time_s": {
@@ -50,6 +51,7 @@ def as_dict(solution: Solution) -> dict[str, Any]:
             "assembly": times.get("assembly", 0.0) + times.get("Jacobian", 0.0),
             "linear": times.get("KSP", 0.0),
             "step_length": times.get("step length", 0.0),
+            **({"certify": times["certify"]} if "certify" in times else {}),
         },
         "versions": versions(),
     }
@@ -127,4 +129,11 @@ def summary(data: dict[str, Any]) -> str:
     if one_d and data.get("rupture") is not None:
         behind = f", reformation {1e3 * data['reformation']:.5g} mm" if data["reformation"] is not None else ""
         lines.insert(3, f"rupture {1e3 * data['rupture']:.5g} mm{behind}")
+    if data.get("certified"):
+        lines.append(
+            f"proved: the exact discrete solution is within {data['band_p']:.1e} Pa of p, {data['band_p_max']:.1e} Pa of p_max, "
+            f"{data['band_load']:.1e} {load_unit} of the load (the grid's own error comes on top)"
+        )
+    elif "certified" in data:
+        lines.append(f"not proved: {data['certified_message']}")
     return "\n".join(lines)

@@ -2,11 +2,14 @@
 
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from ..parallel import Array, Reduce
 from .certificate import Certificate
 from .grid import Grid
+
+if TYPE_CHECKING:
+    from ..solvers.enclosure import Enclosure
 
 Fields = dict[str, Array]  # this rank's points of each field, by name, in the grid's order
 
@@ -102,6 +105,7 @@ class Solution:
     settings : method, system, recipe, ksp_type ... as the JSON prints them.
     times : seconds by stage: setup, assembly, linear, total.
     levels : nested iteration's grids, coarse to fine: nx, ny, iterations, linear_iterations, time_s; the last is this one.
+    enclosure : the band that `certify` asked for.
     """
 
     problem: Problem
@@ -113,6 +117,7 @@ class Solution:
     settings: dict[str, Any] = field(default_factory=dict)
     times: dict[str, float] = field(default_factory=dict)
     levels: list[dict[str, Any]] = field(default_factory=list)
+    enclosure: "Enclosure | None" = None
 
     @property
     def p(self) -> Array:

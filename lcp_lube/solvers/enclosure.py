@@ -1,0 +1,214 @@
+"""Guaranteed bands: arrays between which the exact discrete solution lies, whatever computed them (docs/guaranteed_bounds.md).
+
+The flow balance G as a function of z (p = max(z, 0), r = s max(-z, 0)) is inverse isotone: G(a) <= G(b) implies a <= b. So
+two signs, G(z - e) <= 0 <= G(z + e), prove that the one solution lies between z - e and z + e. The guess e comes from one
+linear solve; the proof are the signs, tested with a bound on the rounding of G itself.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..linear.krylov import LinearSolverError
+from ..linear.stages import Stages
+from ..linear.system import make_system
+from ..parallel import Array
+from ..problems.problem import LubricationProblem
+from ..problems.solution import Fields
+
+UNIT = 2.0**-53  # largest relative error of one operation
+TINY = 1e-300  # more than all that underflow can add to a sum of 7 terms
+RTOL = 1e-2  # of the solve for e: the signs are tested afterwards, the band need not be sharp
+REPAIRS = 40  # local corrections of a band before it is given up
+
+
+@dataclass(frozen=True)
+class Enclosure:
+    """A band around an answer, or why there is none.
+
+    Attributes
+    ----------
+    certified : whether the band is proved.
+    message : a sentence.
+    lower, upper : fields p and r, this rank's points: lower p <= p* <= upper p and upper r <= r* <= lower r for the discrete
+        solution p*, r*; empty if not certified.
+    bounds : band_p, band_p_max (Pa), band_load (N; N/m in 1D), band_r: how far the answer's p anywhere, its p_max, its load
+        and its r anywhere are from the discrete solution's at most; empty if not certified.
+    """
+
+    certified: bool
+    message: str
+    lower: Fields = field(default_factory=dict)
+    upper: Fields = field(default_factory=dict)
+    bounds: dict[str, float] = field(default_factory=dict)
+
+    def as_dict(self) -> dict[str, bool | str | float | None]:
+        """The keys of the command line's --json."""
+        names = ("band_p", "band_p_max", "band_load", "band_r")
+        return {"certified": self.certified, "certified_message": self.message} | {name: self.bounds.get(name) for name in names}
+
+
+def balance(problem: LubricationProblem, p: Array, r: Array) -> tuple[Array, Array]:
+    """F1 = A p + B r - c as the sum of its face flows, and a bound on the rounding in it. Collective.
+
+    Each of the 7 terms passes at most 8 roundings: difference, product, six additions. With u the unit roundoff, the error
+    is at most 8u/(1 - 8u) times the exact sum of their moduli, and that at most (1 - u)^-8 times the computed one: 9u covers
+    both. What is bounded is the error against the balance with the stored coefficients k, b, c taken as exact.
+    """
+    s, box = problem.scheme, problem.grid.box
+    frame_p, frame_r = (problem.grid.ghosted(a, outside=0.0) for a in (p, r))
+    p, r = p.reshape(box), r.reshape(box)
+    terms = [
+        s.k_W * (p - frame_p[1:-1, :-2]),
+        s.k_E * (p - frame_p[1:-1, 2:]),
+        s.b_C * r,
+        s.b_W * frame_r[1:-1, :-2],
+        -s.c,
+    ]
+    if problem.grid.dim == 2:
+        terms += [s.k_S * (p - frame_p[:-2, 1:-1]), s.k_N * (p - frame_p[2:, 1:-1])]
+    total, moduli = np.zeros(box), np.zeros(box)
+    for term in terms:
+        total += term
+        moduli += np.abs(term)
+    return total.ravel(), (9 * UNIT * moduli + TINY).ravel()
+
+
+def conditions(problem: LubricationProblem) -> str:
+    """Which condition of the theorem the problem's data break, as a sentence; empty if they meet all. Collective.
+
+    Compared number by number, without rounding: A's and -B's off-diagonal entries are nonpositive, no column hands on more
+    than its diagonal has, every cell hands both p and r on to the next one along x, and every x line has an end. Then every
+    blend of their columns is a nonsingular M-matrix. The assembled equations must be these and no others.
+    """
+    grid, s = problem.grid, problem.scheme
+    inside = grid.ghosted(np.ones(grid.local_size), outside=0.0) > 0
+    west, east, south, north = inside[1:-1, :-2], inside[1:-1, 2:], inside[:-2, 1:-1], inside[2:, 1:-1]
+
+    def seen_from(values: Array, dj: int, di: int) -> Array:
+        """The neighbour's value at each owned point."""
+        framed = grid.ghosted(values.ravel(), outside=0.0)
+        return framed[1 + dj : 1 + dj + grid.box[0], 1 + di : 1 + di + grid.box[1]]
+
+    k_next, b_next = seen_from(s.k_W, 0, 1), seen_from(s.b_W, 0, 1)
+    fine = (s.k_W >= 0) & (s.k_E > 0) & (s.k_S >= 0) & (s.k_N >= 0) & (s.b_C < 0) & (s.b_W >= 0) & np.isfinite(s.c)
+    fine &= ~east | ((k_next > 0) & (s.k_E >= k_next) & (b_next > 0) & (-s.b_C >= b_next))
+    fine &= ~west | (s.k_W >= seen_from(s.k_E, 0, -1))
+    if grid.dim == 2:
+        fine &= (~south | (s.k_S >= seen_from(s.k_N, -1, 0))) & (~north | (s.k_N >= seen_from(s.k_S, 1, 0)))
+    count = problem.reduce.sum
+    if bad := int(count((~fine).astype(float))):
+        return f"{bad} columns of A or B do not have an M-matrix's signs and dominance"
+    if count((~east).astype(float)) != (grid.shape[1] if grid.dim == 2 else 1):
+        return "x lines without an end"
+    # Nothing but these terms: the matrices and the face flows agree on a vector without symmetries.
+    number = grid.first + np.arange(grid.local_size)
+    p, r = 1.0 + np.modf(0.618033988749895 * number)[0], np.modf(0.7548776662466927 * number)[0]
+    F, rounding = balance(problem, p, r)
+    diagonal = (s.k_W + s.k_E + s.k_S + s.k_N).ravel()
+    same = np.abs(sum(problem.terms(p, r)) - problem.c - F) <= rounding + 64 * UNIT * (2 * diagonal - s.b_C.ravel() + np.abs(problem.c))
+    return "" if count((~same).astype(float)) == 0 else "its equations have terms that the theorem does not know"
+
+
+def enclose(problem: LubricationProblem, fields: Fields, system: str, stages: Stages) -> Enclosure:
+    """A band around the fields p and r that provably contains the discrete solution, or the reason why not. Collective.
+
+    Its price is one linear solve, by the KSP that the options describe, and a few evaluations of G.
+
+    Parameters
+    ----------
+    fields : any method's answer: z = p - r/s has the sign of the larger one, and keeps the balance of the cell's own terms.
+    system : registry name of the matrix for that solve.
+    """
+    if broken := conditions(problem):
+        return Enclosure(False, f"no band: {broken}")
+    band = _Band(problem, fields)
+    if not np.isfinite(problem.reduce.sum(band.z)):
+        return Enclosure(False, "no band: the answer is not finite")
+    try:
+        e = band.width(system, stages)
+    except LinearSolverError as error:
+        return Enclosure(False, f"no band: {error}")
+    lower, upper = band.prove(e, -1.0), band.prove(e, 1.0)
+    if lower is None or upper is None:
+        where = "below" if lower is None else "above"
+        return Enclosure(False, f"no band: the flow balance does not have the needed sign {where} the answer; is it poor?")
+    bounds = _bounds(problem, fields, lower, upper)
+    message = f"the exact discrete solution is proved to lie within {bounds['band_p']:.1e} Pa of p"
+    return Enclosure(True, message, lower, upper, bounds)
+
+
+class _Band:
+    """z, the price of a change in it, and the sign tests."""
+
+    def __init__(self, problem: LubricationProblem, fields: Fields):
+        self.problem, scheme = problem, problem.scheme
+        self.diagonal = (scheme.k_W + scheme.k_E + scheme.k_S + scheme.k_N).ravel()
+        self.s = self.diagonal / -scheme.b_C.ravel()  # both kinds of columns then have A's diagonal
+        self.z = fields["p"] - fields["r"] / self.s
+        p, r = self.pair(self.z)
+        self.G, rounding = balance(problem, p, r)
+        # G moves by this much when p and r are rounded, which z - e and z + e are.
+        about = problem.grid.ghosted(np.abs(self.z) * self.diagonal, outside=0.0)
+        near = about[1:-1, 1:-1] + about[1:-1, :-2] + about[1:-1, 2:]
+        if problem.grid.dim == 2:
+            near = near + about[:-2, 1:-1] + about[2:, 1:-1]
+        self.slack = 4 * rounding + 8 * UNIT * near.ravel()
+
+    def pair(self, z: Array) -> tuple[Array, Array]:
+        """p and r, complementary to the last bit: what is tested is this pair, s has no part in the proof."""
+        return np.maximum(z, 0.0), self.s * np.maximum(-z, 0.0)
+
+    def width(self, system: str, stages: Stages) -> Array:
+        """e ~ J(z)^-1 (|G(z)| + slack), and a little for the error of the solve itself. Collective.
+
+        Raises
+        ------
+        LinearSolverError : the solve fails.
+        """
+        reduce = self.problem.reduce
+        w = np.abs(self.G) + self.slack
+        w += 4 * RTOL * reduce.norm(w) / np.sqrt(self.problem.size)
+        full = self.z >= 0
+        made = make_system(system, self.problem, stages)
+        try:
+            dp, dr, _ = made.solve((~full).astype(float), full.astype(float), w, np.zeros_like(w), RTOL)
+        finally:
+            made.destroy()
+        return np.maximum(np.where(full, dp, -dr / self.s), 0.0)
+
+    def prove(self, e: Array, sign: float) -> Fields | None:
+        """The pair of z + sign e, its e enlarged where needed, if G has that sign there; None if this cannot be shown.
+
+        Where the sign fails, the cell's own e is raised by what is lacking; that only takes from its neighbours, so the rest
+        stays proved or is repaired in the next round (Gauss-Seidel in spirit, for an M-function).
+        """
+        most = 16 * self.problem.reduce.max(e)
+        for _ in range(REPAIRS):
+            p, r = self.pair(self.z + sign * e)
+            F, rounding = balance(self.problem, p, r)
+            lacking = rounding - sign * F  # NaN is lacking too
+            fails = ~(lacking <= 0)
+            if not self.problem.reduce.sum(fails.astype(float)):
+                return {"p": p, "r": r}
+            e = np.where(fails, e + 1.5 * (lacking + self.slack) / self.diagonal, e)
+            if not self.problem.reduce.max(e) <= most:
+                break
+        return None
+
+
+def _bounds(problem: LubricationProblem, fields: Fields, lower: Fields, upper: Fields) -> dict[str, float]:
+    """Distances of the answer from the farther end of the band, in SI, what their own arithmetic rounds added. Collective."""
+    reduce, unit = problem.reduce, problem.p_unit
+    p, r = fields["p"], fields["r"]
+    off_p = np.maximum(upper["p"] - p, p - lower["p"])
+    off_r = np.maximum(lower["r"] - r, r - upper["r"])
+    p_max, low, high = (reduce.max(a) for a in (p, lower["p"], upper["p"]))
+    largest = max(abs(p_max), high, *(side / unit for side in problem.p_sides)) + abs(problem.p_c) / unit
+    load_rounding = (problem.size + 16) * UNIT * reduce.sum(np.abs(p) + off_p)  # a sum of n numbers, in any order
+    return {
+        "band_p": (reduce.max(off_p) + 8 * UNIT * largest) * unit,
+        "band_p_max": (max(high - p_max, p_max - low) + 8 * UNIT * largest) * unit,
+        "band_load": (reduce.sum(off_p) + load_rounding) * problem.grid.cell * unit,
+        "band_r": reduce.max(off_r) * (1 + 8 * UNIT),
+    }
