@@ -9,8 +9,8 @@ from pydantic import Field, model_validator
 from .parallel import Array
 from .problems.exact import ExactSolution, exact_solution
 from .problems.film import JournalGap
+from .problems.flows import side_flows
 from .problems.problem import LubricationProblem
-from .problems.reynolds import sides
 from .scene import LubricationScene, Positive
 
 
@@ -62,8 +62,11 @@ class JournalScene(LubricationScene):
         problem.extras = self._bearing_numbers
         return problem
 
-    def _bearing_numbers(self, problem: LubricationProblem, p: Array, r: Array) -> dict[str, float]:
-        """Sommerfeld number W psi^2/(B D mu omega), attitude angle, side leakage and Q/((D/2)^3 psi omega). Collective."""
+    def _bearing_numbers(self, problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any]:
+        """Sommerfeld number W psi^2/(B D mu omega), attitude angle, load, side leakage as Q/((D/2)^3 psi omega). Collective.
+
+        bearing_load is in N (1D: N/m), load_vector its parts towards the narrowest gap and across, in the sense of rotation.
+        """
         grid = problem.grid
         phi = 2.0 * np.pi * np.broadcast_to(grid.x, grid.box).ravel() / self.L
         width = self.width if grid.dim == 2 and self.width else 1.0
@@ -72,27 +75,14 @@ class JournalScene(LubricationScene):
         towards = grid.cell * (-problem.reduce.dot(p, np.cos(phi)) * problem.p_unit - groove)
         across = grid.cell * problem.reduce.dot(p, np.sin(phi)) * problem.p_unit
         load = math.hypot(towards, across)
-        numbers = {
+        numbers: dict[str, Any] = {
             "sommerfeld": load * self.psi**2 / (width * self.D * self.mu * self.omega),
             "attitude_deg": math.degrees(math.atan2(across, towards)),
             "bearing_load": load,
+            "load_vector": [towards, across],
         }
         if grid.dim == 2:
-            leakage = self._leakage(problem, p)
-            numbers["side_leakage"] = leakage
+            flow = side_flows(problem, p, r)
+            leakage = flow["south"] + flow["north"]
             numbers["side_leakage_number"] = leakage / ((0.5 * self.D) ** 3 * self.psi * self.omega)
         return numbers
-
-    def _leakage(self, problem: LubricationProblem, p: Array) -> float:
-        """Volume flow out of both ends, m3/s: through the last faces, and what the half cells beyond them squeeze out.
-
-        Those faces stand half a spacing inside; in the full film the Couette flow that a half cell loses leaves by the end.
-        """
-        grid, s = problem.grid, problem.scheme
-        field = p.reshape(grid.box)
-        out = np.zeros(grid.box)
-        for at_end, k, p_end in zip(sides(grid)[2:], (s.k_S, s.k_N), problem.p_sides[2:], strict=True):
-            through = k * (field - p_end / problem.p_unit)
-            squeezed = np.where(field > 0, 0.5 * (s.couette_W - s.couette_E), 0.0)
-            out += np.where(at_end, through + squeezed, 0.0)
-        return 0.5 * grid.spacing[1] * problem.reduce.sum(out)

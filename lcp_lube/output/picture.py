@@ -8,7 +8,7 @@ import numpy as np
 
 from ..parallel import Array
 from ..problems.exact import ExactSolution
-from ..problems.quantities import cavity_sign
+from ..problems.fronts import cavity_sign
 from ..problems.solution import Solution
 from .files import coordinates, gather
 
@@ -19,7 +19,7 @@ MOST_POINTS = {1: 4000, 2: 500}  # a direction; larger fields are thinned before
 class Picture:
     """Fields in SI as (ny, nx) arrays, or (nx,) with an empty y, thinned if large; and what is known beside them.
 
-    sign is positive in the full film and negative in the cavity (`quantities.cavity_sign`); empty for problems without one.
+    sign is positive in the full film and negative in the cavity (`fronts.cavity_sign`); empty for problems without one.
     """
 
     solution: Solution

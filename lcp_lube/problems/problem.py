@@ -53,7 +53,7 @@ class LubricationProblem:
         self.grid, self.scheme, self.film = grid, scheme, film
         self.mu, self.U, self.p_unit, self.p_sides, self.p_c = mu, U, p_unit, p_sides, p_c
         self.exact = exact
-        self.extras: Callable[[LubricationProblem, Array, Array], dict[str, float]] | None = None
+        self.extras: Callable[[LubricationProblem, Array, Array], dict[str, Any]] | None = None
         self.reduce = grid.reduce
         self.c = scheme.c.ravel()
 
@@ -151,9 +151,8 @@ class LubricationProblem:
         )
 
     def quantities(self, fields: Fields) -> dict[str, Any]:
-        """Load, friction, largest pressure, cavitated share, fronts, and the scene's own `extras`. Collective."""
-        p, r = fields["p"], fields["r"]
-        return {**quantities(self, p, r), **(self.extras(self, p, r) if self.extras else {})}
+        """Load, friction, flows, largest pressure, cavity, and the scene's own `extras`. Collective."""
+        return quantities(self, fields["p"], fields["r"])
 
     def physical(self, fields: Fields) -> dict[str, tuple[Array, str]]:
         """Absolute pressure in Pa, void fraction, film in m."""
@@ -166,14 +165,16 @@ class LubricationProblem:
     def prolong(self, coarse: "LubricationProblem", fields: Fields, interior: bool) -> Fields:
         """p and r on this grid from a coarser one, by interpolating z = p/P - r/R bilinearly (P, R: largest p and r).
 
-        interior: p, r = (+-z + sqrt(z^2 + 4 m))/2 with m = 1e-3, off the boundary with products p r = m P R. Collective.
+        interior: p, r = (+-z + sqrt(z^2 + 4 m))/2, off the boundary with products p r = m P R. The front is known to a mesh H of
+        the coarse grid, where p ~ (H/L)^2 and r ~ H/L: m = 10 (H/L)^3, at most 1e-3. Collective.
         """
         P = coarse.reduce.max(fields["p"]) or 1.0
         R = coarse.reduce.max(fields["r"]) or 1.0
         transfer = Transfer(coarse.grid, self.grid)
         z = transfer(fields["p"] / P - fields["r"] / R)
         transfer.destroy()
-        root = np.sqrt(z * z + 4e-3) if interior else np.abs(z)
+        m = min(1e-3, 10.0 / max(coarse.grid.shape) ** 3)
+        root = np.sqrt(z * z + 4.0 * m) if interior else np.abs(z)
         return {"p": 0.5 * P * (root + z), "r": 0.5 * R * (root - z)}
 
     def destroy(self) -> None:

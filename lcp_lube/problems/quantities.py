@@ -1,19 +1,24 @@
-"""What an engineer reads off the fields: load, friction, largest pressure, cavitated area, fronts."""
+"""What an engineer reads off the fields: load, friction, flows, power, largest pressure, thinnest film, cavity."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from mpi4py import MPI
 
 from ..parallel import Array
+from .flows import friction, side_flows
+from .fronts import cavity_sign, fronts
 
 if TYPE_CHECKING:
     from .problem import LubricationProblem
 
 
-def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, float | None]:
-    """Integrals and extrema of the fields. Collective.
+def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any]:
+    """Integrals and extrema of the fields, and the scene's own numbers (`problem.extras`). Collective.
+
+    In 1D forces, powers and areas are per unit width (N/m, W/m, m), flows too (m2/s).
 
     Parameters
     ----------
@@ -21,92 +26,101 @@ def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, flo
 
     Returns
     -------
-    p_max : Pa, absolute. load : N (N/m in 1D), integral of the absolute pressure. friction : drag on the moving wall, N
-    (N/m in 1D). cavitated_fraction : share of the points. rupture, reformation : m, first ones in 1D, None where absent.
+    p_max : largest pressure, absolute, Pa; p_max_at : its [x] or [x, y], m (of a side: its middle).
+    load : integral of the absolute pressure, N. load_above_ambient : that of p - p_ambient, p_ambient (Pa, absolute) being the
+    smallest pressure at a side.
+    friction : drag on the moving wall, N (`flows.friction`). friction_coefficient : friction over the load carried, which is
+    the scene's bearing_load, else load_above_ambient; None unless that is positive. power_loss : friction U, W.
+    flow : out of each side, m3/s (`flows.side_flows`). side_leakage : south and north together (2D).
+    min_h, min_h_at : thinnest film and where, m, sides included.
+    cavitated_fraction : share of the points; cavitated_area : theirs, m2.
+    rupture, reformation : x of the first ones, m, None where absent; in 2D on the middle line (`fronts.fronts`).
+    p_unit : Pa.
     """
-    grid, red = problem.grid, problem.reduce
+    grid, reduce = problem.grid, problem.reduce
     p_pa = p * problem.p_unit
-    z = cavity_sign(problem, p, r)
-    out: dict[str, float | None] = {
-        "p_max": max(red.max(p_pa), *problem.p_sides[: 2 * grid.dim]) + problem.p_c,
-        "load": _load(problem, p_pa),
-        "friction": _friction(problem, p_pa, r),
+    used_sides = problem.p_sides[: 2 * grid.dim]
+    cavitated = reduce.sum((cavity_sign(problem, p, r) < 0).astype(float))
+    load, ambient = _load(problem, p_pa), min(used_sides)
+    flow = side_flows(problem, p, r)
+    p_max, p_max_at = _largest_pressure(problem, p_pa)
+    min_h, min_h_at = _thinnest(problem)
+    rupture, reformation = fronts(problem, p, r)
+    out: dict[str, Any] = {
+        "p_max": p_max + problem.p_c,
+        "p_max_at": p_max_at,
+        "load": load + problem.p_c * _area(problem),
+        "p_ambient": ambient + problem.p_c,
+        "load_above_ambient": load - ambient * _area(problem),
+        "friction": friction(problem, p_pa, r),
         "p_unit": problem.p_unit,
-        "cavitated_fraction": red.sum((z < 0).astype(float)) / grid.size,
+        "cavitated_fraction": cavitated / grid.size,
+        "cavitated_area": cavitated * grid.cell,
+        "rupture": rupture,
+        "reformation": reformation,
+        "min_h": min_h,
+        "min_h_at": min_h_at,
+        "flow": flow,
     }
-    if grid.dim == 1:
-        out["rupture"], out["reformation"] = fronts(problem, p, r)
+    if grid.dim == 2:
+        out["side_leakage"] = flow["south"] + flow["north"]
+    out |= problem.extras(problem, p, r) if problem.extras else {}
+    carried = out.get("bearing_load", out["load_above_ambient"])
+    out["friction_coefficient"] = out["friction"] / carried if carried > 0 else None
+    out["power_loss"] = out["friction"] * problem.U
     return out
 
 
-def cavity_sign(problem: LubricationProblem, p: Array, r: Array) -> Array:
-    """p / max|p| - r: positive in the full film, negative in the cavity; no threshold to choose. Collective."""
-    p_max = problem.reduce.max(np.abs(p))
-    return (p / p_max if p_max > 0 else p) - r
+def _area(problem: LubricationProblem) -> float:
+    return float(np.prod(problem.grid.lengths))
 
 
 def _load(problem: LubricationProblem, p_pa: Array) -> float:
-    """Trapezoidal rule, boundary included; a corner has the mean of its two sides."""
+    """Integral of p - p_c by the trapezoidal rule, boundary included; a corner has the mean of its two sides."""
     grid = problem.grid
     p_W, p_E, p_S, p_N = problem.p_sides
     inside = problem.reduce.sum(p_pa)
     if grid.dim == 1:
-        return grid.cell * (inside + 0.5 * (p_W + p_E)) + problem.p_c * grid.lengths[0]
+        return grid.cell * (inside + 0.5 * (p_W + p_E))
     nx, ny = grid.shape
     edges = 0.5 * (ny * (p_W + p_E) + nx * (p_S + p_N)) + 0.25 * (p_W + p_E + p_S + p_N)
-    return grid.cell * (inside + edges) + problem.p_c * grid.lengths[0] * grid.lengths[1]
+    return grid.cell * (inside + edges)
 
 
-def _friction(problem: LubricationProblem, p_pa: Array, r: Array) -> float:
-    """Integral of mu U (1 - r)/h + (h/2) dp/dx: shear on the wall that moves, the void carrying none.
-
-    Shear by the trapezoidal rule over the points and the two ends (no void at the inlet; at the outlet the last point's);
-    the pressure term as sums of h_face (p_E - p_W)/2 over the x faces.
-    """
+def _largest_pressure(problem: LubricationProblem, p_pa: Array) -> tuple[float, list[float] | None]:
+    """p - p_c in Pa at the points and sides, and where. Collective."""
     grid = problem.grid
-    dx = grid.spacing[0]
-    h, box = problem.scheme.h, grid.box
-    p2, r2 = p_pa.reshape(box), r.reshape(box)
-    x, y = (np.array(a) for a in np.broadcast_arrays(grid.x, grid.y))
-    framed = grid.ghosted(p_pa)
-    p_W = np.where(x < 1.5 * dx, problem.p_sides[0], framed[1:-1, :-2])
-    last = x > grid.lengths[0] - 1.5 * dx
-    muU = problem.mu * problem.U
-    total = muU * (1.0 - r2) / h * dx + 0.5 * problem.film(x - dx / 2, y) * (p2 - p_W)
-    first_end = np.where(x < 1.5 * dx, 0.5 * muU / problem.film(np.zeros_like(x), y) * dx, 0.0)
-    h_end = problem.film(np.full_like(x, grid.lengths[0]), y)
-    last_end = 0.5 * muU * (1.0 - r2) / h_end * dx + 0.5 * problem.film(x + dx / 2, y) * (problem.p_sides[1] - p2)
-    per_width = problem.reduce.sum(total + first_end + np.where(last, last_end, 0.0))
-    return per_width * (grid.spacing[1] if grid.dim == 2 else 1.0)
+    largest, place = _largest(problem, p_pa.reshape(grid.box), grid.x[0], grid.y[:, 0])
+    low = [*grid.origin[: grid.dim]]
+    middle = [a + 0.5 * length for a, length in zip(low, grid.lengths, strict=True)]
+    for k, p_side in enumerate(problem.p_sides[: 2 * grid.dim]):
+        if p_side > largest:
+            largest, place = p_side, list(middle)
+            place[k // 2] = low[k // 2] + (k % 2) * grid.lengths[k // 2]
+    return largest, place
 
 
-def fronts(problem: LubricationProblem, p: Array, r: Array) -> tuple[float | None, float | None]:
-    """First rupture and first reformation behind it in 1D, in metres; None where there is none. Collective.
-
-    Each front is found to its cell from the sign of p/max|p| - r and placed inside it. Rupture: where U h = Q, the one flow
-    of the discrete solution (p = p' = 0 there), h taken linear over the cell (and one beyond: the discrete front
-    may be late). Reformation: where the pressure behind it, extrapolated linearly, is zero.
-    """
+def _thinnest(problem: LubricationProblem) -> tuple[float, list[float] | None]:
+    """Smallest film over the points and the points of the boundary, and where, m. Collective."""
     grid, film = problem.grid, problem.film
-    dx, L = grid.spacing[0], grid.lengths[0]
-    x = grid.x[0]
-    z = grid.ghosted(cavity_sign(problem, p, r))[1]
-    z[0] = 1.0 if grid.x_start == 0 else z[0]  # the inflow boundary is full
-    cavity = z < 0
-    west, east = film(x - dx, 0 * x), film(x, 0 * x)
-    Q = problem.boundary_flows(p, r)[0]
-    front = cavity[1:-1] & ~cavity[:-2]
-    slope = np.where(east > west, east - west, np.inf)  # a step up in the film: rupture at its edge, the cell's start
-    rupture = problem.reduce.min(np.where(front, x - dx + dx * np.clip((Q / problem.U - west) / slope, -1.0, 2.0), np.inf))
-    if not np.isfinite(rupture):
-        return None, None
-    p_line = grid.ghosted(p)[1]
-    if grid.x_end == grid.shape[0]:
-        p_line[-1] = problem.p_sides[1] / problem.p_unit
-    rise = p_line[2:] - p_line[1:-1]
-    back = np.where(rise > 0, np.clip(p_line[1:-1] / np.where(rise > 0, rise, 1.0), 0.0, 1.0), 0.5)
-    full_again = ~cavity[1:-1] & cavity[:-2] & (x > rupture)
-    reformation = problem.reduce.min(np.where(full_again, x - back * dx, np.inf))
-    if not np.isfinite(reformation) and problem.p_sides[1] > 0:
-        reformation = L - 0.5 * dx  # in the last cell, before a boundary above the cavitation pressure
-    return rupture, reformation if np.isfinite(reformation) else None
+    x, y = grid.x[0], grid.y[:, 0]
+    ends = [np.array([start, start + length]) for start, length in zip(grid.origin, grid.lengths, strict=False)]
+    places = [(ends[0], y)] + ([(x, ends[1]), (ends[0], ends[1])] if grid.dim == 2 else [])
+    films = [(problem.scheme.h, x, y)] + [(film(a[None, :], b[:, None]), a, b) for a, b in places]
+    thickness, place = max((_largest(problem, -h, a, b) for h, a, b in films), key=lambda found: found[0])
+    return -thickness, place
+
+
+def _largest(problem: LubricationProblem, values: Array, x: Array, y: Array) -> tuple[float, list[float] | None]:
+    """Largest of values over y (rows) and x (columns) and its place; NaN: nowhere. Collective.
+
+    Of equals, to within the tolerance of a solve, the first in x and then y, whatever the ranks.
+    """
+    largest = problem.reduce.max(values)
+    if not np.isfinite(largest):
+        return largest, None
+    near = values >= largest - 1e-9 * abs(largest)
+    column = int(np.argmax(near.any(axis=0)))
+    row = int(np.argmax(near[:, column]))
+    own = (float(x[column]), float(y[row])) if near.any() else (np.inf, np.inf)
+    return largest, [*problem.grid.comm.allreduce(own, MPI.MIN)][: problem.grid.dim]

@@ -1,0 +1,67 @@
+"""What flows through the sides of a film, and what drags at its wall."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..parallel import Array
+from .reynolds import sides
+
+if TYPE_CHECKING:
+    from .problem import LubricationProblem
+
+SIDES = ("west", "east", "south", "north")
+
+
+def side_flows(problem: LubricationProblem, p: Array, r: Array) -> dict[str, float]:
+    """Volume flow out of the film through each side, m3/s (1D: m2/s); their sum is zero. Collective.
+
+    Half of the equation's terms, (U h (1 - r) - h^3/(6 mu) dp/dx)/2: one wall moves. The box scheme balances the cells around
+    the points, whose outer faces stand half a spacing inside the sides: exact for west and east, where the flow of a line does
+    not change on the way. Along a side y = const of constant pressure, the strip between the outer faces and the side carries
+    Couette flow alone, U h (1 - r)/2 of the line of points beside it; what it loses between west and east leaves by the side.
+    """
+    grid, s = problem.grid, problem.scheme
+    west, east, south, north = problem.boundary_flows(p, r)
+    if grid.dim == 1:
+        return {"west": -0.5 * west, "east": 0.5 * east}
+    at_west, at_east, *at_ends = sides(grid)
+    leaving = s.couette_E + s.b_C * r.reshape(grid.box)
+    total = problem.reduce.sum
+    strips = [  # enters at the west, leaves at the east
+        (0.5 * total(np.where(at_west & end, s.couette_W, 0.0)), 0.5 * total(np.where(at_east & end, leaving, 0.0)))
+        for end in at_ends
+    ]
+    half = 0.5 * grid.spacing[1]
+    return {
+        "west": -half * (west + sum(enters for enters, _ in strips)),
+        "east": half * (east + sum(leaves for _, leaves in strips)),
+        "south": half * (strips[0][0] - strips[0][1] - south),
+        "north": half * (strips[1][0] - strips[1][1] + north),
+    }
+
+
+def friction(problem: LubricationProblem, p_pa: Array, r: Array) -> float:
+    """Drag on the moving wall, N (1D: N/m): integral of mu U (1 - r)/h + (h/2) dp/dx, the void carrying no shear. Collective.
+
+    By the midpoint rule over the x faces, where the box scheme knows the liquid's share of the film: it is that of the Couette
+    flow, in the cavity Q/(U h_face). In 2D the strips along the sides y = const have the shear of the lines beside them, and no
+    pressure term, p being constant there.
+
+    Parameters
+    ----------
+    p_pa : pressure in Pa above the cavitation pressure, r : void fraction; owned points.
+    """
+    grid, s, film = problem.grid, problem.scheme, problem.film
+    dx, muU = grid.spacing[0], problem.mu * problem.U
+    p = p_pa.reshape(grid.box)
+    first, last, south, north = sides(grid)
+    p_east = np.where(last, problem.p_sides[1], grid.ghosted(p_pa)[1:-1, 2:])
+    h_west, h_east = (np.broadcast_to(film(grid.x + step, grid.y), grid.box) for step in (-dx / 2, dx / 2))
+    liquid = 1.0 + s.b_C * r.reshape(grid.box) / s.couette_E
+    shear = muU * dx * (liquid / h_east + np.where(first, 1.0 / h_west, 0.0))
+    shear *= 1.0 + 0.5 * south + 0.5 * north
+    push = 0.5 * (h_east * (p_east - p) + np.where(first, h_west * (p - problem.p_sides[0]), 0.0))
+    return problem.reduce.sum(shear + push) * (grid.spacing[1] if grid.dim == 2 else 1.0)
