@@ -131,9 +131,8 @@ def solve(
     if certify and isinstance(problem, LubricationProblem):
         # By the inner solver that has just solved this problem.
         system = METHODS[took_over].systems[0] if took_over else chosen.system
-        with recipe(default_recipe(problem, system, large=False)[0] if took_over else chosen.recipe):
-            with stages("certify"):
-                enclosure = enclose(problem, fields, system, Stages())
+        with recipe(default_recipe(problem, system, large=False)[0] if took_over else chosen.recipe), stages("certify"):
+            enclosure = enclose(problem, fields, system, Stages())
     if outcome is not Outcome.CONVERGED and isinstance(problem, BoxProblem):
         outcome, message = problem.explain(outcome, message)
     if outcome is Outcome.CONVERGED and not certificate.holds:
