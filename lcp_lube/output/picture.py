@@ -11,6 +11,7 @@ from ..problems.exact import ExactSolution
 from ..problems.fronts import cavity_sign
 from ..problems.solution import Solution
 from .files import coordinates, gather
+from .units import prefix, quantity
 
 MOST_POINTS = {1: 4000, 2: 500}  # a direction; larger fields are thinned before rank 0 gathers them
 
@@ -67,20 +68,6 @@ def title(picture: Picture) -> str:
     if values.get("cavitated_fraction") is not None:
         parts.append(f"{100 * values['cavitated_fraction']:.1f} % cavitated{' (dotted)' * (picture.y.size > 0)}")
     return ",  ".join(parts)
-
-
-def prefix(size: float, unit: str) -> tuple[float, str]:
-    """(factor, unit): what takes SI values up to `size` to numbers from 1 to 1000, and their unit."""
-    if not unit or not 0 < size < math.inf:
-        return 1.0, unit
-    power = min(max(3 * math.floor(math.log10(size) / 3 + 1e-12), -9), 9)
-    return 10.0**-power, {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}[power] + unit
-
-
-def quantity(value: float, unit: str) -> str:
-    """'6.624 MPa' from 6.624e6 and 'Pa'."""
-    factor, unit = prefix(abs(value), unit)
-    return f"{value * factor:.4g} {unit}"
 
 
 def scaled(values: Array, unit: str) -> tuple[Array, str]:

@@ -14,7 +14,8 @@ from ..errors import InputError
 from ..parallel import Array
 from ..problems.solution import Solution
 from .files import replacing
-from .picture import Picture, collect, largest, prefix, quantity, scaled, title
+from .picture import Picture, collect, largest, scaled, title
+from .units import prefix, quantity
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -130,7 +131,8 @@ def section(upper: Axes, lower: Axes, picture: Picture, row: int | None = None) 
     x, label_x = scaled(np.insert(picture.x, [0, picture.x.size], ends), "m")
     scale = prefix(largest(ends), "m")[0]
 
-    fronts = {name: picture.quantities[name] for name in ("rupture", "reformation") if picture.quantities.get(name) is not None}
+    known = ("rupture", "reformation") if row is None else ()  # in 2D they are those of the middle line
+    fronts = {name: picture.quantities[name] for name in known if picture.quantities.get(name) is not None}
     spans = [upper.axvspan(scale * a, scale * b, color="0.90", lw=0) for a, b in _cavities(picture.x, sign, ends, fronts)]
     for name, place in fronts.items():
         upper.axvline(scale * place, color=GREY, lw=0.8, ls=(0, (1, 2)))

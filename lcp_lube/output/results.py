@@ -13,6 +13,7 @@ from petsc4py import PETSc
 
 from .. import __version__
 from ..problems.solution import Solution
+from .units import place, quantity
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -100,6 +101,28 @@ MEASURES = ("residual", "natural_residual", "complementarity", "mass_defect", "b
 UNITS = {"min_p": " Pa"}
 
 
+def _bearing_lines(data: dict[str, Any], one_d: bool) -> list[str]:
+    """What the summary tells of a bearing beyond pressure and load: a journal's numbers, fronts, places, losses, flows."""
+    per, flow_unit = ("/m", "m2/s") if one_d else ("", "m3/s")
+    lines = []
+    if data.get("sommerfeld") is not None:
+        lines.append(
+            f"bearing load {quantity(data['bearing_load'], 'N' + per, 6)}, attitude angle {data['attitude_deg']:.5g} deg, "
+            f"Sommerfeld number {data['sommerfeld']:.6g}"
+        )
+    if data.get("rupture") is not None:
+        behind = f", reformation {1e3 * data['reformation']:.5g} mm" if data["reformation"] is not None else ""
+        lines.append(f"rupture {1e3 * data['rupture']:.5g} mm{behind}{'' if one_d else ' (on the middle line)'}")
+    thinnest = f"thinnest film {quantity(data['min_h'], 'm')} at {place(data['min_h_at']) or '-'}"
+    lines.append(f"p_max at {place(data['p_max_at']) or '-'}; {thinnest}")
+    coefficient = data["friction_coefficient"]
+    losses = "" if coefficient is None else f"friction coefficient {coefficient:.4g}, "
+    flows = ", ".join(f"{side} {value:.4g}" for side, value in data["flow"].items())
+    lines.append(f"{losses}power loss {quantity(data['power_loss'], 'W' + per)}; flow out: {flows} {flow_unit}")
+    return lines
+
+
+@np.errstate(over="ignore", invalid="ignore")
 def summary(data: dict[str, Any]) -> str:
     """A few lines for people."""
     one_d = data["ny"] is None
@@ -126,13 +149,12 @@ def summary(data: dict[str, Any]) -> str:
         quantities,
         f"certificate (tol {data['certificate_tol']:.0e}): {measures}",
     ]
-    if one_d and data.get("rupture") is not None:
-        behind = f", reformation {1e3 * data['reformation']:.5g} mm" if data["reformation"] is not None else ""
-        lines.insert(3, f"rupture {1e3 * data['rupture']:.5g} mm{behind}")
+    if "load" in data:
+        lines[3:3] = _bearing_lines(data, one_d)
     if data.get("certified"):
         lines.append(
-            f"proved: the exact discrete solution is within {data['band_p']:.1e} Pa of p, {data['band_p_max']:.1e} Pa of p_max, "
-            f"{data['band_load']:.1e} {load_unit} of the load (the grid's own error comes on top)"
+            f"proved: the exact discrete solution is within {data['band_p']:.1e} Pa of p, {data['band_p_max']:.1e} Pa of "
+            f"p_max, {data['band_load']:.1e} {load_unit} of the load (the grid's own error comes on top)"
         )
     elif "certified" in data:
         lines.append(f"not proved: {data['certified_message']}")

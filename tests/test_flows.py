@@ -1,0 +1,146 @@
+"""Friction, flows, power and places: against exact solutions, by conservation, and under the laws that tie them together."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from films import MU, WIDTH, FilmScene, Knots, L, U, knots, make_problem, pressures, schemes, shapes
+from hypothesis import given, settings
+
+from lcp_lube import load_scene, solve
+from lcp_lube.problems.flows import SIDES
+
+OCTAVES, PER_OCTAVE = (50, 100, 200, 400), 8
+
+
+def exact_drag(scene):
+    """Drag and dissipation (N/m, W/m) of the exact 1D solution by quadrature: mu U (1 - r)/h + (h/2) p', and
+    mu U^2 (1 - r)/h + h^3 p'^2/(12 mu); p' = 6 mu (U h - Q)/h^3 where the film is full."""
+    exact, film = scene.exact(), scene.gap
+    edges = np.unique([x for x in (0.0, exact.rupture, exact.reformation, scene.L, *film.breakpoints()) if x is not None])
+    nodes, weights = np.polynomial.legendre.leggauss(80)
+    drag = loss = 0.0
+    for a, b in pairwise(edges):
+        x = 0.5 * (a + b) + 0.5 * (b - a) * nodes
+        h, r = film(x), exact.r(x)
+        slope = np.where(r > 0, 0.0, 6 * scene.mu * (scene.U * h - exact.Q) / h**3)
+        w = 0.5 * (b - a) * weights
+        drag += w @ (scene.mu * scene.U * (1 - r) / h + 0.5 * h * slope)
+        loss += w @ (scene.mu * scene.U**2 * (1 - r) / h + h**3 * slope**2 / (12 * scene.mu))
+    return drag, loss
+
+
+def found(scene):
+    solution = solve(scene, method="active-set", nested=False)
+    assert solution.converged, solution.message
+    values = solution.problem.quantities(solution.fields)
+    solution.destroy()
+    return values
+
+
+@pytest.mark.parametrize("name", ["problem1", "problem2", "problem3", "long_journal"])
+def test_friction_is_of_second_order_on_average(name):
+    """The void is known at the faces, not at the points: there the drag of a cavity would be of first order."""
+    drag, _ = exact_drag(load_scene(name))
+    means = []
+    for n in OCTAVES:
+        sizes = np.round(n * 2 ** (np.arange(PER_OCTAVE) / PER_OCTAVE)).astype(int)
+        means.append(np.mean([abs(found(load_scene(name, {"n": int(n)}))["friction"] / drag - 1) for n in sizes]))
+    assert -np.polyfit(np.log(OCTAVES), np.log(means), 1)[0] > 1.7, means
+    assert means[-1] < 1.5e-5
+
+
+@pytest.mark.parametrize("name", ["problem1", "problem2", "problem3"])
+def test_what_goes_in_as_power_is_dissipated(name):
+    """friction U + p_a Q - p_b Q = the dissipation of the exact fields, where the whole flow passes both ends."""
+    scene = load_scene(name, {"n": 800})
+    drag, loss = exact_drag(scene)
+    values, Q = found(scene), scene.exact().Q
+    assert drag * scene.U + 0.5 * Q * (scene.p_a - scene.p_b) == pytest.approx(loss, rel=1e-9)  # the formulae themselves
+    assert values["power_loss"] == values["friction"] * scene.U
+    assert values["power_loss"] - sum(p * values["flow"][side] for p, side in ((scene.p_a, "west"), (scene.p_b, "east"))) == (
+        pytest.approx(loss, rel=1e-4)
+    )
+    assert values["flow"]["east"] == pytest.approx(0.5 * Q, rel=1e-4)
+
+
+@settings(max_examples=40)
+@given(shape=shapes, film=knots(), scheme=schemes, p_sides=pressures)
+def test_flows_sum_to_zero(shape, film, scheme, p_sides):
+    """Whatever the film, the scheme and the sides: conservation is in the scheme."""
+    nx, ny = (*shape, 1)[:2]
+    data = {"nx": nx} if len(shape) == 1 else {"dimension": 2, "nx": nx, "ny": ny, "width": WIDTH, "p_side": p_sides[2]}
+    scene = FilmScene.of(film, **data, L=L, mu=MU, U=U, scheme=scheme, p_a=p_sides[0], p_b=p_sides[1])
+    values = found(scene)
+    flow = values["flow"]
+    assert tuple(flow) == SIDES[: 2 * len(shape)]
+    assert abs(sum(flow.values())) <= 1e-9 * sum(map(abs, flow.values()))
+    if len(shape) == 2:
+        assert values["side_leakage"] == flow["south"] + flow["north"]
+
+
+def test_flows_of_a_plain_film():
+    """Couette flow U h width/2 and Poiseuille flow h^3 width dp/(12 mu L), through the whole width, strips included."""
+    h, p_a = 2e-5, 3e6
+    problem = make_problem((9,), Knots((h,)), p_sides=(p_a, 0, 0, 0))
+    p = p_a / 1e6 * (1 - problem.grid.x[0] / L)
+    flow = problem.quantities({"p": p, "r": np.zeros(9)})["flow"]
+    assert flow["east"] == pytest.approx(U * h / 2 + h**3 * p_a / (12 * MU * L), rel=1e-13)
+    problem.destroy()
+    problem = make_problem((4, 6), Knots((h,)))
+    flow = problem.quantities({"p": np.zeros(24), "r": np.zeros(24)})["flow"]
+    assert flow["east"] == pytest.approx(U * h / 2 * WIDTH, rel=1e-13) == -flow["west"]
+    assert flow["south"] == flow["north"] == 0.0
+    problem.destroy()
+
+
+def test_side_leakage_and_friction_of_a_journal_converge():
+    """Steps of refinement shrink faster than twofold (the front's place in its cell disturbs them); both ends leak the same."""
+    values = [found(load_scene("journal", {"nx": 32 * k - 1, "ny": 8 * k - 1})) for k in (1, 2, 4, 8)]
+    for key, least in (("side_leakage", 2.2), ("friction", 2.5), ("bearing_load", 2.5)):
+        steps = np.abs(np.diff([v[key] for v in values]))
+        assert steps[0] / steps[2] > least**2, (key, steps)
+    last = values[-1]
+    assert last["flow"]["south"] == pytest.approx(last["flow"]["north"], rel=1e-6)
+    assert np.hypot(*last["load_vector"]) == pytest.approx(last["bearing_load"], rel=1e-13)
+    assert last["friction_coefficient"] == last["friction"] / last["bearing_load"]
+
+
+def test_load_above_ambient_and_friction_coefficient():
+    """Raising every pressure by the same amount changes neither; a load that points the other way has no coefficient."""
+    low, high = (found(load_scene("problem1", {"n": 60, "p_c": p_c})) for p_c in (0.0, 3e5))
+    for key in ("load_above_ambient", "friction_coefficient", "power_loss"):
+        assert high[key] == pytest.approx(low[key], rel=1e-12)
+    assert (low["p_ambient"], high["p_ambient"]) == (0.0, 3e5)
+    textured = found(load_scene("textured_slider", {"K": 1}))
+    assert textured["load_above_ambient"] < 0 and textured["friction_coefficient"] is None
+
+
+@pytest.mark.parametrize("nx, ny", [(4, 6), (5, 1), (1, 3)])
+def test_places(nx, ny):
+    """The largest pressure is where it was put; a side's is in its middle; the thinnest film may be on the boundary."""
+    problem = make_problem((nx, ny), Knots((2e-5, 1e-5), tilt=0.5))
+    p = np.ones((ny, nx))
+    p[ny // 2, nx // 2] = 2.0
+    values = problem.quantities({"p": p.ravel(), "r": np.zeros(p.size)})
+    assert values["p_max_at"] == pytest.approx([L * (nx // 2 + 1) / (nx + 1), WIDTH * (ny // 2 + 1) / (ny + 1)])
+    assert (values["min_h"], values["min_h_at"]) == (1e-5, [L, 0.0])
+    problem.destroy()
+    problem = make_problem((nx, ny), Knots((2e-5,)), p_sides=(0, 0, 0, 3e6))
+    values = problem.quantities({"p": p.ravel(), "r": np.zeros(p.size)})
+    assert (values["p_max"], values["p_max_at"]) == (3e6, [L / 2, WIDTH])
+    problem.destroy()
+
+
+def test_no_place_in_a_field_that_overflowed():
+    problem = make_problem((4,), Knots((1e-5, 2e-5)))
+    values = problem.quantities({"p": np.array([1.0, np.nan, 1.0, 1.0]), "r": np.zeros(4)})
+    assert np.isnan(values["p_max"]) and values["p_max_at"] is None
+    problem.destroy()
+
+
+def test_fronts_on_the_middle_line_of_a_wide_bearing_are_those_of_the_long_one():
+    wide = found(load_scene("journal", {"nx": 199, "ny": 19, "width_over_diameter": 30.0}))
+    long = found(load_scene("long_journal", {"n": 199}))
+    assert wide["rupture"] == pytest.approx(long["rupture"], abs=1.5 * np.pi * 0.1 / 200)
+    assert wide["cavitated_area"] == pytest.approx(wide["cavitated_fraction"] * np.pi * 0.1 * 3.0, rel=0.06)
