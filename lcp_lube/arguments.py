@@ -148,6 +148,9 @@ def parse(own: list[str]) -> argparse.Namespace:
         parser_of_chart.add_argument("--quick", action="store_true", help="a small chart in seconds, with a csv of its own")
         _results_option(parser_of_chart)
 
+    doctor = command("doctor", "what is installed, what is missing, and a short self-check on one and two ranks")
+    doctor.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")
+
     command("list", "scenes, methods, systems and recipes, each with a line")
     return parser.parse_args(own)
 

@@ -179,6 +179,12 @@ def run_chart(args: argparse.Namespace) -> int:
     return max(STABILITY[name].load()(quick=args.quick, results=args.results) for name in args.maps or STABILITY)
 
 
+def run_doctor(args: argparse.Namespace) -> int:
+    from .doctor import run
+
+    return run(args)
+
+
 def run_list(args: argparse.Namespace) -> int:
     groups = {
         "scenes": {name: scene_line(name) for name in scene_names()},
@@ -198,5 +204,6 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "compare": run_compare,
     "table": run_table,
     "chart": run_chart,
+    "doctor": run_doctor,
     "list": run_list,
 }

@@ -23,12 +23,14 @@ def start(arguments: list[str]) -> None:
 
     Raises
     ------
-    InputError : PETSc refuses the arguments, in its own words.
+    InputError : PETSc refuses the arguments, in its own words; or it is not there.
     """
     check(arguments)
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    import petsc4py
-
+    try:
+        import petsc4py
+    except ImportError as error:
+        raise InputError(f"PETSc for Python is needed, see 'Installation' in README.md: {error}") from None
     sys.stderr.flush()
     before = os.dup(2)
     with tempfile.TemporaryFile() as said:
