@@ -20,7 +20,8 @@ from .solvers.enclosure import Enclosure, enclose
 from .solvers.nested import level_shapes
 from .solvers.newton import Monitor, Stopping, iterate
 
-COARSE_EPS = 1e-4
+# A coarse answer is a start: its front matters, not its last digits. An interior method's layer there must be thin, though.
+COARSE_EPS = {False: 1e-4, True: 1e-8}  # by MethodEntry.interior
 
 
 @np.errstate(over="ignore", invalid="ignore")  # iterates that overflow are an outcome, not a warning
@@ -90,8 +91,8 @@ def solve(
                 guess = level.prolong(*near, entry.interior) if near is not None else None
             if previous is not None:
                 previous.destroy()
-            # A coarse answer is a start: its front matters, not its last digits.
-            level_stopping = stopping if finest else Stopping(max(COARSE_EPS, stopping.eps1), np.inf, stopping.max_it)
+            coarse_eps = max(COARSE_EPS[entry.interior], stopping.eps1)
+            level_stopping = stopping if finest else Stopping(coarse_eps, np.inf, stopping.max_it)
             run = entry.load()(level, stages, chosen.system, options or {}, level_stopping, guess)
             try:
                 outcome, message, steps = iterate(run, level_stopping, monitor)

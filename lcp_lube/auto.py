@@ -8,10 +8,8 @@ from petsc4py import PETSc
 from .errors import InputError, nearest
 from .linear.options import set_names
 from .problems.solution import Problem
-from .registry import DEFAULT_METHOD, METHODS
+from .registry import DEFAULT_METHOD, METHODS, SMALL, SMALL_BOX
 
-SMALL = 20_000  # points up to which one grid and a direct solver cost less than setting up anything better
-SMALL_BOX = 5_000  # the same where a contact area has to move by a cell a step
 DIN_ONLY = {"r0", "mu", "conditions"}  # flags that only an interior method can heed
 
 
@@ -66,7 +64,8 @@ def plan(
             )
     _known(system, entry.systems, f"method {method}: --system")
     if nested is None:
-        nested = entry.nested and not entry.interior and grid.size > small
+        given = entry.interior and {"p0", "r0"} & set(options)  # a start that someone chose is to be used
+        nested = entry.nested and grid.size > entry.nested_above and not given
         if nested:
             why.append("nested: the front found on a coarser grid leaves a few steps on this one")
     elif nested and not entry.nested:

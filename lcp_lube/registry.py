@@ -14,6 +14,9 @@ SCENE_DIR = PACKAGE / "scenes"
 # A wheel carries the recipes inside the package; in a checkout they stand at top level.
 RECIPE_DIR = next((d for d in (PACKAGE / "options", PACKAGE.parent / "options") if d.is_dir()), PACKAGE / "options")
 
+SMALL = 20_000  # points up to which one grid and a direct solver cost less than setting up anything better
+SMALL_BOX = 5_000  # the same where a contact area has to move by a cell a step
+
 
 @dataclass(frozen=True)
 class Entry:
@@ -32,7 +35,8 @@ class MethodEntry(Entry):
     """A method: `target` is build(problem, stages, system, options, stopping, start) -> Method.
 
     kinds are the problems it solves (`Problem.kind`), systems the matrices it can use, its default first; nested: it can
-    start from a coarser grid's answer, which must lie strictly inside p, r > 0 if it is an interior method; eps: its default
+    start from a coarser grid's answer, which must lie strictly inside p, r > 0 if it is an interior method, and does so by
+    default on grids of more than `nested_above` points; eps: its default
     tolerances of ||F|| and ||alpha d||; fallback: the method that takes over where this one fails; variants: the same idea for
     other kinds of problems.
     """
@@ -40,6 +44,7 @@ class MethodEntry(Entry):
     kinds: tuple[str, ...] = ("lubrication",)
     systems: tuple[str, ...] = ("full", "reduced")
     nested: bool = False
+    nested_above: float = inf
     interior: bool = True
     eps: tuple[float, float] = (1e-8, 1e-8)
     fallback: str = ""
@@ -59,6 +64,7 @@ METHODS: dict[str, MethodEntry] = {
         "DIN with a predictor-corrector step: fewer iterations",
         systems=("reduced", "full"),
         nested=True,
+        nested_above=500,
     ),
     "active-set": MethodEntry(
         "lcp_lube.solvers.active_set:build",
@@ -66,6 +72,7 @@ METHODS: dict[str, MethodEntry] = {
         kinds=("lubrication", "box", "mixed", "user"),
         systems=("reduced", "full", "cavity"),
         nested=True,
+        nested_above=SMALL,
         interior=False,
         fallback="din-pc",
         variants={
@@ -75,6 +82,7 @@ METHODS: dict[str, MethodEntry] = {
                 kinds=("box",),
                 systems=("jacobian",),
                 nested=True,
+                nested_above=SMALL_BOX,
                 interior=False,
                 eps=(1e-8, inf),
             ),

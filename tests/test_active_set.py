@@ -90,6 +90,17 @@ def test_predictor_corrector(name, n, system):
     solution.destroy()
 
 
+@pytest.mark.parametrize("name", ["problem1", "problem2", "problem3"])
+def test_predictor_corrector_is_nested_on_fine_grids(name):
+    """At most 12 steps for ten thousand points: a start with the layer at the front as thin as a coarse mesh."""
+    solution = run(name, {"n": 10_000}, method="din-pc")
+    assert solution.converged and len(solution.levels) == 8 and solution.iterations <= 12
+    solution.destroy()
+    given = run(name, {"n": 1000}, method="din-pc", options={"p0": 2.0})
+    assert given.converged and not given.levels, "a start that someone chose is to be used"
+    given.destroy()
+
+
 def test_nested_iteration_ends_where_one_grid_does():
     flat, nested = (run("problem4", {"nx": 61, "ny": 50}, method="active-set", nested=n) for n in (False, True))
     assert [level["nx"] for level in nested.levels] == [30, 61] and not flat.levels

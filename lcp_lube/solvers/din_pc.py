@@ -1,7 +1,8 @@
 """DIN with a predictor-corrector step (Mehrotra): two solves with one factorisation, and far fewer iterations.
 
 The predictor is the pure Newton direction; how far it gets before the boundary tells how much centring the corrector needs,
-sigma = (mu_affine/mu)^3, and its second-order term dp dr is put right. Convergence is tested as in DIN.
+sigma = (mu_affine/mu)^3, and its second-order term dp dr is put right. Where the centrality conditions would cut that step,
+more centring (one more solve with the same matrix) goes further than a shorter step. Convergence is tested as in DIN.
 """
 
 from dataclasses import dataclass
@@ -19,6 +20,8 @@ from .din import DIN, DinOptions
 from .method_options import make_options
 from .newton import Stopping
 from .steplength import feasible, halve_until
+
+CENTRING = (0.0, 0.01, 0.1)  # sigma at least; the next where the step would leave the central path's neighbourhood
 
 
 @dataclass(frozen=True)
@@ -47,7 +50,7 @@ class DinPc(DIN):
         self.boundary = options.boundary
 
     def advance(self) -> Step:
-        """One predictor, one corrector; alpha as close to the boundary as the centrality conditions allow."""
+        """One predictor, a corrector, or up to three; alpha as close to the boundary as the centrality conditions allow."""
         reduce, n, rtol = self.problem.reduce, self.problem.size, self.options.tol_min
         p, r = self.p, self.r
         products = p * r
@@ -56,23 +59,28 @@ class DinPc(DIN):
         alpha = feasible(reduce, (p, dp), (r, dr))
         mu_affine = reduce.dot(p + alpha * dp, r + alpha * dr) / n
         sigma = float(np.clip(mu_affine / mu, 0.0, 1.0)) ** 3
-        dp, dr, more = self.system.resolve(-self.F1, sigma * mu - products - dp * dr, rtol)
+        second_order = dp * dr
 
-        with self.system.stages("step length"):
-            # Towards a full step near the solution, where the products vanish: superlinear convergence needs it.
-            near = max(self.boundary, 1.0 - mu)
+        def central(alpha: float) -> bool:
+            trial: tuple[Array, Array] = (p + alpha * dp, r + alpha * dr)
+            return self.central.holds(trial[0] * trial[1], reduce.norm(self.problem.flow(*trial)))
+
+        # Towards a full step near the solution, where the products vanish: superlinear convergence needs it.
+        near = max(self.boundary, 1.0 - mu)
+        for floor in CENTRING:
+            sigma = max(sigma, floor)
+            dp, dr, more = self.system.resolve(-self.F1, sigma * mu - products - second_order, rtol)
+            its += more
             alpha = feasible(reduce, (p, dp / near), (r, dr / near))  # near times the step to the boundary, at most 1
-
-            def central(alpha: float) -> bool:
-                trial: tuple[Array, Array] = (p + alpha * dp, r + alpha * dr)
-                return self.central.holds(trial[0] * trial[1], reduce.norm(self.problem.flow(*trial)))
-
+            if central(alpha):
+                break
+        with self.system.stages("step length"):
             alpha, cuts = halve_until(central, alpha)
             self.p, self.r = p + alpha * dp, r + alpha * dr
             self.F1 = self.problem.flow(self.p, self.r)
             self.norm = reduce.norm(self.F1, self.p * self.r)
             step_norm = alpha * reduce.norm(dp, dr)
-        return Step(self.norm, step_norm, alpha, its + more, cuts, 0, sigma, rtol)
+        return Step(self.norm, step_norm, alpha, its, cuts, 0, sigma, rtol)
 
 
 def build(
