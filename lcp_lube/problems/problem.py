@@ -165,8 +165,8 @@ class LubricationProblem:
     def prolong(self, coarse: "LubricationProblem", fields: Fields, interior: bool) -> Fields:
         """p and r on this grid from a coarser one, by interpolating z = p/P - r/R bilinearly (P, R: largest p and r).
 
-        interior: p, r = (+-z + sqrt(z^2 + 4 m))/2, off the boundary with products p r = m P R. The front is known to a mesh H of
-        the coarse grid, where p ~ (H/L)^2 and r ~ H/L: m = 10 (H/L)^3, at most 1e-3. Collective.
+        interior: p, r = (+-z + sqrt(z^2 + 4 m))/2, off the boundary with products p r = m P R. The front is known to a mesh
+        H of the coarse grid, where p ~ (H/L)^2 and r ~ H/L: m = 10 (H/L)^3, at most 1e-3. Collective.
         """
         P = coarse.reduce.max(fields["p"]) or 1.0
         R = coarse.reduce.max(fields["r"]) or 1.0
