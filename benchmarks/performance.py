@@ -2,8 +2,8 @@
 
     python benchmarks/performance.py [EXPERIMENT ...] [--quick] [--repeats 3] [--results DIR]
 
-Experiments: grids, films, peers, tables, line, cycles (see EXPERIMENTS). Every case is a process of its own, so that its peak
-memory is its own; whatever is divided by one another ran alternately in that process. Seconds are medians, by the clock and of
+Experiments: grids, films, peers, tables, line, cycles, krylov (see EXPERIMENTS). Every case is a process of its own, so that
+its peak memory is its own; whatever is divided by one another ran alternately in that process. Seconds are medians, by the clock and of
 the processor: the second one is to be trusted where other jobs were on the machine (`load`). Cases that stand in
 performance.csv (or peers.csv) already are not run again.
 """
@@ -202,6 +202,12 @@ def near_null_cycles(case: Case, repeats: int) -> dict[str, Values]:
     return out
 
 
+def true_tolerance(case: Case, repeats: int) -> dict[str, Values]:
+    """The default solve with every inner solve to 1e-8: are the Krylov iterations of a step bounded on every grid?"""
+    with options({"ksp_rtol": "1e-8"}):
+        return alone(case, 1)
+
+
 # Cells a side, and the peers that can do it in reasonable time.
 PEER_SETS = (
     (1, "scipy ssls rsls tao_ssils"),
@@ -219,6 +225,7 @@ EXPERIMENTS: dict[str, Callable[[Case, int], dict[str, Values]]] = {
     "tables": every_recipe,
     "line": alone,
     "cycles": near_null_cycles,
+    "krylov": true_tolerance,
 }
 
 
@@ -243,6 +250,10 @@ def cases(experiment: str, quick: bool) -> Iterator[Case]:
     elif experiment == "line":
         for name in ("problem1", "problem3"):
             yield Case(experiment, name, {"n": 2000 if quick else 1_000_000}, ("default",))
+    elif experiment == "krylov":
+        for n in (60,) if quick else (200, 400, 800, 1600):
+            for scene in ("textured_slider", "rough", "journal"):
+                yield Case(experiment, scene, {"n": n, "K": n // 25} if scene == "textured_slider" else {"n": n}, ("default",))
     elif experiment == "cycles":
         for scene, changes in (("textured_slider", {"K": 2 if quick else 8}), ("rough", {"n": 50 if quick else 250})):
             yield Case(experiment, scene, changes, ("0", "1", "2", "3"))
