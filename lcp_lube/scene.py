@@ -11,9 +11,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from .errors import InputError, nearest
 from .problems.exact import ExactSolution, exact_solution
 from .problems.film import Wave
-from .problems.grid import Grid
+from .problems.model import Model, Side
 from .problems.problem import LubricationProblem
-from .problems.reynolds import Film, box_scheme
+from .problems.reynolds import Film
 from .problems.solution import Problem
 from .registry import FAMILIES, SCENE_DIR, scene_names
 
@@ -90,6 +90,28 @@ class LubricationScene(Scene):
         """The exact solution; None where none is known."""
         return None
 
+    @property
+    def sides(self) -> tuple[Side, Side, Side, Side]:
+        """West, east, south and north: a pressure each, unless a family says otherwise."""
+        west, east, ends = (Side(p=p) for p in (self.p_a, self.p_b, self.p_side))
+        return west, east, ends, ends
+
+    @property
+    def model(self) -> Model:
+        """What is discretised."""
+        return Model(
+            lengths=(self.L,) if self.dimension == 1 else (self.L, self.width or self.L),
+            sides=self.sides,
+            gap=self.gap,
+            mu=self.mu,
+            U=self.U,
+            p_c=self.p_c,
+            p_unit=self.p_unit,
+            scheme=self.scheme,
+            mean_cubes=self.mean_cubes,
+            exact=self.exact,
+        )
+
     def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
         """The discrete problem on this scene's grid. Collective.
 
@@ -97,31 +119,7 @@ class LubricationScene(Scene):
         ------
         InputError : more ranks than the grid can be dealt to.
         """
-        lengths = (self.L,) if self.dimension == 1 else (self.L, self.width or self.L)
-        grid = Grid(self.shape, lengths, comm)
-        p_sides = (self.p_a, self.p_b, self.p_side, self.p_side)
-        gap = self.gap
-        scheme = box_scheme(
-            grid,
-            gap,
-            mu=self.mu,
-            U=self.U,
-            scheme=self.scheme,
-            p_sides=p_sides,
-            p_unit=self.p_unit,
-            mean_cubes=self.mean_cubes,
-        )
-        return LubricationProblem(
-            grid,
-            scheme,
-            mu=self.mu,
-            U=self.U,
-            p_unit=self.p_unit,
-            p_sides=p_sides,
-            p_c=self.p_c,
-            film=gap,
-            exact=self.exact,
-        )
+        return self.model.build(self.shape, comm)
 
 
 class SliderScene(LubricationScene):

@@ -105,8 +105,8 @@ def taken(n: int, step: int) -> np.ndarray:
 def coordinates(grid: Grid, stride: tuple[int, int] = (1, 1)) -> tuple[Array, ...]:
     """Coordinates x, and y in 2D, of the points that `gather` returns, in metres; on every rank."""
     return tuple(
-        start + (taken(n, step) + 1.0) * spacing
-        for start, n, step, spacing in zip(grid.origin, grid.shape, stride, grid.spacing, strict=False)
+        start + (taken(n, step) + offset) * spacing
+        for start, n, step, offset, spacing in zip(grid.origin, grid.shape, stride, grid.offset, grid.spacing, strict=False)
     )
 
 

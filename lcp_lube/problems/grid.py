@@ -13,6 +13,12 @@ from ..parallel import Array, Reduce
 
 BYTES_PER_POINT = 250  # of the coefficients, A, B and the fields alone: no run needs less
 
+# Where the first point lies, in spacings from its side. open: the side is a neighbour with a given value; closed: it is the
+# outer face of the first cell, through which nothing flows; mirror: the first point lies on it, in half a cell; periodic: the
+# cell at the other end follows.
+OFFSET = {"open": 1.0, "closed": 0.5, "mirror": 0.0, "periodic": 0.5}
+OPEN = ("open", "open")
+
 
 class Grid:
     """Interior points x_i = i dx, dx = L/(nx+1) (and y_j = j dy, dy = Ly/(ny+1)) of a line or a rectangle.
@@ -26,10 +32,11 @@ class Grid:
     lengths : side lengths in metres, (L,) or (L, Ly).
     comm : PETSc communicator; default all ranks.
     origin : coordinates of the corner x = y = 0 of the description above, in metres.
+    ends : kinds (`OFFSET`) of the two ends in x and in y; spacings and first points as above are those of open ends.
 
     Raises
     ------
-    InputError : fewer than one point a side, more points than fit, or more ranks than the points can be dealt to.
+    InputError : fewer than one point a side (periodic: 3), more points than fit, or more ranks than the points can be dealt to.
     """
 
     def __init__(
@@ -38,13 +45,21 @@ class Grid:
         lengths: Sequence[float],
         comm: PETSc.Comm | None = None,
         origin: tuple[float, float] = (0.0, 0.0),
+        ends: tuple[tuple[str, str], tuple[str, str]] = (OPEN, OPEN),
     ):
         if any(n < 1 for n in shape):
             raise InputError(f"grid {'x'.join(map(str, shape))}: at least 1 interior point a side is needed")
         self.shape = tuple(int(n) for n in shape)
         self.lengths = tuple(float(length) for length in lengths)
-        self.spacing = tuple(length / (n + 1) for length, n in zip(self.lengths, self.shape, strict=True))
         self.dim = len(self.shape)
+        self.ends = ends[: self.dim]
+        self.periodic = tuple("periodic" in pair for pair in self.ends)
+        if any(periodic and n < 3 for periodic, n in zip(self.periodic, self.shape, strict=True)):
+            raise InputError(f"grid {'x'.join(map(str, shape))}: at least 3 points between periodic sides are needed")
+        self.offset = tuple(OFFSET[first] for first, _ in self.ends)
+        # Spacings from side to side.
+        self.meshes = tuple(n + OFFSET[a] + OFFSET[b] - 1.0 for n, (a, b) in zip(self.shape, self.ends, strict=True))
+        self.spacing = tuple(length / meshes for length, meshes in zip(self.lengths, self.meshes, strict=True))
         self.origin = origin
         self.size = math.prod(self.shape)
         comm = comm or PETSc.COMM_WORLD
@@ -60,6 +75,7 @@ class Grid:
                 dof=1,
                 stencil_width=1,
                 stencil_type=PETSc.DMDA.StencilType.STAR,
+                boundary_type=tuple("periodic" if periodic else "none" for periodic in self.periodic),
                 comm=comm,
             )
         except PETSc.Error:
@@ -103,14 +119,28 @@ class Grid:
     @property
     def x(self) -> Array:
         """Owned x coordinates in metres, shape (1, nx_local)."""
-        return self.origin[0] + (np.arange(self.x_start, self.x_end) + 1.0)[None, :] * self.spacing[0]
+        return self.origin[0] + (np.arange(self.x_start, self.x_end) + self.offset[0])[None, :] * self.spacing[0]
 
     @property
     def y(self) -> Array:
         """Owned y coordinates in metres, shape (ny_local, 1); 0 in 1D."""
         if self.dim == 1:
             return np.zeros((1, 1))
-        return self.origin[1] + (np.arange(self.y_start, self.y_end) + 1.0)[:, None] * self.spacing[1]
+        return self.origin[1] + (np.arange(self.y_start, self.y_end) + self.offset[1])[:, None] * self.spacing[1]
+
+    def nodes_and_faces(self, side: int) -> tuple[Array, Array]:
+        """Coordinates in x (side 0) or y (1) of the owned points with a neighbour before and behind, and of the faces between.
+
+        Each comes from its number alone, so that the two cells of a face see the same film even where it jumps there, and what
+        leaves one cell enters the next. Nothing lies beyond a closed or mirror end: its own coordinate stands there.
+        """
+        start, end = ((self.x_start, self.x_end), (self.y_start, self.y_end))[side]
+        points, faces, n, offset = np.arange(start - 1, end + 1), np.arange(start, end + 1), self.shape[side], self.offset[side]
+        if self.periodic[side]:
+            points, faces = points % n, faces % n
+        lines = (np.clip(k + shift, 0.0, self.meshes[side]) for k, shift in ((points, offset), (faces, offset - 0.5)))
+        at_points, at_faces = (self.origin[side] + line * self.spacing[side] for line in lines)
+        return at_points, at_faces
 
     def ghosted(self, owned: Array, outside: float = np.nan) -> Array:
         """Owned values with one layer of the neighbours' around them, `outside` beyond the domain.

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse
+from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
@@ -63,8 +64,9 @@ def box_scheme(
     p_sides: tuple[float, float, float, float],
     p_unit: float,
     mean_cubes: bool = False,
+    r_in: float = 0.0,
 ) -> BoxScheme:
-    """Coefficients of the box scheme on the owned points.
+    """Coefficients of the box scheme on the owned points; the grid's ends say what its sides are.
 
     Parameters
     ----------
@@ -72,25 +74,48 @@ def box_scheme(
     mu, U : viscosity in Pa s, speed of the moving wall in m/s (U > 0: the flow goes to larger x).
     scheme : form of the Couette flux. 'nodal' (paper, eq. 7): U (h_face - (h r)_upwind); 'face': U h_face (1 - r_upwind);
         'upwind': U (h (1 - r))_upwind.
-    p_sides : Dirichlet pressures above the cavitation pressure at west, east, south, north in Pa (south, north: 2D only).
+    p_sides : Dirichlet pressures above the cavitation pressure at west, east, south, north in Pa (south, north: 2D only);
+        read where the grid's end is open.
     p_unit : pressure unit in Pa; p in the equations is measured in it.
     mean_cubes : take h^3 at a face as the mean of the nodal values (scene 5) instead of the film at the face.
+    r_in : void fraction that enters at an open west side.
 
     Raises
     ------
     InputError : a film that is not positive, or data so large or small that a coefficient overflows or vanishes.
     """
     with np.errstate(all="ignore"):
-        box = _coefficients(grid, film, mu, U, scheme, p_sides, p_unit, mean_cubes)
+        box = _coefficients(grid, film, mu, U, scheme, p_sides, p_unit, mean_cubes, r_in)
     reduce = grid.reduce
     faces = [box.k_W, box.k_E] + ([box.k_S, box.k_N] if grid.dim == 2 else [])
-    smallest, largest = min(map(reduce.min, [box.h, *faces])), max(map(reduce.max, [*faces, np.abs(box.b_C), np.abs(box.c)]))
+    conducting = [np.where(wall, np.inf, k) for wall, k in zip(sides(grid, ("closed", "mirror")), faces, strict=False)]
+    smallest = min(map(reduce.min, [box.h, *conducting]))
+    largest = max(map(reduce.max, [*faces, np.abs(box.b_C), np.abs(box.c)]))
     if not (smallest > 1 / LARGE and largest < LARGE):
+        with np.errstate(all="ignore"):
+            check_film(grid, film)
         raise InputError(
             f"film {reduce.min(box.h):g} to {reduce.max(box.h):g} m, mu = {mu:g} Pa s, U = {U:g} m/s, p_unit = {p_unit:g} Pa: "
             f"flow balance with coefficients {smallest:g} to {largest:g}, allowed are {1 / LARGE:g} to {LARGE:g} (SI units?)"
         )
     return box
+
+
+def check_film(grid: Grid, film: Film) -> None:
+    """Raise InputError with the place where the film is thinnest, unless it is positive on all nodes and faces. Collective."""
+    x_nodes, x_faces = grid.nodes_and_faces(0)
+    y_nodes, y_faces = grid.nodes_and_faces(1) if grid.dim == 2 else (np.zeros(1), np.zeros(1))
+    lowest = (np.inf, 0.0, 0.0)
+    for x, y in ((x_nodes, y_nodes), (x_faces, y_nodes), (x_nodes, y_faces)):
+        x, y = x[None, :], y[:, None]
+        h = np.nan_to_num(np.broadcast_to(film(x, y), (y.size, x.size)), nan=-np.inf, posinf=np.inf, neginf=-np.inf)
+        j, i = np.unravel_index(np.argmin(h), h.shape)
+        lowest = min(lowest, (float(h[j, i]), float(x[0, i]), float(y[j, 0])))
+    h_min, at_x, at_y = grid.comm.allreduce(lowest, MPI.MIN)
+    if not h_min > 0:
+        where = f"x = {at_x:g}" + (f", y = {at_y:g}" if grid.dim == 2 else "")
+        found = f"{h_min:g} m" if np.isfinite(h_min) else "no number"
+        raise InputError(f"film {found} at {where} m: it must be positive everywhere")
 
 
 def _coefficients(
@@ -102,11 +127,10 @@ def _coefficients(
     p_sides: tuple[float, float, float, float],
     p_unit: float,
     mean_cubes: bool,
+    r_in: float,
 ) -> BoxScheme:
-    # Nodes with their outer neighbours, and faces: each coordinate comes from its number alone, so that the two cells of a
-    # face see the same film even where it jumps there, and what leaves one cell enters the next.
     dx, (ny, nx) = grid.spacing[0], grid.box
-    x_nodes, x_faces = (grid.origin[0] + i * dx for i in _numbers(grid.x_start, grid.x_end))
+    x_nodes, x_faces = grid.nodes_and_faces(0)
     x, y = x_nodes[None, 1:-1], grid.y
     h_x = np.broadcast_to(film(x_nodes[None, :], y), (ny, nx + 2))
     h_face = np.broadcast_to(film(x_faces[None, :], y), (ny, nx + 1))
@@ -125,7 +149,7 @@ def _coefficients(
     k_W, k_E = (k * cube / dx for cube in cubes(h_face, h_x, 1))
     if grid.dim == 2:
         dy = grid.spacing[1]
-        y_nodes, y_faces = (grid.origin[1] + j * dy for j in _numbers(grid.y_start, grid.y_end))
+        y_nodes, y_faces = grid.nodes_and_faces(1)
         h_y = np.broadcast_to(film(x, y_nodes[:, None]), (ny + 2, nx))
         at_y_faces = np.broadcast_to(film(x, y_faces[:, None]), (ny + 1, nx))
         k_S, k_N = (k * cube * dx / dy**2 for cube in cubes(at_y_faces, h_y, 0))
@@ -142,7 +166,20 @@ def _coefficients(
         b_C, b_W = -couette_E, couette_W
     else:
         b_C, b_W = -U * h, U * h_W
-    b_W = np.where(first, 0.0, b_W)  # r = 0 on the inflow boundary
+    open_west, *_ = sides(grid)
+    if r_in:
+        couette_W = couette_W - np.where(open_west, b_W * r_in, 0.0)
+    if not grid.periodic[0]:
+        b_W = np.where(first, 0.0, b_W)  # what enters is in c
+    if any(end != "open" for pair in grid.ends for end in pair):
+        # Column sums stay >= 0, those of A and B are 0 in the cells away from open sides. b_C stays at a closed east side: in
+        # every solution with flow r is 0 there, as what arrives must be pressed back.
+        west, east, south, north = sides(grid, ("closed", "mirror"))
+        k_W, k_E = np.where(west, 0.0, k_W), np.where(east, 0.0, k_E)
+        k_S, k_N = np.where(south, 0.0, k_S), np.where(north, 0.0, k_N)
+        couette_W, couette_E = np.where(west, 0.0, couette_W), np.where(east, 0.0, couette_E)
+        half = np.where(sides(grid, ("mirror",))[3], 0.5, 1.0)  # the cells of the line on the mirror
+        k_W, k_E, b_C, b_W, couette_W, couette_E = (half * a for a in (k_W, k_E, b_C, b_W, couette_W, couette_E))
 
     c = couette_W - couette_E
     for conductance, at_side, p_side in zip((k_W, k_E, k_S, k_N), sides(grid), p_sides, strict=True):
@@ -150,19 +187,14 @@ def _coefficients(
     return BoxScheme(k_W, k_E, k_S, k_N, b_C, b_W, c, couette_W, couette_E, h)
 
 
-def _numbers(start: int, end: int) -> tuple[Array, Array]:
-    """Numbers, in spacings from the boundary, of the nodes from point start - 1 to end, and of the faces between them."""
-    return np.arange(start - 1, end + 1) + 1.0, np.arange(start, end + 1) + 0.5
-
-
-def sides(grid: Grid) -> tuple[NDArray[np.bool_], ...]:
-    """Masks (they broadcast to `grid.box`) of the owned points next to the west, east, south and north side."""
+def sides(grid: Grid, kinds: Sequence[str] = ("open",)) -> tuple[NDArray[np.bool_], ...]:
+    """Masks (they broadcast to `grid.box`) of the owned points at the west, east, south and north end, if of these kinds."""
     i = np.arange(grid.x_start, grid.x_end)[None, :]
     j = np.arange(grid.y_start, grid.y_end)[:, None]
-    if grid.dim == 1:
-        none = np.zeros((1, 1), dtype=bool)
-        return i == 0, i == grid.shape[0] - 1, none, none
-    return i == 0, i == grid.shape[0] - 1, j == 0, j == grid.shape[1] - 1
+    masks = [i == 0, i == grid.shape[0] - 1]
+    masks += [j == 0, j == grid.shape[1] - 1] if grid.dim == 2 else [np.zeros((1, 1), dtype=bool)] * 2
+    found = [end in kinds for pair in grid.ends for end in pair] + [False, False]
+    return tuple(mask & is_found for mask, is_found in zip(masks, found, strict=False))
 
 
 def coo(grid: Grid, entries: Sequence[tuple[int, int, NDArray]]) -> Iterator[tuple[NDArray, NDArray, NDArray]]:

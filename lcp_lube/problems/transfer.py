@@ -31,7 +31,7 @@ class Transfer:
         weights = scipy.sparse.csr_matrix([[1.0]])
         for side in range(fine.dim):
             points = np.arange(*ranges[side])
-            along = _weights(points, coarse.shape[side], fine.shape[side], nearest, zero_boundary)
+            along = _weights(points, coarse, fine, side, nearest, zero_boundary)
             weights = scipy.sparse.kron(along, weights, format="csr")
         weights.indices = coarse.dm.getAO().app2petsc(weights.indices.astype(PETSc.IntType))
         weights.has_sorted_indices = False
@@ -58,19 +58,26 @@ class Transfer:
             obj.destroy()
 
 
-def _weights(fine: np.ndarray, n_coarse: int, n_fine: int, nearest: bool, zero_boundary: bool) -> scipy.sparse.csr_matrix:
-    """Linear interpolation along one side as a matrix, a row for each index in `fine`, a column for each coarse point."""
-    # Fine point i lies at (left + part / (n_fine + 1)) coarse spacings: integers, so that nested points get one weight, 1.
-    left, part = np.divmod((fine + 1) * (n_coarse + 1), n_fine + 1)
-    right = part / (n_fine + 1)
+def _weights(
+    points: np.ndarray, coarse: Grid, fine: Grid, side: int, nearest: bool, zero_boundary: bool
+) -> scipy.sparse.csr_matrix:
+    """Linear interpolation along one side as a matrix, a row for each of the fine points, a column for each coarse one."""
+    n_coarse = coarse.shape[side]
+    # Fine point i lies left + part / meshes coarse spacings behind the first coarse point: integers (offsets are multiples of
+    # 1/2), so that nested points get one weight, 1.
+    offset, offset_coarse, meshes, meshes_coarse = (
+        round(2 * a) for a in (fine.offset[side], coarse.offset[side], fine.meshes[side], coarse.meshes[side])
+    )
+    left, part = np.divmod((2 * points + offset) * meshes_coarse - offset_coarse * meshes, 2 * meshes)
+    right = part / (2 * meshes)
     if nearest:
         right = np.rint(right)
-    rows = np.concatenate([np.arange(fine.size)] * 2)
-    columns = np.concatenate([left - 1, left])
+    rows = np.concatenate([np.arange(points.size)] * 2)
+    columns = np.concatenate([left, left + 1])
     values = np.concatenate([1.0 - right, right])
     if zero_boundary:
         used = (columns >= 0) & (columns < n_coarse) & (values > 0)
     else:
-        columns = np.clip(columns, 0, n_coarse - 1)
+        columns = columns % n_coarse if fine.periodic[side] else np.clip(columns, 0, n_coarse - 1)
         used = values > 0
-    return scipy.sparse.csr_matrix((values[used], (rows[used], columns[used])), shape=(fine.size, n_coarse))
+    return scipy.sparse.csr_matrix((values[used], (rows[used], columns[used])), shape=(points.size, n_coarse))
