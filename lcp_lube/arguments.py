@@ -82,7 +82,7 @@ def _free_scene(own: list[str], petsc: list[str]) -> None:
     def is_scene(word: str) -> bool:
         return word.endswith(".toml") or word in scene_names()
 
-    if own[:1] not in (["solve"], ["compare"]) or any(is_scene(word) for word in own):
+    if own[:1] not in (["solve"], ["compare"], ["sweep"]) or any(is_scene(word) for word in own):
         return
     taken = [k for k, word in enumerate(petsc) if is_scene(word) and petsc[k - 1] != "-options_file"]
     if len(taken) == 1:
@@ -122,11 +122,34 @@ def parse(own: list[str]) -> argparse.Namespace:
     solve.add_argument("--explain", action="store_true", help="say on stderr what was chosen, and why")
     solve.add_argument("--monitor", action="store_true", help="a line an iteration on stderr")
 
+    solve.add_argument("--checkpoint", metavar="FILE", help="save the iterate here, in one piece, so that --resume can go on")
+    solve.add_argument("--every", type=int, metavar="N", help="a checkpoint after every N steps, default 1")
+    solve.add_argument("--resume", metavar="FILE", help="go on from a checkpoint of this scene, on any number of ranks")
+
     compare = command("compare", "several methods and recipes on one scene, in one table")
     _scene_options(compare)
     compare.add_argument("--methods", default="din", metavar="A,B,...", help="default din")
     compare.add_argument("--recipes", default="", metavar="A,B,...", help="default: the default recipe")
     compare.add_argument("--json", action="store_true", help="a JSON list of the runs")
+
+    sweep = command("sweep", "a scene at many values of its keys: one csv row a point, warm starts")
+    _scene_options(sweep)
+    sweep.add_argument("--method", default="auto", help="see 'lcp-lube list'; default auto")
+    sweep.add_argument("--recipe", help="inner solver: options/NAME.opts; explicit PETSc options win over it")
+    sweep.add_argument(
+        "--vary",
+        action="append",
+        required=True,
+        metavar="KEY=FROM:TO:N",
+        help="N values from FROM to TO, both among them (FROM:TO:N:log: at equal ratios), or a list A,B,C; several --vary: all "
+        "combinations, the last varying fastest",
+    )
+    sweep.add_argument(
+        "--output", type=Path, metavar="FILE.csv", help="filled row by row; points that stand there are not solved again"
+    )
+    sweep.add_argument(
+        "--warm", action=argparse.BooleanOptionalAction, default=True, help="start from the neighbour's answer; default yes"
+    )
 
     table = command("table", "reproduce a published table beside the printed one")
     table.add_argument("number", type=int, metavar="K")

@@ -45,13 +45,13 @@ def say(text: str) -> None:
             raise InputError(f"standard output: {error.strerror}") from None
 
 
-def scene_of(args: argparse.Namespace) -> Scene:
-    """The scene with the command line's changes."""
+def scene_of(args: argparse.Namespace, more: dict[str, Any] | None = None) -> Scene:
+    """The scene with the command line's changes, and more of them."""
     changes = parse_changes(scene_changes(args)[0])
     for key in ("n", "nx", "ny", "film"):
         if getattr(args, key) is not None:
             changes[key] = getattr(args, key)
-    return load_scene(args.scene, changes)
+    return load_scene(args.scene, {**changes, **(more or {})})
 
 
 def stopping_of(args: argparse.Namespace) -> dict[str, Any]:
@@ -93,6 +93,8 @@ def solution_of(args: argparse.Namespace, monitor: Monitor | None = None) -> Sol
 
 
 def run_solve(args: argparse.Namespace) -> int:
+    if args.every is not None and args.checkpoint is None:
+        raise InputError("--every: --checkpoint FILE is needed too")
     from .output import files
 
     for path in args.output:
@@ -185,6 +187,12 @@ def run_doctor(args: argparse.Namespace) -> int:
     return run(args)
 
 
+def run_sweep(args: argparse.Namespace) -> int:
+    from .sweep import run
+
+    return run(args)
+
+
 def run_list(args: argparse.Namespace) -> int:
     groups = {
         "scenes": {name: scene_line(name) for name in scene_names()},
@@ -202,6 +210,7 @@ def run_list(args: argparse.Namespace) -> int:
 COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "solve": run_solve,
     "compare": run_compare,
+    "sweep": run_sweep,
     "table": run_table,
     "chart": run_chart,
     "doctor": run_doctor,

@@ -2,7 +2,7 @@
 
 import csv
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,15 +25,19 @@ class ResumableCsv:
     columns : names of all columns; a row leaves some of them out, they stay empty.
     key : the columns that tell one row from another.
     comm : the ranks that work together; every method but `find` is collective.
+    growing : columns that the file has, and those that new rows bring, are added to `columns`.
 
     Raises
     ------
     InputError : the file cannot be read, or is no csv with these keys.
     """
 
-    def __init__(self, path: Path, columns: Sequence[str], key: Sequence[str], comm: MPI.Comm = MPI.COMM_WORLD):
-        self.path, self.columns, self.key, self.comm = path, list(columns), list(key), comm
+    def __init__(
+        self, path: Path, columns: Sequence[str], key: Sequence[str], comm: MPI.Comm = MPI.COMM_WORLD, growing: bool = False
+    ):
+        self.path, self.columns, self.key, self.comm, self.growing = path, list(columns), list(key), comm, growing
         self.rows: list[Row] = self._on_rank_0(self._read)
+        self._grow(name for row in self.rows[:1] for name in row)
 
     def find(self, **key: object) -> Row | None:
         """The row with these keys, its values as text."""
@@ -47,6 +51,7 @@ class ResumableCsv:
         ------
         InputError : the file cannot be written.
         """
+        self._grow(values)
         row = {name: "" if values.get(name) is None else str(values[name]) for name in self.columns}
         row = self.comm.bcast(row)  # seconds differ from rank to rank
         old = self.find(**{name: row[name] for name in self.key})
@@ -54,8 +59,17 @@ class ResumableCsv:
             self.rows.append(row)
         else:
             self.rows[self.rows.index(old)] = row
-        self._on_rank_0(self._write)
+        self.write()
         return row
+
+    def write(self) -> None:
+        """Replace the file; to be called before a long run, to hear whether it can be written.
+
+        Raises
+        ------
+        InputError : it cannot.
+        """
+        self._on_rank_0(self._write)
 
     def _read(self) -> list[Row]:
         if not self.path.exists():
@@ -65,7 +79,12 @@ class ResumableCsv:
             missing = set(self.key) - set(reader.fieldnames or ())
             if missing:
                 raise InputError(f"{self.path}: no csv of this experiment, it has no column {sorted(missing)[0]}; move it away")
-            return [{name: row.get(name) or "" for name in self.columns} for row in reader]
+            names = dict.fromkeys([*self.columns, *(reader.fieldnames or ())]) if self.growing else self.columns
+            return [{name: row.get(name) or "" for name in names} for row in reader]
+
+    def _grow(self, names: Iterable[str]) -> None:
+        if self.growing:
+            self.columns += [name for name in names if name not in self.columns]
 
     def _write(self) -> None:
         self.path.parent.mkdir(parents=True, exist_ok=True)
