@@ -126,6 +126,14 @@ METHODS: dict[str, MethodEntry] = {
         interior=False,
         eps=(1e-10, inf),
     ),
+    "monotone": MethodEntry(
+        "lcp_lube.solvers.monotone:build",
+        "policy iteration from above: slow on hard films, but proved to end on every one",
+        systems=("reduced",),
+        nested=True,
+        nested_above=200,
+        interior=False,
+    ),
     "fbn-a": MethodEntry("lcp_lube.solvers.fischer:build_armijo", "Fischer-Burmeister Newton, Armijo rule on ||F||^2/2"),
     "fbn-i": MethodEntry("lcp_lube.solvers.fischer:build_inexact", "Fischer-Burmeister Newton, inexact decrease of ||F||"),
     "newton": MethodEntry(

@@ -1,0 +1,182 @@
+"""Monotone iteration that ends for every film: policy iteration on G from above, each policy's model solved from below.
+
+In scaled unknowns (s = diag A/diag(-B), so that both kinds of columns have A's diagonal d) a cell's balance reads
+
+    G(z)_i = d_i z_i - f_w(z_west) - sum over east, south, north of k max(z_j, 0) - c_i,    f_w(z) = min(k z, d_west z):
+
+what arrives from the west is concave, what arrives from the others convex. Replace f_w by one of its two branches, k z where
+the cell to the west is not known to be cavitated, d z where it is (the policy X): as f_w is the smaller one, the solution of
+this model is a supersolution of G, and every cell where it is negative is cavitated in the solution itself. So X only grows,
+at most n times, and where it does not the model is G. The model is a convex problem: Newton's method (Howard's policy
+iteration) solves it in finitely many steps, from below. Proofs: docs/guaranteed_bounds.md. Neither a line search nor a good
+start is needed; sweeps of nonlinear Gauss-Seidel keep supersolutions and carry the void downstream, which saves steps.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..linear.krylov import Krylov
+from ..linear.reduced import ReducedSystem
+from ..linear.stages import Stages
+from ..parallel import Array
+from ..problems.problem import LubricationProblem
+from ..problems.solution import Fields, Step
+from .method_options import make_options
+from .newton import Stopping
+from .relaxation import relaxation
+
+EPS = float(np.finfo(float).eps)
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class MonotoneOptions:
+    """sweeps: of relaxation from each supersolution, 0: none; rtol: relative tolerance of iterative inner solves."""
+
+    sweeps: int = 32
+    rtol: float = 1e-10
+
+    def __post_init__(self) -> None:
+        if self.sweeps < 0:
+            raise InputError(f"monotone.sweeps = {self.sweeps}: at least 0 is needed")
+        if not 0 < self.rtol < 1:
+            raise InputError(f"monotone.rtol = {self.rtol}: allowed are numbers between 0 and 1")
+
+
+class ModelSystem(ReducedSystem):
+    """The models' Newton matrices: column j hands k to the east or, if cavitated, d; to the other sides k or nothing."""
+
+    def __init__(self, problem: LubricationProblem, stages: Stages):
+        super().__init__(problem, stages)
+        self._carried = self._b_entries != 0.0  # the diagonal and what a cell receives from the west
+        self._s = self._diagonal_A / self._diagonal_B
+
+    def solve_model(self, cavity: Mask, full: Mask, rtol: float) -> tuple[Array, int]:
+        """z with (model's Jacobian) z = c for these policies, and the number of linear iterations. Collective.
+
+        Raises
+        ------
+        LinearSolverError : breakdown, a failed factorisation, or a result that is not finite.
+        """
+        grid = self.problem.grid
+        with self.stages("Jacobian"):
+            east, others, void = (
+                grid.ghosted(a).ravel()[self._neighbour] for a in (~cavity * 1.0, full * 1.0, cavity * self._s)
+            )
+            values = self._a * np.where(self._carried, east, others) - self._b_entries * void
+            self.mat.setValuesCSR(self._pointers, self._columns, values)
+            self.mat.assemble()
+        self._b.setArray(self.problem.c)
+        with self.stages("KSP"):
+            iterations = self.krylov.solve(self._b, self._x, rtol)
+        return self._x.array_r.copy(), iterations
+
+
+class Monotone:
+    """The supersolutions z; `newton.iterate` runs it. `norm` is ||G(z)|| / ||c||, as the active set's.
+
+    Parameters
+    ----------
+    start : fields p and r whose cavity is the first policy; cells of it that turn out positive leave it again. Default: none.
+    """
+
+    def __init__(
+        self,
+        problem: LubricationProblem,
+        system: ModelSystem,
+        options: MonotoneOptions,
+        eps1: float,
+        start: Fields | None = None,
+    ):
+        self.problem, self.system, self.options, self.eps1 = problem, system, options, eps1
+        scheme = problem.scheme
+        self.diagonal = (scheme.k_W + scheme.k_E + scheme.k_S + scheme.k_N).ravel()
+        self.s = self.diagonal / -scheme.b_C.ravel()
+        n = problem.grid.local_size
+        z = start["p"] - start["r"] / self.s if start else np.ones(n)
+        self.z = z if np.isfinite(problem.reduce.norm(z)) else np.ones(n)
+        self.cavity: Mask = self.z < 0
+        self._above = False  # whether z is known to be a supersolution
+        self._relaxation = relaxation(problem) if options.sweeps else None
+        self.norm = self._norm()
+
+    @property
+    def fields(self) -> Fields:
+        return {"p": np.maximum(self.z, 0.0), "r": self.s * np.maximum(-self.z, 0.0)}
+
+    @property
+    def krylov(self) -> Krylov:
+        return self.system.krylov
+
+    def destroy(self) -> None:
+        self.system.destroy()
+
+    def _norm(self) -> float:
+        fields, reduce, c = self.fields, self.problem.reduce, self.problem.c
+        G = self.problem.flow(fields["p"], fields["r"])
+        rounding = 16 * EPS * reduce.norm(self.diagonal * np.abs(self.z) + np.abs(c))
+        return reduce.norm(G) / (max(reduce.norm(c), rounding / self.eps1) or 1.0)
+
+    def _any(self, mask: Mask) -> bool:
+        return bool(self.problem.reduce.sum(mask.astype(float)))
+
+    def _solve_policy(self) -> tuple[Array, int]:
+        """The model's solution for the present policy and the number of linear iterations. Collective.
+
+        After the first solve the iterates are subsolutions of the model and only rise: no full cell is given up again.
+        """
+        full, rising, total = (self.z > 0) & ~self.cavity, False, 0
+        while True:
+            z, iterations = self.system.solve_model(self.cavity, full, self.options.rtol)
+            total += iterations
+            positive = (z > 0) & ~self.cavity
+            if rising:
+                positive |= full
+            if not self._any(positive != full):
+                return z, total
+            full, rising = positive, True
+
+    def advance(self) -> Step:
+        """Solve one policy's model, and let the policy grow, or shrink where the start was wrong.
+
+        The step's norm counts as zero when the policy stays as it is: the model is G then, and solved.
+        """
+        before = self.z
+        self.z, iterations = self._solve_policy()
+        with self.system.stages("step length"):
+            self.norm = self._norm()
+            wrong = self.cavity & (self.z > 0)
+            # Once no cell of it is positive, z is a supersolution, and the policy only grows; rounding must not undo that.
+            self._above = self._above or not self._any(wrong)
+            cavity = self.cavity | (self.z < 0) if self._above else self.cavity & ~wrong
+        if self._above and self._relaxation is not None and self.norm > self.eps1:
+            with self.system.stages("relaxation"):
+                fields = self.fields
+                p, r = self._relaxation(fields["p"], fields["r"], self.options.sweeps)
+                cavity |= p - r / self.s < 0
+        changed = self._any(cavity != self.cavity)
+        self.cavity = cavity
+        step_norm = self.problem.reduce.norm(self.z - before) if changed else 0.0
+        return Step(self.norm, step_norm, 1.0, iterations, rtol=self.options.rtol)
+
+
+def build(
+    problem: LubricationProblem,
+    stages: Stages,
+    system: str,
+    options: dict[str, Any],
+    stopping: Stopping,
+    start: Fields | None = None,
+) -> Monotone:
+    """The registry's door. The matrices are the reduced system's in sparsity, but its own.
+
+    Raises
+    ------
+    InputError : an unknown option or a value out of range.
+    """
+    settings = make_options(MonotoneOptions, "monotone", options)
+    return Monotone(problem, ModelSystem(problem, stages), settings, stopping.eps1, start)
