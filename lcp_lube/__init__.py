@@ -15,6 +15,7 @@ _PUBLIC = {
     "Scene": "lcp_lube.scene",
     "load_scene": "lcp_lube.scene",
     "solve": "lcp_lube.api",
+    "solve_to_accuracy": "lcp_lube.accuracy",
     "Solution": "lcp_lube.problems.solution",
 }
 __all__ = [*_PUBLIC, "__version__"]

@@ -116,6 +116,13 @@ def parse(own: list[str]) -> argparse.Namespace:
     solve.add_argument(
         "--certify", action="store_true", help="prove how far the answer is from the exact discrete solution at most (films)"
     )
+    solve.add_argument(
+        "--accuracy",
+        type=float,
+        metavar="TOL",
+        help="finer and finer grids until the load's estimated relative error is below TOL; --n, --nx, --ny: no finer ones",
+    )
+    solve.add_argument("--quantity", metavar="NAME", help="what --accuracy is about: load (default), p_max, friction, ...")
     solve.add_argument("--output", action="append", default=[], metavar="FILE", help=".npz, .vts (ParaView) or .h5")
     solve.add_argument("--plot", metavar="FILE.png", help="picture of p, r and h")
     solve.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")

@@ -35,6 +35,9 @@ class EhlLineScene(Scene):
     def shape(self) -> tuple[int, ...]:
         return (self.n,)
 
+    def with_shape(self, shape: tuple[int, ...]) -> "EhlLineScene":
+        return self.model_copy(update={"n": shape[0]})
+
     def build(self, comm: PETSc.Comm | None = None) -> EhlProblem:
         """The discrete problem. Collective.
 

@@ -44,6 +44,7 @@ def as_dict(solution: Solution) -> dict[str, Any]:
         **certificate.measures,
         "certificate_tol": certificate.tol,
         **(solution.enclosure.as_dict() if solution.enclosure else {}),
+        **{key: settings[key] for key in ("accuracy", "accuracy_quantity", "accuracy_estimate") if key in settings},
         **({"levels": solution.levels} if solution.levels else {}),
         "memory_mb": peak_memory(solution),
         "time_s": {
@@ -151,6 +152,11 @@ def summary(data: dict[str, Any]) -> str:
     ]
     if "load" in data:
         lines[3:3] = _bearing_lines(data, one_d)
+    if "accuracy_estimate" in data:
+        lines.append(
+            f"{data['accuracy_quantity']}: estimated relative error {data['accuracy_estimate']:.1e}, {data['accuracy']:g} was asked "
+            f"for; {len(data['levels'])} grids"
+        )
     if data.get("certified"):
         lines.append(
             f"proved: the exact discrete solution is within {data['band_p']:.1e} Pa of p, {data['band_p_max']:.1e} Pa of "

@@ -60,6 +60,7 @@ class Outcome(StrEnum):
     NOT_FINITE = "not_finite"
     WRONG_SOLUTION = "wrong_solution"
     NO_SOLUTION = "no_solution"
+    ACCURACY = "accuracy_not_reached"
 
     @property
     def sentence(self) -> str:
@@ -71,6 +72,7 @@ class Outcome(StrEnum):
             Outcome.NOT_FINITE: "the iterates overflowed or became NaN",
             Outcome.WRONG_SOLUTION: "the method stopped, but its answer is not a solution",
             Outcome.NO_SOLUTION: "the problem has no solution",
+            Outcome.ACCURACY: "solved, but the accuracy asked for was not reached",
         }[self]
 
 
