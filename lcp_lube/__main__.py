@@ -44,10 +44,10 @@ def main(argv: list[str] | None = None) -> int:
     except MemoryError:
         short = InputError("not enough memory; fewer points or more ranks are needed")
         return _refuse(short, alone=not alarm.all_arrive())
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as interrupt:
         alone = not alarm.all_arrive()
         if alone or alarm.rank == 0:
-            print("lcp-lube: interrupted", file=sys.stderr, flush=True)
+            print("; ".join(["lcp-lube: interrupted", *map(str, interrupt.args)]), file=sys.stderr, flush=True)
         if alone:
             alarm.end_all(130)
         return 130

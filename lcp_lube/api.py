@@ -1,5 +1,7 @@
 """solve(scene) -> Solution: choose method, system and recipe, run the outer loop, certify."""
 
+from dataclasses import astuple
+from pathlib import Path
 from time import perf_counter
 from typing import Any
 
@@ -8,6 +10,7 @@ from petsc4py import PETSc
 
 from .alarm import check_same
 from .auto import default_recipe, plan
+from .checkpoint import CHOICES, Checkpointer, load
 from .errors import InputError
 from .linear.options import recipe
 from .linear.stages import Stages
@@ -18,7 +21,7 @@ from .registry import METHODS
 from .scene import Scene
 from .solvers.enclosure import Enclosure, enclose
 from .solvers.nested import level_shapes
-from .solvers.newton import Monitor, Stopping, iterate
+from .solvers.newton import Monitor, Stopping
 
 # A coarse answer is a start: its front matters, not its last digits. An interior method's layer there must be thin, though.
 COARSE_EPS = {False: 1e-4, True: 1e-8}  # by MethodEntry.interior
@@ -38,6 +41,9 @@ def solve(
     nested: bool | None = None,
     start: tuple[Problem, Fields] | None = None,
     certify: bool = False,
+    checkpoint: str | Path | None = None,
+    every: int = 1,
+    resume: str | Path | None = None,
 ) -> Solution:
     """Solve a scene and certify the answer. Collective.
 
@@ -54,6 +60,8 @@ def solve(
     nested : start from the answers on coarser grids; default: where it pays.
     start : a problem of the same kind on any grid, and fields near the answer, from which its own are interpolated: those of a
         neighbouring scene. They take the coarser grids' place, unless `nested` asks for these.
+    checkpoint, every : write the iterate to this file after every so many steps; see `checkpoint`.
+    resume : go on from such a file, as if the run had not been stopped. What is not given anew is as it was begun with.
     certify : also prove a band around the answer (`Solution.enclosure`), for the price of one linear solve at most.
 
     Returns
@@ -72,6 +80,11 @@ def solve(
         problem = scene.build(comm)
     if start is not None and nested is None:
         nested = False
+    keeper = Checkpointer(checkpoint, every, problem.grid.comm)
+    saved = load(resume, scene, problem.grid.comm) if resume is not None else None
+    if saved is not None:
+        kept = saved.settle(method=method, system=system, recipe=recipe_name, nested=nested, options=options or {})
+        method, system, recipe_name, nested, options = (kept[name] for name in CHOICES)
     chosen = plan(problem, scene.name, method, system, recipe_name, nested, options or ())
     entry = METHODS[chosen.method].of(problem.kind)
     if certify and not isinstance(problem, LubricationProblem):
@@ -80,7 +93,10 @@ def solve(
         stopping = Stopping(**{**dict(zip(("eps1", "eps2"), entry.eps, strict=True)), **(stopping or {})})
     shapes = level_shapes(scene.shape, problem.grid.comm.size) if chosen.nested else [scene.shape]
     near, previous = start, None  # what the next grid starts from, and the problem on the grid before
-    levels = []
+    levels: list[dict[str, Any]] = []
+    if saved is not None:
+        shapes, levels, near = saved.shapes, saved.record["levels"], None
+    keeper.begin(scene, (chosen.method, chosen.system, recipe_name, chosen.nested, options or {}))
     with recipe(chosen.recipe) as recipe_used:
         for shape in shapes:
             finest = shape == shapes[-1]
@@ -95,7 +111,13 @@ def solve(
             level_stopping = stopping if finest else Stopping(coarse_eps, np.inf, stopping.max_it)
             run = entry.load()(level, stages, chosen.system, options or {}, level_stopping, guess)
             try:
-                outcome, message, steps = iterate(run, level_stopping, monitor)
+                if saved is not None and saved.failure:  # the fallback had taken over
+                    outcome, message, steps = saved.failure
+                else:
+                    before = saved.restore(run, level.grid) if saved is not None else []
+                    saved = None
+                    where = {"shapes": shapes[shapes.index(shape) :], "levels": levels}
+                    outcome, message, steps = keeper.iterate(run, level.grid, level_stopping, monitor, before, **where)
                 krylov = run.krylov
                 ksp_type, pc_type = (krylov.ksp_type, krylov.pc_type) if krylov else (None, None)
                 near = (level, run.fields)
@@ -121,7 +143,9 @@ def solve(
             run = rescue.load()(problem, stages, rescue.systems[0], {}, stopping, None if rescue.interior else fields)
             try:
                 failure = message
-                outcome, message, more = iterate(run, stopping, monitor)
+                before = saved.restore(run, problem.grid) if saved is not None else []
+                failed = (outcome, message, [astuple(step) for step in steps])
+                outcome, message, more = keeper.iterate(run, problem.grid, stopping, monitor, before, failed=failed)
             finally:
                 run.destroy()
         fields, steps = run.fields, steps + more

@@ -89,12 +89,15 @@ def solution_of(args: argparse.Namespace, monitor: Monitor | None = None) -> Sol
         monitor=monitor,
         nested=args.nested,
         certify=args.certify,
+        checkpoint=args.checkpoint,
+        every=args.every or 1,
+        resume=args.resume,
     )
 
 
 def run_solve(args: argparse.Namespace) -> int:
-    if args.every is not None and args.checkpoint is None:
-        raise InputError("--every: --checkpoint FILE is needed too")
+    if args.every is not None and (args.checkpoint is None or args.every < 1):
+        raise InputError(f"--every {args.every}: at least 1, and --checkpoint FILE, are needed")
     from .output import files
 
     for path in args.output:

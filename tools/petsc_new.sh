@@ -36,7 +36,8 @@ export PETSC_CONFIGURE_OPTIONS="--with-debugging=0 --with-fortran-bindings=0 --w
 echo "petsc-new: compiling into $venv ..."
 pip install --upgrade 'setuptools<81' wheel cython numpy
 pip install --no-binary mpi4py mpi4py # for Debian's Open MPI, and there for petsc4py to find
-pip install --upgrade --no-build-isolation petsc petsc4py
+pip install --upgrade --no-build-isolation petsc # first: petsc4py is compiled against it
+pip install --upgrade --no-build-isolation petsc4py
 pip install --editable '.[plot,test,fast]'
 "$venv/bin/python" -c '
 from petsc4py import PETSc

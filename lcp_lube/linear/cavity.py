@@ -50,6 +50,8 @@ class CavitySystem:
     InputError : a grid whose x lines are cut by ranks (1D, or fewer y lines than ranks, on more than one rank).
     """
 
+    state: tuple[str, ...] = ("_w", "_full")  # what a step starts from
+
     def __init__(self, problem: LubricationProblem, stages: Stages | None = None):
         self.problem = problem
         self.stages = stages or Stages()
@@ -90,7 +92,7 @@ class CavitySystem:
             self._mat = self._assemble(full, target)
             with self.stages("near-null"):
                 if total > COARSEST:
-                    self._scale(self._mat, full)
+                    self._scale(self._mat, full, CYCLES if changed else 0)
             with self.stages("KSP"):
                 self.krylov = Krylov(self._mat)
         with self.stages("KSP"):
@@ -108,11 +110,12 @@ class CavitySystem:
             rows = self._rows(full, target, first, local, total)
             return PETSc.Mat().createAIJWithArrays(((local, total), (local, total)), rows, comm=comm)
 
-    def _scale(self, S: PETSc.Mat, full: NDArray[np.bool_]) -> None:
-        """Improve w and multiply the columns of S by it. Collective."""
-        hierarchy = NearNull(S, self._column[full], self._line[full])
-        self._w[full] = hierarchy.improve(self._w[full], CYCLES)
-        hierarchy.destroy()
+    def _scale(self, S: PETSc.Mat, full: NDArray[np.bool_], cycles: int) -> None:
+        """Improve w and multiply the columns of S by it; a run that is taken up again has it already. Collective."""
+        if cycles:
+            hierarchy = NearNull(S, self._column[full], self._line[full])
+            self._w[full] = hierarchy.improve(self._w[full], cycles)
+            hierarchy.destroy()
         scaling = S.createVecRight()
         scaling.setArray(self._w[full])
         S.diagonalScale(None, scaling)

@@ -67,6 +67,8 @@ class ActiveSet:
     start : fields p and r, a cell being cavitated where r > 0; default full film at options.p0.
     """
 
+    state: tuple[str, ...] = ("z", "G", "norm", "_best", "_stalled", "_rescue", "_taken", "_sweeps")  # what a step starts from
+
     def __init__(
         self,
         problem: LubricationProblem,

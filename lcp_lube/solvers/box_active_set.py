@@ -52,6 +52,8 @@ class BoxActiveSet:
     start : field v, moved into the bounds; default problem.v0. D is that of the start.
     """
 
+    state: tuple[str, ...] = ("v", "D", "f", "R", "_scale", "norm")  # what a step starts from
+
     def __init__(self, problem: BoxProblem, system: BoxSystem, options: BoxActiveSetOptions, start: Fields | None = None):
         self.problem, self.system, self.options = problem, system, options
         self.v = np.clip(start["v"], problem.lower, problem.upper) if start else problem.v0

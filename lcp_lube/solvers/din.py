@@ -83,6 +83,8 @@ class DIN:
     options : see `DinOptions`.
     """
 
+    state: tuple[str, ...] = ("p", "r", "F1", "norm", "central.tau1", "central.tau2")  # what a step starts from
+
     def __init__(self, problem: LubricationProblem, system: System, options: DinOptions, start: Fields | None = None):
         self.problem, self.system, self.options = problem, system, options
         self.p = start["p"].copy() if start else np.full(problem.grid.local_size, options.p0)

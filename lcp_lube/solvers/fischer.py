@@ -85,6 +85,8 @@ class FischerNewton:
     start : fields p and r to start from; default p0 and r0 everywhere.
     """
 
+    state: tuple[str, ...] = ("p", "r", "F1", "F2", "norm")  # what a step starts from
+
     def __init__(
         self,
         problem: LubricationProblem,

@@ -83,6 +83,8 @@ class Interior:
     InputError : l = u somewhere: the box has no inside.
     """
 
+    state: tuple[str, ...] = ("at", "H", "norm")  # what a step starts from
+
     def __init__(self, problem: BoxProblem, system: BoxSystem, options: InteriorOptions, start: Fields | None = None):
         self.problem, self.system, self.options = problem, system, options
         l, u = problem.lower, problem.upper

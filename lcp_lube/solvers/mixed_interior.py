@@ -76,6 +76,8 @@ class KeptJacobian:
 class MixedInterior(Interior):
     """The iterates of the interior point method from z = max(+-f(v), z0), with Jacobians that may be kept."""
 
+    state: tuple[str, ...] = ()  # a Jacobian kept from earlier steps cannot be made anew
+
     def __init__(
         self,
         problem: BoxProblem,

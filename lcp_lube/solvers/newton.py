@@ -1,6 +1,6 @@
 """The outer loop of every method: step, test, record. A method supplies the step; the loop owns limits and outcomes."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -16,7 +16,11 @@ class NoSolutionError(ArithmeticError):
 
 
 class Method(Protocol):
-    """What the loop and its caller need of a method: ||F|| at the start, one step at a time, and the fields it reached."""
+    """What the loop and its caller need of a method: ||F|| at the start, one step at a time, and the fields it reached.
+
+    A method that can be taken up again (`checkpoint`) names in `state` the attributes that a step starts from: numbers, arrays
+    of this rank's points, or tuples and dataclasses of these; so does the system that it uses. All else they make anew.
+    """
 
     norm: float
 
@@ -47,8 +51,14 @@ class Stopping:
 Monitor = Callable[[int, Step], None]
 
 
-def iterate(method: Method, stopping: Stopping, monitor: Monitor | None = None) -> tuple[Outcome, str, list[Step]]:
+def iterate(
+    method: Method, stopping: Stopping, monitor: Monitor | None = None, before: Sequence[Step] = ()
+) -> tuple[Outcome, str, list[Step]]:
     """Run a method to its end. Collective.
+
+    Parameters
+    ----------
+    before : the steps that a run has made which is taken up again; they count as its own.
 
     Returns
     -------
@@ -56,10 +66,12 @@ def iterate(method: Method, stopping: Stopping, monitor: Monitor | None = None) 
     message : why it ended, as a sentence.
     steps : one record a step.
     """
-    steps: list[Step] = []
-    if not np.isfinite(method.norm):
+    steps = list(before)
+    if not steps and not np.isfinite(method.norm):
         return Outcome.NOT_FINITE, "||F|| at the starting vector is not finite", steps
-    for k in range(1, stopping.max_it + 1):
+    if steps and (end := _end(len(steps), steps[-1], stopping)):
+        return *end, steps
+    for k in range(len(steps) + 1, stopping.max_it + 1):
         try:
             step = method.advance()
         except StepLengthError as error:
@@ -71,9 +83,16 @@ def iterate(method: Method, stopping: Stopping, monitor: Monitor | None = None) 
         steps.append(step)
         if monitor is not None:
             monitor(k, step)
-        if not (np.isfinite(step.norm) and np.isfinite(step.step_norm)):
-            return Outcome.NOT_FINITE, f"step {k}: ||F|| = {step.norm}, ||alpha d|| = {step.step_norm}", steps
-        if step.norm <= stopping.eps1 and step.step_norm <= stopping.eps2:
-            return Outcome.CONVERGED, f"||F|| = {step.norm:.2e}, ||alpha d|| = {step.step_norm:.2e}", steps
+        if end := _end(k, step, stopping):
+            return *end, steps
     last = f" with ||F|| = {steps[-1].norm:.2e}, ||alpha d|| = {steps[-1].step_norm:.2e}" if steps else ""
     return Outcome.MAX_ITERATIONS, f"not converged after {stopping.max_it} iterations{last}", steps
+
+
+def _end(k: int, step: Step, stopping: Stopping) -> tuple[Outcome, str] | None:
+    """How the run ends with this step; None if it goes on."""
+    if not (np.isfinite(step.norm) and np.isfinite(step.step_norm)):
+        return Outcome.NOT_FINITE, f"step {k}: ||F|| = {step.norm}, ||alpha d|| = {step.step_norm}"
+    if step.norm <= stopping.eps1 and step.step_norm <= stopping.eps2:
+        return Outcome.CONVERGED, f"||F|| = {step.norm:.2e}, ||alpha d|| = {step.step_norm:.2e}"
+    return None

@@ -47,6 +47,8 @@ class PlainNewton:
     alpha = 1 for a convex source from below; else it is halved until ||f|| decreases as an inexact Newton step must.
     """
 
+    state: tuple[str, ...] = ("v", "f", "climbing", "norm")  # what a step starts from
+
     def __init__(self, problem: SemilinearProblem, stages: Stages, options: NewtonOptions, start: Fields | None = None):
         self.problem, self.stages, self.options = problem, stages, options
         self.v = start["v"].copy() if start else np.full(problem.grid.local_size, problem.v0)

@@ -71,6 +71,8 @@ class Semismooth:
     start : field v; default problem.v0.
     """
 
+    state: tuple[str, ...] = ("x", "centre", "rho", "_rho0", "_first", "_mark", "_since", "norm")  # what a step starts from
+
     def __init__(self, problem: BoxProblem, stages: Stages, options: SemismoothOptions, start: Fields | None = None):
         self.problem, self.stages, self.options = problem, stages, options
         l, u = problem.lower, problem.upper
