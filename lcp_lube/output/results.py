@@ -154,8 +154,8 @@ def summary(data: dict[str, Any]) -> str:
         lines[3:3] = _bearing_lines(data, one_d)
     if "accuracy_estimate" in data:
         lines.append(
-            f"{data['accuracy_quantity']}: estimated relative error {data['accuracy_estimate']:.1e}, {data['accuracy']:g} was asked "
-            f"for; {len(data['levels'])} grids"
+            f"{data['accuracy_quantity']}: estimated relative error {data['accuracy_estimate']:.1e} "
+            f"({data['accuracy']:g} was asked for), {len(data['levels'])} grids"
         )
     if data.get("certified"):
         lines.append(
