@@ -21,7 +21,7 @@ from .registry import METHODS
 from .scene import Scene
 from .solvers.enclosure import Enclosure, enclose
 from .solvers.nested import level_shapes
-from .solvers.newton import Monitor, Stopping
+from .solvers.newton import Monitor, Stopping, iterate
 
 # A coarse answer is a start: its front matters, not its last digits. An interior method's layer there must be thin, though.
 COARSE_EPS = {False: 1e-4, True: 1e-8}  # by MethodEntry.interior
@@ -135,22 +135,28 @@ def solve(
                 }
             )
     fields, took_over = run.fields, None
-    if outcome is not Outcome.CONVERGED and entry.fallback and set(options or {}) <= {"p0"}:
-        rescue = METHODS[entry.fallback]
+    reached, failures = fields, ""
+    for name in entry.fallback if set(options or {}) <= {"p0"} else ():
+        if outcome is Outcome.CONVERGED:
+            break
+        failures += f"{took_over or chosen.method} failed ({message}); "
+        rescue = METHODS[name]
         # Interior methods converge from anywhere, and only direct inner solves keep up with them on films like this one.
         with recipe(default_recipe(problem, rescue.systems[0], large=False)[0]):
             # An interior method begins anew; another may take up what was reached.
-            run = rescue.load()(problem, stages, rescue.systems[0], {}, stopping, None if rescue.interior else fields)
+            run = rescue.load()(problem, stages, rescue.systems[0], {}, stopping, None if rescue.interior else reached)
             try:
-                failure = message
-                before = saved.restore(run, problem.grid) if saved is not None else []
-                failed = (outcome, message, [astuple(step) for step in steps])
-                outcome, message, more = keeper.iterate(run, problem.grid, stopping, monitor, before, failed=failed)
+                if took_over is None:
+                    before = saved.restore(run, problem.grid) if saved is not None else []
+                    failed = (outcome, message, [astuple(step) for step in steps])
+                    outcome, message, more = keeper.iterate(run, problem.grid, stopping, monitor, before, failed=failed)
+                else:  # a resumed run finds its way here again from the first fallback's last checkpoint
+                    outcome, message, more = iterate(run, stopping, monitor)
             finally:
                 run.destroy()
-        fields, steps = run.fields, steps + more
-        took_over = entry.fallback
-        message = f"{chosen.method} failed ({failure}); {took_over} took over: {message}"
+        fields, steps, took_over = run.fields, steps + more, name
+    if took_over:
+        message = f"{failures}{took_over} took over: {message}"
     certificate = problem.certify(fields, stopping.eps1)
     enclosure: Enclosure | None = None
     if certify and isinstance(problem, LubricationProblem):

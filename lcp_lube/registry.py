@@ -37,7 +37,7 @@ class MethodEntry(Entry):
     kinds are the problems it solves (`Problem.kind`), systems the matrices it can use, its default first; nested: it can
     start from a coarser grid's answer, which must lie strictly inside p, r > 0 if it is an interior method, and does so by
     default on grids of more than `nested_above` points; eps: its default
-    tolerances of ||F|| and ||alpha d||; fallback: the method that takes over where this one fails; variants: the same idea for
+    tolerances of ||F|| and ||alpha d||; fallback: the methods that take over in turn where it fails; variants: the same idea for
     other kinds of problems.
     """
 
@@ -47,7 +47,7 @@ class MethodEntry(Entry):
     nested_above: float = inf
     interior: bool = True
     eps: tuple[float, float] = (1e-8, 1e-8)
-    fallback: str = ""
+    fallback: tuple[str, ...] = ()
     variants: dict[str, "MethodEntry"] = field(default_factory=dict)
 
     def of(self, kind: str) -> "MethodEntry":
@@ -74,7 +74,7 @@ METHODS: dict[str, MethodEntry] = {
         nested=True,
         nested_above=SMALL,
         interior=False,
-        fallback="din-pc",
+        fallback=("din-pc", "monotone"),
         variants={
             "box": MethodEntry(
                 "lcp_lube.solvers.box_active_set:build",
@@ -95,7 +95,7 @@ METHODS: dict[str, MethodEntry] = {
                     systems=("jacobian",),
                     interior=False,
                     eps=(1e-10, inf),
-                    fallback="semismooth",
+                    fallback=("semismooth",),
                 ),
             ),
         },
@@ -114,7 +114,7 @@ METHODS: dict[str, MethodEntry] = {
                 kinds=("mixed", "user"),
                 systems=("jacobian",),
                 eps=(1e-10, 1e-4),
-                fallback="semismooth",
+                fallback=("semismooth",),
             ),
         ),
     ),
