@@ -8,7 +8,11 @@ from films import MU, WIDTH, FilmScene, Knots, L, U, knots, make_problem, pressu
 from hypothesis import given, settings
 
 from lcp_lube import load_scene, solve
+from lcp_lube.linear.stages import Stages
 from lcp_lube.problems.flows import SIDES
+from lcp_lube.problems.model import Model, Side
+from lcp_lube.solvers.active_set import build
+from lcp_lube.solvers.newton import Stopping, iterate
 
 OCTAVES, PER_OCTAVE = (50, 100, 200, 400), 8
 
@@ -144,3 +148,63 @@ def test_fronts_on_the_middle_line_of_a_wide_bearing_are_those_of_the_long_one()
     long = found(load_scene("long_journal", {"n": 199}))
     assert wide["rupture"] == pytest.approx(long["rupture"], abs=1.5 * np.pi * 0.1 / 200)
     assert wide["cavitated_area"] == pytest.approx(wide["cavitated_fraction"] * np.pi * 0.1 * 3.0, rel=0.06)
+
+
+PER_WIDTH = ("load", "friction", "load_above_ambient", "power_loss", "cavitated_area")
+
+
+def on_sides(shape, film, sides, width=WIDTH):
+    """Quantities of a film with sides of any kind; all of them per whole width where half of it is modelled."""
+    model = Model((L, width)[: len(shape)], sides, film, MU, U, 0.0, 1e6, "face")
+    problem = model.build(shape)
+    run = build(problem, Stages(), "reduced", {}, Stopping())
+    outcome, message, _ = iterate(run, Stopping())
+    assert outcome == "converged", message
+    values = problem.quantities(run.fields)
+    run.destroy()
+    problem.destroy()
+    return values
+
+
+def test_closed_mirror_and_periodic_sides():
+    """A film that does not depend on y: between closed or periodic sides it is the 1D film; half of it, up to a mirror or a
+    closed side, is half of the whole."""
+    film, west, east = Knots((2e-5, 1e-5, 2e-5)), Side(p=1e6), Side(p=5e5)
+    line = on_sides((31,), film, (west, east, Side(), Side()))
+    for kinds in (("closed", "closed"), ("periodic", "periodic"), ("closed", "mirror")):
+        wide = on_sides((31, 6), film, (west, east, *map(Side, kinds)))
+        for key in PER_WIDTH:
+            assert wide[key] == pytest.approx(line[key] * WIDTH, rel=1e-7), (kinds, key)
+        assert wide["flow"]["east"] == pytest.approx(line["flow"]["east"] * WIDTH, rel=1e-7)
+        for key in ("p_max", "rupture", "reformation", "cavitated_fraction", "friction_coefficient", "min_h"):
+            assert wide[key] == pytest.approx(line[key], rel=1e-7), (kinds, key)
+    whole = on_sides((31, 7), film, (west, east, Side(p=2e5), Side(p=2e5)))
+    half = on_sides((31, 4), film, (west, east, Side(p=2e5), Side("mirror")), WIDTH / 2)
+    for key in PER_WIDTH:
+        assert 2 * half[key] == pytest.approx(whole[key], rel=1e-7), key
+    assert 2 * half["side_leakage"] == pytest.approx(whole["side_leakage"], rel=1e-7)
+    for key in ("p_max", "p_ambient", "rupture", "reformation", "min_h"):
+        assert half[key] == pytest.approx(whole[key], rel=1e-7), key
+    even = on_sides((31, 8), film, (west, east, Side(p=2e5), Side(p=2e5)))
+    closed = on_sides((31, 4), film, (west, east, Side(p=2e5), Side("closed")), WIDTH / 2)
+    for key in PER_WIDTH:
+        assert 2 * closed[key] == pytest.approx(even[key], rel=1e-7), key
+
+
+def test_periodic_along_the_flow():
+    """A film of constant thickness goes round: Couette shear, no flow through the periodic sides, ambient from the others."""
+    h = 2e-5
+    values = on_sides((12, 5), Knots((h,)), (Side("periodic"), Side("periodic"), Side(p=1e6), Side(p=1e6)))
+    assert values["friction"] == pytest.approx(MU * U / h * L * WIDTH, rel=1e-12)
+    assert values["load"] == pytest.approx(1e6 * L * WIDTH, rel=1e-12)
+    assert values["load_above_ambient"] == pytest.approx(0.0, abs=1e-6) and values["p_ambient"] == 1e6
+    assert values["flow"] == pytest.approx(dict.fromkeys(SIDES, 0.0), abs=1e-15)
+
+
+def test_closed_at_the_end():
+    """What the wall drags to a closed end is pressed back: h^2 dp/dx = 6 mu U, so the drag is 4 mu U L/h."""
+    h = 2e-5
+    values = on_sides((20,), Knots((h,)), (Side(), Side("closed"), Side(), Side()))
+    assert values["friction"] == pytest.approx(4 * MU * U / h * L, rel=1e-9)
+    assert values["load"] == pytest.approx(6 * MU * U / h**2 * L**2 / 2, rel=1e-3)
+    assert values["flow"] == pytest.approx({"west": 0.0, "east": 0.0}, abs=1e-15)

@@ -7,12 +7,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..parallel import Array
+from .grid import Grid
 from .reynolds import sides
 
 if TYPE_CHECKING:
     from .problem import LubricationProblem
 
 SIDES = ("west", "east", "south", "north")
+
+
+def point_weights(grid: Grid) -> Array:
+    """Share of a cell that belongs to each owned point: 1, and 1/2 on a mirror line."""
+    *_, north = sides(grid, ("mirror",))
+    return np.broadcast_to(np.where(north, 0.5, 1.0), grid.box).ravel()
 
 
 def side_flows(problem: LubricationProblem, p: Array, r: Array) -> dict[str, float]:
@@ -47,21 +54,25 @@ def friction(problem: LubricationProblem, p_pa: Array, r: Array) -> float:
     """Drag on the moving wall, N (1D: N/m): integral of mu U (1 - r)/h + (h/2) dp/dx, the void carrying no shear. Collective.
 
     By the midpoint rule over the x faces, where the box scheme knows the liquid's share of the film: it is that of the Couette
-    flow, in the cavity Q/(U h_face). In 2D the strips along the sides y = const have the shear of the lines beside them, and no
-    pressure term, p being constant there.
+    flow, in the cavity Q/(U h_face). In 2D the strips along open sides y = const have the shear of the lines beside them, and
+    no pressure term, p being constant there. The half cells at closed sides have no flow, so h^2 dp/dx = 6 mu U where full.
 
     Parameters
     ----------
     p_pa : pressure in Pa above the cavitation pressure, r : void fraction; owned points.
     """
     grid, s, film = problem.grid, problem.scheme, problem.film
-    dx, muU = grid.spacing[0], problem.mu * problem.U
-    p = p_pa.reshape(grid.box)
+    dx, muU, weight = grid.spacing[0], problem.mu * problem.U, point_weights(grid).reshape(grid.box)
+    p, r = p_pa.reshape(grid.box), r.reshape(grid.box)
     first, last, south, north = sides(grid)
+    walls = sides(grid, ("closed",))[:2]
     p_east = np.where(last, problem.p_sides[1], grid.ghosted(p_pa)[1:-1, 2:])
     h_west, h_east = (np.broadcast_to(film(grid.x + step, grid.y), grid.box) for step in (-dx / 2, dx / 2))
-    liquid = 1.0 + s.b_C * r.reshape(grid.box) / s.couette_E
-    shear = muU * dx * (liquid / h_east + np.where(first, 1.0 / h_west, 0.0))
-    shear *= 1.0 + 0.5 * south + 0.5 * north
-    push = 0.5 * (h_east * (p_east - p) + np.where(first, h_west * (p - problem.p_sides[0]), 0.0))
-    return problem.reduce.sum(shear + push) * (grid.spacing[1] if grid.dim == 2 else 1.0)
+    passes = ~np.broadcast_to(walls[1], grid.box)  # the east face
+    liquid = 1.0 + s.b_C * r / np.where(passes, s.couette_E, np.inf)
+    shear = np.where(passes, liquid / h_east, 0.0) + np.where(first, 1.0 / h_west, 0.0)
+    for wall in walls:
+        shear = shear + np.where(wall, 0.5 * np.where(p > 0, 4.0, 1.0 - r) / s.h, 0.0)
+    push = np.where(passes, 0.5 * h_east * (p_east - p), 0.0) + np.where(first, 0.5 * h_west * (p - problem.p_sides[0]), 0.0)
+    per_row = muU * dx * shear * (1.0 + 0.5 * south + 0.5 * north) + push
+    return problem.reduce.sum(per_row * weight) * (grid.spacing[1] if grid.dim == 2 else 1.0)

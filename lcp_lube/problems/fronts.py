@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..parallel import Array
+from .flows import point_weights
 
 if TYPE_CHECKING:
     from .problem import LubricationProblem
@@ -33,20 +34,22 @@ def fronts(problem: LubricationProblem, p: Array, r: Array) -> tuple[float | Non
     row = row if here else 0
     y = np.full_like(x, grid.y[row, 0])
     z = grid.ghosted(cavity_sign(problem, p, r))[row + 1]
-    z[0] = 1.0 if grid.x_start == 0 else z[0]  # the inflow boundary is full
+    opens = [kind == "open" for kind in grid.ends[0]]
+    z[0] = 1.0 if grid.x_start == 0 and opens[0] else z[0]  # the inflow boundary is full
     cavity = z < 0
     west, east = film(x - dx, y), film(x, y)
-    if grid.dim == 1:
+    if grid.dim == 1 and opens[0]:
         Q = np.array(problem.boundary_flows(p, r)[0])
     else:
-        Q = (scheme.couette_E + scheme.b_C * r.reshape(grid.box))[row]
+        leaves = scheme.couette_E + scheme.b_C * r.reshape(grid.box)
+        Q = leaves[row] / point_weights(grid).reshape(grid.box)[row]
     front = cavity[1:-1] & ~cavity[:-2] & here
     slope = np.where(east > west, east - west, np.inf)  # a step up in the film: rupture at its edge, the cell's start
     rupture = problem.reduce.min(np.where(front, x - dx + dx * np.clip((Q / problem.U - west) / slope, -1.0, 2.0), np.inf))
     if not np.isfinite(rupture):
         return None, None
     p_line = grid.ghosted(p)[row + 1]
-    if grid.x_end == grid.shape[0]:
+    if grid.x_end == grid.shape[0] and opens[1]:
         p_line[-1] = problem.p_sides[1] / problem.p_unit
     rise = p_line[2:] - p_line[1:-1]
     back = np.where(rise > 0, np.clip(p_line[1:-1] / np.where(rise > 0, rise, 1.0), 0.0, 1.0), 0.5)
@@ -58,5 +61,8 @@ def fronts(problem: LubricationProblem, p: Array, r: Array) -> tuple[float | Non
 
 
 def middle_row(problem: LubricationProblem) -> int:
-    """Number of the line of points on y = width/2, or next below it; 0 in 1D."""
-    return (problem.grid.shape[1] - 1) // 2 if problem.grid.dim == 2 else 0
+    """Number of the line of points on y = width/2, or next below it, or on a mirror line; 0 in 1D."""
+    grid = problem.grid
+    if grid.dim == 1:
+        return 0
+    return grid.shape[1] - 1 if "mirror" in grid.ends[1] else (grid.shape[1] - 1) // 2

@@ -8,7 +8,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ..parallel import Array
-from .flows import friction, side_flows
+from .flows import friction, point_weights, side_flows
 from .fronts import cavity_sign, fronts
 
 if TYPE_CHECKING:
@@ -39,9 +39,9 @@ def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any
     """
     grid, reduce = problem.grid, problem.reduce
     p_pa = p * problem.p_unit
-    used_sides = problem.p_sides[: 2 * grid.dim]
-    cavitated = reduce.sum((cavity_sign(problem, p, r) < 0).astype(float))
-    load, ambient = _load(problem, p_pa), min(used_sides)
+    cavity = (cavity_sign(problem, p, r) < 0).astype(float)
+    weight = point_weights(grid)
+    load, ambient = _load(problem, p_pa), min(p for p in open_pressures(problem) if p is not None)
     flow = side_flows(problem, p, r)
     p_max, p_max_at = _largest_pressure(problem, p_pa)
     min_h, min_h_at = _thinnest(problem)
@@ -54,8 +54,8 @@ def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any
         "load_above_ambient": load - ambient * _area(problem),
         "friction": friction(problem, p_pa, r),
         "p_unit": problem.p_unit,
-        "cavitated_fraction": cavitated / grid.size,
-        "cavitated_area": cavitated * grid.cell,
+        "cavitated_fraction": reduce.sum(cavity) / grid.size,
+        "cavitated_area": reduce.sum(cavity * weight) * grid.cell,
         "rupture": rupture,
         "reformation": reformation,
         "min_h": min_h,
@@ -75,16 +75,23 @@ def _area(problem: LubricationProblem) -> float:
     return float(np.prod(problem.grid.lengths))
 
 
+def open_pressures(problem: LubricationProblem) -> list[float | None]:
+    """Pressures above p_c at west, east (south, north) in Pa; None where the side has none, being closed or periodic."""
+    kinds = [kind for pair in problem.grid.ends for kind in pair]
+    return [p if kind == "open" else None for p, kind in zip(problem.p_sides, kinds, strict=False)]
+
+
 def _load(problem: LubricationProblem, p_pa: Array) -> float:
-    """Integral of p - p_c by the trapezoidal rule, boundary included; a corner has the mean of its two sides."""
+    """Integral of p - p_c: trapezoidal to the open sides, a corner having the mean of its two; cells end at the others."""
     grid = problem.grid
-    p_W, p_E, p_S, p_N = problem.p_sides
-    inside = problem.reduce.sum(p_pa)
-    if grid.dim == 1:
-        return grid.cell * (inside + 0.5 * (p_W + p_E))
-    nx, ny = grid.shape
-    edges = 0.5 * (ny * (p_W + p_E) + nx * (p_S + p_N)) + 0.25 * (p_W + p_E + p_S + p_N)
-    return grid.cell * (inside + edges)
+    along = [n - 0.5 * pair.count("mirror") for n, pair in zip(grid.shape, grid.ends, strict=True)]
+    total = problem.reduce.sum(p_pa * point_weights(grid))
+    pressures = open_pressures(problem)
+    for k, p_side in enumerate(pressures):
+        if p_side is not None:
+            corners = sum(other is not None for other in pressures[2 - k // 2 * 2 :][:2])
+            total += 0.5 * p_side * (along[1 - k // 2] if grid.dim == 2 else 1.0) + 0.125 * p_side * corners
+    return grid.cell * total
 
 
 def _largest_pressure(problem: LubricationProblem, p_pa: Array) -> tuple[float, list[float] | None]:
@@ -93,8 +100,8 @@ def _largest_pressure(problem: LubricationProblem, p_pa: Array) -> tuple[float, 
     largest, place = _largest(problem, p_pa.reshape(grid.box), grid.x[0], grid.y[:, 0])
     low = [*grid.origin[: grid.dim]]
     middle = [a + 0.5 * length for a, length in zip(low, grid.lengths, strict=True)]
-    for k, p_side in enumerate(problem.p_sides[: 2 * grid.dim]):
-        if p_side > largest:
+    for k, p_side in enumerate(open_pressures(problem)):
+        if p_side is not None and p_side > largest:
             largest, place = p_side, list(middle)
             place[k // 2] = low[k // 2] + (k % 2) * grid.lengths[k // 2]
     return largest, place
