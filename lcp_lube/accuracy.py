@@ -23,6 +23,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from .api import solve
+from .auto import SMALL
 from .errors import InputError, nearest
 from .problems.problem import LubricationProblem
 from .problems.solution import Fields, Outcome, Problem, Solution
@@ -90,7 +91,7 @@ def solve_to_accuracy(
         solution = solve(
             scene.with_shape(shape),
             stopping=_stopping(stopping, tol, before),
-            start=_start(before) if nested is not False else None,
+            start=_start(before, prod(shape)) if nested is not False else None,
             nested=False,
             comm=comm,
             **how,
@@ -238,9 +239,11 @@ def _stopping(given: Stopping | dict[str, Any] | None, tol: float, before: Solut
     return {"eps1": float(np.clip(ALGEBRAIC * tol, 1e-12, 1e-4)), "eps2": inf, **(given or {})}
 
 
-def _start(before: Solution | None) -> tuple[Problem, Fields] | None:
-    """What the next grid starts from, where the method can."""
+def _start(before: Solution | None, points: int) -> tuple[Problem, Fields] | None:
+    """What the next grid starts from, where that pays: a small film is solved sooner than sweeps are compiled."""
     if before is None or before.outcome in (Outcome.NOT_FINITE, Outcome.LINEAR_SOLVER):
+        return None
+    if before.problem.kind == "lubrication" and points <= SMALL:
         return None
     entry = METHODS[before.settings["method"]].of(before.problem.kind)
     return (before.problem, before.fields) if entry.nested else None

@@ -9,6 +9,7 @@ from typing import Any
 
 from mpi4py import MPI
 
+from .accuracy import solve_to_accuracy
 from .api import solve
 from .arguments import method_options, scene_changes
 from .errors import InputError, nearest
@@ -79,20 +80,25 @@ def options_of(args: argparse.Namespace, method: str) -> dict[str, Any]:
 
 def solution_of(args: argparse.Namespace, monitor: Monitor | None = None) -> Solution:
     """What `solve` with these arguments finds. Collective."""
-    return solve(
-        scene_of(args),
-        method=args.method,
-        system=args.system,
-        recipe_name=args.recipe,
-        stopping=stopping_of(args),
-        options=options_of(args, args.method),
-        monitor=monitor,
-        nested=args.nested,
-        certify=args.certify,
-        checkpoint=args.checkpoint,
-        every=args.every or 1,
-        resume=args.resume,
-    )
+    scene = scene_of(args)
+    how: dict[str, Any] = {
+        "method": args.method,
+        "system": args.system,
+        "recipe_name": args.recipe,
+        "stopping": stopping_of(args),
+        "options": options_of(args, args.method),
+        "monitor": monitor,
+        "nested": args.nested,
+        "certify": args.certify,
+    }
+    if args.accuracy is None:
+        if args.quantity is not None:
+            raise InputError(f"--quantity {args.quantity}: --accuracy TOL is needed too")
+        return solve(scene, **how, checkpoint=args.checkpoint, every=args.every or 1, resume=args.resume)
+    if args.checkpoint or args.resume:
+        raise InputError("--accuracy: its many grids cannot be checkpointed or resumed; give --n instead")
+    finest = scene.shape if args.n or args.nx or args.ny else None
+    return solve_to_accuracy(scene, args.accuracy, args.quantity, finest=finest, **how)
 
 
 def run_solve(args: argparse.Namespace) -> int:
