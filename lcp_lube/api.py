@@ -21,7 +21,7 @@ from .registry import METHODS
 from .scene import Scene
 from .solvers.enclosure import Enclosure, enclose
 from .solvers.nested import level_shapes
-from .solvers.newton import Monitor, Stopping, iterate
+from .solvers.newton import Monitor, Stopping
 
 # A coarse answer is a start: its front matters, not its last digits. An interior method's layer there must be thin, though.
 COARSE_EPS = {False: 1e-4, True: 1e-8}  # by MethodEntry.interior
@@ -111,12 +111,12 @@ def solve(
             level_stopping = stopping if finest else Stopping(coarse_eps, np.inf, stopping.max_it)
             run = entry.load()(level, stages, chosen.system, options or {}, level_stopping, guess)
             try:
-                if saved is not None and saved.failure:  # the fallback had taken over
-                    outcome, message, steps = saved.failure
+                if saved is not None and saved.failures:  # another method had taken over
+                    outcome, message, steps = saved.failures[0]
                 else:
                     before = saved.restore(run, level.grid) if saved is not None else []
                     saved = None
-                    where = {"shapes": shapes[shapes.index(shape) :], "levels": levels}
+                    where: dict[str, Any] = {"shapes": shapes[shapes.index(shape) :], "levels": levels}
                     outcome, message, steps = keeper.iterate(run, level.grid, level_stopping, monitor, before, **where)
                 krylov = run.krylov
                 ksp_type, pc_type = (krylov.ksp_type, krylov.pc_type) if krylov else (None, None)
@@ -135,10 +135,11 @@ def solve(
                 }
             )
     fields, took_over = run.fields, None
-    reached, failures = fields, ""
-    for name in entry.fallback if set(options or {}) <= {"p0"} else ():
+    reached, failures, more, failed = fields, "", steps, []
+    for tried, name in enumerate(entry.fallback if set(options or {}) <= {"p0"} else (), start=1):
         if outcome is Outcome.CONVERGED:
             break
+        failed.append((outcome, message, [astuple(step) for step in more]))
         failures += f"{took_over or chosen.method} failed ({message}); "
         rescue = METHODS[name]
         # Interior methods converge from anywhere, and only direct inner solves keep up with them on films like this one.
@@ -146,12 +147,14 @@ def solve(
             # An interior method begins anew; another may take up what was reached.
             run = rescue.load()(problem, stages, rescue.systems[0], {}, stopping, None if rescue.interior else reached)
             try:
-                if took_over is None:
-                    before = saved.restore(run, problem.grid) if saved is not None else []
-                    failed = (outcome, message, [astuple(step) for step in steps])
-                    outcome, message, more = keeper.iterate(run, problem.grid, stopping, monitor, before, failed=failed)
-                else:  # a resumed run finds its way here again from the first fallback's last checkpoint
-                    outcome, message, more = iterate(run, stopping, monitor)
+                if saved is not None and len(saved.failures) > tried:
+                    outcome, message, more = saved.failures[tried]
+                else:
+                    before = saved.restore(run, problem.grid, reached) if saved is not None else []
+                    saved = None
+                    outcome, message, more = keeper.iterate(
+                        run, problem.grid, stopping, monitor, before, reached, failed=failed
+                    )
             finally:
                 run.destroy()
         fields, steps, took_over = run.fields, steps + more, name

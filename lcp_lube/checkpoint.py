@@ -24,7 +24,7 @@ from . import __version__
 from .errors import InputError
 from .parallel import Array
 from .problems.grid import Grid
-from .problems.solution import Outcome, Step
+from .problems.solution import Fields, Outcome, Step
 from .scene import Scene
 from .solvers.newton import Method, Monitor, Stopping, iterate
 
@@ -104,19 +104,33 @@ class Checkpointer:
         self.record: dict[str, Any] = {}
         self.steps: list[Step] = []
         self._run: Method | None = None
+        self._reached: Fields = {}
         self._grid: Grid | None = None
         self._since = 0
+        self._saved = False
         self._signal = 0
 
     def begin(self, scene: Scene, choices: tuple[Any, ...]) -> None:
         """What is solved and how: the values of CHOICES."""
         if self.active:
-            self.record = {"scene": scene_record(scene), **dict(zip(CHOICES, choices, strict=True)), "failed": None}
+            self.record = {"scene": scene_record(scene), **dict(zip(CHOICES, choices, strict=True)), "failed": []}
 
     def iterate(
-        self, run: Method, grid: Grid, stopping: Stopping, monitor: Monitor | None, before: list[Step], **record: Any
+        self,
+        run: Method,
+        grid: Grid,
+        stopping: Stopping,
+        monitor: Monitor | None,
+        before: list[Step],
+        reached: Fields | None = None,
+        **record: Any,
     ) -> tuple[Outcome, str, list[Step]]:
-        """`newton.iterate`, with checkpoints; `record` is what they are to say of the run from here on.
+        """`newton.iterate`, with checkpoints.
+
+        Parameters
+        ----------
+        reached : fields that they are to hold too: those of a method that failed, where the next one may start.
+        record : what they are to say of the run from here on.
 
         Raises
         ------
@@ -127,6 +141,7 @@ class Checkpointer:
             return iterate(run, stopping, monitor, before)
         state_names(run)
         self._run, self._grid, self.steps = run, grid, list(before)
+        self._reached = {f"reached.{name}": values for name, values in (reached or {}).items()}
         self.record |= record
         with self._listening():
             return iterate(run, stopping, self._watching(monitor), before)
@@ -176,7 +191,7 @@ class Checkpointer:
         InputError : it cannot be written; the last checkpoint is still there then.
         """
         assert self._run is not None and self._grid is not None
-        leaves = _leaves(self._run, state_names(self._run))
+        leaves = [*_leaves(self._run, state_names(self._run)), *self._reached.items()]
         arrays = [(name, np.asarray(value, dtype=float)) for name, value in leaves if isinstance(value, np.ndarray)]
         scalars = {name: _plain(value) for name, value in leaves if not isinstance(value, np.ndarray)}
         header = {
@@ -206,7 +221,7 @@ class Checkpointer:
             if self.comm.rank == 0:
                 temporary.unlink(missing_ok=True)
             raise
-        self._since = 0
+        self._since, self._saved = 0, True
 
     def _on_rank_0(self, call: Callable[[], None]) -> None:
         reason = ""
@@ -216,7 +231,8 @@ class Checkpointer:
             except OSError as error:
                 reason = error.strerror or str(error)
         if reason := self.comm.bcast(reason):
-            raise InputError(f"--checkpoint {self.path}: could not be written: {reason}; the last one is still there")
+            kept = "; the last one is still there" if self._saved else ""
+            raise InputError(f"--checkpoint {self.path}: could not be written: {reason}{kept}")
 
 
 @dataclass(frozen=True)
@@ -229,15 +245,15 @@ class Checkpoint:
     steps: list[Step]
     start: int
 
-    def restore(self, run: Method, grid: Grid) -> list[Step]:
-        """Put the saved state into a run that was made anew; returns the steps that it had taken. Collective.
+    def restore(self, run: Method, grid: Grid, reached: Fields | None = None) -> list[Step]:
+        """Put the saved state into a run made anew, and fields into `reached`; returns the steps that it had taken. Collective.
 
         Raises
         ------
         InputError : the state is another method's, or damaged.
         """
         names = [name for name, _ in self.record["arrays"]]
-        old = _leaves(run, state_names(run))
+        old = [*_leaves(run, state_names(run)), *((f"reached.{name}", values) for name, values in (reached or {}).items())]
         expected = [name for name, value in old if isinstance(value, np.ndarray)]
         if names != expected or {name for name, _ in old} != {*names, *self.record["scalars"]}:
             raise InputError(f"--resume {self.path}: not the state of {type(run).__name__} on this system")
@@ -256,6 +272,8 @@ class Checkpoint:
             for part in path:
                 owner = getattr(owner, part)
             setattr(owner, last, _rebuilt(name, getattr(owner, last), values))
+        for name in reached or {}:
+            reached[name] = values[f"reached.{name}"]  # type: ignore[index]
         return list(self.steps)
 
     @property
@@ -264,12 +282,10 @@ class Checkpoint:
         return [tuple(shape) for shape in self.record["shapes"]]
 
     @property
-    def failure(self) -> tuple[Outcome, str, list[Step]] | None:
-        """How the method ended whose fallback was running."""
-        if not self.record["failed"]:
-            return None
-        outcome, message, steps = self.record["failed"]
-        return Outcome(outcome), message, [Step(*step) for step in steps]
+    def failures(self) -> list[tuple[Outcome, str, list[Step]]]:
+        """How the methods ended whose fallback was running."""
+        failed = self.record["failed"]
+        return [(Outcome(outcome), message, [Step(*step) for step in steps]) for outcome, message, steps in failed]
 
     def settle(self, **given: Any) -> dict[str, Any]:
         """How the run was begun, for what is not given anew: None, 'auto' or nothing.

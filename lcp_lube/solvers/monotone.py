@@ -84,6 +84,8 @@ class Monotone:
     start : fields p and r whose cavity is the first policy; cells of it that turn out positive leave it again. Default: none.
     """
 
+    state: tuple[str, ...] = ("z", "cavity", "_above", "norm")  # what a step starts from
+
     def __init__(
         self,
         problem: LubricationProblem,
