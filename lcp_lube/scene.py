@@ -6,9 +6,11 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from petsc4py import PETSc
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError, model_validator
 
+from .changes import changed
 from .errors import InputError, nearest
+from .faults import first_fault, known_keys
 from .problems.exact import ExactSolution, exact_solution
 from .problems.film import Wave
 from .problems.model import Model, Side
@@ -32,6 +34,7 @@ class Scene(BaseModel):
     family: str = "slider"
     name: str = ""
     scheme: str | None = None
+    _folder: Path | None = PrivateAttr(None)  # of the scene's file: other files' names are relative to it
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -181,18 +184,16 @@ def load_scene(source: str | Path, changes: dict[str, Any] | None = None) -> Sce
         raise InputError(f"{source}: {reason}") from None
     if not data:
         raise InputError(f"{source}: the file sets nothing; 'family' and the data of a bearing are needed")
-    if "n" in changes:  # a new number of points a side replaces the file's nx and ny too
-        data = {key: value for key, value in data.items() if key not in ("nx", "ny")}
-    data = {"name": name, **data, **changes}
-    family = data.get("family", "slider")
+    family = changes.get("family", data.get("family", "slider"))
     if family not in [*FAMILIES]:  # which may be no string at all
         raise InputError(f"{source}: family = {family}: allowed are {', '.join(FAMILIES)}{nearest(str(family), FAMILIES)}")
     model: Any = FAMILIES[family].load()
     try:
-        return model(**data)
+        scene: Scene = model(**{"name": name, **changed(data, changes, {name, family}, set(known_keys(model)))})
     except ValidationError as error:
-        names = [field.alias or name for name, field in model.model_fields.items()]
-        raise InputError(f"{source}: {_first_fault(error, names)}") from None
+        raise InputError(f"{source}: {first_fault(error, model)}") from None
+    scene._folder = path.parent
+    return scene
 
 
 def parse_changes(assignments: Iterable[str]) -> dict[str, Any]:
@@ -212,13 +213,3 @@ def parse_changes(assignments: Iterable[str]) -> dict[str, Any]:
         except tomllib.TOMLDecodeError:
             changes[key] = value
     return changes
-
-
-def _first_fault(error: ValidationError, known: Iterable[str]) -> str:
-    """The first of pydantic's complaints: key, what was found, what is allowed."""
-    fault = error.errors()[0]
-    key = ".".join(str(part) for part in fault["loc"])
-    if fault["type"] == "extra_forbidden":
-        return f"unknown key {key}{nearest(key, known) or '; known are ' + ', '.join(known)}"
-    allowed = fault["msg"].removeprefix("Value error, ").replace("Input should be ", "allowed is ")
-    return f"{key} = {fault['input']}: {allowed}" if key else allowed

@@ -1,0 +1,79 @@
+"""pydantic's complaints about a scene as one line: key, what was found, what is allowed, the nearest name."""
+
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+
+from .errors import nearest
+from .units import SUFFIXES, Measured
+
+LONGEST = 60  # of what was found
+
+
+def first_fault(error: ValidationError, model: type[BaseModel]) -> str:
+    """The first complaint, in words."""
+    fault = error.errors()[0]
+    path, tables = _walk(model, fault["loc"])
+    key, found, context = ".".join(path), _short(fault["input"]), fault.get("ctx", {})
+    if fault["type"] == "extra_forbidden":
+        known = [name for table in tables for name in known_keys(table)]
+        return f"unknown key {key}{nearest(path[-1], known) or '; known are ' + ', '.join(_plain(tables))}"
+    if fault["type"] == "missing":
+        return f"{key} is missing"
+    if fault["type"] == "union_tag_not_found":
+        return f"{key}: shape is missing; allowed are {', '.join(_tags(tables))}"
+    if fault["type"] == "union_tag_invalid":
+        tag = str(context["tag"])
+        return f"{key}.shape = {tag}: allowed are {', '.join(_tags(tables))}{nearest(tag, _tags(tables))}"
+    allowed = fault["msg"].removeprefix("Value error, ").replace("Input should be ", "allowed is ")
+    if fault["type"] == "value_error" and isinstance(fault["input"], dict):  # a table's own check, which names its key
+        return f"{key}: {allowed}" if key else allowed
+    return f"{key} = {found}: {allowed}" if key else allowed
+
+
+def known_keys(model: type[BaseModel]) -> list[str]:
+    """The keys of a table, with those that carry a unit."""
+    suffixed = model.lengths if issubclass(model, Measured) else frozenset()
+    return _plain([model]) + [name + suffix for name in suffixed for suffix in SUFFIXES]
+
+
+def _plain(tables: list[type[BaseModel]]) -> list[str]:
+    return list(dict.fromkeys(field.alias or name for table in tables for name, field in table.model_fields.items()))
+
+
+def _walk(model: type[BaseModel], loc: tuple[int | str, ...]) -> tuple[list[str], list[type[BaseModel]]]:
+    """The key as people write it, and the models of the table that it stands in."""
+    path, tables = [], [model]
+    for k, part in enumerate(loc):
+        if isinstance(part, int):
+            path.append(str(part + 1) if tables and k + 1 < len(loc) else str(part))
+            continue
+        tagged = [table for table in tables if part in _tags([table])]
+        if tagged and len(tables) > 1:
+            tables = tagged
+            path[-1] = f"{part}" if path and path[-1].isdigit() else path[-1]
+            continue
+        path.append(part)
+        fields = [field for table in tables for name, field in table.model_fields.items() if part in (name, field.alias)]
+        below = [inner for field in fields for inner in _models(field.annotation)]
+        tables = below if below and (k + 1 < len(loc) or len(below) > 1) else tables
+    return path, tables
+
+
+def _models(annotation: Any) -> list[type[BaseModel]]:
+    """The models inside a field's type."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [model for inner in get_args(annotation) for model in _models(inner)]
+
+
+def _tags(tables: list[type[BaseModel]]) -> list[str]:
+    """What `shape` may be in these tables."""
+    return [
+        tag for table in tables if "shape" in table.model_fields for tag in get_args(table.model_fields["shape"].annotation)
+    ]
+
+
+def _short(value: Any) -> str:
+    text = str(value)
+    return text if len(text) <= LONGEST else text[:LONGEST] + "..."
