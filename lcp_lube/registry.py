@@ -36,9 +36,8 @@ class MethodEntry(Entry):
 
     kinds are the problems it solves (`Problem.kind`), systems the matrices it can use, its default first; nested: it can
     start from a coarser grid's answer, which must lie strictly inside p, r > 0 if it is an interior method, and does so by
-    default on grids of more than `nested_above` points; eps: its default
-    tolerances of ||F|| and ||alpha d||; fallback: the methods that take over in turn where it fails; variants: the same idea for
-    other kinds of problems.
+    default on grids of more than `nested_above` points; eps: its default tolerances of ||F|| and ||alpha d||; fallback: the
+    methods that take over in turn where it fails; variants: the same idea for other kinds of problems.
     """
 
     kinds: tuple[str, ...] = ("lubrication",)

@@ -204,6 +204,39 @@ def test_conditions_are_checked():
     assert "does not know" in broken(c=s.c + 1e-6)
 
 
+ENDS = {  # ends in x, in y: what stands in docs/guaranteed_bounds.md
+    "closed": ((("open", "open"), ("closed", "closed")), True),
+    "mirror": ((("open", "open"), ("open", "mirror")), True),
+    "west": ((("closed", "open"), ("open", "open")), True),
+    "round": ((("open", "open"), ("periodic", "periodic")), True),
+    "east": ((("open", "closed"), ("open", "open")), False),
+    "endless": ((("periodic", "periodic"), ("open", "open")), False),
+}
+
+
+@pytest.mark.parametrize("case", ENDS)
+def test_which_sides_satisfy_them(case):
+    from films import MU, U
+
+    from lcp_lube.problems.grid import Grid
+    from lcp_lube.problems.problem import LubricationProblem
+    from lcp_lube.problems.reynolds import box_scheme
+
+    ends, holds = ENDS[case]
+    grid, sides = Grid((7, 5), (0.1, 0.07), ends=ends), (1e5, 1e5, 2e5, 3e5)
+
+    def film(x, y):
+        return 1e-5 * (1.5 + np.sin(2 * np.pi * x / 0.1) + 0 * y)
+
+    scheme = box_scheme(grid, film, mu=MU, U=U, scheme="face", p_sides=sides, p_unit=1e6)
+    problem = LubricationProblem(grid, scheme, mu=MU, U=U, p_unit=1e6, p_sides=sides, p_c=0.0, film=film)
+    assert (conditions(problem) == "") == holds, conditions(problem)
+    if holds:
+        found = band(problem, answer(problem))
+        assert found.certified, found.message
+    problem.destroy()
+
+
 def test_only_films(cli):
     with pytest.raises(InputError, match="--certify: scene bratu"):
         solve(load_scene("bratu"), certify=True)

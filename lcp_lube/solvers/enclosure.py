@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..linear.krylov import LinearSolverError
 from ..linear.stages import Stages
@@ -17,6 +18,7 @@ from ..parallel import Array
 from ..problems.problem import LubricationProblem
 from ..problems.solution import Fields
 
+Mask = NDArray[np.bool_]
 UNIT = 2.0**-53  # largest relative error of one operation
 TINY = 1e-300  # more than all that underflow can add to a sum of 7 terms
 RTOL = 1e-2  # of the solve for e: the signs are tested afterwards, the band need not be sharp
@@ -92,17 +94,20 @@ def conditions(problem: LubricationProblem) -> str:
         framed = grid.ghosted(values.ravel(), outside=0.0)
         return framed[1 + dj : 1 + dj + grid.box[0], 1 + di : 1 + di + grid.box[1]]
 
+    def count(mask: Mask) -> int:
+        return int(problem.reduce.sum(mask.astype(float)))
+
     k_next, b_next = seen_from(s.k_W, 0, 1), seen_from(s.b_W, 0, 1)
-    fine = (s.k_W >= 0) & (s.k_E > 0) & (s.k_S >= 0) & (s.k_N >= 0) & (s.b_C < 0) & (s.b_W >= 0) & np.isfinite(s.c)
-    fine &= ~east | ((k_next > 0) & (s.k_E >= k_next) & (b_next > 0) & (-s.b_C >= b_next))
+    fine = (s.k_W >= 0) & (s.k_E >= 0) & (s.k_S >= 0) & (s.k_N >= 0) & (s.b_C < 0) & (s.b_W >= 0) & np.isfinite(s.c)
+    fine &= ~east | ((s.k_E >= k_next) & (-s.b_C >= b_next))
     fine &= ~west | (s.k_W >= seen_from(s.k_E, 0, -1))
     if grid.dim == 2:
         fine &= (~south | (s.k_S >= seen_from(s.k_N, -1, 0))) & (~north | (s.k_N >= seen_from(s.k_S, 1, 0)))
-    count = problem.reduce.sum
-    if bad := int(count((~fine).astype(float))):
+    if bad := count(~fine):
         return f"{bad} columns of A or B do not have an M-matrix's signs and dominance"
-    if count((~east).astype(float)) != (grid.shape[1] if grid.dim == 2 else 1):
-        return "x lines without an end"
+    hands_on = np.where(east, (k_next > 0) & (b_next > 0), s.k_E > 0)
+    if count(~hands_on) or count(~east) != (grid.shape[1] if grid.dim == 2 else 1):
+        return "the theorem needs an open side to the east, at the end of every line"
     # Nothing but these terms: the matrices and the face flows agree on a vector without symmetries.
     number = grid.first + np.arange(grid.local_size)
     p, r = 1.0 + np.modf(0.618033988749895 * number)[0], np.modf(0.7548776662466927 * number)[0]
@@ -110,7 +115,7 @@ def conditions(problem: LubricationProblem) -> str:
     Ap, Br = problem.terms(p, r)
     size = (4 * (s.k_W + s.k_E + s.k_S + s.k_N) - s.b_C + s.b_W + np.abs(s.c)).ravel()
     same = np.abs(Ap + Br - problem.c - F) <= rounding + 16 * UNIT * size
-    return "" if count((~same).astype(float)) == 0 else "its equations have terms that the theorem does not know"
+    return "" if count(~same) == 0 else "its equations have terms that the theorem does not know"
 
 
 def enclose(problem: LubricationProblem, fields: Fields, system: str, stages: Stages) -> Enclosure:
