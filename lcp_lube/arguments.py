@@ -7,7 +7,7 @@ from typing import Any, NoReturn
 
 from . import __version__
 from .errors import InputError, nearest
-from .registry import STABILITY, scene_names
+from .registry import METHODS, STABILITY, scene_names
 
 
 class Parser(argparse.ArgumentParser):
@@ -226,8 +226,9 @@ def _scene_options(parser: argparse.ArgumentParser) -> None:
 
 
 def scene_changes(args: argparse.Namespace) -> tuple[list[str], list[str]]:
-    """The --set assignments for the scene and those for a method (METHOD.OPTION=VALUE)."""
-    method = [text for text in args.set if "." in text.partition("=")[0]]
+    """The --set assignments for the scene (KEY or TABLE.KEY) and those for a method (METHOD.OPTION)."""
+    words = {text: text.partition("=")[0].partition(".") for text in args.set}
+    method = [text for text, (owner, dot, _) in words.items() if dot and owner.strip() in METHODS]
     return [text for text in args.set if text not in method], method
 
 

@@ -3,6 +3,7 @@
 from typing import Any
 
 from .errors import InputError, nearest
+from .registry import METHODS
 from .units import stem
 
 
@@ -23,7 +24,10 @@ def changed(data: dict[str, Any], changes: dict[str, Any], prefixes: set[str], k
     out: dict[str, Any] = _copied(data)
     for key, value in changes.items():
         path = key.split(".")
-        if len(path) > 1 and path[0] in prefixes and stem(path[0]) not in known:
+        if len(path) > 1 and stem(path[0]) not in known:
+            if path[0] not in prefixes:
+                near = nearest(path[0], [*known, *METHODS])
+                raise InputError(f"--set {key}: {path[0]} is no table of the scene, and no method{near}")
             path = path[1:]
         if path == ["n"]:  # a new number of points a side replaces the file's nx and ny too
             out = {name: old for name, old in out.items() if name not in ("nx", "ny") or name in changes}

@@ -4,7 +4,7 @@ import argparse
 import json
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from mpi4py import MPI
@@ -66,15 +66,15 @@ def stopping_of(args: argparse.Namespace) -> dict[str, Any]:
     return {**given, "max_it": args.max_it}
 
 
-def options_of(args: argparse.Namespace, method: str) -> dict[str, Any]:
-    """The method's options from flags and from --set METHOD.OPTION=VALUE."""
+def options_of(args: argparse.Namespace, method: str, among: Sequence[str] = ()) -> dict[str, Any]:
+    """The method's options from flags and from --set METHOD.OPTION=VALUE; such options of others `among` are theirs."""
     options = method_options(args)
     for key, value in parse_changes(scene_changes(args)[1]).items():
         owner, _, name = key.partition(".")
-        if owner not in METHODS:
-            raise InputError(f"--set {key}: {owner} is no method{nearest(owner, METHODS)}")
-        if owner == method or method == "auto":
+        if owner == method:
             options[name] = value
+        elif owner not in among:
+            raise InputError(f"--set {key}: an option of method {owner}, and the method is {method}; add --method {owner}")
     return options
 
 
@@ -161,7 +161,7 @@ def run_compare(args: argparse.Namespace) -> int:
         recipes=[name for name in args.recipes.split(",") if name] or [None],
         system=args.system,
         stopping=stopping_of(args),
-        options=lambda method: options_of(args, method),
+        options=lambda method: options_of(args, method, args.methods.split(",")),
         nested=args.nested,
     )
     check_unread()

@@ -63,7 +63,7 @@ def refused(capsys):
         ("solve problem1 --set h_min", "--set h_min: KEY=VALUE is needed"),
         ("solve problem1 --set hmin=1e-5", "problem1: unknown key hmin; nearest is h_min"),
         ("solve problem1 --set p_c=none", "problem1: p_c = none: allowed is a valid number"),
-        ("solve problem1 --set dinn.gamma=0.5", "--set dinn.gamma: dinn is no method; nearest is din"),
+        ("solve problem1 --set dinn.gamma=0.5", "--set dinn.gamma: dinn is no table of the scene, and no method; nearest is din"),
         ("solve problem1 --method din --set din.gama=0.5", "din.gama: method din has no such option; nearest is gamma"),
         ("solve problem1 --method din --set din.gamma=2", "din.gamma = 2.0: allowed are numbers between 0 and 1"),
         ("solve problem1 --film saw", "problem1: film = saw: allowed is 'sinusoid' or 'parabola'"),

@@ -60,7 +60,7 @@ class Model:
             if side.kind == "periodic" and used[OPPOSITE[name]].kind != "periodic":
                 raise InputError(f"sides.{name} is periodic, sides.{OPPOSITE[name]} is not: both of them or none")
             if side.r and (name != "west" or side.p):
-                raise InputError(f"sides.{name}: r = {side.r:g} enters: west alone, at the cavitation pressure, can have it")
+                raise InputError(f"sides.{name}.r = {side.r:g}: void enters by the west side alone, and there at p = p_c")
         pressures = [side.p for side in used.values() if side.kind == "open"]
         if not pressures:
             raise InputError("no side has a pressure: without one the level of p is open; give at least one side a p")
@@ -126,4 +126,4 @@ class _Inside:
         return self.gap(*places)
 
     def breakpoints(self) -> tuple[float, ...]:
-        return self.gap.breakpoints()
+        return self.gap.breakpoints()  # type: ignore[attr-defined]
