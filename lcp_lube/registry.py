@@ -174,6 +174,12 @@ FAMILIES: dict[str, Entry] = {
 # The maps of `chart stability`: each makes its runs and draws them.
 STABILITY: dict[str, Entry] = {
     "starts": Entry("lcp_lube.chart.starts:chart", "starting vectors p0, r0 from 1e-15 to 1e3 by rule for mu (DIN)"),
+    "conditions": Entry("lcp_lube.chart.conditions:chart", "all subsets of the step-length conditions F, R, C, B (DIN)"),
+    "film_ratio": Entry("lcp_lube.chart.film_ratio:chart", "film ratio 1.1 to 1e4 by grid, every method"),
+    "supply_speed": Entry("lcp_lube.chart.supply_speed:chart", "supply pressure by speed, every method"),
+    "inner_tolerance": Entry("lcp_lube.chart.inner_tolerance:chart", "loose inner solves by recipe, and what (31) says of them"),
+    "roughness": Entry("lcp_lube.chart.roughness:chart", "standard deviation of a random surface by grid, every method"),
+    "turning_point": Entry("lcp_lube.chart.turning_point:chart", "lambda around the turning point of Bratu's equation"),
 }
 
 

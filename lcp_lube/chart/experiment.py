@@ -13,8 +13,9 @@ from ..errors import InputError
 from ..linear.options import LATE, set_names
 from ..output.results import as_dict, machine, versions
 from ..output.resumable import ResumableCsv
-from ..problems.solution import Step
+from ..problems.solution import Outcome, Step
 from ..scene import Scene
+from .reference import WRONG, Reference
 
 # Outcomes of the charts, beside those of `Outcome`: left by us, and solved, but by the method's fallback.
 KRYLOV_LIMIT, FELL_BACK = "krylov_limit", "fell_back"
@@ -41,12 +42,20 @@ class _Enough(Exception):
     """Leaves a run from within its monitor."""
 
 
-def run(scene: Scene, krylov_limit: float = float("inf"), **choices: Any) -> dict[str, Any]:
+def run(
+    scene: Scene,
+    krylov_limit: float = float("inf"),
+    reference: Reference | None = None,
+    steps: list[Step] | None = None,
+    **choices: Any,
+) -> dict[str, Any]:
     """One run, however it ends: RECORD, `wall_s`, `cpu_s` (this rank's), errors and the rest of the JSON's keys. Collective.
 
     Parameters
     ----------
     scene, choices : as `api.solve` takes them.
+    reference : gives `distance` and `reference`; a certified answer that is as far from it as WRONG is a wrong one.
+    steps : filled with the record of every step.
     krylov_limit : the run is left after the step in which its Krylov iterations pass this number; of its answer nothing is
         then known. Counted in iterations, not in seconds: a limit that falls on the same step on every machine.
 
@@ -54,7 +63,7 @@ def run(scene: Scene, krylov_limit: float = float("inf"), **choices: Any) -> dic
     ------
     InputError : the run was refused.
     """
-    steps: list[Step] = []
+    steps = [] if steps is None else steps
 
     def monitor(k: int, step: Step) -> None:
         steps.append(step)
@@ -80,7 +89,16 @@ def run(scene: Scene, krylov_limit: float = float("inf"), **choices: Any) -> dic
     clocks = {"wall_s": solution.times["total"], "cpu_s": process_time() - cpu_begin}
     try:
         data = as_dict(solution)
-        outcome = {"outcome": FELL_BACK} if solution.settings["took_over"] else {}
+        # 'auto' is all that it does; of a method that was asked for by name a rescue by another one is a failure.
+        outcome: dict[str, Any] = (
+            {"outcome": FELL_BACK} if solution.settings["took_over"] and choices.get("method", "auto") != "auto" else {}
+        )
+        if reference is not None:
+            far = reference.distance(solution.problem, solution.fields)
+            outcome |= {"distance": None if far is None else f"{far:.3e}", "reference": reference.how}
+            if solution.converged and (not reference.solvable or (far is not None and not far <= WRONG)):
+                why = f"{far:.1e} from the reference" if far is not None else "although there is no solution"
+                outcome |= {"outcome": Outcome.WRONG_SOLUTION, "message": f"{solution.message}, {why}"}
         return {**environment, **data, **exact_errors(solution.problem, data), **clocks, **outcome}
     finally:
         solution.destroy()

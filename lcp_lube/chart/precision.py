@@ -161,7 +161,7 @@ def measure(scene: LubricationScene, exact: ExactSolution, configuration: Config
     iteration_error is the part of the load's error that the iteration leaves: against the active set on the same grid, whose
     answer is exact but for rounding.
     """
-    choices = {
+    choices: dict[str, Any] = {
         "method": configuration.method,
         "system": configuration.system,
         "recipe_name": configuration.recipe,
