@@ -122,8 +122,7 @@ def test_last_resort_of_auto(film, monkeypatch):
     solution.destroy()
 
 
-@pytest.mark.parametrize("ranks", [2, 3])
-@pytest.mark.parametrize("words", ["problem1 --n 101", "problem4 --nx 33 --ny 41"])
+@pytest.mark.parametrize("words, ranks", [("problem1 --n 101", 3), ("problem4 --nx 33 --ny 41", 2)])
 def test_on_several_ranks(cli, words, ranks):
     name, *changes = words.replace("--", "").split()
     numbers = {key: int(value) for key, value in zip(changes[::2], changes[1::2], strict=True)}
