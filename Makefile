@@ -11,10 +11,10 @@ export PRTE_MCA_rmaps_default_mapping_policy := :oversubscribe
 # The ranks are the parallelism; threads inside each would only compete.
 export OMP_NUM_THREADS := 1
 
-.PHONY: help setup demo test lint format charts clean
+.PHONY: help setup demo test test-petsc-new mutations lint format charts clean
 
 help: ## this list
-	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | expand -t 10
+	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | expand -t 16
 
 setup: $(READY) ## install what is missing, nothing else
 
@@ -28,6 +28,13 @@ demo: $(READY) ## solve problem 4 and draw it: problem4.png
 
 test: lint ## ruff, mypy, then all tests with their coverage
 	$(BIN)/python -m pytest -q --cov=lcp_lube --cov-report=term
+
+test-petsc-new: ## the tests with the newest PETSc of PyPI, without hypre; compiles it the first time
+	tools/petsc_new.sh
+	.venv-petsc-new/bin/python -m pytest -q
+
+mutations: $(READY) ## 2,000 damaged scenes, options and files thrown at the command line
+	LCP_LUBE_MUTATIONS=2000 $(BIN)/python -m pytest -q tests/test_mutations.py --timeout 3000
 
 lint: $(READY) ## ruff and mypy
 	$(BIN)/ruff check

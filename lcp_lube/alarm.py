@@ -20,11 +20,11 @@ class Alarm:
     def all_arrive(self, seconds: float | None = None) -> bool:
         """True if every rank calls this within the time. If some do, the lowest of them gives up first, and speaks for all.
 
-        The time is 4 s, up to 7 s on a busy machine: ranks that fail together are then further apart, and a job in which one
+        The time is 4 s, up to 6 s on a busy machine: ranks that fail together are then further apart, and a job in which one
         rank fails is still to end within 10 s.
         """
         if seconds is None:
-            seconds = min(7.0, 4.0 * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1)))
+            seconds = min(6.0, 4.0 * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1)))
         request = self._comm.Ibarrier()
         end = time.monotonic() + seconds + min(0.25 * self.rank, 2.0)
         while not request.Test():
