@@ -135,6 +135,7 @@ def solve(
                 }
             )
     fields, took_over = run.fields, None
+    details: dict[str, Any] = getattr(run, "details", {})  # what a method tells of itself beyond its steps
     reached, failures, more, failed = fields, "", steps, []
     for tried, name in enumerate(entry.fallback if set(options or {}) <= {"p0"} else (), start=1):
         if outcome is Outcome.CONVERGED:
@@ -143,9 +144,13 @@ def solve(
         failures += f"{took_over or chosen.method} failed ({message}); "
         rescue = METHODS[name]
         # Interior methods converge from anywhere, and only direct inner solves keep up with them on films like this one.
-        with recipe(default_recipe(problem, rescue.systems[0], large=False)[0]):
+        system, inner = rescue.systems[0], default_recipe(problem, rescue.systems[0], large=False)[0]
+        if not chosen.system and not rescue.interior:  # a method without linear systems hands over what it has reached
+            next_one = plan(problem, scene.name, name)
+            system, inner = next_one.system, next_one.recipe or inner
+        with recipe(inner):
             # An interior method begins anew; another may take up what was reached.
-            run = rescue.load()(problem, stages, rescue.systems[0], {}, stopping, None if rescue.interior else reached)
+            run = rescue.load()(problem, stages, system, {}, stopping, None if rescue.interior else reached)
             try:
                 if saved is not None and len(saved.failures) > tried:
                     outcome, message, more = saved.failures[tried]
@@ -164,7 +169,7 @@ def solve(
     enclosure: Enclosure | None = None
     if certify and isinstance(problem, LubricationProblem):
         # By the inner solver that has just solved this problem.
-        system = METHODS[took_over].systems[0] if took_over else chosen.system
+        system = METHODS[took_over].systems[0] if took_over else chosen.system or "reduced"
         with recipe(default_recipe(problem, system, large=False)[0] if took_over else chosen.recipe), stages("certify"):
             enclosure = enclose(problem, fields, system, Stages())
     if outcome is not Outcome.CONVERGED and isinstance(problem, BoxProblem):
@@ -182,14 +187,15 @@ def solve(
             "scene": scene.name,
             "method": chosen.method,
             "took_over": took_over,
-            "system": chosen.system,
+            "system": chosen.system or None,
             "scheme": scene.scheme,
             "recipe": recipe_used,
             "ksp_type": ksp_type,
             "pc_type": pc_type,
             "why": chosen.why,
+            "details": {key: value for key, value in details.items() if key != "levels"},
         },
         times={**stages.seconds, "total": perf_counter() - begin},
-        levels=levels if chosen.nested else [],
+        levels=levels if chosen.nested else details.get("levels", []),
         enclosure=enclosure,
     )

@@ -52,6 +52,13 @@ def plan(
     else:
         fitting = [name for name, other in METHODS.items() if problem.kind in other.kinds]
         raise InputError(f"--method {method}: not for scene {scene}; allowed are {', '.join(fitting)}")
+    if not entry.systems:
+        for option, given in (("--system", None if system == "auto" else system), ("--recipe", recipe)):
+            if given is not None:
+                raise InputError(f"{option} {given}: method {method} solves no linear systems")
+        if nested:
+            raise InputError(f"--nested: method {method} has grids of its own")
+        return Plan(method, "", None, False, why)
     grid = problem.grid
     small = SMALL_BOX if problem.kind == "box" else SMALL
     large = grid.dim == 2 and grid.size > small

@@ -22,3 +22,20 @@ def compiled(kernel: Kernel) -> Kernel:
         return cast(Kernel, njit(cache=True)(kernel))
     except RuntimeError:  # numba found no directory for its cache
         return cast(Kernel, njit(kernel))
+
+
+def kernel(function: Kernel) -> Kernel:
+    """`compiled` as a decorator, for modules whose kernels call one another and which are imported when they are needed.
+
+    Division by zero gives inf or NaN, as in NumPy, and products may be added without rounding in between: loops like these
+    are only then turned into vector instructions.
+    """
+    try:
+        from numba import njit
+    except ImportError:
+        return function
+    options = {"error_model": "numpy", "fastmath": {"contract", "nsz"}}
+    try:
+        return cast(Kernel, njit(cache=True, **options)(function))
+    except RuntimeError:
+        return cast(Kernel, njit(**options)(function))

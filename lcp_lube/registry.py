@@ -34,7 +34,8 @@ class Entry:
 class MethodEntry(Entry):
     """A method: `target` is build(problem, stages, system, options, stopping, start) -> Method.
 
-    kinds are the problems it solves (`Problem.kind`), systems the matrices it can use, its default first; nested: it can
+    kinds are the problems it solves (`Problem.kind`), systems the matrices it can use, its default first, none
+    if it solves no linear systems; nested: it can
     start from a coarser grid's answer, which must lie strictly inside p, r > 0 if it is an interior method, and does so by
     default on grids of more than `nested_above` points; eps: its default tolerances of ||F|| and ||alpha d||; fallback: the
     methods that take over in turn where it fails; variants: the same idea for other kinds of problems.
@@ -124,6 +125,14 @@ METHODS: dict[str, MethodEntry] = {
         systems=("jacobian",),
         interior=False,
         eps=(1e-10, inf),
+    ),
+    "fas": MethodEntry(
+        "lcp_lube.solvers.fas:build",
+        "nonlinear multigrid: full multigrid and a few cycles of sweeps, no matrix at all",
+        systems=(),
+        interior=False,
+        eps=(1e-8, inf),
+        fallback=("active-set", "din-pc", "monotone"),
     ),
     "monotone": MethodEntry(
         "lcp_lube.solvers.monotone:build",

@@ -24,7 +24,7 @@ def test_methods_name_existing_systems_and_kinds():
     for kind, name in registry.DEFAULT_METHOD.items():
         assert kind in registry.METHODS[name].kinds
     for name, entry in registry.METHODS.items():
-        assert entry.kinds and entry.systems, name
+        assert entry.kinds and (entry.systems or name == "fas"), name  # it solves no linear systems
         if "lubrication" in entry.kinds:
             assert set(entry.systems) <= set(registry.SYSTEMS), name
 

@@ -45,6 +45,7 @@ def as_dict(solution: Solution) -> dict[str, Any]:
         "certificate_tol": certificate.tol,
         **(solution.enclosure.as_dict() if solution.enclosure else {}),
         **{key: settings[key] for key in ("accuracy", "accuracy_quantity", "accuracy_estimate") if key in settings},
+        **settings.get("details", {}),
         **({"levels": solution.levels} if solution.levels else {}),
         "memory_mb": peak_memory(solution),
         "time_s": {
@@ -131,6 +132,7 @@ def summary(data: dict[str, Any]) -> str:
     load_unit = "N/m" if one_d else "N"
     inner = f", {data['linear_iterations']} Krylov" if data["linear_iterations"] else ""
     recipe = data["recipe"] or f"{data['ksp_type']} + {data['pc_type']}"
+    system = f" on the {data['system']} system, {recipe}" if data["system"] else ""
     scheme = f", scheme {data['scheme']}" if data["scheme"] else ""
     measures = ", ".join(
         f"{name.replace('_', ' ')} {data[name]:.1e}{UNITS.get(name, '')}" for name in MEASURES if data.get(name) is not None
@@ -143,7 +145,7 @@ def summary(data: dict[str, Any]) -> str:
     else:
         quantities = ", ".join(f"{name} {data[name]:.8g}" for name in QUANTITIES if data.get(name) is not None)
     lines = [
-        f"{data['scene']} ({size}{scheme}) by {data['method']} on the {data['system']} system, {recipe}, "
+        f"{data['scene']} ({size}{scheme}) by {data['method']}{system}, "
         f"{data['ranks']} rank{'s' * (data['ranks'] > 1)}",
         f"{data['outcome']}: {data['iterations']} iterations{inner}, {data['centrality']} centrality and "
         f"{data['backtracking']} backtracking cuts, {data['time_s']['total']:.2f} s; {data['message']}",

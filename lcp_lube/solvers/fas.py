@@ -1,0 +1,258 @@
+"""Nonlinear multigrid: the full approximation scheme (FAS) for the flow balance in z, where a whole solve costs a few sweeps.
+
+    G(z) = A max(z, 0) + B max(-z, 0) / -b_C - c = 0
+
+G is an M-function, so that nonlinear Gauss-Seidel converges from any start, and what it leaves is smooth away from the fronts:
+a coarser grid's business. It solves G_H(z_H) = G_H(injected z) + restricted residual, and z is corrected by the interpolated
+difference. A point is not moved across its front by that: it stops there, and the sweeps decide. What the coarse grid cannot
+know, where the front lies inside its cells, is put right by some more sweeps within a few cells of the front, which are few
+points. Full multigrid, from the coarsest grid up, gives the start. See docs/nonlinear_multigrid.md.
+"""
+
+from dataclasses import dataclass
+from importlib.util import find_spec
+from math import inf
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..linear.krylov import Krylov
+from ..linear.stages import Stages
+from ..parallel import Array
+from ..problems.problem import LubricationProblem
+from ..problems.solution import Fields, Step
+from .method_options import make_options
+from .newton import Stopping
+from .steplength import StepLengthError
+
+EPS = float(np.finfo(float).eps)
+WINDOW = 3  # cycles over which the fall of ||G|| is judged
+TRUNCATIONS = {"none": 0, "clip": 1, "sides": 2, "points": 3}  # see `fas_kernels.correct`
+COARSEST_SWEEPS = 40
+
+
+@dataclass(frozen=True)
+class FasOptions:
+    """cycle: V, F or W; pre, post: sweeps before and after the coarse grid; front: sweeps over the points within `width` cells of
+    a front after each correction; truncation: of corrections at fronts, none, clip, sides or points; weights: of the
+    interpolation, by the conductances of the faces (harmonic) or the same everywhere (linear); stall: the least fall of ||G||
+    over three cycles, as a factor, below which the method gives up."""
+
+    cycle: str = "F"
+    pre: int = 3
+    post: int = 3
+    front: int = 10
+    width: int = 3
+    truncation: str = "clip"
+    weights: str = "harmonic"
+    stall: float = 0.3
+
+    def __post_init__(self) -> None:
+        for name, legal in (("cycle", ("V", "F", "W")), ("truncation", TRUNCATIONS), ("weights", ("harmonic", "linear"))):
+            if getattr(self, name) not in legal:
+                raise InputError(f"fas.{name} = {getattr(self, name)}: allowed are {', '.join(legal)}")
+        for name in ("pre", "post", "front", "width"):
+            if getattr(self, name) < 0:
+                raise InputError(f"fas.{name} = {getattr(self, name)}: at least 0 is needed")
+        if self.pre + self.post == 0:
+            raise InputError("fas.pre = fas.post = 0: at least one sweep is needed")
+        if not 0 < self.stall <= 1:
+            raise InputError(f"fas.stall = {self.stall}: allowed are numbers above 0, up to 1")
+
+
+class Fas:
+    """The iterates z; `newton.iterate` runs it. `norm` is that of `active_set`, ||G(z)|| / ||c||.
+
+    The first step is full multigrid, the others are cycles; a given start takes full multigrid's place.
+
+    Parameters
+    ----------
+    start : fields p and r.
+    """
+
+    state = ("z", "norm", "_recent", "_first", "_taken")
+
+    def __init__(
+        self, problem: LubricationProblem, stages: Stages, options: FasOptions, eps1: float, start: Fields | None = None
+    ):
+        # Compiled or read from numba's cache at this import, 0.2 s: only where the method is used.
+        from . import fas_kernels, fas_levels
+
+        self._kernels, self._restrict = fas_kernels, fas_levels.restrict
+        self.problem, self.stages, self.options, self.eps1 = problem, stages, options, eps1
+        self._harmonic, self._truncation = options.weights == "harmonic", TRUNCATIONS[options.truncation]
+        with stages("assembly"):
+            self._levels = fas_levels.hierarchy(problem, self._harmonic)
+        self._c_norm = problem.reduce.norm(problem.c)
+        self._recent: tuple[float, ...] = (inf,) * WINDOW
+        self._taken, self._first, self._correction = 0, inf, 0.0
+        if start is not None:
+            self.z = start["p"] + problem.scheme.b_C.ravel() * start["r"]
+            self._taken = 1
+        self.norm = self._norm()
+        self._first = self.norm
+
+    @property
+    def z(self) -> Array:
+        """p, or minus the flow of void, at this rank's points."""
+        return self._levels[0].z[self._own].ravel()
+
+    @z.setter
+    def z(self, value: Array) -> None:
+        level, grid = self._levels[0], self.problem.grid
+        level.z[self._own] = value.reshape(grid.box)
+        if level.comm is None and grid.comm.size > 1:
+            for where, part in grid.comm.allgather((self._own, value.reshape(grid.box))):
+                level.z[where] = part
+        level.share(level.z)
+
+    @property
+    def _own(self) -> tuple[slice, slice]:
+        """Where this rank's points stand in the finest level's arrays."""
+        grid, first = self.problem.grid, self._levels[0].first
+        rows = slice(grid.y_start + 1, grid.y_end + 1) if self._levels[0].comm is None else slice(1, -1)
+        assert first in (0, grid.y_start)
+        return rows, slice(grid.x_start + 1, grid.x_end + 1)
+
+    @property
+    def fields(self) -> Fields:
+        z = self._levels[0].z[self._own]
+        return {"p": np.maximum(z, 0.0).ravel(), "r": (np.maximum(-z, 0.0) / -self.problem.scheme.b_C).ravel()}
+
+    @property
+    def krylov(self) -> Krylov | None:
+        return None
+
+    @property
+    def details(self) -> dict[str, Any]:
+        """levels: coarse to fine, their visits and own seconds; cycles after full multigrid; work_units: relaxed points over
+        points; convergence_factor: geometric mean of the cycles'. Collective."""
+        cycles = self._taken - 1
+        measured = cycles > 0 and 0 < self.norm < inf and 0 < self._first < inf
+        return {
+            "levels": [
+                {"nx": v.nx, "ny": v.ny, "iterations": v.visits, "linear_iterations": 0, "time_s": v.seconds}
+                for v in reversed(self._levels)
+            ],
+            "cycles": max(cycles, 0),
+            "work_units": self._work() / self.problem.size,
+            "convergence_factor": (self.norm / self._first) ** (1.0 / cycles) if measured else None,
+        }
+
+    def _work(self) -> float:
+        """Points relaxed so far by all ranks, those that all of them relax counted once. Collective."""
+        apart = sum(level.work for level in self._levels if level.split)
+        return sum(level.work for level in self._levels if not level.split) + self.problem.reduce.sum(np.array([apart]))
+
+    def destroy(self) -> None:
+        """There is nothing of PETSc's here."""
+
+    def _norm(self) -> float:
+        """||G|| / ||c||; where rounding in G's sums alone exceeds eps1, on very fine grids, relative to that. Collective."""
+        level = self._levels[0]
+        sums = np.array(self._kernels.norms(level.z, level.kx, level.ky, level.c))
+        if level.comm is not None:
+            level.comm.Allreduce(sums.copy(), sums)
+        residual, terms = np.sqrt(sums)
+        return float(residual / (max(self._c_norm, 16 * EPS * terms / self.eps1) or 1.0))
+
+    def advance(self) -> Step:
+        """Full multigrid, or one cycle; the step is what the coarse grids corrected. Collective.
+
+        Raises
+        ------
+        StepLengthError : ||G|| has stalled.
+        """
+        if self.norm > self.options.stall * self._recent[0] and self.norm > self.eps1:
+            if not self.norm < 1.0:
+                self.z = np.zeros(self.problem.grid.local_size)  # the better start for whoever takes over
+            raise StepLengthError(f"||G|| is at {self.norm:.1e} of ||c|| after {self._taken} cycles and has stalled")
+        with self.stages("cycles"):
+            if self._taken == 0:
+                self._full_multigrid()
+            else:
+                self._cycle(0, self.options.cycle)
+            self._taken += 1
+        self._recent = (*self._recent[1:], self.norm if self._taken > 1 else inf)
+        with self.stages("norm"):
+            self.norm = self._norm()
+        if self._taken == 1:
+            self._first = self.norm
+        step = self.problem.reduce.comm.allreduce(self._correction) if self._levels[0].comm is not None else self._correction
+        return Step(self.norm, float(np.sqrt(step)), 1.0)
+
+    def _full_multigrid(self) -> None:
+        """From the coarsest grid up, one cycle on each. Collective."""
+        for k in reversed(range(len(self._levels))):
+            level = self._levels[k]
+            if k:
+                level.c[:] = level.f
+            if k + 1 < len(self._levels):
+                coarse = self._levels[k + 1]
+                where = (level.first, level.by_x, level.by_y, self._harmonic)
+                self._kernels.interpolate(level.z, coarse.part(coarse.z), level.kx, level.ky, *where)
+                level.share(level.z)
+            self._cycle(k, self.options.cycle)
+
+    def _cycle(self, k: int, kind: str) -> None:
+        """One cycle from level k down and back. Collective."""
+        begin, o = perf_counter(), self.options
+        level = self._levels[k]
+        level.visits += 1
+        if k + 1 == len(self._levels):
+            for s in range(2):
+                self._relax(level, max(COARSEST_SWEEPS, 2 * level.nx, 2 * level.ny) // 2, s == 1)
+            level.seconds += perf_counter() - begin
+            return
+        coarse = self._levels[k + 1]
+        self._relax(level, o.pre, False)
+        where = (level.first, level.by_x, level.by_y)
+        self._restrict(level, coarse, coarse.c, self._harmonic)
+        self._kernels.inject(level.z, coarse.part(coarse.old), *where)
+        coarse.gather(coarse.old)
+        coarse.z[:] = coarse.old
+        self._kernels.add_balance(coarse.old, coarse.kx, coarse.ky, coarse.c)
+        level.seconds += perf_counter() - begin
+        self._cycle(k + 1, kind)
+        if kind != "V" and k + 2 < len(self._levels):
+            self._cycle(k + 1, "V" if kind == "F" else kind)
+        begin = perf_counter()
+        differences = (coarse.part(coarse.z), coarse.part(coarse.old))
+        self._correction = self._kernels.correct(
+            level.z, *differences, level.kx, level.ky, *where, self._harmonic, self._truncation
+        )
+        level.share(level.z)
+        if o.front:
+            level.work += o.front * self._kernels.relax_front(level.z, level.kx, level.ky, level.c, o.front, o.width)
+            level.share(level.z)
+        self._relax(level, o.post, True)
+        level.seconds += perf_counter() - begin
+
+    def _relax(self, level: Any, sweeps: int, down: bool) -> None:
+        """Sweeps at once; one by one where other ranks have to hear of each."""
+        for count in [1] * sweeps if level.split else [sweeps] * bool(sweeps):
+            self._kernels.sweep(level.z, level.kx, level.ky, level.c, count, down)
+            level.share(level.z)
+        level.work += sweeps * level.nx * (level.z.shape[0] - 2)
+
+
+def build(
+    problem: LubricationProblem,
+    stages: Stages,
+    system: str,
+    options: dict[str, Any],
+    stopping: Stopping,
+    start: Fields | None = None,
+) -> Fas:
+    """The registry's door.
+
+    Raises
+    ------
+    InputError : an unknown option or a value out of range; numba is missing.
+    """
+    settings = make_options(FasOptions, "fas", options)
+    if find_spec("numba") is None:
+        raise InputError("--method fas: its loops need numba, which is not installed (pip install numba)")
+    return Fas(problem, stages, settings, stopping.eps1, start)
