@@ -56,6 +56,8 @@ class CavitySystem:
         self.problem = problem
         self.stages = stages or Stages()
         grid = problem.grid
+        if any(grid.periodic):
+            raise InputError("--system cavity: x lines need a beginning and an end, y columns too; take --system reduced")
         if grid.box[1] != grid.shape[0]:
             raise InputError("--system cavity: needs every x line on one rank; take --system reduced or fewer ranks")
         scheme = problem.scheme
