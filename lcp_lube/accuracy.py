@@ -36,8 +36,12 @@ DIFFERENCES = 3  # that Richardson's estimate heeds: a front moves, and one diff
 ANSWER = (1.0, 10.0)  # least and greatest answer to a misplaced jump: relative change over share of Int h^-3
 COARSEST = {1: 12, 2: 4}  # points a side at least on the first grid
 LINES, PARTS = 17, 16  # lines of a 2D grid on which the film is looked at, and looks between two points
+# Looks, in spacings from the left one of two points: just inside of both, where a film that jumps at a point has its own side.
+_LOOKS = np.clip(np.linspace(0.0, 1.0, PARTS + 1), 1e-7, 1.0 - 1e-7)
+_WEIGHTS = np.array([0.5, *[1.0] * (PARTS - 1), 0.5]) / PARTS
 ALGEBRAIC = 1e-3  # ||F|| relative to the tolerance: what is left of it must not show
 ALLOWED = (1e-10, 0.5)  # tolerances
+HOPELESS = 1_000_000  # points on which an estimate that has not come down is taken to stay up
 PATIENCE = 4  # grids without a better estimate: rounding has the word
 ASYMPTOTIC = 0.1  # an estimate below it falls by second order at best
 BYTES, BYTES_DENSE = {1: 900, 2: 1200}, 24  # memory by points, measured (`auto`'s choices)
@@ -116,7 +120,9 @@ def solve_to_accuracy(
         )
         times = {name: times.get(name, 0.0) + seconds for name, seconds in solution.times.items()}
         shape = tuple(2 * n + 1 for n in shape)
-        end = _end([level["estimate"] for level in levels], values, tol) or _no_room(problem, shape, finest, estimate, tol)
+        end = _end([level["estimate"] for level in levels], values, tol, problem.grid.size) or _no_room(
+            problem, shape, finest, estimate, tol
+        )
     assert solution is not None and quantity is not None  # for the type checker: there is a first grid
     if solution.converged and not estimate <= tol:
         solution.outcome = Outcome.ACCURACY
@@ -147,7 +153,8 @@ def relative_error(values: Sequence[float], misplaced: Sequence[float]) -> float
         return inf
     age = np.arange(len(steps))[::-1]
     tiny = np.finfo(float).tiny
-    order = float(np.clip(np.min(np.log2((steps[:-1] + tiny) / (steps[-1] + tiny)) / age[:-1]), 1.0, 2.0))
+    logs = np.log2(steps + tiny)
+    order = float(np.clip(np.min((logs[:-1] - logs[-1]) / age[:-1]), 1.0, 2.0))
     richardson = SAFETY * np.max(steps / 2.0 ** (order * age)) / (2.0**order - 1.0) / abs(values[-1])
     if not misplaced[-1]:
         return float(richardson)
@@ -170,7 +177,7 @@ def misplaced_film(problem: Problem) -> float:
     share = 0.0
     for side in range(grid.dim):
         n, spacing, start = grid.shape[side], grid.spacing[side], grid.origin[side]
-        fine = start + (np.arange((n + 1) * PARTS) + 0.5) * (spacing / PARTS)
+        fine = (start + (np.arange(n + 1)[:, None] + _LOOKS) * spacing).ravel()
         face = start + (np.arange(n + 1) + 0.5) * spacing
         across = 1 - side
         if grid.dim == 1:
@@ -182,18 +189,18 @@ def misplaced_film(problem: Problem) -> float:
             np.broadcast_to(problem.film(*((at[None, :], lines[:, None])[:: 1 - 2 * side])), (lines.size, at.size))
             for at in (fine, face)
         ]
-        share += _misplaced(film[0].reshape(lines.size, n + 1, PARTS), film[1])
+        share += _misplaced(film[0].reshape(lines.size, n + 1, PARTS + 1), film[1])
     return share
 
 
 def _misplaced(looks: np.ndarray, face: np.ndarray) -> float:
-    """`misplaced_film` from the film at the looks, shape (lines, n + 1, PARTS), and at the faces, shape (lines, n + 1)."""
+    """`misplaced_film` from the film at the looks, shape (lines, n + 1, PARTS + 1), and at the faces, shape (lines, n + 1)."""
     weight = looks**-3.0
-    mean = weight.mean(axis=-1)
+    mean = weight @ _WEIGHTS
     off = np.abs(face**-3.0 - mean)
     spread = looks.max(axis=-1) - looks.min(axis=-1)
     jump = np.abs(np.diff(looks, axis=-1)).max(axis=-1) > 0.5 * spread
-    seen = jump & (spread > 1e-3 * looks.mean(axis=-1)) | (off > 0.5 * mean)
+    seen = jump & (spread > 1e-9 * looks.mean(axis=-1)) | (off > 0.5 * mean)
     return float(np.sum(off[seen]) / np.sum(mean))
 
 
@@ -218,14 +225,16 @@ def ladder(levels: list[dict[str, Any]], quantity: str, tol: float) -> list[str]
     return lines
 
 
-def _end(estimates: Sequence[float], values: Sequence[float], tol: float) -> str:
+def _end(estimates: Sequence[float], values: Sequence[float], tol: float, points: int) -> str:
     """Why this grid is the last one; empty if it is not."""
     if estimates[-1] <= tol:
         return "reached"
     if len(values) > 1 and np.isnan(values[-2:]).all():
         return "no value on the last two grids"
     best = int(np.argmin(estimates))
-    if np.isfinite(estimates[best]) and len(estimates) - best > PATIENCE:
+    # A film with a layer thinner than these grids stays far off for long, and then converges.
+    settled = estimates[best] < ASYMPTOTIC or points > HOPELESS
+    if settled and len(estimates) - best > PATIENCE:
         return f"{PATIENCE} finer grids gave no better estimate than {estimates[best]:.1e}"
     return ""
 

@@ -1,0 +1,226 @@
+"""--accuracy: the estimate against exact solutions, where the ladder ends, what is refused."""
+
+import math
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+import pytest
+from films import MU, FilmScene, L, U
+
+from lcp_lube.accuracy import first_shape, misplaced_film, relative_error, solve_to_accuracy
+from lcp_lube.api import solve
+from lcp_lube.errors import InputError
+from lcp_lube.problems.exact import exact_solution
+from lcp_lube.problems.solution import Outcome
+from lcp_lube.registry import scene_names
+from lcp_lube.scene import load_scene
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """A film between knots at any places: straight, smooth (half a cosine from knot to knot) or in steps."""
+
+    kind: str
+    knots: tuple[float, ...]  # m, from 0 to L
+    heights: tuple[float, ...]  # m
+
+    def __call__(self, x, y=0.0, /):
+        x = np.broadcast_arrays(np.asarray(x, dtype=float), y)[0]
+        k = np.clip(np.searchsorted(self.knots, x, side="right") - 1, 0, len(self.knots) - 2)
+        knots, h = np.array(self.knots), np.array(self.heights)
+        t = np.clip((x - knots[k]) / (knots[k + 1] - knots[k]), 0, 1)
+        part = {"straight": t, "smooth": np.sin(0.5 * np.pi * t) ** 2, "steps": 0.0}[self.kind]
+        return h[k] + (h[k + 1] - h[k]) * part
+
+    def breakpoints(self):
+        return self.knots
+
+
+def random_films(count, seed):
+    """Scenes with their exact solutions: film ratios up to 20, up to 6 pieces, any of three pressures at either end."""
+    rng = np.random.default_rng(seed)
+    for k in range(count):
+        pieces = rng.integers(2, 7)
+        knots = (0.0, *np.sort(rng.uniform(0.03, 0.97, pieces - 1)) * L, L)
+        kind = ("straight", "smooth", "steps")[k % 3]
+        heights = 5e-6 * rng.uniform(1.5, 6 if kind == "steps" else 20) ** rng.uniform(0, 1, pieces + 1)
+        film = Pieces(kind, knots, tuple(heights))
+        p_a, p_b = (float(p) for p in rng.choice([0.0, 1e5, 3e6], 2))
+        scheme = str(rng.choice(["face", "nodal"]))
+        scene = FilmScene.of(film, p_a=p_a, p_b=p_b, scheme=scheme, name=f"{kind}{k}")
+        yield scene, exact_solution(film, L, MU, U, p_a, p_b)
+
+
+def exact_scenes():
+    """Every built-in scene with an exact solution, and some with other data."""
+    variants = {
+        **{f"problem{k}": [{}, {"film": "parabola"}] for k in (1, 2, 3)},
+        "long_journal": [{"eccentricity": e} for e in (0.2, 0.5, 0.9)],
+    }
+    for name in scene_names():
+        for changes in variants.get(name, [{}]):
+            scene = load_scene(name, changes)
+            exact = scene.exact() if hasattr(scene, "exact") else None
+            if exact is not None:
+                yield scene, exact
+
+
+def errors(cases, quantity, tol):
+    """Estimated and true relative errors, shape (cases, 2), of runs that all reach the tolerance."""
+    out = []
+    for scene, exact in cases:
+        if getattr(exact, quantity) == 0:
+            continue  # an empty film: no relative error
+        solution = solve_to_accuracy(scene, tol, quantity)
+        problem = solution.problem
+        truth = getattr(exact, quantity) + problem.p_c * (1.0 if quantity == "p_max" else problem.grid.lengths[0])
+        value = problem.quantities(solution.fields)[quantity]
+        solution.destroy()
+        assert solution.outcome is Outcome.CONVERGED, f"{scene.name}: {solution.message}"
+        assert value == solution.levels[-1]["value"]
+        out.append((solution.settings["accuracy_estimate"], abs(value / truth - 1)))
+    return np.array(out)
+
+
+@pytest.mark.parametrize("quantity, tol", list(product(["load", "p_max"], [1e-2, 1e-3])))
+def test_estimate_against_exact_solutions(quantity, tol):
+    """The true error is below the estimate in 90 % of the runs, and the estimate within ten times of it in the median."""
+    estimate, true = errors([*exact_scenes(), *random_films(30, seed=11)], quantity, tol).T
+    assert len(true) >= 35
+    assert np.all(estimate <= tol)
+    assert np.mean(true <= estimate + 1e-12) >= 0.9
+    inexact = true > 1e-12  # a largest pressure that is a side's is exact on every grid
+    assert np.median(estimate[inexact] / true[inexact]) <= 10
+
+
+def test_no_grid_finer_than_needed():
+    """The grid before the last one was not known to be good enough; a coarser tolerance ends sooner."""
+    sizes = []
+    for tol in (1e-1, 1e-2, 1e-3, 1e-4):
+        solution = solve_to_accuracy(load_scene("problem1"), tol)
+        solution.destroy()
+        estimates = [level["estimate"] for level in solution.levels]
+        assert estimates[-1] <= tol
+        assert all(estimate > tol for estimate in estimates[:-1])
+        sizes.append(solution.levels[-1]["nx"])
+    assert sizes == sorted(sizes)
+    assert sizes[0] < sizes[-1] <= 400
+
+
+@pytest.mark.parametrize("scene, tol", [("problem4", 1e-2), ("journal", 1e-2)])
+def test_plane_film(scene, tol):
+    """A 2D load against that of a grid with some 250 points along x."""
+    solution = solve_to_accuracy(load_scene(scene), tol)
+    value = solution.levels[-1]["value"]
+    solution.destroy()
+    fine = solve(load_scene(scene, {"nx": 255, "ny": 127 if scene == "problem4" else 63}))
+    truth = fine.problem.quantities(fine.fields)["load"]
+    fine.destroy()
+    assert abs(value / truth - 1) <= tol
+    assert solution.levels[-1]["nx"] < 100
+
+
+@pytest.mark.parametrize(
+    "scene, quantity", [("obstacle_ball", "sum_v"), ("bratu", "max_v"), ("poisson_cubic", "sum_v"), ("ehl_line", "k")]
+)
+def test_scenes_that_are_no_films(scene, quantity):
+    solution = solve_to_accuracy(load_scene(scene, {"n": 40}), 2e-2, quantity)
+    solution.destroy()
+    assert solution.converged
+    assert len({level["nx"] for level in solution.levels}) == len(solution.levels) >= 3
+
+
+def test_other_methods():
+    values = []
+    for method in ("din", "din-pc", "active-set"):
+        solution = solve_to_accuracy(load_scene("problem3"), 1e-2, method=method)
+        solution.destroy()
+        assert solution.converged
+        values.append(solution.levels[-1]["value"])
+    assert values == pytest.approx([values[0]] * 3, rel=1e-3)
+
+
+def test_relative_error_by_hand():
+    """Second order without noise: the error itself, times the safety factor; a vanishing difference proves nothing."""
+    errors = 0.3 / 4.0 ** np.arange(5)
+    assert relative_error(1 + errors, [0.0] * 5) == pytest.approx(2 * errors[-1], rel=0.02)
+    assert relative_error([1.0, 1.1], [0.0] * 2) == math.inf
+    assert relative_error([1.0, 1.0, 1.0], [0.0] * 3) == 0.0
+    assert relative_error([1.0, 1.0, 1.0], [0.1, 0.05, 0.02]) >= 0.02
+    assert relative_error([1.0, math.nan, 1.1], [0.0] * 3) == math.inf
+    assert relative_error([1.2, 1.04, 1.04, 1.04], [0.0] * 4) >= 0.16 / 16 / 3
+
+
+def test_jump_is_seen_where_values_do_not_show_it():
+    """A step off the faces by the same length on several grids: equal values, and an estimate that is not fooled."""
+    film = Pieces("steps", (0.0, 0.63 * L, L), (2e-5, 1e-5, 1e-5))
+    for n in (24, 49):
+        problem = FilmScene.of(film, n=n).build()
+        share = misplaced_film(problem)
+        # Between points and faces h^-3 is off by up to half a spacing of it.
+        assert 0 < share <= 0.5 * (1e5**3 - (5e4) ** 3) * problem.grid.spacing[0] / (0.37 * L * 1e5**3 + 0.63 * L * 5e4**3)
+        problem.destroy()
+    smooth = FilmScene.of(Pieces("smooth", (0.0, 0.5 * L, L), (2e-5, 1e-5, 2e-5)), n=49).build()
+    assert misplaced_film(smooth) == 0
+    smooth.destroy()
+
+
+def test_first_shape_keeps_two_lines_for_every_rank():
+    assert first_shape((100, 100)) == (5, 5)
+    assert first_shape((360, 79)) == (21, 4)
+    assert first_shape((360, 79), ranks=3)[1] >= 6
+    assert first_shape((3, 3)) == (3, 3)
+
+
+@pytest.mark.parametrize(
+    "tol, quantity, words",
+    [
+        (0.0, None, "allowed are relative errors"),
+        (math.nan, None, "allowed are relative errors"),
+        (1e-3, "pmax", "nearest is p_max"),
+        (1e-3, "flow", "no such number"),
+    ],
+)
+def test_bad_input(tol, quantity, words):
+    with pytest.raises(InputError, match=words):
+        solve_to_accuracy(load_scene("problem1"), tol, quantity)
+
+
+def test_out_of_memorys_reach_is_refused(cli):
+    run = cli("solve", "problem4", "--accuracy", "1e-9")
+    assert run.status == 2
+    assert len(run.lines) == 1
+    assert "--accuracy 1e-09" in run.err
+    assert "this machine has" in run.err
+
+
+def test_command_line(cli):
+    run = cli("solve", "problem2", "--accuracy", "1e-3", "--quantity", "p_max", "--json", "--explain")
+    assert run.status == 0
+    data = run.json
+    assert data["accuracy_quantity"] == "p_max"
+    assert data["accuracy_estimate"] <= 1e-3
+    assert data["levels"][-1]["value"] == pytest.approx(data["p_max"])
+    assert data["levels"][-1]["nx"] == data["nx"]
+    grids = [line.split() for line in run.lines if line.strip()[0].isdigit()]
+    assert [int(words[0]) for words in grids] == [level["nx"] for level in data["levels"]]
+
+
+def test_finest_grid_allowed(cli):
+    run = cli("solve", "problem1", "--accuracy", "1e-6", "--n", 60, "--json")
+    assert run.status == 1
+    assert run.json["outcome"] == "accuracy_not_reached"
+    assert run.json["nx"] <= 60
+    assert "60 is not allowed" in run.json["message"]
+    run = cli("solve", "problem1", "--quantity", "load")
+    assert run.status == 2
+    assert "--accuracy TOL is needed" in run.err
+
+
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_ranks(cli, ranks):
+    one = cli("solve", "problem4", "--accuracy", "2e-2", "--json").json
+    more = cli("solve", "problem4", "--accuracy", "2e-2", "--json", ranks=ranks).json
+    assert more["converged"]
+    assert more["load"] == pytest.approx(one["load"], rel=2e-2)
