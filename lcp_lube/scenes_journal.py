@@ -10,6 +10,7 @@ from .parallel import Array
 from .problems.exact import ExactSolution, exact_solution
 from .problems.film import JournalGap
 from .problems.flows import side_flows
+from .problems.model import Side
 from .problems.problem import LubricationProblem
 from .scene import LubricationScene, Positive
 
@@ -18,12 +19,14 @@ class JournalScene(LubricationScene):
     """A journal of diameter D turning in a bush of width B: x = D phi/2 from the groove at h_max, y along the axis.
 
     h = c (1 + eccentricity cos phi), c = psi D/2; the groove keeps p = p_a = p_b and no void, the ends p = p_side. L, width, U
-    and p_unit follow from D, width_over_diameter, omega and psi; dimension 1 is the infinitely long bearing.
+    and p_unit follow from D, width_over_diameter, omega and psi; dimension 1 is the infinitely long bearing. Without a groove
+    (round = "periodic") the film goes on at phi = 2 pi, and the ends, at p_side > 0, feed it.
     """
 
     dimension: Literal[1, 2] = 2
     eccentricity: Annotated[float, Field(ge=0, lt=1, description="relative eccentricity")] = 0.5
     width_over_diameter: Positive = Field(1.0, description="B/D (2D)")
+    round: Literal["groove", "periodic"] = Field("groove", description="at phi = 0: an axial groove, or nothing (2D)")
     D: Positive = Field(0.1, description="diameter, m")
     psi: Annotated[float, Field(gt=0, lt=1, description="relative clearance c/(D/2)")] = 1e-3
     omega: Positive = Field(100.0, description="angular velocity, rad/s")
@@ -47,6 +50,22 @@ class JournalScene(LubricationScene):
         except (TypeError, ZeroDivisionError, OverflowError):
             return data  # the fields' own checks say what is wrong
         return {**data, **{key: value for key, value in derived.items() if value > 0 and math.isfinite(value)}}
+
+    @model_validator(mode="after")
+    def _fed(self) -> "JournalScene":
+        if self.round == "periodic":
+            if self.dimension == 1 or not self.p_side > 0:
+                found = "dimension = 1" if self.dimension == 1 else f"p_side = {self.p_side:g}"
+                raise ValueError(f"{found}: without a groove (round = periodic) the ends feed the film: 2D, p_side > 0")
+            if self.p_a or self.p_b:
+                raise ValueError(f"p_a = {self.p_a:g}, p_b = {self.p_b:g}: there is no groove (round = periodic)")
+        return self
+
+    @property
+    def sides(self) -> tuple[Side, Side, Side, Side]:
+        if self.round == "groove":
+            return super().sides
+        return Side("periodic"), Side("periodic"), Side(p=self.p_side), Side(p=self.p_side)
 
     @property
     def gap(self) -> JournalGap:
