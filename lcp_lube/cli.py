@@ -14,6 +14,7 @@ from .api import solve
 from .arguments import method_options, scene_changes
 from .errors import InputError, nearest
 from .linear.options import check_unread
+from .neighbour import solve_or_balance
 from .output.results import as_dict, finite, summary
 from .problems.solution import Solution, Step
 from .registry import METHODS, STABILITY, SYSTEMS, recipe_line, recipe_names
@@ -91,6 +92,11 @@ def solution_of(args: argparse.Namespace, monitor: Monitor | None = None) -> Sol
         "nested": args.nested,
         "certify": args.certify,
     }
+    if getattr(scene, "balance", None) is not None:
+        for option in ("accuracy", "checkpoint", "resume"):
+            if getattr(args, option) is not None:
+                raise InputError(f"--{option}: not with [balance], whose many solves make one answer")
+        return solve_or_balance(lambda changes: scene_of(args, changes), None, **how)
     if args.accuracy is None:
         if args.quantity is not None:
             raise InputError(f"--quantity {args.quantity}: --accuracy TOL is needed too")

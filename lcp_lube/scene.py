@@ -8,11 +8,12 @@ from typing import Annotated, Any, Literal
 from petsc4py import PETSc
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError, model_validator
 
+from .balance import BalanceTable
 from .changes import changed
 from .errors import InputError, nearest
 from .faults import first_fault, known_keys
 from .problems.exact import ExactSolution, exact_solution
-from .problems.film import Wave
+from .problems.film import Raised, Wave
 from .problems.model import Model, Side
 from .problems.problem import LubricationProblem
 from .problems.reynolds import Film
@@ -68,6 +69,8 @@ class LubricationScene(Scene):
     scheme: Literal["nodal", "face", "upwind"] = Field("face", description="form of the Couette flux")
     mean_cubes: bool = Field(False, description="h^3 at a face as the mean of the nodal values")
     p_unit: Positive = Field(1e6, description="pressure unit of the equations, Pa")
+    h_offset: Finite = Field(0.0, description="added to the film everywhere, m: its level")
+    balance: BalanceTable | None = Field(None, description="load to carry, and what is found for it")
     n: Count = Field(100, description="interior points a side")
     nx: Count | None = Field(None, description="interior points in x; default n")
     ny: Count | None = Field(None, description="interior points in y; default n (2D)")
@@ -105,7 +108,7 @@ class LubricationScene(Scene):
         return Model(
             lengths=(self.L,) if self.dimension == 1 else (self.L, self.width or self.L),
             sides=self.sides,
-            gap=self.gap,
+            gap=Raised(self.gap, self.h_offset) if self.h_offset else self.gap,  # type: ignore[arg-type]
             mu=self.mu,
             U=self.U,
             p_c=self.p_c,
@@ -151,7 +154,7 @@ class SliderScene(LubricationScene):
     def exact(self) -> ExactSolution | None:
         if self.dimension == 2:
             return None
-        return exact_solution(self.gap, self.L, self.mu, self.U, self.p_a, self.p_b)
+        return exact_solution(Raised(self.gap, self.h_offset), self.L, self.mu, self.U, self.p_a, self.p_b)
 
 
 def scene_line(name: str) -> str:

@@ -8,11 +8,12 @@ import numpy as np
 from petsc4py import PETSc
 from pydantic import Field, field_validator, model_validator
 
+from .balance import BalanceTable
 from .errors import InputError
 from .problems.exact import ExactSolution, exact_solution
 from .problems.model import NAMES, OPPOSITE, Model, Side
 from .problems.problem import LubricationProblem
-from .problems.shapes import Sum
+from .problems.shapes import Block, Sum
 from .scene import Count, Finite, Positive, Scene
 from .scenes_film import Extent, FilmPart
 from .units import Measured, metres
@@ -80,6 +81,8 @@ class BearingScene(Measured, Scene):
     scheme: Literal["nodal", "face", "upwind"] = Field("face", description="form of the Couette flux")
     mean_cubes: bool = Field(False, description="h^3 at a face as the mean of the nodal values")
     p_unit: Positive | None = Field(None, description="pressure unit of the equations, Pa; default from mu U L/h^2")
+    h_offset: Finite = metres(0.0, "added to the film everywhere: its level")
+    balance: BalanceTable | None = Field(None, description="load to carry, and what is found for it")
     n: Count = Field(100, description="points a side")
     nx: Count | None = Field(None, description="points in x; default n")
     ny: Count | None = Field(None, description="points in y; default n (2D)")
@@ -141,7 +144,8 @@ class BearingScene(Measured, Scene):
     def gap(self) -> Sum:
         """The film h(x, y) in metres."""
         extent = Extent(self.side_lengths, self._folder or Path())
-        return Sum([table.part(extent) for table in self.film], self.h_floor)
+        level = [Block(self.h_offset, (-math.inf, math.inf), (-math.inf, math.inf))] if self.h_offset else []
+        return Sum([*(table.part(extent) for table in self.film), *level], self.h_floor)
 
     @property
     def model(self) -> Model:

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from .parallel import Array
 from .problems.exact import ExactSolution, exact_solution
-from .problems.film import JournalGap
+from .problems.film import JournalGap, Raised
 from .problems.flows import side_flows
 from .problems.model import Side
 from .problems.problem import LubricationProblem
@@ -74,7 +74,7 @@ class JournalScene(LubricationScene):
     def exact(self) -> ExactSolution | None:
         if self.dimension == 2:
             return None
-        return exact_solution(self.gap, self.L, self.mu, self.U, self.p_a, self.p_b)
+        return exact_solution(Raised(self.gap, self.h_offset), self.L, self.mu, self.U, self.p_a, self.p_b)
 
     def build(self, comm: Any = None) -> LubricationProblem:
         problem = super().build(comm)

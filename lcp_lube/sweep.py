@@ -17,12 +17,12 @@ import numpy as np
 from mpi4py import MPI
 from tqdm import tqdm
 
-from .api import solve
 from .errors import InputError
 from .linear.options import check_unread
+from .neighbour import solve_or_balance
 from .output.results import as_dict, finite
 from .output.resumable import ResumableCsv
-from .problems.solution import Fields, Outcome, Problem, Solution
+from .problems.solution import Outcome, Solution, Step
 from .scene import Scene
 
 MOST_POINTS = 100_000
@@ -88,22 +88,20 @@ class _Neighbours:
     """Answers that later points start from: for each axis the latest one with the axes behind it at their first value."""
 
     axes: int
-    kept: list[tuple[Scene, Solution] | None] = field(init=False)
+    kept: list[tuple[str, Solution] | None] = field(init=False)  # family and answer
 
     def __post_init__(self) -> None:
         self.kept = [None] * self.axes
 
-    def start(self, axis: int, scene: Scene) -> tuple[Problem, Fields] | None:
+    def near(self, axis: int, scene: Scene) -> Solution | None:
         """What a point that moved along this axis starts from."""
-        near = self.kept[axis]
-        if near is None or near[0].family != scene.family or len(near[0].shape) != len(scene.shape):
-            return None
-        return near[1].problem, near[1].fields
+        family, solution = self.kept[axis] or ("", None)
+        return solution if family == scene.family else None
 
     def keep(self, axis: int, scene: Scene, solution: Solution | None) -> None:
         """Take an answer in the place of those at this axis and behind; None: forget them."""
         old = self.kept[axis:]
-        self.kept[axis:] = [(scene, solution) if solution is not None else None] * len(old)
+        self.kept[axis:] = [(scene.family, solution) if solution is not None else None] * len(old)
         left = [id(near[1]) for near in self.kept if near is not None]
         for unused in {id(near[1]): near[1] for near in old if near is not None}.values():
             if id(unused) not in left:
@@ -133,7 +131,7 @@ def sweep(
     Parameters
     ----------
     scene_at : the scene at a point; all are built, and so validated, before the first is solved.
-    solve_at : solve_at(scene, start) -> Solution.
+    solve_at : solve_at(point, near) -> Solution, near being a neighbour's to start from.
     path : a csv that is filled row by row; points that stand there, with the same data and settings, are not solved again.
     warm : start each point from its neighbour's answer.
     settings : what the answers depend on beside the scene; part of what tells one row from another.
@@ -164,7 +162,7 @@ def sweep(
             digest = sha256(f"{scene.model_dump_json()} {settings}".encode()).hexdigest()[:12]
             row = store.find(digest=digest) if store else None
             if row is None:
-                row = {**point, **_row(scene, solve_at, neighbours, moved, warm), "digest": digest}
+                row = {**point, **_row(point, scene, solve_at, neighbours, moved if warm else None), "digest": digest}
                 row = store.add(row) if store else row
             rows.append(row)
             bar.set_postfix_str(f"{row['outcome']}, {row.get('iterations')} iterations")
@@ -175,19 +173,16 @@ def sweep(
     return rows, columns
 
 
-def _row(scene: Scene, solve_at: Callable[..., Solution], neighbours: _Neighbours, moved: int, warm: bool) -> dict[str, Any]:
-    """Solve one point, from the beginning if its neighbour's answer leads nowhere. Collective."""
-    start = neighbours.start(moved, scene) if warm else None
+def _row(
+    point: dict[str, Any], scene: Scene, solve_at: Callable[..., Solution], neighbours: _Neighbours, moved: int | None
+) -> dict[str, Any]:
+    """Solve one point, which moved along this axis; None: from the beginning. Collective."""
     try:
-        solution = solve_at(scene, start)
-        if start is not None and not solution.converged:
-            solution.destroy()
-            start = None
-            solution = solve_at(scene, None)
+        solution = solve_at(point, None if moved is None else neighbours.near(moved, scene))
     except InputError as error:
         return {"outcome": REFUSED, "converged": False, "message": str(error)}
-    row = flat(as_dict(solution)) | {"start": "cold" if start is None else "warm"}
-    if warm and solution.converged:
+    row = flat(as_dict(solution)) | {"start": solution.settings.get("start")}
+    if moved is not None and solution.converged:
         neighbours.keep(moved, scene, solution)
     else:
         solution.destroy()
@@ -223,13 +218,17 @@ def run(args: argparse.Namespace) -> int:
         "nested": args.nested,
     }
 
-    def solve_here(scene: Scene, start: tuple[Problem, Fields] | None) -> Solution:
-        return solve(scene, start=start, monitor=lambda k, step: check_unread() if k == 1 else None, **choices)
+    def solve_at(point: dict[str, Any], near: Solution | None) -> Solution:
+        def monitor(k: int, step: Step) -> None:
+            if k == 1:
+                check_unread()
+
+        return solve_or_balance(lambda changes: scene_of(args, {**point, **changes}), near, monitor=monitor, **choices)
 
     rows, columns = sweep(
         [parse_axis(text, (base.name, base.family)) for text in args.vary],
         lambda point: scene_of(args, point),
-        solve_here,
+        solve_at,
         args.output,
         args.warm,
         settings=repr(choices),

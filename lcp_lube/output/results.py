@@ -45,6 +45,7 @@ def as_dict(solution: Solution) -> dict[str, Any]:
         "certificate_tol": certificate.tol,
         **(solution.enclosure.as_dict() if solution.enclosure else {}),
         **{key: settings[key] for key in ("accuracy", "accuracy_quantity", "accuracy_estimate") if key in settings},
+        **({"balance": settings["balance"]} if "balance" in settings else {}),
         **settings.get("details", {}),
         **({"levels": solution.levels} if solution.levels else {}),
         "memory_mb": peak_memory(solution),
@@ -112,6 +113,10 @@ def _bearing_lines(data: dict[str, Any], one_d: bool) -> list[str]:
             f"bearing load {quantity(data['bearing_load'], 'N' + per, 6)}, attitude angle {data['attitude_deg']:.5g} deg, "
             f"Sommerfeld number {data['sommerfeld']:.6g}"
         )
+    if data.get("balance"):
+        found = data["balance"]
+        carried = quantity(found["carried"], "N" + per, 6)
+        lines.append(f"balance: {found['vary']} = {found['value']:.8g} carries {carried}, found in {found['solves']} solves")
     if data.get("rupture") is not None:
         behind = f", reformation {1e3 * data['reformation']:.5g} mm" if data["reformation"] is not None else ""
         lines.append(f"rupture {1e3 * data['rupture']:.5g} mm{behind}{'' if one_d else ' (on the middle line)'}")
@@ -135,7 +140,9 @@ def summary(data: dict[str, Any]) -> str:
     system = f" on the {data['system']} system, {recipe}" if data["system"] else ""
     scheme = f", scheme {data['scheme']}" if data["scheme"] else ""
     measures = ", ".join(
-        f"{name.replace('_', ' ')} {data[name]:.1e}{UNITS.get(name, '')}" for name in MEASURES if data.get(name) is not None
+        f"{name.replace('_', ' ')} {data[name]:.1e}{UNITS.get(name, '')}"
+        for name in MEASURES
+        if isinstance(data.get(name), float)
     )
     if "load" in data:
         quantities = (

@@ -117,3 +117,19 @@ class JournalGap:
     def breakpoints(self) -> tuple[float, ...]:
         """Return the two ends and the narrowest place, x in m."""
         return (0.0, 0.5 * self.L, self.L)
+
+
+@dataclass(frozen=True)
+class Raised:
+    """A film with its level changed: `offset` (m) is added everywhere."""
+
+    film: Film
+    offset: float
+
+    def __call__(self, x: ArrayLike, y: ArrayLike | None = None, /) -> Array:
+        """Return h (m) at x and y (m), with the broadcast shape of both."""
+        return self.film(x, y) + self.offset
+
+    def breakpoints(self) -> tuple[float, ...]:
+        """Return those of the film."""
+        return self.film.breakpoints()

@@ -61,6 +61,7 @@ class Outcome(StrEnum):
     WRONG_SOLUTION = "wrong_solution"
     NO_SOLUTION = "no_solution"
     ACCURACY = "accuracy_not_reached"
+    LOAD_NOT_CARRIED = "load_not_carried"
 
     @property
     def sentence(self) -> str:
@@ -72,6 +73,7 @@ class Outcome(StrEnum):
             Outcome.NOT_FINITE: "the iterates overflowed or became NaN",
             Outcome.WRONG_SOLUTION: "the method stopped, but its answer is not a solution",
             Outcome.NO_SOLUTION: "the problem has no solution",
+            Outcome.LOAD_NOT_CARRIED: "no film of those allowed carries the load",
             Outcome.ACCURACY: "solved, but the accuracy asked for was not reached",
         }[self]
 

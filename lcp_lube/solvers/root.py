@@ -1,0 +1,55 @@
+"""Roots of functions of one variable that are dear to evaluate."""
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+from math import isfinite
+
+LONGEST_STEP = 2.5  # while there is no bracket
+FLATTEST = 0.05  # slope below which a step is taken as if it were this
+
+
+@dataclass
+class Search:
+    """A root of g between low and high: secant steps, kept inside the bracket once there is one.
+
+    g may be -inf where all that is known is that it is too small.
+
+    Parameters
+    ----------
+    slope : that of g, to begin with: its sign says where g grows.
+    """
+
+    low: float
+    high: float
+    slope: float
+    points: list[tuple[float, float]] = field(default_factory=list)  # t, g(t), in the order of their evaluation
+    widths: list[float] = field(default_factory=list)  # of the bracket, after each point since there is one
+
+    def add(self, t: float, g: float) -> None:
+        """Take up a value of g."""
+        self.points.append((t, g))
+        known = [point for point in self.points if isfinite(point[1])][-2:]
+        if len(known) == 2 and known[1][1] != known[0][1]:
+            self.slope = (known[1][1] - known[0][1]) / (known[1][0] - known[0][0])
+        if (bracket := self.bracket) is not None:
+            self.widths.append(bracket[1] - bracket[0])
+
+    @property
+    def bracket(self) -> tuple[float, float] | None:
+        """The narrowest interval between two points with g of different sign; None without one."""
+        pairs = [(a[0], b[0]) for a, b in pairwise(sorted(self.points)) if min(a[1], b[1]) < 0 < max(a[1], b[1])]
+        return min(pairs, key=lambda pair: pair[1] - pair[0], default=None)
+
+    def next(self) -> float | None:
+        """Where to evaluate next; None where there is nothing left to be tried."""
+        up = 1.0 if self.slope >= 0 else -1.0
+        t, g = min(self.points, key=lambda point: (abs(point[1]), -up * point[0]))
+        step = -g / (up * max(abs(self.slope), FLATTEST))
+        if (bracket := self.bracket) is None:
+            target = min(max(t + min(max(step, -LONGEST_STEP), LONGEST_STEP), self.low), self.high)
+            return None if target in [point[0] for point in self.points] else target
+        a, b = bracket
+        if b - a <= 1e-14 * max(abs(a), abs(b), 1.0):
+            return None
+        slow = len(self.widths) > 3 and self.widths[-1] > 0.5 * self.widths[-4]
+        return t + step if a < t + step < b and not slow else 0.5 * (a + b)
