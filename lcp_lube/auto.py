@@ -10,6 +10,7 @@ from .linear.options import set_names
 from .problems.solution import Problem
 from .registry import DEFAULT_METHOD, METHODS, SMALL, SMALL_BOX
 
+SMALL_RING = 200_000  # the same for a film that is periodic along the flow
 DIN_ONLY = {"r0", "mu", "conditions"}  # flags that only an interior method can heed
 
 
@@ -61,10 +62,12 @@ def plan(
         return Plan(method, "", None, False, why)
     grid = problem.grid
     small = SMALL_BOX if problem.kind == "box" else SMALL
+    if problem.kind == "lubrication" and grid.periodic[0]:
+        small = SMALL_RING  # what feeds the film is a small part of what goes round: its balance needs digits
     large = grid.dim == 2 and grid.size > small
     if system == "auto":
         system = entry.systems[0]
-        if large and "cavity" in entry.systems and grid.box[1] == grid.shape[0] and PETSc.Sys.hasExternalPackage("hypre"):
+        if large and "cavity" in entry.systems and grid.box[1] == grid.shape[0] and not any(grid.periodic):
             system = "cavity"
             why.append(
                 "system cavity: with the cavitated cells eliminated and its near-null vector scaled out, multigrid holds"
@@ -86,8 +89,12 @@ def plan(
 def default_recipe(problem: Problem, system: str, large: bool) -> tuple[str, str]:
     """The inner solver that this PETSc has for this system, size and number of ranks, and why."""
     has = PETSc.Sys.hasExternalPackage
-    if problem.kind in ("lubrication", "equations") and system != "full" and large and has("hypre"):
-        return "bcgs_amg", "a large 2D M-matrix: multigrid costs the same per point on every grid"
+    if problem.kind in ("lubrication", "equations") and system != "full" and large:
+        reason = "a large 2D M-matrix: multigrid costs the same per point on every grid"
+        if has("hypre"):
+            return "bcgs_amg", reason
+        if system == "cavity":  # its scaling is what the other multigrids need
+            return ("bcgs_ml" if has("ml") else "bcgs_gamg"), f"{reason}; this PETSc has no hypre, whose is the fastest"
     if problem.kind == "box" and large:
         return "multigrid", "a large problem with coarser grids: multigrid costs the same per point on every grid"
     ranks = problem.grid.comm.size

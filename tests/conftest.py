@@ -124,7 +124,7 @@ def mpi_job(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int], dict[st
     def run(ranks: int) -> dict[str, Any]:
         if ranks not in done:
             folder = tmp_path_factory.mktemp(f"ranks{ranks}")
-            job = start([str(TESTS / "mpi_job.py"), str(folder)], ranks, folder, timeout=200)
+            job = start([str(TESTS / "mpi_job.py"), str(folder)], ranks, folder, timeout=400)
             assert job.status == 0, job.err
             with np.load(folder / "fields.npz") as fields:
                 done[ranks] = {**json.loads((folder / "record.json").read_text()), "fields": dict(fields)}

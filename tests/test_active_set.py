@@ -1,9 +1,12 @@
 """Active set, predictor-corrector, nested iteration and the plan behind 'auto'."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from petsc4py import PETSc
 
 from lcp_lube.api import solve
 from lcp_lube.errors import InputError
@@ -162,6 +165,30 @@ def test_auto_chooses_and_says_why():
     assert din.settings["method"] == "din"
     for solution in (small, line, din):
         solution.destroy()
+
+
+@pytest.mark.parametrize(
+    "missing, recipe", [({"hypre"}, "bcgs_ml"), ({"hypre", "ml"}, "bcgs_gamg"), ({"hypre", "ml", "numba"}, "bcgs_gamg")]
+)
+@pytest.mark.parametrize("scene, changes", [("problem4", {"n": 150}), ("textured_slider", {"K": 5})])
+def test_auto_without_what_it_likes_best(scene, changes, missing, recipe, monkeypatch):
+    """Another multigrid, array arithmetic for compiled loops: the same answer, and the reason is said."""
+    has = PETSc.Sys.hasExternalPackage
+    if recipe == "bcgs_ml" and not has("ml"):
+        pytest.skip("this PETSc has no ML")
+    best = run(scene, changes)
+    sys = SimpleNamespace(hasExternalPackage=lambda name: name not in missing and has(name))
+    monkeypatch.setattr("lcp_lube.auto.PETSc", SimpleNamespace(Sys=sys))
+    if "numba" in missing:
+        for module in ("lcp_lube.linear.cavity", "lcp_lube.solvers.relaxation"):
+            monkeypatch.setattr(f"{module}.find_spec", lambda name: None)
+    solution = run(scene, changes)
+    assert solution.converged and solution.settings["recipe"] == recipe and solution.settings["system"] == "cavity"
+    assert any("no hypre" in reason for reason in solution.settings["why"])
+    assert solution.total("linear_iterations") <= 8 * solution.iterations
+    np.testing.assert_allclose(solution.p, best.p, atol=1e-6 * best.p.max())
+    best.destroy()
+    solution.destroy()
 
 
 @pytest.mark.parametrize(
