@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from ..output.resumable import Row
 from .outcome_map import Axis, Case, OutcomeMap, Panels, methods, tallies
 
-AMPLITUDES = (0, 0.5, 1, 2, 3, 4, 6)  # um; the smooth film's is 15 to 25 um
+AMPLITUDES = (0, 1, 2, 4, 6, 10, 20)  # um, on a film of 15 to 25 um; 1 um is left everywhere
 SIZES = (16, 32, 64)
 SEEDS = (1, 2, 3)
 
