@@ -153,7 +153,7 @@ class SemilinearProblem:
         with np.errstate(invalid="ignore"):
             return Certificate(
                 measures={
-                    "residual": red.norm(flow - supply) / scale if scale > 0 else 0.0,
+                    "residual": red.norm(flow - supply) / scale if scale != 0 else 0.0,  # NaN stays NaN
                     "balance": abs(out - red.sum(supply)) / given if given > 0 else abs(out),
                 },
                 tol=certificate_tol(eps1),

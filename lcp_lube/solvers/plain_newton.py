@@ -27,6 +27,8 @@ from .method_options import make_options
 from .newton import NoSolutionError, Stopping
 from .steplength import halve_until, inexact_decrease
 
+LOOSEST = 0.1  # true relative residual of an inner solve that a proof may still lean on
+
 
 @dataclass(frozen=True)
 class NewtonOptions:
@@ -96,11 +98,17 @@ class PlainNewton:
                     raise self._no_solution() from None
                 raise
         d = self._x.array_r.copy()
-        # A KSP that stopped early has no d to prove anything by.
-        self.climbing = self.climbing and self.krylov.ksp.getConvergedReason() > 0
+        # A KSP that stopped early has no d to prove anything by, whatever it says.
+        self.climbing = self.climbing and self.krylov.ksp.getConvergedReason() > 0 and self._solves(d)
         if self.climbing and min(self._curvature(d), self._curvature(self._bump)) < 0:
             raise self._no_solution()
         return d, iterations
+
+    def _solves(self, d: Array) -> bool:
+        """Whether f'(v) d + f is small against f: the KSP may have tested another norm, or lie. Collective."""
+        self._x.setArray(d)
+        self.mat.mult(self._x, self._b)
+        return self.problem.reduce.norm(self._b.array_r + self.f) <= LOOSEST * self.norm
 
     def _curvature(self, d: Array) -> float:
         """d' f'(v) d. Collective."""
