@@ -2,8 +2,8 @@
 
     python benchmarks/performance.py [EXPERIMENT ...] [--quick] [--repeats 3] [--results DIR]
 
-Experiments: grids, films, peers, tables, line, cycles, krylov (see EXPERIMENTS). Every case is a process of its own, so that
-its peak memory is its own; whatever is divided by one another ran alternately in that process. Seconds are medians, by the
+Experiments: grids, films, peers, tables, line, cycles, krylov, auto (see EXPERIMENTS). Every case is a process of its own,
+so that its peak memory is its own; whatever is divided by one another ran alternately in that process. Seconds are medians, by the
 clock and of the processor: the second one is to be trusted where other jobs were on the machine (`load`). Cases that stand
 in performance.csv (or peers.csv) already are not run again.
 """
@@ -208,6 +208,25 @@ def true_tolerance(case: Case, repeats: int) -> dict[str, Values]:
         return alone(case, 1)
 
 
+FIXED = """active-set/reduced/umfpack/flat active-set/reduced/umfpack/nested active-set/reduced/superlu/flat
+    active-set/cavity/umfpack/nested active-set/cavity/bcgs_amg/flat active-set/cavity/bcgs_amg/nested fas//""".split()  # noqa: SIM905
+
+
+def fixed_choices(case: Case, repeats: int) -> dict[str, Values]:
+    """The default and every fixed choice in turn; ratios are the default's seconds over theirs."""
+    runs: dict[str, list[Values]] = {name: [] for name in case.variants}
+    for _ in range(repeats):
+        for name, done in runs.items():
+            method, system, inner, levels = (*name.split("/"), "", "", "")[:4] if name != "auto" else ("auto", "", "", "")
+            nested = {"nested": True, "flat": False}.get(levels)
+            done.append(ours(case, method=method, system=system or "auto", recipe_name=inner or None, nested=nested))
+    out = {name: medians(done) for name, done in runs.items()}
+    for values in out.values():
+        for clock in ("wall", "cpu"):
+            values[f"ratio_{clock}"] = out["auto"][f"{clock}_s"] / values[f"{clock}_s"]
+    return out
+
+
 # Cells a side, and the peers that can do it in reasonable time.
 PEER_SETS = (
     (1, "scipy ssls rsls tao_ssils"),
@@ -226,6 +245,7 @@ EXPERIMENTS: dict[str, Callable[[Case, int], dict[str, Values]]] = {
     "line": alone,
     "cycles": near_null_cycles,
     "krylov": true_tolerance,
+    "auto": fixed_choices,
 }
 
 
@@ -254,6 +274,11 @@ def cases(experiment: str, quick: bool) -> Iterator[Case]:
         for n in (60,) if quick else (200, 400, 800, 1600):
             for scene in ("textured_slider", "rough", "journal"):
                 yield Case(experiment, scene, {"n": n, "K": n // 25} if scene == "textured_slider" else {"n": n}, ("default",))
+    elif experiment == "auto":
+        for n in (40,) if quick else (100, 200, 400):
+            for scene in ("problem4", "rough", "journal", "textured_slider"):
+                changes = {"n": n, "K": max(n // 25, 1)} if scene == "textured_slider" else {"n": n}
+                yield Case(experiment, scene, changes, ("auto", *FIXED))
     elif experiment == "cycles":
         for scene, changes in (("textured_slider", {"K": 2 if quick else 8}), ("rough", {"n": 50 if quick else 250})):
             yield Case(experiment, scene, changes, ("0", "1", "2", "3"))
