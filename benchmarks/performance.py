@@ -2,10 +2,10 @@
 
     python benchmarks/performance.py [EXPERIMENT ...] [--quick] [--repeats 3] [--results DIR]
 
-Experiments: grids, films, peers, tables, line, cycles, krylov, auto (see EXPERIMENTS). Every case is a process of its own,
-so that its peak memory is its own; whatever is divided by one another ran alternately in that process. Seconds are medians, by the
-clock and of the processor: the second one is to be trusted where other jobs were on the machine (`load`). Cases that stand
-in performance.csv (or peers.csv) already are not run again.
+Experiments: grids, films, peers, tables, line, cycles, krylov, auto (see EXPERIMENTS). Every case is a process of its own, so
+that its peak memory is its own; whatever is divided by one another ran alternately in that process. Seconds are medians, by
+the clock and of the processor: the second one is to be trusted where other jobs were on the machine (`load`). Cases that
+stand in performance.csv (or peers.csv) already are not run again.
 """
 
 import argparse
