@@ -3,10 +3,13 @@
 import numpy as np
 import pytest
 
+from lcp_lube import Complementarity
 from lcp_lube.api import solve
+from lcp_lube.linear.stages import Stages
 from lcp_lube.problems.solution import Outcome, Step
 from lcp_lube.registry import MethodEntry
 from lcp_lube.scene import load_scene
+from lcp_lube.solvers.enclosure import enclose
 
 SCENES = {
     "problem1": ({"n": 25}, ("auto", "din", "din-pc", "fbn-a", "fbn-i", "active-set", "monotone")),
@@ -16,6 +19,7 @@ SCENES = {
     "bratu": ({"n": 9}, ("newton",)),
     "poisson_cubic": ({"n": 9}, ("newton",)),
     "ehl_line": ({"n": 30}, ("interior", "semismooth")),
+    "user": ({}, ("active-set", "interior", "semismooth")),
 }
 RUNS = [(name, method) for name, (_, methods) in SCENES.items() for method in methods]
 FEW = {"max_it": 12}
@@ -37,8 +41,16 @@ KSPS: dict[str, tuple[dict[str, object], bool]] = {
 }
 
 
+M, Q = np.array([[4.0, -1.0, 0.0], [-1.0, 4.0, 0.0], [0.0, -1.0, 4.0]]), np.array([-1.0, 2.0, -3.0])
+
+
+def users(J=M):
+    """A linear complementarity problem of a user's."""
+    return Complementarity(lambda x: M @ x + Q, lambda x: J, [0.0] * 3, [np.inf] * 3, [1.0, 2.0, 1.0])
+
+
 def scene_of(name):
-    return load_scene(name, SCENES[name][0])
+    return users() if name == "user" else load_scene(name, SCENES[name][0])
 
 
 @pytest.fixture(scope="module")
@@ -120,7 +132,7 @@ DAMAGES = {
 }
 
 
-@pytest.mark.parametrize("name, method", [(name, methods[-1]) for name, (_, methods) in SCENES.items()])
+@pytest.mark.parametrize("name, method", [(name, methods[-1]) for name, (_, methods) in SCENES.items()] + [("problem4", "fas")])
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_methods_that_claim_to_have_converged(name, method, damage, right, monkeypatch):
     """The certificate alone stands between such a claim and the user: it never holds, and NaN is no exception."""
@@ -131,7 +143,7 @@ def test_methods_that_claim_to_have_converged(name, method, damage, right, monke
         return lambda *words: Claiming(build(*words), expected, damage)
 
     monkeypatch.setattr(MethodEntry, "load", corrupted)
-    solution = solve(scene_of(name), method=method, nested=False, certify=load_scene(name).family == "slider")
+    solution = solve(scene_of(name), method=method, nested=False, certify=name.startswith("problem"))
     assert not solution.converged and solution.outcome is Outcome.WRONG_SOLUTION
     assert "the certificate fails" in solution.message
     assert solution.enclosure is None or not solution.enclosure.certified
@@ -173,7 +185,28 @@ def test_a_system_of_the_wrong_sign(monkeypatch):
         solution.destroy()
 
 
-def test_a_certificate_that_never_comes(monkeypatch):
+@pytest.mark.parametrize("corruption", KSPS)
+def test_bands_by_a_solver_that_lies(corruption, right, petsc_options):
+    """A band is a guess and a proof: without a good guess there is none, or one that holds all the same."""
+    problem, fields = scene_of("problem3").build(), right("problem3")
+    petsc_options(**KSPS[corruption][0])
+    for factor in (1.0, 1.0 + 1e-9, 1.01):
+        found = enclose(problem, {name: factor * a for name, a in fields.items()}, "reduced", Stages())
+        if found.certified:
+            assert np.abs((factor - 1.0) * fields["p"]).max() * problem.p_unit <= found.bounds["band_p"] * (1 + 1e-3)
+        assert factor < 1.01 or not found.certified
+    problem.destroy()
+
+
+@pytest.mark.parametrize("J", [-M, np.zeros((3, 3)), np.full((3, 3), np.nan), M.T[::-1].copy(), 1e300 * M], ids=str)
+@pytest.mark.parametrize("method", ["active-set", "interior", "semismooth"])
+def test_a_users_wrong_jacobian(J, method, right):
+    solution = solve(users(J), method=method, stopping=FEW)
+    assert_honest(solution, right("user"), may_converge=True)
+    solution.destroy()
+
+
+def test_a_certificate_of_nan():
     """A certificate whose measures are NaN holds for nothing."""
     from lcp_lube.problems.certificate import Certificate
 
