@@ -38,10 +38,10 @@ class Axis:
     values: tuple[Any, ...]
 
 
-def parse_axis(text: str, prefixes: Sequence[str] = ()) -> Axis:
+def parse_axis(text: str) -> Axis:
     """KEY=FROM:TO:N (N values, both ends among them), KEY=FROM:TO:N:log (at equal ratios) or KEY=A,B,C.
 
-    Whole numbers stay whole where FROM, TO and the step are. A key may begin with one of `prefixes` and a dot.
+    Whole numbers stay whole where FROM, TO and the step are.
 
     Raises
     ------
@@ -51,8 +51,6 @@ def parse_axis(text: str, prefixes: Sequence[str] = ()) -> Axis:
     forms = "KEY=FROM:TO:N, KEY=FROM:TO:N:log or KEY=A,B,C is needed"
     if not (key and equals and values):
         raise InputError(f"--vary {text}: {forms}")
-    head, dot, rest = key.partition(".")
-    key = rest if dot and head in prefixes else key
     match [part.strip() for part in values.split(":")]:
         case [listed]:
             return Axis(key, _listed(listed))
@@ -208,7 +206,6 @@ def run(args: argparse.Namespace) -> int:
 
     if args.output is not None and args.output.suffix.lower() != ".csv":
         raise InputError(f"--output {args.output}: a sweep writes a .csv")
-    base = scene_of(args)
     choices = {
         "method": args.method,
         "system": args.system,
@@ -226,7 +223,7 @@ def run(args: argparse.Namespace) -> int:
         return solve_or_balance(lambda changes: scene_of(args, {**point, **changes}), near, monitor=monitor, **choices)
 
     rows, columns = sweep(
-        [parse_axis(text, (base.name, base.family)) for text in args.vary],
+        [parse_axis(text) for text in args.vary],
         lambda point: scene_of(args, point),
         solve_at,
         args.output,

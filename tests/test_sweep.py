@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from lcp_lube import solve
 from lcp_lube.errors import InputError
+from lcp_lube.neighbour import solve_near
 from lcp_lube.problems.solution import Outcome
 from lcp_lube.scene import load_scene
 from lcp_lube.sweep import Axis, parse_axis, points, sweep
@@ -34,12 +35,12 @@ def table(text):
         ("n=50:200:4", "n", (50, 100, 150, 200)),
         ("n=50,7", "n", (50, 7)),
         ("scheme=face,nodal", "scheme", ("face", "nodal")),
-        ("journal.eccentricity=0.1,0.2", "eccentricity", (0.1, 0.2)),
+        ("journal.eccentricity=0.1,0.2", "journal.eccentricity", (0.1, 0.2)),
         ("wave=[0.1, 0.2],[0.3, 0.4]", "wave", ([0.1, 0.2], [0.3, 0.4])),
     ],
 )
 def test_axes(text, key, values):
-    axis = parse_axis(text, ("journal",))
+    axis = parse_axis(text)
     assert axis.key == key
     np.testing.assert_array_equal(axis.values, values)
     assert [type(a) for a in axis.values] == [type(b) for b in values]
@@ -68,11 +69,14 @@ def run(axes, warm=True, path=None, settings="", changes=JOURNAL, **choices):
     """A sweep of the journal, and the starts that its solves were given."""
     starts = []
 
-    def solve_at(scene, start):
-        starts.append(start)
-        return solve(scene, start=start, **choices)
+    def scene_at(point):
+        return load_scene("journal", {**changes, **point})
 
-    rows, columns = sweep(axes, lambda point: load_scene("journal", {**changes, **point}), solve_at, path, warm, settings)
+    def solve_at(point, near):
+        starts.append(near.fields if near else None)
+        return solve_near(scene_at(point), near, **choices)
+
+    rows, columns = sweep(axes, scene_at, solve_at, path, warm, settings)
     return rows, columns, starts
 
 
@@ -97,9 +101,9 @@ def test_a_new_line_starts_from_the_beginning_of_the_one_before():
     """Not from its end, which is far away."""
     axes = [Axis("width_over_diameter", (0.5, 1.0)), Axis("eccentricity", (0.2, 0.4, 0.9))]
     _, _, starts = run(axes)
-    assert starts[3][1] is starts[1][1] and starts[2][1] is not starts[1][1]
+    assert starts[3] is starts[1] and starts[2] is not starts[1]
     first = solve(load_scene("journal", {**JOURNAL, "width_over_diameter": 0.5, "eccentricity": 0.2}))
-    np.testing.assert_allclose(starts[3][1]["p"], first.p, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(starts[3]["p"], first.p, rtol=1e-6, atol=1e-9)
     first.destroy()
 
 
@@ -123,35 +127,47 @@ def test_resumed(tmp_path):
 
 def test_a_failed_point_is_a_row_and_no_start():
     """A run that ends at its iteration limit, and the one behind it: started from the last one that converged."""
-    calls = []
-
-    def solve_at(scene, start):
-        calls.append((scene.eccentricity, start is not None))
-        return solve(scene, start=start, stopping={"max_it": 1 if scene.eccentricity == 0.4 else 50})
-
-    axis = Axis("eccentricity", (0.2, 0.4, 0.6))
-    rows, columns = sweep([axis], lambda point: load_scene("journal", {**JOURNAL, **point}), solve_at)
-    assert [row["outcome"] for row in rows] == ["converged", Outcome.MAX_ITERATIONS, "converged"]
-    # Its neighbour's answer led nowhere: once more from the beginning.
-    assert calls == [(0.2, False), (0.4, True), (0.4, False), (0.6, True)]
-    assert {"outcome", "message", "load"} <= set(columns)
-
-
-def test_a_refused_point_is_a_row(cli):
-    """A film that closes somewhere is noticed by the solve; where all points are refused, so is the sweep."""
-
-    def solve_at(scene, start):
-        if scene.eccentricity > 0.3:
-            raise InputError("no such film")
-        return solve(scene, start=start)
+    nears = []
 
     def scene_at(point):
         return load_scene("journal", {**JOURNAL, **point})
+
+    def solve_at(point, near):
+        nears.append(near and near.problem.film.eccentricity)
+        limit = 1 if point["eccentricity"] == 0.4 else 99
+        return solve_near(scene_at(point), near, method="din", stopping={"max_it": limit})
+
+    rows, columns = sweep([Axis("eccentricity", (0.2, 0.4, 0.6))], scene_at, solve_at)
+    assert [row["outcome"] for row in rows] == ["converged", Outcome.MAX_ITERATIONS, "converged"]
+    # The second one was begun anew when its neighbour's answer led nowhere.
+    assert nears == [None, 0.2, 0.2] and [row["start"] for row in rows] == ["cold", "cold", "warm"]
+    assert {"outcome", "message", "load"} <= set(columns)
+
+
+def test_a_refused_point_is_a_row():
+    """What only the solve notices; where all points are refused, so is the sweep."""
+
+    def scene_at(point):
+        return load_scene("journal", {**JOURNAL, **point})
+
+    def solve_at(point, near):
+        if point["eccentricity"] > 0.3:
+            raise InputError("no such film")
+        return solve_near(scene_at(point), near)
 
     rows, _ = sweep([Axis("eccentricity", (0.4, 0.2))], scene_at, solve_at)
     assert [row["outcome"] for row in rows] == ["refused", "converged"] and rows[0]["message"] == "no such film"
     with pytest.raises(InputError, match="no such film"):
         sweep([Axis("eccentricity", (0.4, 0.5))], scene_at, solve_at)
+
+
+def test_a_sweep_of_loads(cli):
+    """Each row is a balance, which begins at its neighbour's eccentricity."""
+    done = cli("sweep", "journal", "--nx", 31, "--ny", 9, "--vary", "balance.load=1e3,2e3,4e3")
+    rows = table(done.out)
+    assert done.status == 0 and [float(row["bearing_load"]) for row in rows] == pytest.approx([1e3, 2e3, 4e3], rel=2e-6)
+    values = [float(row["balance_value"]) for row in rows]
+    assert values == sorted(values) and int(rows[2]["balance_solves"]) <= 5
 
 
 def test_command(cli, tmp_path):
@@ -168,10 +184,10 @@ def test_command(cli, tmp_path):
 
 def test_command_with_a_file_a_failure_and_several_ranks(cli, tmp_path):
     words = ["sweep", "journal", "--ny", 9, "--vary", "eccentricity=0.2,0.6", "--vary", "nx=15,31", "--output", "s.csv"]
-    done = cli(*words, "--max-it", 3, "--no-warm", ranks=2)
+    done = cli(*words, "--method", "din", "--max-it", 12, "--no-warm", ranks=2)
     assert done.status == 1 and done.out == ""
     rows = table((tmp_path / "s.csv").read_text())
-    assert {row["outcome"] for row in rows} == {"max_iterations", "converged"}
+    assert {row["outcome"] for row in rows} == {"max_iterations"}
     assert (cli(*words, ranks=3).status, cli(*words).status) == (0, 0)
     assert len(table((tmp_path / "s.csv").read_text())) == 8
 

@@ -1,0 +1,193 @@
+"""Load balance: round trips with direct solves, its bounded search, loads that no film carries."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lcp_lube import load_scene
+from lcp_lube.balance import MOST_SOLVES, carried
+from lcp_lube.errors import InputError
+from lcp_lube.neighbour import solve_near, solve_or_balance
+from lcp_lube.problems.solution import Outcome
+from lcp_lube.solvers.root import Search
+
+
+def direct(name, changes):
+    """The load that a film carries."""
+    solution = solve_near(load_scene(name, changes), None)
+    assert solution.converged
+    load = carried(solution.problem.quantities(solution.fields))
+    solution.destroy()
+    return load
+
+
+def balance(name, changes, near=None):
+    """The found settings, outcome, message and quantities of a balance."""
+    solution = solve_or_balance(lambda more: load_scene(name, {**changes, **more}), near)
+    values = solution.problem.quantities(solution.fields)
+    found = solution.settings["balance"], solution.outcome, solution.message, values
+    solution.destroy()
+    return found
+
+
+@settings(max_examples=15)
+@given(st.floats(0.02, 0.98))
+def test_journals_round_trip(eccentricity):
+    """The eccentricity of a direct solve is found from its load."""
+    data = {"nx": 31, "ny": 7}
+    load = direct("journal", {**data, "eccentricity": eccentricity})
+    found, outcome, message, values = balance("journal", {**data, "balance": {"load": load}})
+    assert outcome is Outcome.CONVERGED, message
+    assert found["vary"] == "eccentricity" and found["load"] == load
+    assert found["value"] == pytest.approx(eccentricity, rel=1e-5)
+    assert found["carried"] == pytest.approx(load, rel=2e-6) == values["bearing_load"]
+    assert found["iterations"] == found["solves"] <= 9
+
+
+@settings(max_examples=15)
+@given(st.floats(-13e-6, 8e-6), st.sampled_from(["problem1", "problem2"]))
+def test_films_round_trip(level, name):
+    """The level of a film is found from its load, from a tenth of the film to half as much again."""
+    load = direct(name, {"n": 60, "h_offset": level})
+    found, outcome, message, _ = balance(name, {"n": 60, "balance.load": load})
+    assert outcome is Outcome.CONVERGED, message
+    assert found["vary"] == "h_offset"
+    # The load is what is sought: of two levels that carry the same one, either will do.
+    assert direct(name, {"n": 60, "h_offset": found["value"]}) == pytest.approx(load, rel=1e-5)
+    assert found["iterations"] <= 15
+
+
+def test_the_exact_long_bearing():
+    """The load of the exact solution at eccentricity 0.5 (So 3.22777817) gives it back, second order in the grid."""
+    load = 3.22777817 * 0.1 * 0.02 * 100 / 1e-3**2
+    errors = [abs(balance("long_journal", {"n": n, "balance.load": load})[0]["value"] - 0.5) for n in (50, 100, 200)]
+    assert errors[-1] < 1e-4 and errors[0] / errors[-1] > 8
+
+
+@pytest.mark.parametrize("vary, interval", [("mu", [1e-3, 1.0]), ("omega", [1.0, 1e4]), ("psi", [1e-4, 1e-2])])
+def test_other_keys_need_a_range(vary, interval):
+    """The load grows with viscosity and speed and falls with the clearance; each is found, from far away."""
+    data = {"nx": 31, "ny": 7, "balance": {"load": 1e3, "vary": vary, "range": interval}}
+    found, outcome, message, values = balance("journal", data)
+    assert outcome is Outcome.CONVERGED, message
+    assert interval[0] < found["value"] < interval[1] and values["bearing_load"] == pytest.approx(1e3, rel=2e-6)
+    with pytest.raises(InputError, match=r"journal: balance.range is needed for balance.vary"):
+        balance("journal", {**data, "balance": {"load": 1e3, "vary": vary}})
+
+
+@pytest.mark.parametrize(
+    "name, changes, end",
+    [
+        ("journal", {"nx": 31, "ny": 7, "balance.load": 1e12}, 0.9999),
+        ("journal", {"nx": 31, "ny": 7, "balance": {"load": 1e5, "range": [0.1, 0.8]}}, 0.8),
+        ("journal", {"nx": 31, "ny": 7, "balance": {"load": 1e2, "range": [0.1, 0.8]}}, 0.1),
+        ("textured_slider", {"K": 1, "balance.load": 100.0}, None),  # it sucks: no load at any level
+    ],
+)
+def test_a_load_that_cannot_be_carried(name, changes, end):
+    found, outcome, message, _ = balance(name, changes)
+    assert outcome is Outcome.LOAD_NOT_CARRIED and found["iterations"] < MOST_SOLVES
+    assert end is None or found["value"] == pytest.approx(end, rel=1e-3)
+    assert "asked for; nearest to it" in message
+
+
+def test_coarse_grids_come_first():
+    """On a large grid a few solves are left for the last one; without nested iteration all are there."""
+    changes = {"nx": 127, "ny": 63, "balance.load": 5e3}
+    nested = balance("journal", changes)[0]
+    solution = solve_or_balance(lambda more: load_scene("journal", {**changes, **more}), None, nested=False)
+    plain = solution.settings["balance"]
+    solution.destroy()
+    assert nested["iterations"] <= 3 < plain["iterations"] == plain["solves"] < nested["solves"]
+    assert nested["value"] == pytest.approx(plain["value"], rel=1e-5)
+
+
+@given(
+    root=st.floats(-8, 8),
+    start=st.floats(-9, 9),
+    slope=st.sampled_from([-2.0, 1.0]),
+    bend=st.floats(-0.9, 0.9),
+    falling=st.booleans(),
+    scale=st.floats(0.1, 5.0),
+)
+def test_the_search_finds_every_root_of_a_monotone_function(root, start, slope, bend, falling, scale):
+    """Whatever slope it is told to begin with; with kinks, as fronts that move make them."""
+
+    def g(t):
+        s = t - root
+        value = scale * (s + bend * abs(s) * 0.9 + 0.05 * np.sin(3 * s) * (1 - abs(bend)))
+        return -value if falling else value
+
+    search = Search(-9.5, 9.5, slope)
+    t = start
+    for _ in range(60):
+        search.add(t, g(t))
+        if abs(g(t)) < 1e-9:
+            return
+        target = search.next()
+        if target is None:
+            break
+        t = target
+        assert -9.5 <= t <= 9.5
+    raise AssertionError(f"not found: {search.points[-4:]}")
+
+
+def test_the_search_gives_up():
+    """No root: at the end of its range, or where all that is known is that the value is too small."""
+    search = Search(0.0, 10.0, 1.0)
+    t, count = 1.0, 0
+    while t is not None:
+        search.add(t, -1.0 / (1.0 + t))
+        t, count = search.next(), count + 1
+    assert search.points[-1][0] == 10.0 and count < 10
+    search = Search(-10.0, 10.0, -2.0)
+    t = 0.0
+    while t is not None:
+        search.add(t, -np.inf)
+        t = search.next()
+    assert search.points[-1][0] == -10.0
+
+
+def test_command(cli, tmp_path):
+    words = ["journal", "--nx", 31, "--ny", 9]
+    data = cli("solve", *words, "--set", "balance.load=5000", "--json").json
+    assert set(data["balance"]) == {"vary", "value", "load", "carried", "iterations", "solves"}
+    again = cli("solve", *words, "--set", f"eccentricity={data['balance']['value']}", "--json").json
+    assert again["bearing_load"] == pytest.approx(5000, rel=2e-6)
+    assert again["attitude_deg"] == pytest.approx(data["attitude_deg"], rel=1e-6)
+    (tmp_path / "my.toml").write_text('family = "slider"\nn = 40\n[balance]\nload = 1e12\n')
+    done = cli("solve", "my.toml", "--set", "balance.range=[-1e-5, 1e-5]")
+    assert done.status == 1 and done.out.splitlines()[1].startswith("load_not_carried: ")
+    same = cli("solve", *words, "--set", "balance.load=5000", "--json", ranks=3).json
+    assert same["balance"]["value"] == pytest.approx(data["balance"]["value"], rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "scene, change, message",
+    [
+        ("journal", "balance.load=-1", "balance.load = -1"),
+        ("journal", "balance={load = 1.0, lode = 1}", "balance.lode"),
+        ("journal", "balance.range=[0.5, 0.2]", "balance"),
+        ("bratu", "balance.load=1", "balance"),
+        ("problem1", "balance.vary=U", "balance.load is missing"),
+    ],
+)
+def test_bad_input(scene, change, message, cli):
+    done = cli("solve", scene, "--set", change)
+    assert done.status == 2 and len(done.lines) == 1 and message in done.lines[0], done.err
+
+
+def test_ranges_outside_the_domain():
+    for name, table, message in (
+        ("journal", {"load": 1e3, "range": [0.0, 0.5]}, "allowed for eccentricity"),
+        ("journal", {"load": 1e3, "range": [0.5, 1.5]}, "allowed for eccentricity"),
+        ("problem1", {"load": 1e3, "range": [-1e-3, 1e-3]}, "allowed for h_offset"),
+    ):
+        with pytest.raises(InputError, match=message):
+            balance(name, {"n": 20, "balance": table})
+
+
+def test_not_with_accuracy_or_checkpoints(cli):
+    done = cli("solve", "journal", "--set", "balance.load=1e3", "--accuracy", 1e-2)
+    assert done.status == 2 and "--accuracy: not with [balance]" in done.lines[0]
