@@ -12,7 +12,10 @@ LONGEST = 60  # of what was found
 
 def first_fault(error: ValidationError, model: type[BaseModel]) -> str:
     """The first complaint, in words."""
-    fault = error.errors()[0]
+    faults = error.errors()
+    fault = next(
+        (fault for fault in faults if fault["type"] == "extra_forbidden"), faults[0]
+    )  # a typo explains what is missing
     path, tables = _walk(model, fault["loc"])
     key, found, context = ".".join(path), _short(fault["input"]), fault.get("ctx", {})
     if fault["type"] == "extra_forbidden":
@@ -43,10 +46,11 @@ def _plain(tables: list[type[BaseModel]]) -> list[str]:
 
 def _walk(model: type[BaseModel], loc: tuple[int | str, ...]) -> tuple[list[str], list[type[BaseModel]]]:
     """The key as people write it, and the models of the table that it stands in."""
-    path, tables = [], [model]
+    path: list[str] = []
+    tables, of_tables = [model], False
     for k, part in enumerate(loc):
         if isinstance(part, int):
-            path.append(str(part + 1) if tables and k + 1 < len(loc) else str(part))
+            path.append(str(part + 1 if of_tables else part))  # entries count from 1, as in --set
             continue
         tagged = [table for table in tables if part in _tags([table])]
         if tagged and len(tables) > 1:
@@ -56,6 +60,7 @@ def _walk(model: type[BaseModel], loc: tuple[int | str, ...]) -> tuple[list[str]
         path.append(part)
         fields = [field for table in tables for name, field in table.model_fields.items() if part in (name, field.alias)]
         below = [inner for field in fields for inner in _models(field.annotation)]
+        of_tables = bool(below)
         tables = below if below and (k + 1 < len(loc) or len(below) > 1) else tables
     return path, tables
 

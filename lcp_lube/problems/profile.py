@@ -1,10 +1,12 @@
 """A measured film: a table of heights from a CSV or NPY file, checked when it is read, interpolated between its points."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from scipy.interpolate import RegularGridInterpolator
+from scipy.interpolate import CubicSpline, RectBivariateSpline, RegularGridInterpolator
 
 from ..errors import InputError
 from ..parallel import Array
@@ -21,11 +23,24 @@ class Profile:
     z: Array
     method: str
 
-    def __call__(self, x: Array, y: Array) -> Array:
-        x, y = np.broadcast_arrays(np.clip(x, self.x[0], self.x[-1]), np.clip(y, self.y[0], self.y[-1]))
+    @cached_property
+    def _values(self) -> Callable[[Array, Array], Array]:
+        """z at points y and x."""
         if self.y.size == 1:
-            return RegularGridInterpolator((self.x,), self.z[0], method=self.method)(x[..., None])
-        return RegularGridInterpolator((self.y, self.x), self.z, method=self.method)(np.stack([y, x], axis=-1))
+            if self.method == "cubic":
+                spline = CubicSpline(self.x, self.z[0])
+                return lambda y, x: spline(x)
+            line = RegularGridInterpolator((self.x,), self.z[0], method=self.method)
+            return lambda y, x: line(x[..., None])
+        if self.method == "cubic":
+            return RectBivariateSpline(self.y, self.x, self.z, kx=3, ky=3, s=0).ev
+        plane = RegularGridInterpolator((self.y, self.x), self.z, method=self.method)
+        return lambda y, x: plane(np.stack([y, x], axis=-1))
+
+    def __call__(self, x: Array, y: Array) -> Array:
+        """h (m) at x and y (m), which broadcast; beyond the profile its value at the edge."""
+        x, y = np.broadcast_arrays(np.clip(x, self.x[0], self.x[-1]), np.clip(y, self.y[0], self.y[-1]))
+        return self._values(y, x)
 
 
 class PiecewiseLinear(Profile):
