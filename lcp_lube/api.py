@@ -168,9 +168,10 @@ def solve(
     certificate = problem.certify(fields, stopping.eps1)
     enclosure: Enclosure | None = None
     if certify and isinstance(problem, LubricationProblem):
-        # By the inner solver that has just solved this problem.
-        system = METHODS[took_over].systems[0] if took_over else chosen.system or "reduced"
-        with recipe(default_recipe(problem, system, large=False)[0] if took_over else chosen.recipe), stages("certify"):
+        # By the inner solver that has just solved this problem, or would have.
+        solver = chosen if chosen.system else plan(problem, scene.name, "active-set", nested=False)
+        system = METHODS[took_over].systems[0] if took_over else solver.system
+        with recipe(default_recipe(problem, system, large=False)[0] if took_over else solver.recipe), stages("certify"):
             enclosure = enclose(problem, fields, system, Stages())
     if outcome is not Outcome.CONVERGED and isinstance(problem, BoxProblem):
         outcome, message = problem.explain(outcome, message)
