@@ -75,8 +75,9 @@ def solve(
     begin = perf_counter()
     stages = Stages()
     with stages("setup"):
-        asked = (scene, method, system, recipe_name, stopping, options, nested, start is None)
-        check_same((comm or PETSc.COMM_WORLD).tompi4py(), f"scene {scene.name} or how to solve it", asked)
+        if scene.family != "user":  # whose data are each rank's own
+            asked = (scene, method, system, recipe_name, stopping, options, nested, start is None)
+            check_same((comm or PETSc.COMM_WORLD).tompi4py(), f"scene {scene.name} or how to solve it", asked)
         problem = scene.build(comm)
     if start is not None and nested is None:
         nested = False
