@@ -1,6 +1,7 @@
 """Several methods and recipes on one scene, side by side."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from math import prod
 from typing import Any
 
 from .api import solve
@@ -103,18 +104,37 @@ def _run(
         solution.destroy()
 
 
+def read_off(problem: Problem, data: dict[str, Any]) -> dict[str, float | None]:
+    """What errors are told of: load and p_max above the cavitation pressure (N or N/m, Pa), rupture (m; 2D: middle line)."""
+    if "load" not in data:
+        return {}
+    p_c = getattr(problem, "p_c", 0.0)
+    return {
+        "load": data["load"] - p_c * prod(problem.grid.lengths),
+        "p_max": data["p_max"] - p_c,
+        "rupture": data["rupture"],
+    }
+
+
+def errors(found: Mapping[str, float | None], known: Mapping[str, float | None], L: float) -> dict[str, float]:
+    """Errors of what `read_off` gives: `load_error` and `p_max_error` relative, `rupture_error` relative to the length L."""
+    out = {}
+    for name, value in known.items():
+        size = L if name == "rupture" else abs(value or 0.0)
+        here = found.get(name)
+        if value is not None and here is not None and size > 0:
+            out[f"{name}_error"] = abs(here - value) / size
+    return out
+
+
 def exact_errors(problem: Problem, data: dict[str, Any]) -> dict[str, float]:
-    """Errors of the load (relative) and of the rupture point (relative to L), where the problem has an exact solution."""
+    """`errors` against the exact solution, where the problem has one."""
     known = getattr(problem, "exact", None)
     exact = known() if known else None
-    errors = {}
-    if exact is not None:
-        L = problem.grid.lengths[0]
-        if exact.load > 0:
-            errors["load_error"] = abs(data["load"] - getattr(problem, "p_c", 0.0) * L - exact.load) / exact.load
-        if exact.rupture is not None and data["rupture"] is not None:
-            errors["rupture_error"] = abs(data["rupture"] - exact.rupture) / L
-    return errors
+    if exact is None:
+        return {}
+    reference = {"load": exact.load, "p_max": exact.p_max, "rupture": exact.rupture}
+    return errors(read_off(problem, data), reference, problem.grid.lengths[0])
 
 
 def table(rows: Sequence[dict[str, Any]]) -> str:

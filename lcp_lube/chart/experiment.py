@@ -1,19 +1,20 @@
 """What the charts share: where their runs are kept, and one run as a row."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from datetime import date
+from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
 from time import perf_counter, process_time
 from typing import Any
 
 from ..api import solve
-from ..compare import exact_errors
+from ..compare import exact_errors, read_off
 from ..errors import InputError
 from ..linear.options import LATE, set_names
 from ..output.results import as_dict, machine, versions
 from ..output.resumable import ResumableCsv
-from ..problems.solution import Outcome, Step
+from ..problems.solution import Outcome, Solution, Step
 from ..scene import Scene
 from .reference import WRONG, Reference
 
@@ -38,6 +39,12 @@ def open_store(path: Path, key: Sequence[str], columns: Sequence[str]) -> Resuma
     return ResumableCsv(path, [*key, *columns, *RECORD], key)
 
 
+def scene_key(scene: Scene) -> tuple[str, str]:
+    """A scene's name, and a digest of its data but for the grid: a scene file that was edited is run again."""
+    data = scene.model_dump_json(exclude={"name", "n", "nx", "ny"}, exclude_defaults=True)
+    return scene.name, sha256(data.encode()).hexdigest()[:8]
+
+
 class _Enough(Exception):
     """Leaves a run from within its monitor."""
 
@@ -47,15 +54,19 @@ def run(
     krylov_limit: float = float("inf"),
     reference: Reference | None = None,
     steps: list[Step] | None = None,
+    solver: Callable[..., Solution] = solve,
     **choices: Any,
 ) -> dict[str, Any]:
     """One run, however it ends: RECORD, `wall_s`, `cpu_s` (this rank's), errors and the rest of the JSON's keys. Collective.
 
+    Further keys: `read_off` (`compare.read_off`), `points`, `krylov`: Krylov iterations on all grids.
+
     Parameters
     ----------
-    scene, choices : as `api.solve` takes them.
+    scene, choices : as the solver takes them.
     reference : gives `distance` and `reference`; a certified answer that is as far from it as WRONG is a wrong one.
     steps : filled with the record of every step.
+    solver : `api.solve`, or what has its arguments.
     krylov_limit : the run is left after the step in which its Krylov iterations pass this number; of its answer nothing is
         then known. Counted in iterations, not in seconds: a limit that falls on the same step on every machine.
 
@@ -73,7 +84,7 @@ def run(
     begin, cpu_begin = perf_counter(), process_time()
     environment = {"machine": machine(), "petsc": versions()["petsc"], "date": date.today().isoformat()}
     try:
-        solution = solve(scene, monitor=monitor, **choices)
+        solution = solver(scene, monitor=monitor, **choices)
     except _Enough:
         return {
             **environment,
@@ -83,6 +94,7 @@ def run(
             "cpu_s": process_time() - cpu_begin,
             "iterations": len(steps),
             **{name: sum(getattr(s, name) for s in steps) for name in ("linear_iterations", "centrality", "backtracking")},
+            "krylov": sum(step.linear_iterations for step in steps),
             "c1": steps[-1].norm,
             "c2": steps[-1].step_norm,
         }
@@ -99,6 +111,11 @@ def run(
             if solution.converged and (not reference.solvable or (far is not None and not far <= WRONG)):
                 why = f"{far:.1e} from the reference" if far is not None else "although there is no solution"
                 outcome |= {"outcome": Outcome.WRONG_SOLUTION, "message": f"{solution.message}, {why}"}
-        return {**environment, **data, **exact_errors(solution.problem, data), **clocks, **outcome}
+        more = {
+            "read_off": read_off(solution.problem, data),
+            "points": solution.problem.grid.size,
+            "krylov": sum(step.linear_iterations for step in steps),
+        }
+        return {**environment, **data, **exact_errors(solution.problem, data), **more, **clocks, **outcome}
     finally:
         solution.destroy()

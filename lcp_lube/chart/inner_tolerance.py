@@ -69,10 +69,11 @@ def sentence(rows: Sequence[Row]) -> str:
     held = [row for row in din if row["held"] == "1"]
     lost = [row for row in din if row["held"] == "0"]
     well = [float(row["lost_at"]) / float(row["c1"]) for row in lost if converged(row) and float(row["c1"]) > 0]
-    text = f"(31) held until ||F|| <= {EPS1:g} in {len(held)} runs of din, of which {sum(map(converged, held))} are right; it was "
-    text += f"lost before in {len(lost)}, of which {sum(map(converged, lost))} are right all the same"
+    text = f"(31) held until ||F|| <= {EPS1:g} in {len(held)} runs of din, of which {sum(map(converged, held))} are right; "
+    text += f"it was lost before in {len(lost)}, of which {sum(map(converged, lost))} are right all the same"
     if well:
-        text += f" (||F|| fell by 1e{np.log10(np.median(well)):.0f} more, median): it is sufficient, and far from necessary"
+        text += f" (||F|| fell by 1e{np.log10(np.median(well)):.0f} more, median)"
+        text += ": far from necessary" + ", if sufficient" * all(map(converged, held))
     return f"{'; '.join(parts)}. {text}."
 
 

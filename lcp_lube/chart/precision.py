@@ -1,86 +1,112 @@
-"""Speed against accuracy: error against the exact solution, and what it costs, for every method that solves a scene.
+"""Speed against accuracy: errors of load, largest pressure and rupture, and what they cost, for every method.
 
 A method joins by its line in the registry, with each of its systems and each recipe that makes sense for the system.
+Two errors of every run are told apart: that of the grid (the same grid solved to rounding, against the known answer), and that
+which the iteration leaves (against the same grid solved to rounding).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from hashlib import sha256
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Any
 
 from mpi4py import MPI
 
+from ..accuracy import solve_to_accuracy
 from ..cli import say
+from ..compare import errors
 from ..errors import InputError
-from ..output.resumable import ResumableCsv
-from ..problems.exact import ExactSolution
-from ..problems.solution import Outcome
+from ..output.resumable import ResumableCsv, Row
 from ..registry import METHODS
-from ..scene import LubricationScene, Scene, load_scene
+from ..scene import Scene, load_scene
 from ..solvers.newton import Stopping
-from .experiment import KRYLOV_LIMIT, open_store, run
-from .precision_picture import cheapest, draw, seconds
+from .experiment import KRYLOV_LIMIT, open_store, run, scene_key
+from .known import FilmScene, Known, known_answer, on_grid
+from .log import write_log
+from .precision_picture import draw_all, seconds
+from .precision_words import cheapest, sentence
 
-SCENES = ("problem1", "problem2", "problem3")
-SIZES = (50, 100, 200, 500, 1000, 2000, 5000, 10_000)
-QUICK_SIZES = (50, 100)
+SCENES = ("problem1", "problem2", "problem3", "parabolic_slider", "journal", "problem4", "textured_slider")
+SIZES = {1: (50, 100, 200, 500, 1000, 2000, 5000), 2: (31, 63, 127, 255, 511)}  # points a side by dimension
+QUICK_SIZES = {1: (50, 100), 2: (15, 31)}
 TOLERANCES = (1e-4, 1e-8)  # eps1 = eps2
+FINAL = {"active-set", "monotone"}  # end in an exact step whatever the tolerance: the smaller one only
 
-# The recipes that make sense in 1D by system; for another system its default one (`auto.default_recipe`).
-RECIPES: dict[str, tuple[str | None, ...]] = {
-    "full": ("superlu", "umfpack", "mumps", "gmres_ilu", "bcgs_ilu"),
-    "reduced": ("banded", "superlu", "umfpack", "mumps", "gmres_ilu", "bcgs_ilu"),
+# Recipes by dimension and system, and the most points a side that each is run on; for another system its default one.
+ALL = 10**9
+RECIPES: dict[int, dict[str, dict[str | None, int]]] = {
+    1: {"full": {"superlu": ALL, "gmres_ilu": ALL}, "reduced": {"banded": ALL, "bcgs_ilu": ALL}, "cavity": {}},
+    2: {
+        "full": {"umfpack": 127, "gmres_ilu": 63, "augmentation_amg": 127},
+        "reduced": {"umfpack": 127, "bcgs_amg": 255},
+        "cavity": {"bcgs_amg": ALL},
+    },
 }
+ACCURACIES = {1: (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6), 2: (1e-1, 1e-2, 1e-3, 1e-4)}  # of auto --accuracy
+FINEST = {1: (100_000,), 2: (1023, 1023)}  # grids that it may go to
 
 REPEATS = 3  # of which the median counts
-LONG = 2.0  # seconds; a longer run is not repeated: its clock is steady enough
-KRYLOV_MOST = 100_000  # iterations; the paper's longest run takes 28,000
+LONG = 0.3  # seconds; a longer run is not repeated: its clock is steady enough
+KRYLOV_MOST = 20_000  # iterations
 
 KEY = ("scene", "data", "n", "method", "nested", "system", "recipe", "eps", "ranks")
 CLOCKS = ("wall_s", "cpu_s")
-COLUMNS = (*CLOCKS, "runs", "load_error", "iteration_error", "rupture_error")
+PARTS = ("error", "grid", "iteration")
+ERRORS = tuple(f"{name}_{part}" for name in ("load", "p_max", "rupture") for part in PARTS)
+COLUMNS = (*CLOCKS, "runs", "points", "krylov", *ERRORS, "p_max", "known", "load_unsure", "p_max_unsure", "rupture_unsure")
 
 
 @dataclass(frozen=True)
 class Configuration:
-    """What is run on every grid. recipe: None is the system's default one."""
+    """What is run on every grid up to `most` points a side. recipe: None is the system's default one."""
 
     method: str
     nested: bool
     system: str
     recipe: str | None
     eps: float
+    most: int = ALL
+
+    @property
+    def key(self) -> dict[str, Any]:
+        return {
+            "method": self.method,
+            "nested": self.nested,
+            "system": self.system,
+            "recipe": self.recipe or "default",
+            "eps": self.eps,
+        }
 
     def __str__(self) -> str:
         nested = " nested" * self.nested
         return f"{self.method}{nested}, {self.system} system, recipe {self.recipe or 'default'}, eps {self.eps:g}"
 
 
-def configurations(quick: bool = False) -> Iterator[Configuration]:
-    """All that make sense in 1D; nested iteration with a method's first system and recipe. quick: one recipe a system."""
+def configurations(dimension: int, quick: bool = False) -> Iterator[Configuration]:
+    """All that make sense; nested iteration with a method's first recipe of each system. quick: one recipe a system."""
     for method, entry in METHODS.items():
         if "lubrication" not in entry.kinds:
             continue
-        systems = entry.systems or ("auto",)
-        for system in systems:
-            recipes = RECIPES.get(system, (None,))
-            for recipe in recipes[:1] if quick else recipes:
-                first = (system, recipe) == (systems[0], recipes[0])
+        tolerances = TOLERANCES[-1:] if method in FINAL else TOLERANCES
+        for system in entry.systems or ("auto",):
+            recipes = [*RECIPES[dimension].get(system, {None: ALL}).items()]
+            for recipe, most in recipes[:1] if quick else recipes:
+                first = recipe == (recipes[-1] if dimension == 2 else recipes[0])[0]  # the one for large grids
                 for nested in (False, True) if entry.nested and first else (False,):
-                    for eps in TOLERANCES:
-                        yield Configuration(method, nested, system, recipe, eps)
+                    for eps in tolerances:
+                        yield Configuration(method, nested, system, recipe, eps, most)
 
 
 def chart(sources: Sequence[str], quick: bool = False, results: Path = Path("lcp_lube_results")) -> int:
-    """Make the runs that are not in the csv yet, then draw the picture from it. Collective.
+    """Make the runs that are not in the csv yet, then draw the pictures from it. Collective.
 
     Parameters
     ----------
-    sources : scenes with an exact solution, by name or file; none: SCENES.
+    sources : scenes of films, by name or file; none: SCENES.
     quick : two small grids, one recipe a system, each run made once; kept apart from the full chart.
-    results : folder of precision.csv and precision_load.png, precision_rupture.png (precision_quick...).
+    results : folder of precision.csv, precision_references.csv and the pictures (precision_quick...).
 
     Returns
     -------
@@ -88,92 +114,108 @@ def chart(sources: Sequence[str], quick: bool = False, results: Path = Path("lcp
 
     Raises
     ------
-    InputError : a scene without an exact solution; see also `open_store`.
+    InputError : a scene that is no film; see also `open_store`.
     """
-    scenes = [with_exact(load_scene(source)) for source in sources or SCENES]
+    scenes = [film(load_scene(source)) for source in sources or SCENES]
     stem = "precision_quick" if quick else "precision"
     store = open_store(results / f"{stem}.csv", KEY, COLUMNS)
-    known = len(store.rows)
-    for scene, exact in scenes:
-        for configuration in configurations(quick):
-            fill(store, scene, exact, configuration, QUICK_SIZES if quick else SIZES, 1 if quick else REPEATS)
-    wanted = [scene_key(scene) for scene, _ in scenes]
+    before = len(store.rows)
+    for scene in scenes:
+        bench = Bench(scene, known_answer(scene, results / f"{stem}_references.csv", quick), 1 if quick else REPEATS)
+        dimension = len(scene.shape)
+        for configuration in configurations(dimension, quick):
+            bench.fill(store, configuration, (QUICK_SIZES if quick else SIZES)[dimension])
+        for tol in ACCURACIES[dimension][: 2 if quick else None]:
+            bench.accuracy(store, tol)
+    wanted = [scene_key(scene) for scene in scenes]
     rows = [row for row in store.rows if (row["scene"], row["data"]) in wanted and row["ranks"] == str(store.comm.size)]
-    say("\n".join(cheapest(rows)))
-    for quantity in ("load", "rupture"):
-        draw(rows, quantity, results / f"{stem}_{quantity}.png", store.comm)
+    table = "\n".join(cheapest(rows))
+    say(table)
+    pictures = draw_all(rows, results / stem, store.comm)
+    if not quick:
+        write_log(results, "precision", rows, f"{sentence(rows, 'load')}\n\n```text\n{table}\n```", pictures)
     say(
-        f"{results / stem}_load.png, {stem}_rupture.png: {len(rows)} runs, {len(store.rows) - known} of them new; the others "
-        f"stood in {store.path} (remove it to run them again)."
+        f"{', '.join(map(str, pictures))}: {len(rows)} runs, {len(store.rows) - before} of them new; the others stood in "
+        f"{store.path} (remove it to run them again)."
     )
     return 0
 
 
-def scene_key(scene: Scene) -> tuple[str, str]:
-    """A scene's name, and a digest of its data but for the grid: a scene file that was edited is run again."""
-    data = scene.model_dump_json(exclude={"name", "n", "nx", "ny"}, exclude_defaults=True)
-    return scene.name, sha256(data.encode()).hexdigest()[:8]
-
-
-def with_exact(scene: Scene) -> tuple[LubricationScene, ExactSolution]:
-    """A scene and its exact solution.
+def film(scene: Scene) -> FilmScene:
+    """The scene, if its load can be told.
 
     Raises
     ------
-    InputError : there is none, or none with a load.
+    InputError : it is no film with cavitation.
     """
-    if isinstance(scene, LubricationScene):
-        exact = scene.exact()
-        if exact is not None and exact.load > 0:
-            return scene, exact
-    raise InputError(f"scene {scene.name}: an exact solution with a load is needed, as {', '.join(SCENES)} have it")
+    if not isinstance(scene, FilmScene):
+        raise InputError(f"scene {scene.name}: it has no load; a film with cavitation is needed, as {', '.join(SCENES)} are")
+    return scene
 
 
-def fill(
-    store: ResumableCsv,
-    scene: LubricationScene,
-    exact: ExactSolution,
-    configuration: Configuration,
-    sizes: Sequence[int],
-    repeats: int,
-) -> None:
-    """Make a configuration's runs on all grids, from small to large, up to one that passes the Krylov limit. Collective."""
-    name, data = scene_key(scene)
-    settings = {**vars(configuration), "recipe": configuration.recipe or "default"}
-    for n in sizes:
-        key = {"scene": name, "data": data, "n": n, **settings, "ranks": store.comm.size}
-        row = store.find(**key)
-        if row is None:
-            try:
-                values = measure(scene.model_copy(update={"nx": n}), exact, configuration, repeats)
-            except InputError as error:
-                say(f"{name}: {configuration}: left out: {error}")
+class Bench:
+    """Runs on one scene. known: what its errors are measured against; repeats: of short runs."""
+
+    def __init__(self, scene: FilmScene, known: Known, repeats: int):
+        self.scene, self.known, self.repeats = scene, known, repeats
+        self._discrete: dict[tuple[int, ...], Mapping[str, float | None]] = {}
+
+    def fill(self, store: ResumableCsv, configuration: Configuration, sizes: Sequence[int]) -> None:
+        """Make a configuration's runs on all its grids, from small to large, up to one past the Krylov limit. Collective."""
+        choices: dict[str, Any] = {
+            "method": configuration.method,
+            "system": configuration.system,
+            "recipe_name": configuration.recipe,
+            "nested": configuration.nested,
+            "stopping": Stopping(configuration.eps, configuration.eps),
+        }
+        for n in sizes:
+            if n > configuration.most:
                 return
-            row = store.add({**values, **key})
-            say(f"{name} n = {n}: {configuration}: {row['outcome']}, {row['iterations']} iterations, {seconds(row):.3g} s")
-        if row["outcome"] == KRYLOV_LIMIT:
-            return
+            scene = self.scene.with_shape((n,) * len(self.scene.shape))
+            row = self.row(store, {**configuration.key, "n": n}, scene, **choices)
+            if row is None or row["outcome"] == KRYLOV_LIMIT:
+                return
 
+    def accuracy(self, store: ResumableCsv, tol: float) -> None:
+        """What `auto --accuracy TOL` takes, all its grids together. Collective."""
+        key = {"method": "auto --accuracy", "nested": True, "system": "auto", "recipe": "auto", "eps": tol, "n": "auto"}
+        solver = partial(solve_to_accuracy, tol=tol, quantity="load", finest=FINEST[len(self.scene.shape)])
+        self.row(store, key, self.scene, solver=solver)
 
-def measure(scene: LubricationScene, exact: ExactSolution, configuration: Configuration, repeats: int) -> dict[str, Any]:
-    """The row of one run: errors relative to the exact load and to the length L, medians of the repeats' seconds. Collective.
+    def row(self, store: ResumableCsv, key: dict[str, Any], scene: Scene, **choices: Any) -> Row | None:
+        """One run's row, from the csv or made now; None if it was refused. Collective."""
+        name, data = scene_key(self.scene)
+        key = {"scene": name, "data": data, **key, "ranks": store.comm.size}
+        row = store.find(**key)
+        if row is not None:
+            return row
+        told = ", ".join(str(value) for value in key.values())
+        try:
+            row = store.add({**self.measure(scene, choices), **key})
+        except InputError as error:
+            say(f"{told}: left out: {error}")
+            return None
+        say(f"{told}: {row['outcome']}, {row['iterations']} iterations, {seconds(row):.3g} s")
+        return row
 
-    iteration_error is the part of the load's error that the iteration leaves: against the active set on the same grid, whose
-    answer is exact but for rounding.
-    """
-    choices: dict[str, Any] = {
-        "method": configuration.method,
-        "system": configuration.system,
-        "recipe_name": configuration.recipe,
-        "nested": configuration.nested,
-        "stopping": Stopping(configuration.eps, configuration.eps),
-    }
-    runs = [run(scene, KRYLOV_MOST, **choices)]
-    while len(runs) < (repeats if MPI.COMM_WORLD.bcast(runs[0]["wall_s"]) < LONG else 1):
-        runs.append(run(scene, KRYLOV_MOST, **choices))
-    values = {**runs[0], **{clock: f"{median(a_run[clock] for a_run in runs):.6f}" for clock in CLOCKS}, "runs": len(runs)}
-    if values.get("load") is not None:
-        discrete = run(scene, method="active-set")
-        if discrete["outcome"] == Outcome.CONVERGED:
-            values["iteration_error"] = abs(values["load"] - discrete["load"]) / exact.load
-    return {name: f"{value:.4e}" if name.endswith("_error") else value for name, value in values.items()}
+    def measure(self, scene: Scene, choices: dict[str, Any]) -> dict[str, Any]:
+        """A run, its errors and the medians of the repeats' seconds. Collective."""
+        runs = [run(scene, KRYLOV_MOST, **choices)]
+        while len(runs) < (self.repeats if MPI.COMM_WORLD.bcast(runs[0]["wall_s"]) < LONG else 1):
+            runs.append(run(scene, KRYLOV_MOST, **choices))
+        clocks = {clock: f"{median(a_run[clock] for a_run in runs):.6f}" for clock in CLOCKS}
+        found = runs[0].get("read_off")
+        shape = tuple(runs[0][side] for side in ("nx", "ny") if runs[0].get(side))
+        return {**runs[0], **clocks, "runs": len(runs), **(self.errors(found, shape) if found else {})}
+
+    def errors(self, found: Mapping[str, float | None], shape: tuple[int, ...]) -> dict[str, Any]:
+        """The columns ERRORS of a run on a grid, and how sure they are. Collective."""
+        if shape not in self._discrete:
+            self._discrete[shape] = on_grid(self.scene.with_shape(shape))
+        discrete, known, L = self._discrete[shape], self.known, self.scene.L
+        out = errors(found, known.values, L)
+        out |= {name.replace("_error", "_grid"): value for name, value in errors(discrete, known.values, L).items()}
+        out |= {name.replace("_error", "_iteration"): value for name, value in errors(found, discrete, L).items()}
+        unsure = {f"{name}_unsure": value for name, value in known.unsure.items()}
+        return {**{name: f"{value:.4e}" for name, value in out.items()}, **unsure, "known": known.how}

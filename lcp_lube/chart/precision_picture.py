@@ -1,180 +1,209 @@
-"""The picture of speed against accuracy, and what it says in words, both from the rows of the csv alone."""
+"""The pictures of speed against accuracy, from the rows of the csv alone."""
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mpi4py import MPI
 
 from ..output.resumable import Row
-from .drawing import look, new_figure, save
+from .drawing import MARKERS, look, new_figure, save
+from .precision_words import ASKED, by_scene, error, fastest, front, loose, percent, seconds, sentence, time
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-LEVELS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
-
-PANELS = ("2n system, direct solver", "2n system, Krylov solver", "n-by-n system", "nested iteration")  # from top to bottom
 AXES = {
     "load": "relative error of the load",
+    "p_max": "relative error of the largest pressure",
     "rupture": "error of the rupture point / L",
 }
+COLUMNS = 2
+PEER = "peer"  # what stands in the column `system` for other codes
 
 
-def panel(row: Row) -> str:
-    """Which of PANELS a run belongs to, by what its inner solver sees."""
-    if row["nested"] == "True":
-        return PANELS[3]
-    if row["system"] != "full":
-        return PANELS[2]
-    return PANELS[0] if row["ksp_type"] == "preonly" else PANELS[1]
+def draw_all(rows: Sequence[Row], stem: Path, comm: MPI.Comm) -> list[Path]:
+    """All pictures: an error against seconds for each of AXES, the load's against Krylov iterations, and its parts. Collective.
 
-
-def seconds(row: Row) -> float:
-    """What a run costs: seconds by the clock, or of the processor where that is less, because other jobs slowed the clock."""
-    return min(float(row["wall_s"]), float(row["cpu_s"]))
-
-
-def error(row: Row, quantity: str) -> float | None:
-    """The error to draw; None for a run that failed.
-
-    The load's is the larger one of the whole error and of the part that the iteration leaves: an iteration that stops where
-    both parts happen to cancel is not accurate.
+    Returns
+    -------
+    list of Path : the files, stem_load.png and so on.
     """
-    names = ("load_error", "iteration_error") if quantity == "load" else ("rupture_error",)
-    values = [float(row[name]) for name in names if row[name]]
-    return max(values) if row["outcome"] == "converged" and values else None
+    pictures: dict[str, Callable[[], Figure]] = {name: lambda name=name: against_seconds(rows, name) for name in AXES}  # type: ignore[misc]
+    pictures |= {"krylov": lambda: against_krylov(rows), "parts": lambda: parts(rows)}
+    paths = []
+    for name, build in pictures.items():
+        paths.append(stem.with_name(f"{stem.name}_{name}.png"))
+        save(build, paths[-1], comm)
+    return paths
 
 
-def front(rows: Sequence[Row], quantity: str) -> list[Row]:
-    """The Pareto front, from fast to accurate: no other run beats one in seconds and, by one part in ten, in error."""
-    best: list[Row] = []
-    least = float("inf")
-    for row in sorted(rows, key=lambda row: seconds(row)):
-        here = error(row, quantity)
-        if here is not None and here < 0.9 * least:
-            best.append(row)
-            least = here
-    return best
-
-
-def cheapest(rows: Sequence[Row]) -> list[str]:
-    """Lines of a table: for each scene and method the seconds of its fastest run within each of LEVELS, and which one it is."""
-    lines = []
-    for scene in _scenes(rows):
-        head = f"{scene}: seconds of the fastest run whose load is within"
-        lines.append(head + "".join(f"{_percent(level):>10}" for level in LEVELS))
-        mine = [row for row in rows if row["scene"] == scene]
-        for method in dict.fromkeys(row["method"] for row in mine):
-            runs = [fastest([row for row in mine if row["method"] == method], level) for level in LEVELS]
-            cells = "".join(f"{seconds(run):>10.2g}" if run else f"{'-':>10}" for run in runs)
-            lines.append(f"  {method:<{len(head) - 2}}{cells}")
-        for level in LEVELS:
-            run = fastest(mine, level)
-            if run:
-                lines.append(f"  fastest within {_percent(level)}: {describe(run)}")
-    return lines
-
-
-def fastest(rows: Sequence[Row], level: float, quantity: str = "load") -> Row | None:
-    """The run of least seconds whose error is at most `level`."""
-    return next((row for row in front(rows, quantity) if (error(row, quantity) or 0.0) <= level), None)
-
-
-def describe(row: Row) -> str:
-    """A run in a few words."""
-    nested = ", nested" * (row["nested"] == "True")
-    inner = f"{row['system']} system, {row['recipe']}"
-    return f"{row['method']}{nested}, {inner}, eps {float(row['eps']):g}, n = {row['n']}: {1e3 * seconds(row):.3g} ms"
-
-
-def _percent(level: float) -> str:
-    return f"{100 * level:g} %"
-
-
-def draw(rows: Sequence[Row], quantity: str, path: Path, comm: MPI.Comm) -> None:
-    """Draw the error of `quantity` (a key of AXES) against seconds. Collective."""
-    save(lambda: picture(rows, quantity), path, comm)
-
-
-def picture(rows: Sequence[Row], quantity: str) -> Figure:
-    """A column a scene, a row a kind of inner solve; lines join a method's fastest runs over the grids."""
-    scenes = _scenes(rows)
-    names = list(dict.fromkeys(row["method"] for row in rows))
-    figure = new_figure(8.8, caption(rows, quantity))
-    grid = figure.subplots(len(PANELS), len(scenes), sharex=True, sharey=True, squeeze=False)
-    accurate = [value for row in rows if (value := error(row, quantity))]
-    failed_at = 4 * max(accurate, default=1.0)
-    for column, scene in enumerate(scenes):
-        mine = [row for row in rows if row["scene"] == scene]
-        for title, axes in zip(PANELS, grid[:, column], strict=True):
-            _front_line(axes, front(mine, quantity), quantity)
-            inside = [row for row in mine if panel(row) == title]
-            for number, name in enumerate(names):
-                _series(axes, [row for row in inside if row["method"] == name], quantity, number, failed_at)
-            axes.set(xscale="log", yscale="log")
-            axes.grid(which="major", color="0.9", lw=0.6)
-            if column == 0:
-                axes.set_ylabel(f"{title}\n{AXES[quantity]}")
-        grid[0, column].set_title(scene, fontweight="bold")
-        grid[-1, column].set_xlabel("seconds")
-    figure.legend(handles=_legend(names, rows), loc="outside upper center", ncols=5)
+def against_seconds(rows: Sequence[Row], quantity: str) -> Figure:
+    """A panel a scene; of each method and tolerance the fastest run on every grid, and the Pareto front, named where asked."""
+    text = (
+        "Of a method's systems and recipes the fastest one on each grid; filled: the grid's error prevails, open: "
+        f"what the iteration leaves. Grey band: doubt of a reference that is not exact. {sentence(rows, quantity)}"
+    )
+    figure, panels = _panels(rows, text, AXES[quantity], "seconds")
+    for scene, mine in by_scene(rows).items():
+        axes = panels[scene]
+        best = front(mine, quantity)
+        axes.step([seconds(r) for r in best], _errors(best, quantity), where="post", color="0.8", lw=4.0, zorder=1)
+        unsure = max((float(row.get(f"{quantity}_unsure") or 0.0) for row in mine), default=0.0)
+        if unsure > 0:
+            axes.axhspan(1e-16, unsure, color="0.93", zorder=0)
+        for number, name in enumerate(methods(rows)):
+            _series(axes, [row for row in mine if row["method"] == name], quantity, styles(rows, number, name), seconds)
+        _limits(axes, mine, quantity)
+        _answers(axes, mine, quantity)
     return figure
 
 
-def _front_line(axes: Axes, best: Sequence[Row], quantity: str) -> None:
-    errors = [error(row, quantity) or 0.0 for row in best]
-    axes.step([seconds(row) for row in best], errors, where="post", color="0.75", lw=4.0, solid_capstyle="butt", zorder=1)
+def against_krylov(rows: Sequence[Row]) -> Figure:
+    """The load's error against Krylov iterations on all grids, for the runs that have any: no clock."""
+    rows = [row for row in rows if row.get("krylov") not in ("", "0", None)]
+    text = (
+        "Krylov iterations of a run, coarser grids included; of a method's Krylov recipes the one with the fewest on each "
+        "grid. Direct solvers have none and are left out. " + fewest(rows)
+    )
+    figure, panels = _panels(rows, text, AXES["load"], "Krylov iterations")
+    for scene, mine in by_scene(rows).items():
+        for number, name in enumerate(methods(rows)):
+            here = [row for row in mine if row["method"] == name]
+            _series(panels[scene], here, "load", styles(rows, number, name), lambda row: float(row["krylov"]))
+        _limits(panels[scene], mine, "load")
+    return figure
 
 
-def _series(axes: Axes, rows: Sequence[Row], quantity: str, number: int, failed_at: float) -> None:
-    """A method's fastest recipe on each grid, by tolerance; every run that failed as a cross on one line."""
-    for eps in dict.fromkeys(row["eps"] for row in rows):
+def fewest(rows: Sequence[Row]) -> str:
+    """Who needs the fewest iterations for a hundredth of a per cent, scene by scene."""
+    parts = []
+    for scene, mine in by_scene(rows).items():
+        good = [row for row in mine if (here := error(row, "load")) is not None and here <= ASKED[-1]]
+        best = min(good, key=lambda row: float(row["krylov"]), default=None)
+        if best:
+            parts.append(f"{scene} {best['method']} ({best['krylov']}, {best['recipe']})")
+    return f"Fewest within {percent(ASKED[-1])}: {'; '.join(parts)}." if parts else ""
+
+
+def parts(rows: Sequence[Row]) -> Figure:
+    """The load's error on each grid taken apart: the grid's part as a line, the iteration's part a mark a method."""
+    rows = [row for row in rows if row["outcome"] == "converged" and row["n"] != "auto" and row.get("load_grid")]
+    over = [row for row in rows if loose(row, "load")]
+    names = ", ".join(f"{m} eps {float(e):g}" for m, e in dict.fromkeys((r["method"], r["eps"]) for r in over))
+    text = (
+        "Line: error of the grid (the same grid solved to rounding). Marks: what the iteration adds, the largest of a method's "
+        f"recipes. The iteration's part is the larger one in {len(over)} of {len(rows)} runs{f': {names}' * bool(names)}."
+    )
+    figure, panels = _panels(rows, text, AXES["load"], "points a side")
+    for scene, mine in by_scene(rows).items():
+        axes = panels[scene]
+        grids = {int(row["n"]): float(row["load_grid"]) for row in mine}
+        axes.plot(sorted(grids), [grids[n] for n in sorted(grids)], color="0.75", lw=4.0, zorder=1)
+        for number, name in enumerate(methods(rows)):
+            for eps in dict.fromkeys(row["eps"] for row in mine if row["method"] == name):
+                most: dict[int, float] = {}
+                for row in mine:
+                    if (row["method"], row["eps"]) == (name, eps):
+                        most[int(row["n"])] = max(float(row["load_iteration"] or 0.0), most.get(int(row["n"]), 1e-16))
+                style = styles(rows, number, name) | _tolerance(eps)
+                axes.plot(sorted(most), [most[n] for n in sorted(most)], **{**style, "lw": 0.8})
+        axes.set_ylim(1e-16, None)
+    return figure
+
+
+def methods(rows: Sequence[Row]) -> list[str]:
+    """All methods, the peers last."""
+    names = list(dict.fromkeys(row["method"] for row in rows if row["system"] != PEER))
+    return [*names, *dict.fromkeys(row["method"] for row in rows if row["system"] == PEER)]
+
+
+def styles(rows: Sequence[Row], number: int, name: str) -> dict[str, Any]:
+    """Colour and marker; other codes in grey, so that they are told from ours at a glance."""
+    peers = [row["method"] for row in rows if row["system"] == PEER]
+    if name in peers:
+        return {"color": "0.45", "marker": MARKERS[::-1][[*dict.fromkeys(peers)].index(name) % len(MARKERS)]}
+    return look(number)
+
+
+def _errors(rows: Sequence[Row], quantity: str) -> list[float]:
+    return [max(error(row, quantity) or 0.0, 1e-16) for row in rows]
+
+
+def _series(axes: Axes, rows: Sequence[Row], quantity: str, style: dict[str, Any], cost: Callable[[Row], float]) -> None:
+    """A method's cheapest run on each grid, by tolerance; runs that failed as crosses at the top."""
+    varying = {row["n"] for row in rows} == {"auto"}  # one line through all tolerances
+    for eps in ["all"] if varying else dict.fromkeys(row["eps"] for row in rows):
+        mine = [row for row in rows if varying or row["eps"] == eps]
         points = []
-        for n in sorted({row["n"] for row in rows}, key=int):
-            here = [row for row in rows if row["eps"] == eps and row["n"] == n and error(row, quantity)]
-            points += sorted(here, key=lambda row: seconds(row))[:1]
-        errors = [error(row, quantity) or 0.0 for row in points]
-        axes.plot([seconds(row) for row in points], errors, **look(number), **_tolerance(eps))
-    failed = [seconds(row) for row in rows if row["outcome"] != "converged"]
-    axes.plot(failed, [failed_at] * len(failed), ls="none", marker="x", color=look(number)["color"], ms=5.0)
+        for n in sorted({row["points"] for row in mine if row["points"]}, key=int):
+            here = [row for row in mine if row["points"] == n and error(row, quantity) is not None]
+            points += sorted(here, key=cost)[:1]
+        line = _tolerance("1e-8" if varying else eps)
+        xs, ys = [cost(row) for row in points], _errors(points, quantity)
+        axes.plot(xs, ys, **{**style, "marker": ""}, ls=line["ls"], lw=1.0)
+        for x, y, row in zip(xs, ys, points, strict=True):
+            axes.plot(x, y, **style, ls="none", mfc="white" if loose(row, quantity) else style["color"])
+    failed = [cost(row) for row in rows if row["outcome"] != "converged" and row["cpu_s"]]
+    axes.plot(failed, [0.97] * len(failed), ls="none", marker="x", color=style["color"], transform=axes.get_xaxis_transform())
+
+
+def _answers(axes: Axes, rows: Sequence[Row], quantity: str) -> None:
+    """Lines at the accuracies that are asked for, and under the title who reaches them first."""
+    said = []
+    for level in ASKED:
+        axes.axhline(level, color="0.5", lw=0.7, ls=":", zorder=0)
+        best = fastest(rows, level, quantity)
+        said.append(f"{percent(level)}: {best['method']}, {time(best)}" if best else f"{percent(level)}: none")
+    axes.text(0.0, 1.015, "   ".join(said), transform=axes.transAxes, fontsize=6.8, va="bottom")
+
+
+def _limits(axes: Axes, rows: Sequence[Row], quantity: str) -> None:
+    seen = [value for row in rows if (value := error(row, quantity))]
+    if seen:
+        axes.set_ylim(0.4 * max(min(seen), 1e-13), 8 * max(seen))
+
+
+def _panels(rows: Sequence[Row], text: str, ylabel: str, xlabel: str) -> tuple[Figure, dict[str, Axes]]:
+    """Empty panels by scene, and a legend in the place that is left or under them."""
+    scenes = [*by_scene(rows)]
+    lines = math.ceil((len(scenes) + 1) / COLUMNS)
+    figure = new_figure(0.9 + 2.05 * lines, text)
+    grid = figure.subplots(lines, COLUMNS, squeeze=False)
+    panels = {}
+    for number, axes in enumerate(grid.ravel()):
+        if number >= len(scenes):
+            axes.set_axis_off()
+            continue
+        panels[scenes[number]] = axes
+        axes.set(xscale="log", yscale="log")
+        axes.grid(which="major", color="0.92", lw=0.6)
+        axes.set_title(scenes[number], fontweight="bold", loc="left", pad=13)
+        axes.set_xlabel(xlabel)
+        if number % COLUMNS == 0:
+            axes.set_ylabel(ylabel)
+    place = grid.ravel()[len(scenes)]
+    place.legend(handles=_legend(rows), loc="center", ncols=2, fontsize=7.0)
+    return figure, panels
 
 
 def _tolerance(eps: str) -> dict[str, Any]:
-    """Loose tolerances dashed with open markers."""
+    """Loose tolerances dashed."""
     return {"ls": "--", "mfc": "white"} if float(eps) > 1e-6 else {"ls": "-"}
 
 
-def _legend(names: Sequence[str], rows: Sequence[Row]) -> list[Any]:
+def _legend(rows: Sequence[Row]) -> list[Any]:
     from matplotlib.lines import Line2D
 
-    handles = [Line2D([], [], **look(number), label=name) for number, name in enumerate(names)]
-    for eps in dict.fromkeys(row["eps"] for row in rows):
-        handles.append(Line2D([], [], color="0.3", marker="o", label=f"eps = {float(eps):g}", **_tolerance(eps)))
+    handles = [Line2D([], [], **styles(rows, number, name), label=name) for number, name in enumerate(methods(rows))]
+    for eps in dict.fromkeys(row["eps"] for row in rows if row["n"] != "auto"):
+        handles.append(Line2D([], [], color="0.3", label=f"eps = {float(eps):g}", ls=_tolerance(eps)["ls"]))
     return [
         *handles,
         Line2D([], [], color="0.3", marker="x", ls="none", label="failed"),
-        Line2D([], [], color="0.75", lw=4.0, label="Pareto front of all"),
+        Line2D([], [], color="0.8", lw=4.0, label="Pareto front"),
     ]
-
-
-def caption(rows: Sequence[Row], quantity: str, level: float = 1e-4) -> str:
-    """What the picture shows, from the rows: the cheapest run for one accuracy, and which inner solves fail."""
-    sizes = sorted({int(row["n"]) for row in rows})
-    text = f"Markers: n = {', '.join(map(str, sizes))}, of a method's recipes the fastest one."
-    bests = {scene: fastest([row for row in rows if row["scene"] == scene], level, quantity) for scene in _scenes(rows)}
-    said = "; ".join(f"{scene}: {describe(best)}" for scene, best in bests.items() if best)
-    if said:
-        text += f" Fastest within {_percent(level)}: {said}."
-    failed = [row for row in rows if row["outcome"] != "converged"]
-    counts = Counter(map(panel, failed))
-    where = ", ".join(f"{counts[title]} with {title}" for title in PANELS if title in counts)
-    return f"{text} {len(failed)} of {len(rows)} runs failed{': ' * bool(where)}{where}."
-
-
-def _scenes(rows: Sequence[Row]) -> list[str]:
-    return list(dict.fromkeys(row["scene"] for row in rows))
