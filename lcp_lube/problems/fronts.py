@@ -8,6 +8,7 @@ import numpy as np
 
 from ..parallel import Array
 from .flows import point_weights
+from .reynolds import Film
 
 if TYPE_CHECKING:
     from .problem import LubricationProblem
@@ -24,8 +25,8 @@ def fronts(problem: LubricationProblem, p: Array, r: Array) -> tuple[float | Non
 
     Each front is found to its cell from the sign of p/max|p| - r and placed inside it. Rupture: where U h = Q, Q being the
     flow along the line (p = p' = 0 there; in 1D the one flow of the discrete solution, in 2D what leaves the first cell of the
-    cavity), h taken linear over the cell (and one beyond: the discrete front may be late). Reformation: where the pressure
-    behind it, extrapolated linearly, is zero.
+    cavity), within the cell or one beside it: the discrete front may be late. Reformation: where the pressure behind it,
+    extrapolated linearly, is zero.
     """
     grid, film, scheme = problem.grid, problem.film, problem.scheme
     dx, L = grid.spacing[0], grid.lengths[0]
@@ -37,15 +38,14 @@ def fronts(problem: LubricationProblem, p: Array, r: Array) -> tuple[float | Non
     opens = [kind == "open" for kind in grid.ends[0]]
     z[0] = 1.0 if grid.x_start == 0 and opens[0] else z[0]  # the inflow boundary is full
     cavity = z < 0
-    west, east = film(x - dx, y), film(x, y)
     if grid.dim == 1 and opens[0]:
-        Q = np.array(problem.boundary_flows(p, r)[0])
+        Q = np.full_like(x, problem.boundary_flows(p, r)[0])
     else:
         leaves = scheme.couette_E + scheme.b_C * r.reshape(grid.box)
         Q = leaves[row] / point_weights(grid).reshape(grid.box)[row]
     front = cavity[1:-1] & ~cavity[:-2] & here
-    slope = np.where(east > west, east - west, np.inf)  # a step up in the film: rupture at its edge, the cell's start
-    rupture = problem.reduce.min(np.where(front, x - dx + dx * np.clip((Q / problem.U - west) / slope, -1.0, 2.0), np.inf))
+    ruptures = _rises_through(film, Q[front] / problem.U, x[front] - 2.0 * dx, x[front] + dx, y[front])
+    rupture = problem.reduce.min(ruptures)
     if not np.isfinite(rupture):
         return None, None
     p_line = grid.ghosted(p)[row + 1]
@@ -58,6 +58,15 @@ def fronts(problem: LubricationProblem, p: Array, r: Array) -> tuple[float | Non
     if not np.isfinite(reformation) and problem.p_sides[1] > 0:
         reformation = grid.origin[0] + L - 0.5 * dx  # in the last cell, before a boundary above the cavitation pressure
     return rupture, reformation if np.isfinite(reformation) else None
+
+
+def _rises_through(film: Film, level: Array, a: Array, b: Array, y: Array) -> Array:
+    """Where the film grows beyond a level between a and b, by bisection: at a jump too; a or b where it does not."""
+    for _ in range(50):
+        middle = 0.5 * (a + b)
+        thin = film(middle, y) < level
+        a, b = np.where(thin, middle, a), np.where(thin, b, middle)
+    return b
 
 
 def middle_row(problem: LubricationProblem) -> int:
