@@ -61,7 +61,11 @@ def split(argv: list[str]) -> tuple[list[str], list[str]]:
 def check_options_file(name: str) -> None:
     """Raise InputError for a file that PETSc would abort on: unreadable, or a line that is no option."""
     try:
+        if Path(name).exists() and not (Path(name).is_file() or Path(name).is_dir()):
+            raise InputError(f"-options_file {name}: is no ordinary file")  # a pipe would be empty when PETSc reads it
         lines = Path(name).read_text(encoding="utf-8").splitlines()
+    except InputError:
+        raise
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else "not a text file"
         raise InputError(f"-options_file {name}: {reason}") from None

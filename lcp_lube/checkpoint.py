@@ -314,10 +314,12 @@ def load(path: str | Path, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> Che
     header: dict[str, Any] = {}
     if comm.rank == 0:
         try:
+            if path.exists() and not (path.is_file() or path.is_dir()):
+                raise InputError("is no ordinary file")
             header, start = _read_header(path)
         except OSError as error:
             reason = error.strerror or str(error)
-        except InputError as error:
+        except ValueError as error:  # InputError, or a name that no file can have
             reason = str(error)
     reason, header, start = comm.bcast((reason, header, start))
     if not reason and header["version"] != __version__:
@@ -419,14 +421,18 @@ def _settle(temporary: Path, path: Path) -> None:
 
 
 def _not_writable(path: Path) -> str:
-    if path.is_dir():
-        return "is a folder"
-    if not path.parent.is_dir():
-        return f"folder {path.parent} does not exist"
     try:
+        if path.is_dir():
+            return "is a folder"
+        if path.exists() and not path.is_file():
+            return "is no ordinary file"  # a device would be replaced
+        if not path.parent.is_dir():
+            return f"folder {path.parent} does not exist"
         probe = path.with_name(f".{path.name}.new")
         probe.touch()
         probe.unlink()
     except OSError as error:
         return f"cannot be written in {path.parent}: {error.strerror}"
+    except ValueError as error:
+        return str(error)  # a name that no file can have
     return ""

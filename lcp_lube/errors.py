@@ -3,12 +3,19 @@
 import difflib
 from collections.abc import Iterable
 
+LONGEST = 700
+
 
 class InputError(ValueError):
-    """Bad input: its message is the one line a user sees; the command line then ends with exit status 2."""
+    """Bad input: its message is the one line a user sees; the command line then ends with exit status 2.
+
+    What was found may hold line ends, control characters or a whole file: these are joined, escaped and cut.
+    """
 
     def __init__(self, message: str):
-        super().__init__(" ".join(message.splitlines()))  # what was found may hold line ends
+        line = " ".join(message.splitlines())
+        line = "".join(char if char.isprintable() else char.encode("unicode_escape").decode() for char in line)
+        super().__init__(line if len(line) <= LONGEST else f"{line[: LONGEST // 2]} ... {line[-LONGEST // 2 :]}")
 
 
 def nearest(word: str, legal: Iterable[str], dash: str = "") -> str:

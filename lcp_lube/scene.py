@@ -182,7 +182,7 @@ def load_scene(source: str | Path, changes: dict[str, Any] | None = None) -> Sce
         )
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (OSError, ValueError, RecursionError) as error:  # ValueError: no UTF-8, no TOML, a number too long for Python
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise InputError(f"{source}: {reason}") from None
     if not data:
@@ -213,6 +213,6 @@ def parse_changes(assignments: Iterable[str]) -> dict[str, Any]:
             raise InputError(f"--set {text}: KEY=VALUE is needed")
         try:
             changes[key] = tomllib.loads(f"value = {value}")["value"]
-        except tomllib.TOMLDecodeError:
+        except (ValueError, RecursionError):
             changes[key] = value
     return changes

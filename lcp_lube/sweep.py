@@ -77,7 +77,7 @@ def _listed(values: str) -> tuple[Any, ...]:
     """The values of A,B,C as TOML, or as bare words."""
     try:
         return tuple(tomllib.loads(f"values = [{values}]")["values"])
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):
         return tuple(value.strip() for value in values.split(","))
 
 

@@ -209,6 +209,8 @@ def _fault(path: Path, plot: bool) -> str:
         return "this PETSc was built without HDF5; use .npz, .vts or .vtr"
     if path.is_dir():
         return "is a folder"
+    if path.exists() and not path.is_file():
+        return "is no ordinary file"  # opening a pipe waits for ever, and a device would be replaced
     if not folder.is_dir():
         return f"folder {folder} does not exist"
     try:

@@ -74,6 +74,8 @@ class ResumableCsv:
     def _read(self) -> list[Row]:
         if not self.path.exists():
             return []
+        if not self.path.is_file():
+            raise InputError(f"{self.path}: is no ordinary file")  # a device would be replaced
         with self.path.open(newline="", encoding="utf-8") as file:
             reader = csv.DictReader(file, restval="")
             missing = set(self.key) - set(reader.fieldnames or ())
