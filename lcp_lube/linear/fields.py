@@ -119,7 +119,8 @@ class Inner:
         pc = self._ksp.getPC()
         pc.setType("lu")
         packages = ("superlu", "umfpack", "mumps") if mat.comm.size == 1 else ("mumps", "superlu_dist")
-        package = next((name for name in packages if PETSc.Sys.hasExternalPackage(name)), None)
+        has = PETSc.Sys.hasExternalPackage
+        package = next((name for name in packages if has(name) or (name == "umfpack" and has("suitesparse"))), None)
         if package:
             pc.setFactorSolverType(package)
         try:
