@@ -45,6 +45,11 @@ def scene_key(scene: Scene) -> tuple[str, str]:
     return scene.name, sha256(data.encode()).hexdigest()[:8]
 
 
+def environment() -> dict[str, str]:
+    """What a run's seconds depend on, and when it was made."""
+    return {"machine": machine(), "petsc": versions()["petsc"], "date": date.today().isoformat()}
+
+
 class _Enough(Exception):
     """Leaves a run from within its monitor."""
 
@@ -82,12 +87,11 @@ def run(
             raise _Enough
 
     begin, cpu_begin = perf_counter(), process_time()
-    environment = {"machine": machine(), "petsc": versions()["petsc"], "date": date.today().isoformat()}
     try:
         solution = solver(scene, monitor=monitor, **choices)
     except _Enough:
         return {
-            **environment,
+            **environment(),
             "outcome": KRYLOV_LIMIT,
             "message": f"left after {krylov_limit:,.0f} Krylov iterations with ||F|| = {steps[-1].norm:.2e}",
             "wall_s": perf_counter() - begin,
@@ -116,6 +120,6 @@ def run(
             "points": solution.problem.grid.size,
             "krylov": sum(step.linear_iterations for step in steps),
         }
-        return {**environment, **data, **exact_errors(solution.problem, data), **more, **clocks, **outcome}
+        return {**environment(), **data, **exact_errors(solution.problem, data), **more, **clocks, **outcome}
     finally:
         solution.destroy()

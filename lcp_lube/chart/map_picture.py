@@ -82,8 +82,8 @@ def tick(value: str) -> str:
     """A number as a tick label: powers of ten as such."""
     number = float(value)
     exponent = math.log10(abs(number)) if number else 0.0
-    if number > 0 and exponent == round(exponent) and not -1 <= exponent <= 2:
-        return f"$10^{{{round(exponent)}}}$"
+    if number and exponent == round(exponent) and not -1 <= exponent <= 2:
+        return f"${'-' * (number < 0)}10^{{{round(exponent)}}}$"
     return f"{number:g}"
 
 
@@ -118,7 +118,7 @@ def picture(
     kept = [row for row in rows if row[panels.across] in titles]
     blocks = {d: chosen(kept, **({panels.down: d} if panels.down else {})) for d in down}
     heights = [_height(mine, y) for mine in blocks.values() for _ in range(lines_each)]
-    figure = new_figure(0.55 + sum(heights) + 0.5 * len(heights), sentence)
+    figure = new_figure(0.55 + sum(heights) + 0.5 * len(heights) + 0.35 * _long(rows, x), sentence)
     grid = figure.subplots(len(heights), columns, squeeze=False, height_ratios=heights)
     for block, (d, mine) in enumerate(blocks.items()):
         for number in range(lines_each * columns):
@@ -147,9 +147,18 @@ def picture(
     return figure
 
 
+def _long(rows: Sequence[Row], x: Axis) -> int:
+    """Whether the numbers under a panel are turned."""
+    return int(_crowded([tick(value) if x.number else value for value in values_of(rows, x)]))
+
+
+def _crowded(labels: Sequence[str]) -> bool:
+    return sum(len(label.strip("${}^")) + 1 for label in labels) > 22
+
+
 def _height(rows: Sequence[Row], y: Axis) -> float:
     """Of a panel in inches: a line of type for every cell."""
-    return max(0.7, 0.155 * len(values_of(rows, y)))
+    return max(0.75, 0.155 * len(values_of(rows, y)))
 
 
 def _merged(rows: Sequence[Row], panels: Panels, x: Axis, y: Axis) -> dict[str, str]:
@@ -201,7 +210,7 @@ def _cells(axes: Axes, rows: Sequence[Row], panels: Panels, x: Axis, y: Axis, ri
             axes.add_patch(Rectangle((i - 0.46, j - 0.46), 0.92, 0.92, fill=False, ec="black", lw=1.2))
     axes.imshow(cells, origin="lower", cmap="Blues", norm=LogNorm(LEAST, MOST), aspect="auto")
     axes.tick_params(length=0)
-    skip_x, skip_y = (max(1, math.ceil(len(values) / most)) for values, most in ((xs, 10), (ys, 16)))
+    skip_x, skip_y = (max(1, math.ceil(len(values) / most)) for values, most in ((xs, 12), (ys, 16)))
     _ticks(axes.set_xticks, xs, x, skip_x)
     _ticks(axes.set_yticks, ys, y, skip_y)
 
@@ -209,8 +218,8 @@ def _cells(axes: Axes, rows: Sequence[Row], panels: Panels, x: Axis, y: Axis, ri
 def _ticks(put: Callable[..., Any], values: Sequence[str], axis: Axis, skip: int) -> None:
     labels = [tick(value) if axis.number else value for value in values]
     labels = [label if k % skip == 0 else "" for k, label in enumerate(labels)]
-    crowded = put.__name__ == "set_xticks" and sum(len(label.strip("${}^")) + 1 for label in labels) > 22
-    put(range(len(values)), labels, fontsize=6.5, rotation=90 if crowded else 0)
+    turned = put.__name__ == "set_xticks" and _crowded(labels)
+    put(range(len(values)), labels, fontsize=6.5, rotation=90 if turned else 0)
 
 
 def marks(rows: Sequence[Row]) -> list[Line2D]:

@@ -38,21 +38,24 @@ WORDS = {
 
 @dataclass(frozen=True)
 class Case:
-    """One run: its key columns, the scene with its changes, and what `api.solve` is told."""
+    """One run: its key columns, the scene with its changes (`late`: those that take long to find), `api.solve`'s choices."""
 
     key: dict[str, Any]
     scene: str
     changes: dict[str, Any] = field(default_factory=dict)
     choices: dict[str, Any] = field(default_factory=dict)
+    late: Callable[[], dict[str, Any]] = dict
 
     def load(self) -> Scene:
-        return load_scene(self.scene, self.changes)
+        return load_scene(self.scene, {**self.changes, **self.late()})
 
     def command(self) -> str:
         """The line that makes this run again."""
         choices, stopping = self.choices, self.choices.get("stopping")
         words: list[Any] = ["lcp-lube", "solve", self.scene]
-        words += [w for k, v in self.changes.items() for w in (("--n", v) if k == "n" else ("--set", f"{k}={v}"))]
+        words += [
+            w for k, v in {**self.changes, **self.late()}.items() for w in (("--n", v) if k == "n" else ("--set", f"{k}={v}"))
+        ]
         method = choices.get("method", "auto")
         for flag, name in (("--method", "method"), ("--system", "system"), ("--recipe", "recipe_name")):
             if choices.get(name):

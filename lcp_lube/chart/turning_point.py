@@ -5,7 +5,7 @@ code apart from the methods that it judges.
 """
 
 from collections.abc import Iterator, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 import scipy.sparse as sp
@@ -31,7 +31,7 @@ WAYS = {
     "newton from 0, direct": ("bratu", 0.0, {"method": "newton", "recipe_name": "umfpack"}),
     "newton from 0, BiCGStab": ("bratu", 0.0, {"method": "newton", "recipe_name": "bcgs_ilu"}),
     "newton from 1, direct": ("bratu", 1.0, {"method": "newton", "recipe_name": "umfpack"}),
-    "obstacle, active set": ("obstacle_bratu", None, {"method": "active-set"}),
+    "obstacle, auto": ("obstacle_bratu", None, {}),
     "obstacle, interior": ("obstacle_bratu", None, {"method": "interior"}),
 }
 
@@ -83,9 +83,14 @@ def cases(quick: bool) -> Iterator[Case]:
     for way, (scene, v0, choices) in [*WAYS.items()][: 2 if quick else None]:
         for n in SIZES[:1] if quick else SIZES:
             for part in (-0.01, 0.01) if quick else (*(-p for p in PARTS), *reversed(PARTS)):
-                lam = branch(n).turning * (1.0 + part)
-                changes = {"n": n, "lambda": lam, **({} if v0 is None else {"v0": v0})}
-                yield Case({"way": way, "method": choices.get("method", "auto"), "n": n, "part": part}, scene, changes, choices)
+                changes = {"n": n, **({} if v0 is None else {"v0": v0})}
+                key = {"way": way, "method": choices.get("method", "auto"), "n": n, "part": part}
+                yield Case(key, scene, changes, choices, partial(beside, n, part))
+
+
+def beside(n: int, part: float) -> dict[str, float]:
+    """lambda beside the grid's turning point."""
+    return {"lambda": branch(n).turning * (1.0 + part)}
 
 
 def reference(scene: Scene) -> Reference:
