@@ -106,7 +106,7 @@ def default_recipe(problem: Problem, system: str, large: bool) -> tuple[str, str
     if problem.grid.dim == 2 and ranks == 1:
         names = ("umfpack", "superlu", "mumps")
     for name in names:
-        if has(name) or (name == "umfpack" and has("suitesparse")):  # PETSc's name for it until 3.24
+        if has(name) or (name == "umfpack" and has("suitesparse")):  # its name in older releases
             return name, f"a direct solver that this PETSc has for {ranks} rank{'s' * (ranks > 1)}"
     return "bjacobi", "this PETSc has no parallel direct solver"
 
