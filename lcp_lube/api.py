@@ -12,11 +12,12 @@ from .alarm import check_same
 from .auto import default_recipe, plan
 from .checkpoint import CHOICES, Checkpointer, load
 from .errors import InputError
-from .linear.options import recipe
+from .linear.options import recipe, set_names
 from .linear.stages import Stages
 from .problems.box import BoxProblem
 from .problems.problem import LubricationProblem
 from .problems.solution import Fields, Outcome, Problem, Solution
+from .reduction import part_of, solve_part
 from .registry import METHODS
 from .scene import Scene
 from .solvers.enclosure import Enclosure, enclose
@@ -92,6 +93,14 @@ def solve(
         raise InputError(f"--certify: scene {scene.name} is no film with cavitation, for which alone the theorem holds")
     if not isinstance(stopping, Stopping):
         stopping = Stopping(**{**dict(zip(("eps1", "eps2"), entry.eps, strict=True)), **(stopping or {})})
+    # Who names a method, a matrix or an inner solver means those of the whole scene.
+    named = (method, system) != ("auto", "auto") or recipe_name or options or {"ksp_type", "pc_type"} & set_names()
+    if not (named or certify or checkpoint or resume) and (part := part_of(scene, problem)):
+        how = {"stopping": stopping, "monitor": monitor, "comm": comm, "nested": nested, "start": start}
+        solution = solve_part(part, problem, solve, stopping.eps1, **how)
+        if solution.outcome is not Outcome.WRONG_SOLUTION:
+            solution.times["total"] = perf_counter() - begin
+            return solution
     shapes = level_shapes(scene.shape, problem.grid.comm.size) if chosen.nested else [scene.shape]
     near, previous = start, None  # what the next grid starts from, and the problem on the grid before
     levels: list[dict[str, Any]] = []
