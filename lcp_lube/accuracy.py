@@ -46,7 +46,7 @@ PATIENCE = 4  # grids without a better estimate: rounding has the word
 ASYMPTOTIC = 0.1  # an estimate below it falls by second order at best
 BYTES, BYTES_DENSE = {1: 900, 2: 1200}, 24  # memory by points, measured (`auto`'s choices)
 RELATIVE_NORM = ("active-set",)  # methods that measure ||F|| relative to the data
-DEFAULT_QUANTITY = ("load", "sum_v", "k")
+DEFAULT_QUANTITY = ("load", "sum_v", "k", "sigma")
 
 
 def solve_to_accuracy(
@@ -65,7 +65,7 @@ def solve_to_accuracy(
     Parameters
     ----------
     tol : relative error allowed, 1e-10 to 0.5.
-    quantity : which number of `Problem.quantities` it is about; default 'load', of other scenes 'sum_v' or 'k'.
+    quantity : which number of `Problem.quantities` it is about; default 'load', of other scenes 'sum_v', 'k', 'sigma'.
     finest : points a side that no grid may exceed; default: what memory holds.
     stopping : tolerances of the nonlinear iteration; by default no tighter than `tol` needs.
     nested : False: no grid starts from the answer on the one before.

@@ -14,9 +14,11 @@ from .checkpoint import CHOICES, Checkpointer, load
 from .errors import InputError
 from .linear.options import recipe, set_names
 from .linear.stages import Stages
+from .march import march
 from .problems.box import BoxProblem
 from .problems.problem import LubricationProblem
 from .problems.solution import Fields, Outcome, Problem, Solution
+from .problems.squeeze import SqueezeProblem
 from .reduction import part_of, solve_part
 from .registry import METHODS
 from .scene import Scene
@@ -76,7 +78,7 @@ def solve(
     begin = perf_counter()
     stages = Stages()
     with stages("setup"):
-        if scene.family != "user":  # whose data are each rank's own
+        if getattr(scene, "family", "user") != "user":  # whose data are each rank's own
             asked = (scene, method, system, recipe_name, stopping, options, nested, start is None)
             check_same((comm or PETSc.COMM_WORLD).tompi4py(), f"scene {scene.name} or how to solve it", asked)
         problem = scene.build(comm)
@@ -101,6 +103,10 @@ def solve(
         if solution.outcome is not Outcome.WRONG_SOLUTION:
             solution.times["total"] = perf_counter() - begin
             return solution
+    if isinstance(problem, SqueezeProblem):
+        if checkpoint or resume or certify or chosen.nested:
+            raise InputError(f"--checkpoint, --resume, --certify, --nested: not for scene {scene.name}, which goes on in time")
+        return march(problem, scene, chosen, stopping, options or {}, monitor, stages)
     shapes = level_shapes(scene.shape, problem.grid.comm.size) if chosen.nested else [scene.shape]
     near, previous = start, None  # what the next grid starts from, and the problem on the grid before
     levels: list[dict[str, Any]] = []

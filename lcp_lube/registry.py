@@ -174,6 +174,7 @@ FAMILIES: dict[str, Entry] = {
     "journal": Entry("lcp_lube.scenes_journal:JournalScene", "journal bearing with an axial groove at the widest gap"),
     "rough": Entry("lcp_lube.scenes_textured:RoughScene", "slider with one wave and a random surface"),
     "bearing": Entry("lcp_lube.scenes_bearing:BearingScene", "a bearing of any kind: film shapes added up, a condition a side"),
+    "squeeze": Entry("lcp_lube.scenes_squeeze:SqueezeScene", "parallel plates that approach and part, in time"),
     "bratu": Entry("lcp_lube.scenes_semilinear:BratuScene", "Bratu's equation on the unit square"),
     "obstacle": Entry("lcp_lube.scenes_obstacle:ObstacleScene", "Bratu's equation between two obstacles"),
     "ehl_line": Entry("lcp_lube.scenes_ehl:EhlLineScene", "elastohydrodynamic line contact"),

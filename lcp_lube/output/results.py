@@ -100,6 +100,7 @@ def finite(value: Any) -> Any:
 
 # What the summary prints of a problem that is not a bearing, and of its certificate, where a problem has it.
 QUANTITIES = ("max_v", "sum_v", "max_error", "contact_lower", "contact_upper", "k", "x_b", "h_min", "p_max")
+QUANTITIES += ("rupture_time", "sigma", "sigma_time", "front", "reformation_time")  # squeeze films
 MEASURES = ("residual", "natural_residual", "complementarity", "mass_defect", "balance", "min_p", "min_r")
 UNITS = {"min_p": " Pa"}
 
@@ -152,8 +153,7 @@ def summary(data: dict[str, Any]) -> str:
     else:
         quantities = ", ".join(f"{name} {data[name]:.8g}" for name in QUANTITIES if data.get(name) is not None)
     lines = [
-        f"{data['scene']} ({size}{scheme}) by {data['method']}{system}, "
-        f"{data['ranks']} rank{'s' * (data['ranks'] > 1)}",
+        f"{data['scene']} ({size}{scheme}) by {data['method']}{system}, {data['ranks']} rank{'s' * (data['ranks'] > 1)}",
         f"{data['outcome']}: {data['iterations']} iterations{inner}, {data['centrality']} centrality and "
         f"{data['backtracking']} backtracking cuts, {data['time_s']['total']:.2f} s; {data['message']}",
         quantities,
