@@ -19,10 +19,9 @@ from .drawing import new_figure, save
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
 
 # A marker for each way to fail.
-FAILURES = {
+FAILURES: dict[str, tuple[str, str]] = {
     Outcome.MAX_ITERATIONS: ("x", "iteration limit"),
     Outcome.STEP_LENGTH: ("_", "no step length"),
     Outcome.WRONG_SOLUTION: ("o", "wrong solution"),
@@ -220,8 +219,3 @@ def _ticks(put: Callable[..., Any], values: Sequence[str], axis: Axis, skip: int
     labels = [label if k % skip == 0 else "" for k, label in enumerate(labels)]
     turned = put.__name__ == "set_xticks" and _crowded(labels)
     put(range(len(values)), labels, fontsize=6.5, rotation=90 if turned else 0)
-
-
-def marks(rows: Sequence[Row]) -> list[Line2D]:
-    """`legend` for pictures of their own."""
-    return legend(rows)

@@ -18,6 +18,7 @@ from ..registry import METHODS
 from ..scene import Scene, load_scene
 from ..solvers.newton import Stopping
 from .experiment import FELL_BACK, KRYLOV_LIMIT, open_store, run
+from .log import write_log
 from .map_picture import Axis, Panels, chosen, converged, draw, groups, unique
 from .reference import Reference, References
 
@@ -126,6 +127,10 @@ class OutcomeMap:
             if row.get("method") == "auto" and not self.right(row):
                 say(f"auto failed: {row['command']}: {row['message']}")
         draw(rows, self.panels, self.x, self.y, sentence, results / f"{stem}.png", store.comm, self.right)
+        if not quick:
+            failed = [f"- `{row['command']}`" for row in rows if row.get("method") == "auto" and not self.right(row)]
+            text = "\n".join([sentence, *(["", "What `auto` fails at:", "", *failed] if failed else [])])
+            write_log(results, f"stability: {self.stem}", rows, text, [results / f"{stem}.png"])
         say(
             f"{results / stem}.png: {len(rows)} runs, {len(store.rows) - known} of them new; the others stood in {store.path} "
             "(remove it to run them again)."

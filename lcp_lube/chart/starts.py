@@ -9,6 +9,7 @@ from ..output.resumable import ResumableCsv
 from ..problems.solution import Outcome
 from ..scene import load_scene
 from .experiment import open_store, run
+from .log import write_log
 from .starts_picture import draw_lines, draw_maps, lines_sentence, map_sentence, rule
 
 SCENES = ("problem1", "problem2", "problem3")
@@ -59,6 +60,9 @@ def chart(quick: bool = False, results: Path = Path("lcp_lube_results")) -> int:
     wanted = list(starts(quick))
     rows = [_row(store, start) for start in wanted]
     say(f"{lines_sentence(rows)}\n{map_sentence(rows)}")
+    pictures = [results / f"{stem}_{kind}.png" for kind in ("lines", "map")]
+    if not quick:
+        write_log(results, "stability: starts", rows, f"{lines_sentence(rows)} {map_sentence(rows)}", pictures)
     draw_lines(rows, results / f"{stem}_lines.png", store.comm)
     draw_maps(rows, results / f"{stem}_map.png", store.comm)
     say(

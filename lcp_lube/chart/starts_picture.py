@@ -11,32 +11,12 @@ import numpy as np
 from mpi4py import MPI
 
 from ..output.resumable import Row
-from ..problems.solution import Outcome
 from .drawing import look, new_figure, save
+from .map_picture import FAILURES, chosen, converged, legend, unique
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
-
-# A marker for each way to fail.
-FAILURES = {
-    Outcome.MAX_ITERATIONS: ("x", "iteration limit"),
-    Outcome.STEP_LENGTH: ("_", "no step length"),
-    Outcome.WRONG_SOLUTION: ("o", "wrong solution"),
-    Outcome.LINEAR_SOLVER: ("+", "linear solver"),
-    Outcome.NOT_FINITE: ("*", "not finite"),
-}
-
-
-def unique(rows: Sequence[Row], name: str) -> list[str]:
-    """Values of a column, in the order in which they come."""
-    return list(dict.fromkeys(row[name] for row in rows))
-
-
-def chosen(rows: Sequence[Row], **values: str) -> list[Row]:
-    """The rows with these values."""
-    return [row for row in rows if all(row[name] == value for name, value in values.items())]
 
 
 def rule(row: Row) -> str:
@@ -50,10 +30,6 @@ def by_rule(rows: Sequence[Row]) -> dict[str, list[Row]]:
     for row in rows:
         rules.setdefault(rule(row), []).append(row)
     return rules
-
-
-def converged(row: Row) -> bool:
-    return row["outcome"] == Outcome.CONVERGED
 
 
 def decade(row: Row, name: str) -> int:
@@ -137,7 +113,8 @@ def lines(rows: Sequence[Row]) -> Figure:
     for axes in grid[-1]:
         axes.set_xlabel("p0 in MPa = r0")
     handles, labels = grid[0, 0].get_legend_handles_labels()
-    marks, said = _failures(rows)
+    marks = legend(rows)
+    said = [str(mark.get_label()) for mark in marks]
     figure.legend(handles + marks, labels + said, loc="outside upper center", ncols=len(labels) + len(said))
     return figure
 
@@ -151,14 +128,6 @@ def _rule(axes: Axes, rows: Sequence[Row], number: int, name: str) -> None:
         failed = chosen(rows, outcome=outcome)
         x, y = [float(row["p0"]) for row in failed], [float(row["iterations"]) for row in failed]
         axes.plot(x, y, color=look(number)["color"], marker=mark, mfc="none", ls="none", ms=6.5 - number)
-
-
-def _failures(rows: Sequence[Row]) -> tuple[list[Line2D], list[str]]:
-    """The legend's marks and words for the ways in which some run failed."""
-    from matplotlib.lines import Line2D
-
-    seen = [failure for outcome, failure in FAILURES.items() if chosen(rows, outcome=outcome)]
-    return [Line2D([], [], color="0.3", marker=mark, mfc="none", ls="none") for mark, _ in seen], [label for _, label in seen]
 
 
 def maps(rows: Sequence[Row]) -> Figure:
@@ -175,8 +144,8 @@ def maps(rows: Sequence[Row]) -> Figure:
         axes.set_title(scene, fontweight="bold")
     for axes in grid[-1]:
         axes.set_xlabel("p0 in MPa")
-    marks, said = _failures(rows)
-    figure.legend(marks, said, loc="outside upper right", ncols=len(said) or 1)
+    marks = legend(rows)
+    figure.legend(handles=marks, loc="outside upper right", ncols=len(marks) or 1)
     return figure
 
 
@@ -194,7 +163,7 @@ def _map(axes: Axes, rows: Sequence[Row]) -> None:
             colour = "white" if cells[j, i] > 130 else "black"
             axes.text(i, j, row["iterations"], ha="center", va="center", fontsize=6.0, color=colour)
         else:
-            axes.plot(i, j, ls="none", marker=FAILURES[Outcome(row["outcome"])][0], ms=3.5, color="0.45")
+            axes.plot(i, j, ls="none", marker=FAILURES[row["outcome"]][0], ms=3.5, color="0.45")
     axes.imshow(cells, origin="lower", cmap="Blues", norm=LogNorm(15, 500), aspect="equal")
     axes.set_xticks(range(len(decades)), [f"$10^{{{k}}}$" if k % 4 == 1 else "" for k in decades])
     axes.set_yticks(range(len(decades)), [f"$10^{{{k}}}$" if k % 4 == 1 else "" for k in decades])
