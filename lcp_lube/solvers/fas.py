@@ -29,14 +29,14 @@ from .steplength import StepLengthError
 
 EPS = float(np.finfo(float).eps)
 WINDOW = 3  # cycles over which the fall of ||G|| is judged
-TRUNCATIONS = {"none": 0, "clip": 1, "sides": 2, "points": 3}  # see `fas_kernels.correct`
+TRUNCATIONS = {"none": 0, "clip": 1, "points": 2}  # see `fas_kernels.correct`
 COARSEST_SWEEPS = 40
 
 
 @dataclass(frozen=True)
 class FasOptions:
     """cycle: V, F or W; pre, post: sweeps before and after the coarse grid; front: sweeps over the points within `width` cells of
-    a front after each correction; truncation: of corrections at fronts, none, clip, sides or points; weights: of the
+    a front after each correction; truncation: of corrections at fronts, none, clip or points; weights: of the
     interpolation, by the conductances of the faces (harmonic) or the same everywhere (linear); stall: the least fall of ||G||
     over three cycles, as a factor, below which the method gives up."""
 

@@ -10,6 +10,7 @@ B has the entries -1 and 1, on every level.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..compiled import kernel
 from ..parallel import Array
@@ -17,12 +18,75 @@ from ..parallel import Array
 
 @kernel
 def sweep(z: Array, kx: Array, ky: Array, c: Array, count: int, down: bool) -> None:
-    """`count` nonlinear Gauss-Seidel sweeps in place, every x line along the flow, lines upwards or down."""
+    """`count` nonlinear Gauss-Seidel sweeps in place, every x line along the flow, lines upwards or down.
+
+    Three at a time: the second one follows the first a line and a point behind, the third one the second. The values are those
+    of sweeps one after the other, but memory is passed over once, and three chains of dependent operations overlap.
+    """
     ny, nx = z.shape[0] - 2, z.shape[1] - 2
-    for _ in range(count):
-        for line in range(ny):
-            m = ny - line if down else line + 1
-            relax(z, kx, ky, c, m, 1, nx + 1)
+    step, first = (-1, ny) if down else (1, 1)
+    left = count
+    if nx > 3:
+        diagonals = np.empty((3, nx + 2))
+        while left >= 3:
+            for s in range(ny + 2):
+                m = first + step * s
+                if s < ny:
+                    inverse_diagonal(kx, ky, m, diagonals[s % 3])
+                if 2 <= s < ny:
+                    three = (diagonals[s % 3], diagonals[(s - 1) % 3], diagonals[(s - 2) % 3])
+                    relax_three(z, kx, ky, c, m, m - step, m - 2 * step, three[0], three[1], three[2])
+                    continue
+                for lag in range(3):
+                    if lag <= s < ny + lag:
+                        relax(z, kx, ky, c, m - lag * step, 1, nx + 1)
+            left -= 3
+    for _ in range(left):
+        for s in range(ny):
+            relax(z, kx, ky, c, first + step * s, 1, nx + 1)
+
+
+@kernel
+def inverse_diagonal(kx: Array, ky: Array, m: int, out: Array) -> None:
+    """One over the sum of the conductances of the points of row m, into out[1:-1]."""
+    for i in range(1, out.size - 1):
+        out[i] = 1.0 / ((kx[m, i] + kx[m, i + 1]) + (ky[m, i] + ky[m + 1, i]))
+
+
+@kernel
+def relax_three(
+    z: Array, kx: Array, ky: Array, c: Array, m1: int, m2: int, m3: int, over1: Array, over2: Array, over3: Array
+) -> None:
+    """`relax` on the whole of rows m1, m2 and m3, each a point behind the one before; over: one over their diagonals."""
+    nx = z.shape[1] - 2
+    relax(z, kx, ky, c, m1, 1, 3)
+    relax(z, kx, ky, c, m2, 1, 2)
+    # Shifted so that one index serves all three; their own, southern and northern rows of z may be one another's.
+    z1, z2, z3 = z[m1, 2:], z[m2, 1:], z[m3]
+    e1, e2, e3 = z[m1, 3:], z[m2, 2:], z[m3, 1:]
+    s1, s2, s3 = z[m1 - 1, 2:], z[m2 - 1, 1:], z[m3 - 1]
+    n1, n2, n3 = z[m1 + 1, 2:], z[m2 + 1, 1:], z[m3 + 1]
+    c1, c2, c3 = c[m1, 2:], c[m2, 1:], c[m3]
+    kw1, kw2, kw3 = kx[m1, 2:], kx[m2, 1:], kx[m3]
+    ke1, ke2, ke3 = kx[m1, 3:], kx[m2, 2:], kx[m3, 1:]
+    ks1, ks2, ks3 = ky[m1, 2:], ky[m2, 1:], ky[m3]
+    kn1, kn2, kn3 = ky[m1 + 1, 2:], ky[m2 + 1, 1:], ky[m3 + 1]
+    over1, over2 = over1[2:], over2[1:]
+    w1, w2, w3 = z1[0], z2[0], z3[0]
+    for i in range(1, nx - 1):
+        k1, k2, k3, d1, d2, d3 = kw1[i], kw2[i], kw3[i], over1[i], over2[i], over3[i]
+        t1 = c1[i] + ke1[i] * max(e1[i], 0.0) + ks1[i] * max(s1[i], 0.0) + kn1[i] * max(n1[i], 0.0)
+        t2 = c2[i] + ke2[i] * max(e2[i], 0.0) + ks2[i] * max(s2[i], 0.0) + kn2[i] * max(n2[i], 0.0)
+        t3 = c3[i] + ke3[i] * max(e3[i], 0.0) + ks3[i] * max(s3[i], 0.0) + kn3[i] * max(n3[i], 0.0)
+        t1 += w1 * (k1 if w1 > 0.0 else 1.0)
+        t2 += w2 * (k2 if w2 > 0.0 else 1.0)
+        t3 += w3 * (k3 if w3 > 0.0 else 1.0)
+        w1 = t1 * (d1 if t1 > 0.0 else 1.0)
+        w2 = t2 * (d2 if t2 > 0.0 else 1.0)
+        w3 = t3 * (d3 if t3 > 0.0 else 1.0)
+        z1[i], z2[i], z3[i] = w1, w2, w3
+    relax(z, kx, ky, c, m2, nx, nx + 1)
+    relax(z, kx, ky, c, m3, nx - 1, nx + 1)
 
 
 @kernel
@@ -40,53 +104,97 @@ def relax(z: Array, kx: Array, ky: Array, c: Array, m: int, start: int, end: int
 @kernel
 def relax_front(z: Array, kx: Array, ky: Array, c: Array, count: int, width: int) -> int:
     """`count` sweeps, to and fro, over the points within `width` cells of a front; returns how many points these are."""
+    spans, found = front_spans(z, width)
+    points = 0
+    for s in range(count):
+        for k in range(found):
+            at = found - 1 - k if s % 2 == 1 else k
+            relax(z, kx, ky, c, spans[at, 0], spans[at, 1], spans[at, 2])
+    for k in range(found):
+        points += spans[k, 2] - spans[k, 1]
+    return points
+
+
+@kernel
+def front_spans(z: Array, width: int) -> tuple[NDArray[np.int32], int]:
+    """Row, first column and last column + 1 of the runs of points within `width` cells of a front, and their number."""
     ny, nx = z.shape[0] - 2, z.shape[1] - 2
-    # Columns of the fronts, row by row: the sign changes to the east or to the north.
-    first = np.zeros(ny + 3, dtype=np.int64)
-    columns = np.empty(nx * ny // 4 + nx + 1, dtype=np.int32)
-    found = 0
-    for m in range(1, ny + 1):
-        first[m] = found
-        if found + nx > columns.size:
-            columns = np.concatenate((columns, np.empty(columns.size + nx, dtype=np.int32)))
-        for i in range(1, nx + 1):
-            full = z[m, i] > 0.0
-            if (i < nx and (z[m, i + 1] > 0.0) != full) or (m < ny and (z[m + 1, i] > 0.0) != full):
-                columns[found] = i
-                found += 1
-    first[ny + 1] = first[ny + 2] = found
-    if found == 0:
-        return 0
-    # Spans of points to be swept: row, first column, last column + 1.
-    spans = np.empty((found + ny + 1, 3), dtype=np.int64)
-    near = np.zeros(nx + 2, dtype=np.uint8)
-    count_spans, points = 0, 0
-    for m in range(1, ny + 1):
-        low, high = first[max(m - 1 - width, 1)], first[min(m + width + 1, ny + 1)]
-        if low == high:
+    rows, pad = 2 * width + 2, width + 8  # in the masks column i stands at i + pad
+    # Fronts to the east or north of the points of the last rows, and the first and last column that they take up.
+    ring = np.zeros((rows, nx + 2 * pad), dtype=np.uint8)
+    low, high = np.full(rows, nx + 1), np.zeros(rows, dtype=np.int64)
+    full, full_north = np.zeros(nx + 2, dtype=np.uint8), np.zeros(nx + 2, dtype=np.uint8)
+    crossed, near = np.zeros(nx + 2 * pad, dtype=np.uint8), np.zeros(nx + 2 * pad, dtype=np.uint8)
+    spans, found = np.empty((ny + 64, 3), dtype=np.int32), 0
+    positive(z[1], full)
+    for m in range(1, ny + width + 1):
+        new = m % rows
+        low[new], high[new] = nx + 1, 0
+        if m <= ny:
+            positive(z[min(m + 1, ny)], full_north)
+            if mark_changes(full, full_north, ring[new, pad:], nx):
+                low[new], high[new] = extent(ring[new, pad:], nx)
+            full, full_north = full_north, full
+        row, first, last = m - width, low.min(), high.max()
+        if row < 1 or first > last:
             continue
-        near[:] = 0
-        for k in range(low, high):
-            for i in range(max(columns[k] - width, 1), min(columns[k] + width + 1, nx) + 1):
-                near[i] = 1
-        i = 1
-        while i <= nx:
-            if near[i] == 0:
+        start, end = first + pad - width, last + pad + width + 2  # columns that can be near
+        crossed[start - width : end + width] = 0
+        for r in range(rows):
+            if low[r] <= high[r]:
+                merge(ring[r, low[r] + pad : high[r] + pad + 1], crossed[low[r] + pad : high[r] + pad + 1])
+        near[start:end] = 0
+        for shift in range(-width, width + 2):
+            merge(crossed[start - shift : end - shift], near[start:end])
+        if found + nx // 2 + 1 > spans.shape[0]:
+            spans = np.concatenate((spans, np.empty((spans.shape[0] + nx, 3), dtype=np.int32)))
+        i, stop = max(first - width, 1), min(last + width + 1, nx)
+        while i <= stop:
+            if near[i + pad] == 0:
                 i += 1
                 continue
-            start = i
-            while i <= nx and near[i] == 1:
+            begin = i
+            while i <= stop and near[i + pad]:
                 i += 1
-            if count_spans == spans.shape[0]:
-                spans = np.concatenate((spans, np.empty((spans.shape[0], 3), dtype=np.int64)))
-            spans[count_spans, 0], spans[count_spans, 1], spans[count_spans, 2] = m, start, i
-            count_spans += 1
-            points += i - start
-    for s in range(count):
-        for k in range(count_spans):
-            at = count_spans - 1 - k if s % 2 == 1 else k
-            relax(z, kx, ky, c, spans[at, 0], spans[at, 1], spans[at, 2])
-    return points
+            spans[found, 0], spans[found, 1], spans[found, 2] = row, begin, i
+            found += 1
+    return spans, found
+
+
+@kernel
+def positive(row: Array, out: NDArray[np.uint8]) -> None:
+    """1 where the film is full."""
+    for i in range(row.size):
+        out[i] = 1 if row[i] > 0.0 else 0
+
+
+@kernel
+def mark_changes(full: NDArray[np.uint8], north: NDArray[np.uint8], out: NDArray[np.uint8], nx: int) -> int:
+    """Mark the points with a front to the east or north of them; returns their number."""
+    total = 0
+    for i in range(1, nx):
+        out[i] = (full[i] ^ full[i + 1]) | (full[i] ^ north[i])
+        total += out[i]
+    out[nx] = full[nx] ^ north[nx]
+    return total + out[nx]
+
+
+@kernel
+def extent(mask: NDArray[np.uint8], nx: int) -> tuple[int, int]:
+    """First and last column that is marked, of at least one."""
+    first, last = 1, nx
+    while mask[first] == 0:
+        first += 1
+    while mask[last] == 0:
+        last -= 1
+    return first, last
+
+
+@kernel
+def merge(mask: NDArray[np.uint8], into: NDArray[np.uint8]) -> None:
+    """into |= mask."""
+    for i in range(mask.size):
+        into[i] |= mask[i]
 
 
 @kernel
@@ -216,47 +324,59 @@ def correct(
 ) -> float:
     """Add the interpolated new - old of the coarse grid; returns the sum of squares of what was added.
 
-    truncation: 0 none; 1 a point that would cross its front stops there; 2 nothing also from coarse points that lie, or lay,
-    on the other side of it; 3 no correction at all at points with such a neighbour or that would cross.
+    truncation: 0 none; 1 a point that would cross its front stops there; 2 no correction at all at points that would, or that
+    have a coarse neighbour that lies, or lay, on the other side.
     """
     ny, nx = z.shape[0] - 2, z.shape[1] - 2
+    south, north, e = np.zeros(nx + 2), np.zeros(nx + 2), np.zeros(nx + 2)
+    before = -2  # the coarse row whose correction stands in south
     added = 0.0
     for m in range(1, ny + 1):
         j = y0 + m - 1
-        if not by_y:
-            a = b = m
-        elif j % 2 == 1:
-            a = b = (j - 1) // 2 - y0 // 2 + 1
+        row = m if not by_y else ((j + 1) // 2 - y0 // 2 if j % 2 == 1 else j // 2 - y0 // 2)
+        if row != before:
+            interpolate_row(new[row] - old[row], kx, m, by_x, harmonic, south)
+            before = row
+        if not by_y or j % 2 == 1:
+            e[:] = south
         else:
-            a = j // 2 - y0 // 2
-            b = a + 1
+            interpolate_row(new[row] - old[row], kx, m, by_x, harmonic, south)
+            interpolate_row(new[row + 1] - old[row + 1], kx, m, by_x, harmonic, north)
+            for i in range(1, nx + 1):
+                v = share(ky[m, i], ky[m + 1, i], harmonic)
+                e[i] = v * south[i] + (1.0 - v) * north[i]
+            before = -2
+        if truncation == 2:
+            last = row + (by_y and j % 2 == 0)
+            for i in range(1, nx + 1):
+                left, right = (i // 2, (i + 1) // 2) if by_x else (i, i)
+                full = z[m, i] > 0.0
+                for J in (row, last):
+                    for k in (left, right):
+                        if ((new[J, k] > 0.0) != full or (old[J, k] > 0.0) != full) and new[J, k] != old[J, k]:
+                            e[i] = 0.0
+        stop = 0.0 if truncation == 2 else 1.0
         for i in range(1, nx + 1):
-            if not by_x:
-                left = right = i
-            elif i % 2 == 0:
-                left = right = i // 2
-            else:
-                left = (i - 1) // 2
-                right = left + 1
-            u = 0.5 if left == right else share(kx[m, i], kx[m, i + 1], harmonic)
-            v = 0.5 if a == b else share(ky[m, i], ky[m + 1, i], harmonic)
             here = z[m, i]
-            full = here > 0.0
-            e, mixed = 0.0, False
-            for J, weight_y in ((a, v), (b, 1.0 - v)):
-                for k, weight_x in ((left, u), (right, 1.0 - u)):
-                    after, before = new[J, k], old[J, k]
-                    if truncation >= 2 and ((after > 0.0) != full or (before > 0.0) != full) and after != before:
-                        mixed = True
-                        continue
-                    e += weight_x * weight_y * (after - before)
-            if truncation == 3 and (mixed or (here + e > 0.0) != full):
-                continue
-            if truncation >= 1 and (here + e > 0.0) != full:
-                e = (1e-300 if full else 0.0) - here
-            z[m, i] = here + e
-            added += e * e
+            moved = here + e[i]
+            if truncation > 0 and (moved > 0.0) != (here > 0.0):
+                moved = (1e-300 if here > 0.0 else 0.0) if stop > 0.0 else here
+            z[m, i] = moved
+            added += (moved - here) ** 2
     return added
+
+
+@kernel
+def interpolate_row(coarse: Array, kx: Array, m: int, by_x: bool, harmonic: bool, out: Array) -> None:
+    """A coarse line's values at the points of row m, whose x faces give the weights."""
+    if not by_x:
+        out[:] = coarse
+        return
+    for k in range(1, coarse.size - 1):
+        out[2 * k] = coarse[k]
+    for k in range((out.size - 1) // 2):
+        u = share(kx[m, 2 * k + 1], kx[m, 2 * k + 2], harmonic)
+        out[2 * k + 1] = u * coarse[k] + (1.0 - u) * coarse[k + 1]
 
 
 @kernel
