@@ -212,42 +212,6 @@ def test_interpolation_between_grids_with_any_sides():
             obj.destroy()
 
 
-RING = """
-family = "bearing"
-dimension = 2
-L_mm = 10
-width_mm = 6
-U = 1
-nx = 20
-ny = 11
-[fluid]
-mu = 0.01
-p_supply = 3e5
-[film]
-shape = "journal"
-c_um = 5
-eccentricity = 0.6
-[sides]
-west = "periodic"
-east = "periodic"
-north = "symmetry"
-"""
-
-
-@pytest.mark.parametrize("ranks", [2, 3])
-def test_on_several_ranks(cli, ranks, tmp_path):
-    """A periodic and a half-closed film, points that do not divide by the ranks."""
-    (tmp_path / "ring.toml").write_text(RING)
-    for changes in ([], ["--set", "sides.west=1e5", "--set", "sides.east=1e5", "--set", "sides.south=periodic"]):
-        words = ["solve", "ring.toml", "--json", "--nx", 21, *changes]
-        if changes:
-            words += ["--set", "sides.north=periodic"]
-        alone, several = cli(*words), cli(*words, ranks=ranks)
-        assert alone.status == several.status == 0, alone.err + several.err
-        for key in ("load", "p_max", "friction", "cavitated_fraction"):
-            assert several.json[key] == pytest.approx(alone.json[key], rel=1e-8)
-
-
 # Films
 
 
