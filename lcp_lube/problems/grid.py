@@ -147,6 +147,10 @@ class Grid:
 
         Returns an array of shape (ny_local + 2, nx_local + 2); its corners are not to be used. Collective.
         """
+        if self.comm.size == 1 and not any(self.periodic):
+            out = np.full((self.box[0] + 2, self.box[1] + 2), outside)
+            out[1:-1, 1:-1] = np.reshape(owned, self.box)
+            return out
         source = self.dm.getGlobalVec()
         target = self.dm.getLocalVec()
         source.setArray(owned)

@@ -88,7 +88,8 @@ def box_scheme(
         box = _coefficients(grid, film, mu, U, scheme, p_sides, p_unit, mean_cubes, r_in)
     reduce = grid.reduce
     faces = [box.k_W, box.k_E] + ([box.k_S, box.k_N] if grid.dim == 2 else [])
-    conducting = [np.where(wall, np.inf, k) for wall, k in zip(sides(grid, ("closed", "mirror")), faces, strict=False)]
+    walls = zip(sides(grid, ("closed", "mirror")), faces, strict=False)
+    conducting = [np.where(wall, np.inf, k) if wall.any() else k for wall, k in walls]
     smallest = min(map(reduce.min, [box.h, *conducting]))
     largest = max(map(reduce.max, [*faces, np.abs(box.b_C), np.abs(box.c)]))
     if not (smallest > 1 / LARGE and largest < LARGE):
@@ -136,23 +137,23 @@ def _coefficients(
     h_face = np.broadcast_to(film(x_faces[None, :], y), (ny, nx + 1))
     h = np.array(h_x[:, 1:-1])
 
-    def cubes(at_faces: Array, at_nodes: Array, axis: int) -> tuple[Array, Array]:
-        """h^3 at the two faces of every cell in one direction."""
-        if mean_cubes:
-            nodal = np.moveaxis(at_nodes, axis, 0) ** 3
-            cube = 0.5 * (nodal[:-1] + nodal[1:])
-        else:
-            cube = np.moveaxis(at_faces, axis, 0) ** 3
-        return np.moveaxis(cube[:-1], 0, axis), np.moveaxis(cube[1:], 0, axis)
+    def cubes(at_faces: Array, at_nodes: Array) -> Array:
+        """h^3 at the faces, which come first to last along axis 0."""
+        if not mean_cubes:
+            return at_faces**3
+        nodal = at_nodes**3
+        return 0.5 * (nodal[:-1] + nodal[1:])
 
     k = p_unit / (6.0 * mu)
-    k_W, k_E = (k * cube / dx for cube in cubes(h_face, h_x, 1))
+    k_x = (k * cubes(h_face.T, h_x.T) / dx).T
+    k_W, k_E = k_x[:, :-1], k_x[:, 1:]  # a face's conductance is stored once
     if grid.dim == 2:
         dy = grid.spacing[1]
         y_nodes, y_faces = grid.nodes_and_faces(1)
         h_y = np.broadcast_to(film(x, y_nodes[:, None]), (ny + 2, nx))
         at_y_faces = np.broadcast_to(film(x, y_faces[:, None]), (ny + 1, nx))
-        k_S, k_N = (k * cube * dx / dy**2 for cube in cubes(at_y_faces, h_y, 0))
+        k_y = k * cubes(at_y_faces, h_y) * dx / dy**2
+        k_S, k_N = k_y[:-1], k_y[1:]
     else:
         k_S = k_N = np.zeros(grid.box)
 
@@ -182,8 +183,8 @@ def _coefficients(
         k_W, k_E, b_C, b_W, couette_W, couette_E = (half * a for a in (k_W, k_E, b_C, b_W, couette_W, couette_E))
 
     c = couette_W - couette_E
-    for conductance, at_side, p_side in zip((k_W, k_E, k_S, k_N), sides(grid), p_sides, strict=True):
-        c = c + np.where(at_side, conductance * (p_side / p_unit), 0.0)
+    for conductance, points, p_side in zip((k_W, k_E, k_S, k_N), side_points(grid), p_sides, strict=True):
+        c[points] += conductance[points] * (p_side / p_unit)
     return BoxScheme(k_W, k_E, k_S, k_N, b_C, b_W, c, couette_W, couette_E, h)
 
 
@@ -195,6 +196,13 @@ def sides(grid: Grid, kinds: Sequence[str] = ("open",)) -> tuple[NDArray[np.bool
     masks += [j == 0, j == grid.shape[1] - 1] if grid.dim == 2 else [np.zeros((1, 1), dtype=bool)] * 2
     found = [end in kinds for pair in grid.ends for end in pair] + [False, False]
     return tuple(mask & is_found for mask, is_found in zip(masks, found, strict=False))
+
+
+def side_points(grid: Grid) -> tuple[tuple[slice | NDArray, slice | NDArray], ...]:
+    """The owned points at the open ends of `sides` as indices into arrays of `grid.box`."""
+    west, east, south, north = (np.flatnonzero(mask) for mask in sides(grid))
+    every = slice(None)
+    return (every, west), (every, east), (south, every), (north, every)
 
 
 def coo(grid: Grid, entries: Sequence[tuple[int, int, NDArray]]) -> Iterator[tuple[NDArray, NDArray, NDArray]]:
@@ -234,3 +242,21 @@ def assemble(grid: Grid, entries: list[tuple[int, int, Array]]) -> PETSc.Mat:
     rows.sort_indices()
     size = (grid.local_size, grid.size)
     return PETSc.Mat().createAIJWithArrays((size, size), (rows.indptr, rows.indices, rows.data), comm=grid.dm.comm)
+
+
+def term_squares(
+    p: Array, r: Array, k_W: Array, k_E: Array, k_S: Array, k_N: Array, b_C: Array, b_W: Array, c: Array
+) -> tuple[float, float, float]:
+    """Sums of the squares of A p, B r and A p + B r - c over this rank's points, for `compiled`; p and r have a frame."""
+    ny, nx = c.shape
+    pressure, void, balance = 0.0, 0.0, 0.0
+    for j in range(ny):
+        for i in range(nx):
+            here = p[j + 1, i + 1]
+            x = k_W[j, i] * (here - p[j + 1, i]) + k_E[j, i] * (here - p[j + 1, i + 2])
+            y = k_S[j, i] * (here - p[j, i + 1]) + k_N[j, i] * (here - p[j + 2, i + 1])
+            a, b = x + y, b_C[j, i] * r[j + 1, i + 1] + b_W[j, i] * r[j + 1, i]
+            pressure += a * a
+            void += b * b
+            balance += (a + b - c[j, i]) ** 2
+    return pressure, void, balance
