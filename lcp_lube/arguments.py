@@ -182,8 +182,16 @@ def parse(own: list[str]) -> argparse.Namespace:
         parser_of_chart.add_argument("--quick", action="store_true", help="a small chart in seconds, with a csv of its own")
         _results_option(parser_of_chart)
 
+    verify = command("verify", "known answers: ours, reference, error, observed order, verdict")
+    verify.add_argument("--quick", action="store_true", help="one case in a moment")
+    verify.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")
+
     doctor = command("doctor", "what is installed, what is missing, and a short self-check on one and two ranks")
     doctor.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")
+
+    new = command("new", "a commented scene file to edit, which solves to the same numbers as the scene that it is made from")
+    new.add_argument("file", type=Path, metavar="FILE.toml")
+    new.add_argument("--from", dest="source", required=True, metavar="SCENE", help="a .toml file or a built-in name")
 
     command("list", "scenes, methods, systems and recipes, each with a line")
     return parser.parse_args(own)

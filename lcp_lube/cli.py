@@ -196,6 +196,12 @@ def run_chart(args: argparse.Namespace) -> int:
     return max(STABILITY[name].load()(quick=args.quick, results=args.results) for name in args.maps or STABILITY)
 
 
+def run_verify(args: argparse.Namespace) -> int:
+    from .verify import run
+
+    return run(args)
+
+
 def run_doctor(args: argparse.Namespace) -> int:
     from .doctor import run
 
@@ -206,6 +212,12 @@ def run_sweep(args: argparse.Namespace) -> int:
     from .sweep import run
 
     return run(args)
+
+
+def run_new(args: argparse.Namespace) -> int:
+    from .template import run
+
+    return run(args.file, args.source)
 
 
 def run_list(args: argparse.Namespace) -> int:
@@ -228,6 +240,8 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "sweep": run_sweep,
     "table": run_table,
     "chart": run_chart,
+    "verify": run_verify,
     "doctor": run_doctor,
+    "new": run_new,
     "list": run_list,
 }

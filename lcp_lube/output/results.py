@@ -99,8 +99,10 @@ def finite(value: Any) -> Any:
 
 
 # What the summary prints of a problem that is not a bearing, and of its certificate, where a problem has it.
-QUANTITIES = ("max_v", "sum_v", "max_error", "contact_lower", "contact_upper", "k", "x_b", "h_min", "p_max")
-QUANTITIES += ("rupture_time", "sigma", "sigma_time", "front", "reformation_time")  # squeeze films
+QUANTITIES = (
+    *("max_v", "sum_v", "max_error", "contact_lower", "contact_upper", "k", "x_b", "h_min", "p_max"),
+    *("rupture_time", "sigma", "sigma_time", "front", "reformation_time"),  # squeeze films
+)
 MEASURES = ("residual", "natural_residual", "complementarity", "mass_defect", "balance", "min_p", "min_r")
 UNITS = {"min_p": " Pa"}
 
