@@ -22,8 +22,10 @@ from mpi4py import MPI  # noqa: E402
 
 from lcp_lube.api import solve  # noqa: E402
 from lcp_lube.output.files import replacing  # noqa: E402
+from lcp_lube.output.panels import section  # noqa: E402
 from lcp_lube.output.picture import Picture, collect, scaled, title  # noqa: E402
-from lcp_lube.output.plot import BLUE, MAPS, NAMES, RED, STYLE, new_figure, plot, section  # noqa: E402
+from lcp_lube.output.plot import plot  # noqa: E402
+from lcp_lube.output.style import BLUE, MAPS, NAMES, RED, STYLE, new_figure  # noqa: E402
 from lcp_lube.problems.solution import Solution  # noqa: E402
 from lcp_lube.scene import load_scene  # noqa: E402
 

@@ -1,0 +1,81 @@
+"""A journal in its bush: the pressure around it, the liquid in the gap, the load and the attitude angle."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .panels import FINE, film_line, liquid_line, pressure_line
+from .picture import Picture, largest
+from .style import BLUE, GREY, LIQUID, RED, WALL
+from .units import quantity
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+CLEARANCE, HIGH, BUSH = 0.22, 0.55, 0.10  # mean gap, largest pressure and wall of the bush in its radii, as drawn
+
+
+def journal(axes: Axes, picture: Picture, row: int | None = None) -> None:
+    """Draw the cross-section through a row, the load downwards, the gap far too wide.
+
+    The angle phi runs from the widest film in the sense of rotation. The film presses the journal against the load, so the
+    narrowest film lies at the attitude angle behind the load's direction, counted in the sense of rotation.
+    """
+    problem: Any = picture.solution.problem
+    start, L = problem.grid.origin[0], problem.grid.lengths[0]
+    towards, across = picture.quantities["load_vector"]
+    attitude = float(np.arctan2(across, towards))
+    widest = 0.5 * np.pi + attitude
+
+    def around(x: Any, radius: Any) -> tuple[Any, Any]:
+        theta = widest + 2.0 * np.pi * (x - start) / L
+        return radius * np.cos(theta), radius * np.sin(theta)
+
+    def ring(x: Any, inner: Any, outer: Any, **look: Any) -> None:
+        (ax, ay), (bx, by) = around(x, inner), around(x[::-1], outer[::-1])
+        axes.fill(np.concatenate([ax, bx]), np.concatenate([ay, by]), lw=0, **look)
+
+    fine = np.linspace(start, start + L, FINE)
+    h = film_line(picture, row, fine)
+    to_gap = CLEARANCE / h.mean()
+    x, p = pressure_line(picture, row)
+    p_sides = p - problem.p_c
+    x_r, _, liquid = liquid_line(picture, row)
+    h_there = film_line(picture, row, x_r)
+
+    outside = 1.0 + BUSH
+    height = HIGH * np.maximum(p_sides, 0.0) / (largest(p_sides) or 1.0)
+    ring(x, outside + 0.0 * x, outside + height, color=BLUE, alpha=0.3)
+    axes.plot(*around(x, np.where(height > 0, outside + height, np.nan)), color=BLUE, lw=1.6)
+    ring(fine, 1.0 + 0.0 * fine, outside + 0.0 * fine, color=WALL)
+    ring(x_r, 1.0 - to_gap * h_there, 1.0 - to_gap * (h_there - liquid), color=LIQUID)  # the liquid clings to the journal
+    axes.plot(*around(fine, 1.0), color="black", lw=1.0)
+    axes.fill(*around(fine, 1.0 - to_gap * h), facecolor="0.93", edgecolor="black", lw=1.4)
+
+    for name, place in picture.fronts.items() if row is None or row == picture.middle else ():
+        gap = to_gap * film_line(picture, row, np.array([place]))[0]
+        axes.plot(*around(place, np.array([1.0 - gap, outside])), color=RED)
+        axes.text(*around(place, outside + 0.06), name, ha="left", va="center", fontsize=8, color=RED)
+    axes.plot(*around(start, np.array([1.0, outside])), color=GREY, lw=1.0)
+    axes.text(*around(start, outside + 0.1), "0°", ha="center", va="center", fontsize=8, color=GREY)
+    narrowest = widest + np.pi
+    centre = 0.5 * to_gap * np.ptp(h) * unit(narrowest)
+    axes.plot(*np.transpose([0.0 * centre, 0.85 * unit(narrowest)]), color=GREY, lw=0.8, ls=(0, (6, 3)))
+    load = {"arrowstyle": "-|>", "lw": 1.6, "color": "black"}
+    axes.annotate("", centre - [0.0, 0.62], centre, arrowprops=load)
+    text = quantity(picture.load or 0.0, "N/m" if row is None else "N")
+    axes.text(centre[0] - 0.04, centre[1] - 0.3, text, ha="right", fontsize=8.5)
+    turn = np.linspace(0.35 * np.pi, 0.65 * np.pi, 30)
+    axes.plot(*np.transpose([0.5 * unit(angle) for angle in turn]), color="black", lw=1.0)
+    axes.annotate("", 0.5 * unit(turn[-1]), 0.5 * unit(turn[-3]), arrowprops={**load, "lw": 1.0})
+    axes.text(0.0, 0.55, "$\\omega$", ha="center", va="bottom")
+    axes.set_title(f"attitude angle {np.degrees(attitude):.1f}°; gap not to scale", loc="center")
+    axes.set_aspect("equal")
+    axes.axis("off")
+
+
+def unit(angle: float) -> Any:
+    """The direction of an angle."""
+    return np.array([np.cos(angle), np.sin(angle)])
