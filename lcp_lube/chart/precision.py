@@ -37,7 +37,7 @@ FINAL = {"active-set", "monotone"}  # end in an exact step whatever the toleranc
 # Recipes by dimension and system, and the most points a side that each is run on; for another system its default one.
 ALL = 10**9
 RECIPES: dict[int, dict[str, dict[str | None, int]]] = {
-    1: {"full": {"superlu": ALL, "gmres_ilu": ALL}, "reduced": {"banded": ALL, "bcgs_ilu": ALL}, "cavity": {}},
+    1: {"full": {"superlu": ALL, "gmres_ilu": 2000}, "reduced": {"banded": ALL, "bcgs_ilu": ALL}, "cavity": {}},
     2: {
         "full": {"umfpack": 127, "gmres_ilu": 63, "augmentation_amg": 127},
         "reduced": {"umfpack": 127, "bcgs_amg": 255},

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from mpi4py import MPI
 
 from ..output.resumable import Row
+from ..registry import METHODS
 from .drawing import MARKERS, look, new_figure, save
 from .precision_words import ASKED, by_scene, error, fastest, front, loose, percent, seconds, sentence, time
 
@@ -48,7 +49,7 @@ def against_seconds(rows: Sequence[Row], quantity: str) -> Figure:
         "Of a method's systems and recipes the fastest one on each grid; filled: the grid's error prevails, open: "
         f"what the iteration leaves. Grey band: doubt of a reference that is not exact. {sentence(rows, quantity)}"
     )
-    figure, panels = _panels(rows, text, AXES[quantity], "seconds")
+    figure, panels = _panels(rows, text, AXES[quantity], "seconds", "Pareto front")
     for scene, mine in by_scene(rows).items():
         axes = panels[scene]
         best = front(mine, quantity)
@@ -56,8 +57,8 @@ def against_seconds(rows: Sequence[Row], quantity: str) -> Figure:
         unsure = max((float(row.get(f"{quantity}_unsure") or 0.0) for row in mine), default=0.0)
         if unsure > 0:
             axes.axhspan(1e-16, unsure, color="0.93", zorder=0)
-        for number, name in enumerate(methods(rows)):
-            _series(axes, [row for row in mine if row["method"] == name], quantity, styles(rows, number, name), seconds)
+        for name in methods(rows):
+            _series(axes, [row for row in mine if row["method"] == name], quantity, styles(rows, name), seconds)
         _limits(axes, mine, quantity)
         _answers(axes, mine, quantity)
     return figure
@@ -68,13 +69,13 @@ def against_krylov(rows: Sequence[Row]) -> Figure:
     rows = [row for row in rows if row.get("krylov") not in ("", "0", None)]
     text = (
         "Krylov iterations of a run, coarser grids included; of a method's Krylov recipes the one with the fewest on each "
-        "grid. Direct solvers have none and are left out. " + fewest(rows)
+        "grid. Direct solvers and multigrid without matrices have none and are left out. " + fewest(rows)
     )
     figure, panels = _panels(rows, text, AXES["load"], "Krylov iterations")
     for scene, mine in by_scene(rows).items():
-        for number, name in enumerate(methods(rows)):
+        for name in methods(rows):
             here = [row for row in mine if row["method"] == name]
-            _series(panels[scene], here, "load", styles(rows, number, name), lambda row: float(row["krylov"]))
+            _series(panels[scene], here, "load", styles(rows, name), lambda row: float(row["krylov"]))
         _limits(panels[scene], mine, "load")
     return figure
 
@@ -99,35 +100,38 @@ def parts(rows: Sequence[Row]) -> Figure:
         "Line: error of the grid (the same grid solved to rounding). Marks: what the iteration adds, the largest of a method's "
         f"recipes. The iteration's part is the larger one in {len(over)} of {len(rows)} runs{f': {names}' * bool(names)}."
     )
-    figure, panels = _panels(rows, text, AXES["load"], "points a side")
+    figure, panels = _panels(rows, text, AXES["load"], "points a side", "error of the grid")
     for scene, mine in by_scene(rows).items():
         axes = panels[scene]
         grids = {int(row["n"]): float(row["load_grid"]) for row in mine}
         axes.plot(sorted(grids), [grids[n] for n in sorted(grids)], color="0.75", lw=4.0, zorder=1)
-        for number, name in enumerate(methods(rows)):
+        for name in methods(rows):
             for eps in dict.fromkeys(row["eps"] for row in mine if row["method"] == name):
                 most: dict[int, float] = {}
                 for row in mine:
                     if (row["method"], row["eps"]) == (name, eps):
                         most[int(row["n"])] = max(float(row["load_iteration"] or 0.0), most.get(int(row["n"]), 1e-16))
-                style = styles(rows, number, name) | _tolerance(eps)
+                style = styles(rows, name) | _tolerance(eps)
                 axes.plot(sorted(most), [most[n] for n in sorted(most)], **{**style, "lw": 0.8})
         axes.set_ylim(1e-16, None)
     return figure
 
 
 def methods(rows: Sequence[Row]) -> list[str]:
-    """All methods, the peers last."""
-    names = list(dict.fromkeys(row["method"] for row in rows if row["system"] != PEER))
+    """All methods in the registry's order, the peers last."""
+    found = dict.fromkeys(row["method"] for row in rows if row["system"] != PEER)
+    order = [*METHODS, *found]
+    names = sorted(found, key=order.index)
     return [*names, *dict.fromkeys(row["method"] for row in rows if row["system"] == PEER)]
 
 
-def styles(rows: Sequence[Row], number: int, name: str) -> dict[str, Any]:
-    """Colour and marker; other codes in grey, so that they are told from ours at a glance."""
+def styles(rows: Sequence[Row], name: str) -> dict[str, Any]:
+    """Colour and marker, the same in all pictures; other codes in grey, so that they are told from ours at a glance."""
     peers = [row["method"] for row in rows if row["system"] == PEER]
     if name in peers:
         return {"color": "0.45", "marker": MARKERS[::-1][[*dict.fromkeys(peers)].index(name) % len(MARKERS)]}
-    return look(number)
+    films = [method for method, entry in METHODS.items() if "lubrication" in entry.kinds]
+    return look(films.index(name) if name in films else len(films))
 
 
 def _errors(rows: Sequence[Row], quantity: str) -> list[float]:
@@ -168,7 +172,7 @@ def _limits(axes: Axes, rows: Sequence[Row], quantity: str) -> None:
         axes.set_ylim(0.4 * max(min(seen), 1e-13), 8 * max(seen))
 
 
-def _panels(rows: Sequence[Row], text: str, ylabel: str, xlabel: str) -> tuple[Figure, dict[str, Axes]]:
+def _panels(rows: Sequence[Row], text: str, ylabel: str, xlabel: str, grey: str = "") -> tuple[Figure, dict[str, Axes]]:
     """Empty panels by scene, and a legend in the place that is left or under them."""
     scenes = [*by_scene(rows)]
     lines = math.ceil((len(scenes) + 1) / COLUMNS)
@@ -187,7 +191,7 @@ def _panels(rows: Sequence[Row], text: str, ylabel: str, xlabel: str) -> tuple[F
         if number % COLUMNS == 0:
             axes.set_ylabel(ylabel)
     place = grid.ravel()[len(scenes)]
-    place.legend(handles=_legend(rows), loc="center", ncols=2, fontsize=7.0)
+    place.legend(handles=_legend(rows, grey), loc="center", ncols=2, fontsize=7.0)
     return figure, panels
 
 
@@ -196,14 +200,14 @@ def _tolerance(eps: str) -> dict[str, Any]:
     return {"ls": "--", "mfc": "white"} if float(eps) > 1e-6 else {"ls": "-"}
 
 
-def _legend(rows: Sequence[Row]) -> list[Any]:
+def _legend(rows: Sequence[Row], grey: str) -> list[Any]:
+    """Methods, tolerances, marks, and what the grey line is."""
     from matplotlib.lines import Line2D
 
-    handles = [Line2D([], [], **styles(rows, number, name), label=name) for number, name in enumerate(methods(rows))]
+    handles = [Line2D([], [], **styles(rows, name), label=name) for name in methods(rows)]
     for eps in dict.fromkeys(row["eps"] for row in rows if row["n"] != "auto"):
         handles.append(Line2D([], [], color="0.3", label=f"eps = {float(eps):g}", ls=_tolerance(eps)["ls"]))
-    return [
-        *handles,
-        Line2D([], [], color="0.3", marker="x", ls="none", label="failed"),
-        Line2D([], [], color="0.8", lw=4.0, label="Pareto front"),
-    ]
+    handles.append(Line2D([], [], color="0.3", marker="o", mfc="white", ls="none", label="iteration's part larger"))
+    if any(row["outcome"] != "converged" for row in rows):
+        handles.append(Line2D([], [], color="0.3", marker="x", ls="none", label="failed"))
+    return [*handles, *([Line2D([], [], color="0.8", lw=4.0, label=grey)] if grey else [])]
