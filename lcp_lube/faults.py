@@ -24,10 +24,10 @@ def first_fault(error: ValidationError, model: type[BaseModel]) -> str:
     if fault["type"] == "missing":
         return f"{key} is missing"
     if fault["type"] == "union_tag_not_found":
-        return f"{key}: shape is missing; allowed are {', '.join(_tags(tables))}"
+        return f"{key}: shape is missing; allowed are {', '.join(tags_of(tables))}"
     if fault["type"] == "union_tag_invalid":
         tag = str(context["tag"])
-        return f"{key}.shape = {tag}: allowed are {', '.join(_tags(tables))}{nearest(tag, _tags(tables))}"
+        return f"{key}.shape = {tag}: allowed are {', '.join(tags_of(tables))}{nearest(tag, tags_of(tables))}"
     allowed = fault["msg"].removeprefix("Value error, ").replace("Input should be ", "allowed is ")
     if fault["type"] == "value_error" and isinstance(fault["input"], dict):  # a table's own check, which names its key
         return f"{key}: {allowed}" if key else allowed
@@ -52,27 +52,27 @@ def _walk(model: type[BaseModel], loc: tuple[int | str, ...]) -> tuple[list[str]
         if isinstance(part, int):
             path.append(str(part + 1 if of_tables else part))  # entries count from 1, as in --set
             continue
-        tagged = [table for table in tables if part in _tags([table])]
+        tagged = [table for table in tables if part in tags_of([table])]
         if tagged and len(tables) > 1:
             tables = tagged
             path[-1] = f"{part}" if path and path[-1].isdigit() else path[-1]
             continue
         path.append(part)
         fields = [field for table in tables for name, field in table.model_fields.items() if part in (name, field.alias)]
-        below = [inner for field in fields for inner in _models(field.annotation)]
+        below = [inner for field in fields for inner in models_of(field.annotation)]
         of_tables = bool(below)
         tables = below if below and (k + 1 < len(loc) or len(below) > 1) else tables
     return path, tables
 
 
-def _models(annotation: Any) -> list[type[BaseModel]]:
+def models_of(annotation: Any) -> list[type[BaseModel]]:
     """The models inside a field's type."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
-    return [model for inner in get_args(annotation) for model in _models(inner)]
+    return [model for inner in get_args(annotation) for model in models_of(inner)]
 
 
-def _tags(tables: list[type[BaseModel]]) -> list[str]:
+def tags_of(tables: list[type[BaseModel]]) -> list[str]:
     """What `shape` may be in these tables."""
     return [
         tag for table in tables if "shape" in table.model_fields for tag in get_args(table.model_fields["shape"].annotation)

@@ -171,6 +171,24 @@ def load_scene(source: str | Path, changes: dict[str, Any] | None = None) -> Sce
         that names the file, the key, what was found and what is allowed.
     """
     changes = changes or {}
+    data, path, name = read_scene(source)
+    family = changes.get("family", data.get("family", "slider"))
+    model = family_of(source, family)
+    try:
+        scene: Scene = model(**{"name": name, **changed(data, changes, {name, family}, set(known_keys(model)))})
+    except ValidationError as error:
+        raise InputError(f"{source}: {first_fault(error, model)}") from None
+    scene._folder = path.parent
+    return scene
+
+
+def read_scene(source: str | Path) -> tuple[dict[str, Any], Path, str]:
+    """What the file of a scene says, the file, and the scene's name.
+
+    Raises
+    ------
+    InputError : no such scene, an unreadable file.
+    """
     source = str(source)
     if source.endswith(".toml"):
         path, name = Path(source), Path(source).stem
@@ -187,16 +205,19 @@ def load_scene(source: str | Path, changes: dict[str, Any] | None = None) -> Sce
         raise InputError(f"{source}: {reason}") from None
     if not data:
         raise InputError(f"{source}: the file sets nothing; 'family' and the data of a bearing are needed")
-    family = changes.get("family", data.get("family", "slider"))
+    return data, path, name
+
+
+def family_of(source: str | Path, family: Any) -> Any:
+    """The model of a family.
+
+    Raises
+    ------
+    InputError : no such family.
+    """
     if family not in [*FAMILIES]:  # which may be no string at all
         raise InputError(f"{source}: family = {family}: allowed are {', '.join(FAMILIES)}{nearest(str(family), FAMILIES)}")
-    model: Any = FAMILIES[family].load()
-    try:
-        scene: Scene = model(**{"name": name, **changed(data, changes, {name, family}, set(known_keys(model)))})
-    except ValidationError as error:
-        raise InputError(f"{source}: {first_fault(error, model)}") from None
-    scene._folder = path.parent
-    return scene
+    return FAMILIES[family].load()
 
 
 def parse_changes(assignments: Iterable[str]) -> dict[str, Any]:

@@ -76,7 +76,7 @@ class BearingScene(Measured, Scene):
     p_out: Finite | None = Field(None, description="pressure of the east side, Pa: short for sides.east.p")
     fluid: Fluid = Field(..., description="the lubricant")
     film: list[FilmPart] = Field(..., min_length=1, description="shapes, which are added up")
-    h_floor: Positive | None = metres(None, "film below which nothing is cut away: the sum is cut there; default: no cut")
+    h_floor: Positive | None = metres(None, "smallest film: the sum is cut there; default no cut")
     sides: SidesTable = Field(SidesTable(), description="condition at each side")
     scheme: Literal["nodal", "face", "upwind"] = Field("face", description="form of the Couette flux")
     mean_cubes: bool = Field(False, description="h^3 at a face as the mean of the nodal values")

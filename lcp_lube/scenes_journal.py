@@ -1,7 +1,7 @@
 """Journal bearings, unwrapped from one axial groove at the widest gap to the same groove again."""
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -23,6 +23,7 @@ class JournalScene(LubricationScene):
     (round = "periodic") the film goes on at phi = 2 pi, and the ends, at p_side > 0, feed it.
     """
 
+    derived: ClassVar[tuple[str, ...]] = ("L", "U", "width", "p_unit")
     dimension: Literal[1, 2] = 2
     eccentricity: Annotated[float, Field(ge=0, lt=1, description="relative eccentricity")] = 0.5
     width_over_diameter: Positive = Field(1.0, description="B/D (2D)")
@@ -37,7 +38,7 @@ class JournalScene(LubricationScene):
     @model_validator(mode="before")
     @classmethod
     def _derived(cls, data: Any) -> Any:
-        for key in ("L", "U", "width", "p_unit"):
+        for key in cls.derived:
             if key in data:
                 raise ValueError(f"{key} = {data[key]}: follows from D, width_over_diameter, omega, psi and mu in this scene")
         fields = cls.model_fields

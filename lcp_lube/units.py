@@ -10,7 +10,8 @@ SUFFIXES = {"_um": -6, "_mm": -3}
 
 def metres(default: Any, text: str, **limits: Any) -> Any:
     """A field in metres, which may be given in other units by a suffix."""
-    return Field(default, description=f"{text}, m", json_schema_extra={"unit": "m"}, **limits)
+    what, semicolon, more = text.partition(";")
+    return Field(default, description=f"{what}, m{semicolon}{more}", json_schema_extra={"unit": "m"}, **limits)
 
 
 def stem(key: str) -> str:
