@@ -97,9 +97,10 @@ def test_hard_films(film):
 
 @pytest.mark.parametrize("film", HARD)
 def test_last_resort_of_auto(film, monkeypatch):
-    """With the active set and the interior method made to fail, the answer is still found, and the message tells how."""
+    """With all that stands before it made to fail, the answer is still found, and the message tells how."""
     from lcp_lube.solvers.active_set import ActiveSet
     from lcp_lube.solvers.din_pc import DinPc
+    from lcp_lube.solvers.fas import Fas
     from lcp_lube.solvers.steplength import StepLengthError
 
     advance, taken = ActiveSet.advance, []
@@ -115,6 +116,7 @@ def test_last_resort_of_auto(film, monkeypatch):
 
     monkeypatch.setattr(ActiveSet, "advance", give_up)
     monkeypatch.setattr(DinPc, "advance", fail)
+    monkeypatch.setattr(Fas, "advance", fail)
     solution = solve(load_scene(*HARD[film]))
     assert solution.converged, solution.message
     assert solution.settings["took_over"] == "monotone"

@@ -112,7 +112,7 @@ def conditions(problem: LubricationProblem) -> str:
     number = grid.first + np.arange(grid.local_size)
     p, r = 1.0 + np.modf(0.618033988749895 * number)[0], np.modf(0.7548776662466927 * number)[0]
     F, rounding = balance(problem, p, r)
-    assembled = -s.c
+    assembled = -problem.c.reshape(grid.box)
     for entries, values in ((s.pressure_entries(), p), (s.void_entries(), r)):
         for dj, di, entry in entries:
             assembled = assembled + entry * seen_from(values, dj, di)
