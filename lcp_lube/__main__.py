@@ -74,6 +74,7 @@ def _refuse(error: InputError, alone: bool = False) -> int:
     rank = next((found for found in named if found), "0")
     if rank == "0" or alone:
         print(f"lcp-lube: {error}", file=sys.stderr, flush=True)
+    petsc_start.forget_unread()
     if alone:
         from mpi4py import MPI
 

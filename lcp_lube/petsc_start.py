@@ -56,6 +56,17 @@ def start(arguments: list[str]) -> None:
     raise InputError(f"{culprit}PETSc does not start: {reason}") from None
 
 
+def forget_unread() -> None:
+    """Newer releases of PETSc warn at their end of options that nobody read; what there is to say has been said in a line."""
+    if "petsc4py.PETSc" in sys.modules:
+        from petsc4py import PETSc
+
+        from .linear.options import unread
+
+        for name in unread() if PETSc.Sys.isInitialized() else ():
+            PETSc.Options().delValue(name)
+
+
 def check(arguments: list[str]) -> None:
     """Raise InputError for values that would end PETSc in a crash at its start or, as -log_view's, at its very end."""
     for k, word in enumerate(arguments):

@@ -1,5 +1,8 @@
 """One KSP, configured by options alone: tolerances, counts, and failures that are heard of."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import numpy as np
 from petsc4py import PETSc
 
@@ -15,6 +18,20 @@ MUMPS_LARGEST_RESERVE = 2000
 
 class LinearSolverError(ArithmeticError):
     """The inner solver broke down; the message says how."""
+
+
+@contextmanager
+def own_errors() -> Iterator[None]:
+    """What a python PC or KSP raises comes out as itself: newer releases of petsc4py hide it behind a PETSc.Error."""
+    try:
+        yield
+    except PETSc.Error as error:
+        cause: BaseException = error
+        while cause.__cause__ is not None:
+            cause = cause.__cause__
+        if cause is error:
+            raise
+        raise cause from None
 
 
 class Krylov:
@@ -46,7 +63,8 @@ class Krylov:
         self._ready = False
         self.fields = fields or {}
         try:
-            self.ksp.setFromOptions()
+            with own_errors():
+                self.ksp.setFromOptions()
         except PETSc.Error as error:
             raise InputError(explain_error(error)) from None
         except (ImportError, AttributeError) as error:  # PETSc imports the class of a python PC or KSP here
@@ -81,8 +99,9 @@ class Krylov:
                 if sorted(order.split(",")) != sorted(self.fields):
                     raise InputError(f"-fieldsplit_order {order}: allowed are {','.join(self.fields)} in any order")
                 pc.setFieldSplitIS(*((name, self.fields[name]) for name in order.split(",")))
-            self.ksp.setUp()
-            self.ksp.setUpOnBlocks()
+            with own_errors():
+                self.ksp.setUp()
+                self.ksp.setUpOnBlocks()
         except PETSc.Error as error:
             if self._ready or error.ierr in ZERO_PIVOT:
                 raise LinearSolverError(explain_error(error)) from None
@@ -112,7 +131,8 @@ class Krylov:
     def _run(self, b: PETSc.Vec, x: PETSc.Vec) -> int:
         """Solve; returns PETSc's reason."""
         try:
-            self.ksp.solve(b, x)
+            with own_errors():
+                self.ksp.solve(b, x)
         except PETSc.Error as error:
             raise LinearSolverError(explain_error(error)) from None
         return self.ksp.getConvergedReason()

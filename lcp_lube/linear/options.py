@@ -119,7 +119,7 @@ def explain_error(error: PETSc.Error) -> str:
 
     if "-pc_python_type [package.]" in text:
         return "-pc_type python: -pc_python_type MODULE.CLASS is needed too"
-    if found := re.search(r"Unknown option (\S+) for (-\S+)\. Available options: (.*)", text):
+    if found := re.search(r"Unknown option \"?(\S+?)\"? for (-\S+)\. Available options: (.*)", text):
         legal = found[3].split()
         return f"{found[2]} {found[1]}: allowed are {', '.join(legal)}{nearest(found[1], legal)}"
     if found := re.search(r"factorization type (\S+) and matrix type mpi", text):
