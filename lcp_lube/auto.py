@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 
 from petsc4py import PETSc
 
@@ -43,6 +44,9 @@ def plan(
     why = []
     if method == "auto":
         method = DEFAULT_METHOD[problem.kind]
+        no_linear = system == "auto" and recipe is None and not nested and not options
+        if method == "active-set" and no_linear and _suits_multigrid(problem):
+            method = "fas"
         reason = METHODS[method].of(problem.kind).line
         if problem.kind == "lubrication" and DIN_ONLY & set(options):
             method, reason = "din", f"{', '.join(sorted(DIN_ONLY & set(options)))} are its options"
@@ -74,8 +78,8 @@ def plan(
             )
     _known(system, entry.systems, f"method {method}: --system")
     if nested is None:
-        given = entry.interior and {"p0", "r0"} & set(options)  # a start that someone chose is to be used
-        nested = entry.nested and grid.size > entry.nested_above and not given
+        own_start = entry.interior and bool({"p0", "r0"} & set(options))  # one that someone chose is to be used
+        nested = entry.nested and grid.size > entry.nested_above and not own_start
         if nested:
             why.append("nested: the front found on a coarser grid leaves a few steps on this one")
     elif nested and not entry.nested:
@@ -84,6 +88,12 @@ def plan(
         recipe, reason = default_recipe(problem, system, large)
         why.append(f"recipe {recipe}: {reason}")
     return Plan(method, system, recipe, nested, why)
+
+
+def _suits_multigrid(problem: Problem) -> bool:
+    """Whether nonlinear multigrid is the fastest: in 2D, its loops compiled, nobody having asked for an inner solver."""
+    plane = problem.kind == "lubrication" and problem.grid.dim == 2 and not any(problem.grid.periodic)
+    return plane and find_spec("numba") is not None and not {"ksp_type", "pc_type"} & set_names()
 
 
 def default_recipe(problem: Problem, system: str, large: bool) -> tuple[str, str]:

@@ -158,7 +158,7 @@ def test_very_fine_line():
 
 
 def test_auto_chooses_and_says_why():
-    small, line = run("problem4", {"n": 20}), run("problem1")
+    small, line = run("problem4", {"n": 20}, system="reduced"), run("problem1")
     assert small.settings["method"] == "active-set" and small.settings["recipe"] in ("umfpack", "superlu", "mumps")
     assert line.settings["recipe"] == "banded" and any("tridiagonal" in reason for reason in line.settings["why"])
     din = run("problem1", options={"mu": "mu1"})
@@ -167,22 +167,35 @@ def test_auto_chooses_and_says_why():
         solution.destroy()
 
 
+def test_auto_in_the_plane(monkeypatch):
+    """Nonlinear multigrid where its loops are compiled, the active set where they are not."""
+    pytest.importorskip("numba")
+    sweeps = run("problem4", {"n": 20})
+    assert sweeps.settings["method"] == "fas" and sweeps.converged and sweeps.total("linear_iterations") == 0
+    monkeypatch.setattr("lcp_lube.auto.find_spec", lambda name: None)
+    steps = run("problem4", {"n": 20})
+    assert steps.settings["method"] == "active-set" and steps.converged
+    np.testing.assert_allclose(sweeps.p, steps.p, atol=1e-6)
+    sweeps.destroy()
+    steps.destroy()
+
+
 @pytest.mark.parametrize(
     "missing, recipe", [({"hypre"}, "bcgs_ml"), ({"hypre", "ml"}, "bcgs_gamg"), ({"hypre", "ml", "numba"}, "bcgs_gamg")]
 )
 @pytest.mark.parametrize("scene, changes", [("problem4", {"n": 150}), ("textured_slider", {"K": 5})])
 def test_auto_without_what_it_likes_best(scene, changes, missing, recipe, monkeypatch):
-    """Another multigrid, array arithmetic for compiled loops: the same answer, and the reason is said."""
+    """The inner solver: another multigrid, array arithmetic for compiled loops; the same answer, and the reason is said."""
     has = PETSc.Sys.hasExternalPackage
     if recipe == "bcgs_ml" and not has("ml"):
         pytest.skip("this PETSc has no ML")
-    best = run(scene, changes)
+    best = run(scene, changes, method="active-set")
     sys = SimpleNamespace(hasExternalPackage=lambda name: name not in missing and has(name))
     monkeypatch.setattr("lcp_lube.auto.PETSc", SimpleNamespace(Sys=sys))
     if "numba" in missing:
         for module in ("lcp_lube.linear.cavity", "lcp_lube.solvers.relaxation"):
             monkeypatch.setattr(f"{module}.find_spec", lambda name: None)
-    solution = run(scene, changes)
+    solution = run(scene, changes, method="active-set")
     assert solution.converged and solution.settings["recipe"] == recipe and solution.settings["system"] == "cavity"
     assert any("no hypre" in reason for reason in solution.settings["why"])
     assert solution.total("linear_iterations") <= 8 * solution.iterations
