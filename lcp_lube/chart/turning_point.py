@@ -23,7 +23,7 @@ from .reference import Reference
 
 PARTS = (0.1, 0.01, 1e-3, 1e-4, 1e-6, 1e-8)  # of the turning point, below it and beyond it
 SIZES = (8, 16, 32, 64)
-MEANS = (0.05, 0.6, 3.0)  # of v: low, near the turning point, high on the upper branch
+MEANS = (1e-3, 1.4)  # of v: near zero, and well beyond the turning point on the upper branch
 
 # Who is tried: the scene, its start, and what `solve` is told.
 WAYS = {
@@ -45,14 +45,14 @@ class Branch:
         line = sp.diags([-np.ones(n - 1), 2.0 * np.ones(n), -np.ones(n - 1)], [-1, 0, 1])
         self.A = (sp.kronsum(line, line) * (n + 1) ** 2).tocsc()
         self.size = n * n
-        top = minimize_scalar(lambda s: -self.at(s)[1], bounds=MEANS[::2], method="bounded", options={"xatol": 1e-9})
+        self._bump = splu(self.A).solve(np.ones(self.size))
+        top = minimize_scalar(lambda s: -self.at(s)[1], bounds=MEANS, method="bounded", options={"xatol": 1e-9})
         self.mean, self.turning = float(top.x), float(-top.fun)
 
     def at(self, mean: float) -> tuple[Array, float]:
         """v with this mean, and its lambda."""
-        v, lam = np.full(self.size, mean), 5.0
-        v = splu(self.A).solve(np.ones(self.size))
-        v *= mean / v.mean()
+        v = self._bump * (mean / self._bump.mean())
+        lam = float((self.A @ v).sum() / np.exp(v).sum())
         for _ in range(50):
             source = np.exp(v)
             solve = splu((self.A - sp.diags(lam * source)).tocsc()).solve
@@ -65,10 +65,10 @@ class Branch:
         return v, lam
 
     def solutions(self, lam: float) -> tuple[Array, ...]:
-        """Lower and upper solution; none beyond the turning point."""
+        """Lower and upper solution, for lambda from 4.7 on; none beyond the turning point."""
         if lam >= self.turning:
             return ()
-        means = [brentq(lambda s: self.at(s)[1] - lam, side, self.mean, xtol=1e-11) for side in (1e-3, MEANS[2])]
+        means = [brentq(lambda s: self.at(s)[1] - lam, side, self.mean, xtol=1e-11) for side in MEANS]
         return tuple(self.at(mean)[0] for mean in means)
 
 
