@@ -34,8 +34,8 @@ def kernel(function: Kernel) -> Kernel:
         from numba import njit
     except ImportError:
         return function
-    options = {"error_model": "numpy", "fastmath": {"contract", "nsz"}}
+    relaxed = {"contract", "nsz"}
     try:
-        return cast(Kernel, njit(cache=True, **options)(function))
+        return cast(Kernel, njit(cache=True, error_model="numpy", fastmath=relaxed)(function))
     except RuntimeError:
-        return cast(Kernel, njit(**options)(function))
+        return cast(Kernel, njit(error_model="numpy", fastmath=relaxed)(function))

@@ -120,19 +120,24 @@ class LubricationProblem:
         pressure, void, residual = self.term_norms(p, r)
         scale = pressure + void + red.norm(self.c)
         p_max = red.max(np.abs(p))
-        west, east, south, north = self.boundary_flows(p, r)
-        inflow = max(west, 0.0) + max(-east, 0.0) + max(south, 0.0) + max(-north, 0.0)
-        # Nothing may flow through at all: what rounding leaves is measured by what the wall drags along.
-        inflow = max(inflow, IDLE * red.max(np.abs(self.scheme.b_C)) * (self.grid.shape[1] if self.grid.dim == 2 else 1))
         return Certificate(
             measures={
                 "residual": residual / scale if scale != 0 else 0.0,  # NaN stays NaN
                 "complementarity": red.max(np.abs(np.minimum(p / p_max if p_max > 0 else p, r))),
-                "mass_defect": abs(west - east + south - north) / inflow if inflow != 0 else 0.0,
+                "mass_defect": self.mass_defect(p, r),
             },
             tol=certificate_tol(eps1),
             extremes={"min_p": red.min(p) * self.p_unit, "min_r": red.min(r)},
         )
+
+    def mass_defect(self, p: Array, r: Array) -> float:
+        """|flow in - flow out| / flow in, over the open sides. Collective."""
+        west, east, south, north = self.boundary_flows(p, r)
+        inflow = max(west, 0.0) + max(-east, 0.0) + max(south, 0.0) + max(-north, 0.0)
+        # Nothing may flow through at all: what rounding leaves is measured by what the wall drags along.
+        dragged = self.reduce.max(np.abs(self.scheme.b_C)) * (self.grid.shape[1] if self.grid.dim == 2 else 1)
+        inflow = max(inflow, IDLE * dragged)
+        return abs(west - east + south - north) / inflow if inflow != 0 else 0.0
 
     def boundary_flows(self, p: Array, r: Array) -> tuple[float, float, float, float]:
         """Scaled flow through the west, east, south and north side, positive towards larger x or y.

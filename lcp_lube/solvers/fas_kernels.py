@@ -262,10 +262,11 @@ def restrict(
     wrap: bool,
     residual: bool,
 ) -> None:
-    """Add to `out` what the rank's rows of the residual c - G(z), or of c, give to the coarse points: the transposed interpolation.
+    """Add to `out` what the rank's rows of the residual c - G(z), or of c, give to the coarse points.
 
-    Where lines are coarsened it is halved: a row is a balance per unit width. Coarse points stand at the odd rows and columns,
-    counted from 0 over the whole grid; the rank's first row is y0, and row 0 of `out` is the coarse line y0 // 2 - 1.
+    That is the transposed interpolation, halved where lines are coarsened: a row is a balance per unit width. Coarse points
+    stand at the odd rows and columns, counted from 0 over the whole grid; the rank's first row is y0, and row 0 of `out` is
+    the coarse line y0 // 2 - 1.
     """
     ny, nx = z.shape[0] - 2, z.shape[1] - 2
     r, coarse = np.zeros(nx + 2), np.zeros(out.shape[1])
@@ -432,12 +433,9 @@ def coarsen_x_faces(kx: Array, ky: Array, out: Array, y0: int, by_x: bool, by_y:
             i = 2 * f - 1 if by_x else f  # the face's column, or that of the first of two, between which point i lies
             total = 0.0
             for d in range(-1 if by_y else 0, 2 if by_y else 1):
-                if not by_x:
-                    k = kx[m + d, i]
-                elif beyond and f == n_faces:
-                    k = kx[m + d, i]
-                else:
-                    k = series(kx[m + d, i], kx[m + d, i + 1])
+                k = kx[m + d, i]
+                if by_x and not (beyond and f == n_faces):
+                    k = series(k, kx[m + d, i + 1])
                 at = min(i, ky.shape[1] - 2)
                 if d == -1:
                     k *= 1.0 - share(ky[m - 1, at], ky[m, at], harmonic)
@@ -453,22 +451,30 @@ def coarsen_y_faces(kx: Array, ky: Array, out: Array, y0: int, by_x: bool, by_y:
     n_faces, n_columns = out.shape[0] - 2, out.shape[1] - 2
     # Row of the even line under the first coarse face; the face south of row m is ky[m].
     shift = (0 if y0 % 2 == 1 else 1) if by_y else 1
-    for F in range(n_faces):
-        m = shift + (2 * F if by_y else F)
+    for f in range(1, n_faces + 1):
+        m = shift + (2 * f - 2 if by_y else f - 1)
         for k in range(1, n_columns + 1):
             i = 2 * k if by_x else k
             total = 0.0
             for d in range(-1 if by_x else 0, 2 if by_x else 1):
-                if not by_y:
-                    value = ky[m, i + d]
-                elif beyond and F == n_faces - 1:
-                    value = ky[m, i + d]
-                else:
-                    value = series(ky[m, i + d], ky[m + 1, i + d])
+                value = ky[m, i + d]
+                if by_y and not (beyond and f == n_faces):
+                    value = series(value, ky[m + 1, i + d])
                 at = min(m, kx.shape[0] - 2)
                 if d == -1:
                     value *= 1.0 - share(kx[at, i - 1], kx[at, i], harmonic)
                 elif d == 1:
                     value *= share(kx[at, i + 1], kx[at, i + 2], harmonic)
                 total += value
-            out[F + 1, k] = 0.5 * total if by_y else total
+            out[f, k] = 0.5 * total if by_y else total
+
+
+@kernel
+def lost_void(b_C: Array, b_W: Array) -> tuple[float, float]:
+    """The largest difference between the void's flow out of a cell and into the next one, and that flow itself, per void."""
+    lost, most = 0.0, 0.0
+    for j in range(b_C.shape[0]):
+        for i in range(1, b_C.shape[1]):
+            lost = max(lost, abs(b_W[j, i] + b_C[j, i - 1]))
+            most = max(most, abs(b_C[j, i]))
+    return lost, most

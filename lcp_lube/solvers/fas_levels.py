@@ -65,8 +65,8 @@ class Level:
         """Bring the frame up to date: rows of the neighbouring ranks, and beyond periodic sides. Collective."""
         n = self.ny if self.comm is None or self.whole else self.y1 - self.y0
         rows, columns = a.shape[0] - n - 1, a.shape[1] - self.nx - 1  # of the frame behind the last point: 1, of faces 2
-        if self.split:
-            below, above = self._neighbours()
+        if self.comm is not None and not self.whole:
+            below, above = self._neighbours(self.comm)
             behind = a[n + 1 :].copy()
             self.comm.Sendrecv(a[n].copy(), above, recvbuf=a[0], source=below)
             self.comm.Sendrecv(a[1 : 1 + rows].copy(), below, recvbuf=behind, source=above)
@@ -90,9 +90,9 @@ class Level:
         """Whether other ranks hold other lines."""
         return self.comm is not None and not self.whole
 
-    def _neighbours(self) -> tuple[int, int]:
+    def _neighbours(self, comm: MPI.Comm) -> tuple[int, int]:
         """The ranks that hold the lines before and behind this one's."""
-        rank, size, ring = self.comm.rank, self.comm.size, self.periodic[1]
+        rank, size, ring = comm.rank, comm.size, self.periodic[1]
         below = rank - 1 if rank else (size - 1 if ring else MPI.PROC_NULL)
         return below, rank + 1 if rank < size - 1 else (0 if ring else MPI.PROC_NULL)
 
@@ -100,8 +100,8 @@ class Level:
         """Add up what the ranks have put into each other's rows, in `part(a)` of an array that was zero. Collective."""
         if self.comm is not None and self.whole:
             self.comm.Allreduce(MPI.IN_PLACE, a)
-        if self.split:
-            below, above = self._neighbours()
+        if self.comm is not None and not self.whole:
+            below, above = self._neighbours(self.comm)
             from_below, from_above = np.zeros_like(a[0]), np.zeros_like(a[0])
             self.comm.Sendrecv(a[-1].copy(), above, recvbuf=from_below, source=below)
             self.comm.Sendrecv(a[0].copy(), below, recvbuf=from_above, source=above)
@@ -124,8 +124,8 @@ def finest(problem: LubricationProblem) -> Level:
     grid, s = problem.grid, problem.scheme
     periodic = (grid.periodic[0], grid.dim == 2 and grid.periodic[1])
     split = grid.comm.size > 1
-    lost = np.abs(s.b_W[:, 1:] + s.b_C[:, :-1]).max(initial=0.0) + np.abs(s.k_W[:, 1:] - s.k_E[:, :-1]).max(initial=0.0)
-    if grid.reduce.max(np.array([lost])) > 1e-12 * grid.reduce.max(np.abs(s.b_C)):
+    lost, carried = kernels.lost_void(s.b_C, s.b_W)
+    if grid.reduce.max(np.array([lost])) > 1e-12 * grid.reduce.max(np.array([carried])):
         raise InputError("--method fas: what leaves a cell of this scheme does not enter the next one; use active-set")
     lines = grid.box[0]
     fewest = int(grid.reduce.min(np.array([lines if grid.box[1] == grid.shape[0] else 0.0])))

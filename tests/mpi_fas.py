@@ -1,0 +1,68 @@
+"""Run under mpiexec by test_fas.py: nonlinear multigrid on several ranks, records and whole fields to a folder.
+
+mpiexec -n 3 python tests/mpi_fas.py OUT     writes OUT/record.json and OUT/fields.npz
+"""
+
+import json
+import sys
+import traceback
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from mpi_job import whole
+
+SIDES = {"round": "periodic", "p_side": 1e5}
+# name: (scene, changes). Sizes that no number of ranks divides; lines cut by the ranks, or too few of them; periodic in x.
+CASES: dict[str, tuple[str, dict[str, Any]]] = {
+    "line": ("problem3", {"n": 53}),
+    "plane": ("problem4", {"nx": 61, "ny": 47, "p_a": 1e5, "p_b": 1e5, "p_side": 1e5}),
+    "even": ("rough", {"nx": 64, "ny": 50}),
+    "few": ("problem4", {"nx": 31, "ny": 7, "scheme": "face"}),
+    "flat": ("problem4", {"nx": 31, "ny": 1, "scheme": "upwind"}),
+    "dimples": ("textured_slider", {"K": 2, "nx": 53, "ny": 67}),
+    "ring": ("journal", {"nx": 72, "ny": 37, "eccentricity": 0.7, **SIDES}),
+    "hard": ("textured_slider", {"K": 3, "nx": 60, "ny": 64, "depth": 135e-6}),
+}
+
+
+def run(name: str, method: str = "fas") -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """Record and whole fields of one solve."""
+    from lcp_lube import load_scene, solve
+
+    scene, changes = CASES[name]
+    stopping = {"eps1": 1e-10}
+    solution = solve(load_scene(scene, changes), method=method, stopping=stopping)
+    fields = {key: whole(solution.problem.grid, values) for key, values in solution.fields.items()}
+    record = {
+        "outcome": str(solution.outcome),
+        "message": solution.message,
+        "took_over": solution.settings["took_over"],
+        "iterations": solution.iterations,
+        "levels": len(solution.levels),
+        **solution.settings["details"],
+        **solution.certificate.measures,
+    }
+    solution.destroy()
+    return record, fields
+
+
+def main(out: Path) -> None:
+    record: dict[str, Any] = {}
+    fields: dict[str, np.ndarray] = {}
+    for name in CASES:
+        record[name], found = run(name)
+        fields |= {f"{name}_{field}": values for field, values in found.items()}
+    if MPI.COMM_WORLD.rank == 0:
+        np.savez(out / "fields.npz", **fields)
+        (out / "record.json").write_text(json.dumps(record))
+
+
+if __name__ == "__main__":
+    try:
+        main(Path(sys.argv[1]))
+    except Exception:
+        traceback.print_exc()
+        sys.stderr.flush()
+        MPI.COMM_WORLD.Abort(1)

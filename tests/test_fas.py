@@ -1,0 +1,257 @@
+"""Nonlinear multigrid: the active set's answers, few cycles on every grid and any number of ranks, hand-over where it fails."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import start
+from films import FilmScene
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lcp_lube.api import solve
+from lcp_lube.errors import InputError
+from lcp_lube.output.results import as_dict
+from lcp_lube.problems.solution import Outcome
+from lcp_lube.scene import load_scene
+
+pytest.importorskip("numba")
+
+import mpi_fas
+
+ROUND = {"p_a": 1e5, "p_b": 1e5, "p_side": 1e5}
+
+
+def run(name, changes=None, **kwargs):
+    return solve(load_scene(name, changes or {}), method="fas", **kwargs)
+
+
+def agree(ours, other, atol=1e-6):
+    """p against its maximum, and r."""
+    np.testing.assert_allclose(ours.p, other.p, rtol=0, atol=atol * np.abs(other.p).max())
+    np.testing.assert_allclose(ours.r, other.r, rtol=0, atol=atol)
+
+
+@pytest.mark.parametrize("scheme", ["nodal", "face", "upwind"])
+@pytest.mark.parametrize("mean_cubes", [False, True])
+@pytest.mark.parametrize(
+    "name, shape", [("problem1", (73,)), ("problem3", (100,)), ("problem4", (41, 36)), ("rough", (27, 64))]
+)
+def test_the_active_sets_answer(name, shape, scheme, mean_cubes):
+    changes = {"scheme": scheme, "mean_cubes": mean_cubes, **dict(zip(("nx", "ny"), shape, strict=False))}
+    ours, other = run(name, changes), solve(load_scene(name, changes), method="active-set", nested=False)
+    assert ours.converged and ours.settings["took_over"] is None, ours.message
+    assert ours.iterations <= 12
+    assert not (ours.p * ours.r).any() and (ours.p >= 0).all() and (ours.r >= 0).all()
+    agree(ours, other)
+    ours.destroy()
+    other.destroy()
+
+
+FILMS = {
+    "problem4": ("problem4", {}, 0.2),
+    "problem4, 0.1 MPa round": ("problem4", ROUND, 0.2),
+    "journal .5": ("journal", {"eccentricity": 0.5}, 0.1),
+    "journal .95": ("journal", {"eccentricity": 0.95}, 0.1),
+    "journal .99": ("journal", {"eccentricity": 0.99}, 0.1),
+    "dimples": ("textured_slider", {"K": 4}, 0.35),
+    "rough": ("rough", {}, 0.2),
+    "rough, film ratio 100": ("rough", {"amplitude": 15e-6, "h_floor": 5e-7, "cells": 20}, 0.2),
+}
+
+
+@pytest.mark.parametrize("n", [127, 150])
+@pytest.mark.parametrize("film", FILMS)
+def test_convergence_factor(film, n):
+    name, changes, bound = FILMS[film]
+    solution = run(name, {**changes, "nx": n, "ny": n}, stopping={"eps1": 1e-10})
+    assert solution.converged and solution.settings["took_over"] is None, solution.message
+    assert solution.settings["details"]["convergence_factor"] < bound
+    solution.destroy()
+
+
+class Step:
+    """A step of the film in the direction of motion."""
+
+    def __init__(self, before, behind):
+        self.before, self.behind = before, behind
+
+    def __call__(self, x, y=0.0):
+        return np.where(np.asarray(x) + 0 * np.asarray(y) < 0.06, self.before, self.behind)
+
+
+@pytest.mark.parametrize("heights", [(1e-4, 1e-5), (1e-5, 1e-4)])
+def test_a_tenfold_step(heights):
+    scene = FilmScene.of(Step(*heights), dimension=2, nx=63, ny=63, **ROUND)
+    solution = solve(scene, method="fas", stopping={"eps1": 1e-10})
+    assert solution.converged and solution.settings["took_over"] is None
+    assert solution.settings["details"]["convergence_factor"] < 0.2
+    solution.destroy()
+
+
+def test_the_factor_does_not_grow_with_the_grid():
+    factors = []
+    for n in (63, 127, 255):
+        solution = run("problem4", {"n": n, **ROUND}, stopping={"eps1": 1e-10})
+        factors.append(solution.settings["details"]["convergence_factor"])
+        solution.destroy()
+    assert max(factors) < 0.15
+
+
+def test_full_multigrid_alone_is_as_good_as_the_grid():
+    """One pass up the grids leaves less than the grid's own error, which halving the mesh shows."""
+    coarse, fine = (run("problem4", {"n": n}) for n in (63, 127))
+    own = abs(coarse.p.max() - fine.p.max())
+    first = run("problem4", {"n": 127}, stopping={"max_it": 1}, options={"cycle": "F"})  # nobody takes over
+    assert first.outcome is Outcome.MAX_ITERATIONS
+    assert abs(first.p.max() - fine.p.max()) < 0.2 * own
+    for solution in (coarse, fine, first):
+        solution.destroy()
+
+
+@pytest.mark.parametrize(
+    "changes", [{"K": 3, "depth": 135e-6}, {"K": 2, "depth": 135e-6, "p_a": 1e4, "p_b": 1e4, "p_side": 1e4}]
+)
+def test_hard_films_are_handed_over_within_few_cycles(changes):
+    solution, other = run("textured_slider", changes), solve(load_scene("textured_slider", changes), method="active-set")
+    assert solution.converged and other.converged
+    if solution.settings["took_over"]:
+        assert solution.settings["took_over"] == "active-set" and solution.settings["details"]["cycles"] <= 5
+        assert "stalled" in solution.message
+    agree(solution, other, 1e-5)
+    solution.destroy()
+    other.destroy()
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    seed=st.integers(0, 10**6),
+    amplitude=st.floats(0, 12e-6),
+    p=st.sampled_from([0.0, 1e3, 1e5, 1e6]),
+    U=st.floats(0.05, 50),
+    nx=st.integers(1, 40),
+    ny=st.integers(1, 40),
+)
+def test_nothing_wrong_is_certified(seed, amplitude, p, U, nx, ny):
+    sides = {"p_a": p, "p_b": p, "p_side": p}
+    changes = {"seed": seed, "amplitude": amplitude, "U": U, "nx": nx, "ny": ny, "cells": 15, **sides}
+    solution, other = (solve(load_scene("rough", changes), method=m, nested=None) for m in ("fas", "active-set"))
+    assert solution.converged, solution.message
+    agree(solution, other, 1e-4)
+    solution.destroy()
+    other.destroy()
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"cycle": "V"}, {"cycle": "W", "pre": 1, "post": 1}, {"truncation": "points"}, {"weights": "linear"}, {"pre": 0}],
+)
+def test_options_change_the_way_and_not_the_answer(options):
+    ours, other = run("problem4", {"n": 50}, options=options), run("problem4", {"n": 50})
+    assert ours.converged and other.converged
+    assert ours.settings["details"]["convergence_factor"] != other.settings["details"]["convergence_factor"]
+    agree(ours, other)
+    ours.destroy()
+    other.destroy()
+
+
+@pytest.mark.parametrize(
+    "options, message",
+    [
+        ({"cycle": "X"}, "fas.cycle = X: allowed are V, F, W"),
+        ({"truncation": "no"}, "fas.truncation = no: allowed are none, clip, points"),
+        ({"weights": "no"}, "fas.weights = no: allowed are harmonic, linear"),
+        ({"pre": -1}, "fas.pre = -1: at least 0 is needed"),
+        ({"pre": 0, "post": 0}, "fas.pre = fas.post = 0: at least one sweep is needed"),
+        ({"stall": 0.0}, "fas.stall = 0.0: allowed are numbers above 0, up to 1"),
+        ({"cycel": "V"}, "nearest is cycle"),
+    ],
+)
+def test_options_are_checked(options, message):
+    with pytest.raises(InputError, match=message.replace(".", r"\.")):
+        run("problem4", {"n": 9}, options=options)
+
+
+@pytest.mark.parametrize("choice", [{"system": "full"}, {"recipe_name": "mumps"}, {"nested": True}])
+def test_what_does_not_apply_is_refused(choice):
+    with pytest.raises(InputError, match="method fas"):
+        run("problem4", {"n": 9}, **choice)
+
+
+def test_json_and_a_start():
+    scene = load_scene("problem4", {"nx": 50, "ny": 41})
+    solution = solve(scene, method="fas")
+    data = as_dict(solution)
+    assert data["cycles"] == data["iterations"] - 1 and data["work_units"] > 6 and 0 < data["convergence_factor"] < 0.3
+    assert [(level["nx"], level["ny"]) for level in data["levels"]] == [(3, 5), (6, 5), (12, 10), (25, 20), (50, 41)]
+    assert data["levels"][-1]["iterations"] == data["iterations"]
+    assert data["system"] is None and data["recipe"] is None
+    again = solve(scene, method="fas", start=(solution.problem, solution.fields))
+    assert again.converged and again.iterations <= 2
+    for each in (solution, again):
+        each.destroy()
+
+
+def test_front_spans_are_all_points_near_a_front():
+    from lcp_lube.solvers.fas_kernels import front_spans
+
+    random = np.random.default_rng(1)
+    for _ in range(60):
+        ny, nx = random.integers(1, 30, 2)
+        width = int(random.integers(0, 5))
+        z = np.zeros((ny + 2, nx + 2))
+        full = random.random((ny, nx)) < random.choice([0.02, 0.5, 0.98])
+        z[1:-1, 1:-1] = np.where(full, 1.0, -1.0)
+        expected = np.zeros((ny, nx), dtype=bool)
+        for j, i in np.argwhere(full[:, :-1] != full[:, 1:]).tolist() + np.argwhere(full[:-1] != full[1:]).tolist():
+            expected[max(0, j - width) : j + width + 2, max(0, i - width) : i + width + 2] = True
+        spans, found = front_spans(z, width)
+        marked = np.zeros((ny, nx), dtype=bool)
+        for row, begin, end in spans[:found]:
+            marked[row - 1, begin - 1 : end - 1] = True
+        np.testing.assert_array_equal(marked, expected)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4])
+@pytest.mark.parametrize("down", [False, True])
+def test_fused_sweeps_are_sweeps_one_after_the_other(count, down):
+    from lcp_lube.solvers.fas_kernels import sweep
+
+    random = np.random.default_rng(2)
+    for ny, nx in ((1, 9), (2, 3), (7, 4), (12, 31)):
+        z, c = random.standard_normal((2, ny + 2, nx + 2))
+        kx, ky = random.random((ny + 2, nx + 3)) + 0.1, random.random((ny + 3, nx + 2)) + 0.1
+        expected = z.copy()
+        for _ in range(count):
+            for m in range(ny, 0, -1) if down else range(1, ny + 1):
+                for i in range(1, nx + 1):
+                    p, q = np.maximum(expected, 0), np.maximum(-expected, 0)
+                    t = c[m, i] + kx[m, i] * p[m, i - 1] + kx[m, i + 1] * p[m, i + 1] - q[m, i - 1]
+                    t += ky[m, i] * p[m - 1, i] + ky[m + 1, i] * p[m + 1, i]
+                    expected[m, i] = t / (kx[m, i] + kx[m, i + 1] + ky[m, i] + ky[m + 1, i]) if t > 0 else t
+        sweep(z, kx, ky, c, count, down)
+        np.testing.assert_allclose(z, expected, rtol=1e-12, atol=1e-12)
+
+
+@pytest.fixture(scope="module")
+def serial():
+    return {name: mpi_fas.run(name) for name in mpi_fas.CASES}
+
+
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_any_number_of_ranks(tmp_path: Path, serial, ranks):
+    """The same answer, and as many cycles to within one."""
+    job = start([str(Path(__file__).parent / "mpi_fas.py"), str(tmp_path)], ranks, tmp_path, timeout=200)
+    assert job.status == 0, job.err
+    record = json.loads((tmp_path / "record.json").read_text())
+    with np.load(tmp_path / "fields.npz") as fields:
+        for name, (expected, values) in serial.items():
+            found = record[name]
+            assert found["outcome"] == expected["outcome"] == "converged", (name, found["message"])
+            assert found["levels"] == expected["levels"], name
+            if expected["took_over"] is None:
+                assert found["took_over"] is None and abs(found["iterations"] - expected["iterations"]) <= 1, name
+            for field, whole in values.items():
+                tolerance = 1e-7 * max(np.abs(whole).max(), 1e-3)
+                np.testing.assert_allclose(fields[f"{name}_{field}"], whole, rtol=0, atol=tolerance, err_msg=name)
