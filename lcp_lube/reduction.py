@@ -94,6 +94,18 @@ def part_of(scene: Scene, problem: Problem) -> Part | None:
     return None
 
 
+def reduced_solve(scene: Scene, eps1: float = 1e-8, **how: Any) -> Solution:
+    """`api.solve` of what is left of a scene, whatever method is named. Collective."""
+    from .api import solve
+
+    problem = scene.build(how.get("comm"))
+    part = part_of(scene, problem)
+    if part is None:
+        problem.destroy()
+        return solve(scene, **how)
+    return solve_part(part, problem, solve, eps1, **how)  # type: ignore[arg-type]
+
+
 def solve_part(part: Part, problem: LubricationProblem, solve: Callable[..., Solution], eps1: float, **how: Any) -> Solution:
     """The whole problem's solution from its part's. Collective.
 
@@ -118,7 +130,8 @@ def solve_part(part: Part, problem: LubricationProblem, solve: Callable[..., Sol
         return Solution(problem, fields, outcome, "nothing to solve", certificate, [], settings)
     if how.get("start") is not None:
         small = part.build(problem.grid.dm.comm)
-        near = problem.prolong(*how["start"], False)
+        neighbour, found = how["start"]
+        near = problem.prolong(neighbour, found, False)
         take = _Pick(problem.grid, small.grid, *_numbers(small.grid))
         how["start"] = (small, {name: take(values) for name, values in near.items()})
     solution = solve(part, **how)

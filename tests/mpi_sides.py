@@ -9,6 +9,7 @@ from mpi4py import MPI
 from side_scenes import SCENES
 
 from lcp_lube import load_scene, solve
+from lcp_lube.reduction import reduced_solve
 
 KEYS = ("load", "friction", "p_max", "cavitated_fraction")
 
@@ -20,7 +21,7 @@ def main(folder: Path) -> None:
             (folder / f"{name}.toml").write_text(text)
         MPI.COMM_WORLD.barrier()
         scene = load_scene(folder / f"{name}.toml")
-        auto, whole = solve(scene, nested=False), solve(scene, method="active-set", nested=False)
+        auto, whole = (solver(scene, method="active-set", nested=False) for solver in (reduced_solve, solve))
         worst = max(
             auto.problem.reduce.max(np.abs(auto.fields[key] - whole.fields[key])) / max(1.0, whole.problem.reduce.max(field))
             for key, field in whole.fields.items()
