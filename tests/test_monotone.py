@@ -103,24 +103,16 @@ def test_last_resort_of_auto(film, monkeypatch):
     from lcp_lube.solvers.fas import Fas
     from lcp_lube.solvers.steplength import StepLengthError
 
-    advance, taken = ActiveSet.advance, []
-
-    def give_up(self):
-        taken.append(1)
-        if len(taken) > 2:
-            raise StepLengthError("made to cycle")
-        return advance(self)
-
     def fail(self):
         raise StepLengthError("made to fail")
 
-    monkeypatch.setattr(ActiveSet, "advance", give_up)
+    monkeypatch.setattr(ActiveSet, "advance", fail)
     monkeypatch.setattr(DinPc, "advance", fail)
     monkeypatch.setattr(Fas, "advance", fail)
     solution = solve(load_scene(*HARD[film]))
     assert solution.converged, solution.message
     assert solution.settings["took_over"] == "monotone"
-    assert "made to cycle" in solution.message and "made to fail" in solution.message
+    assert solution.message.count("made to fail") >= 2
     solution.destroy()
 
 
