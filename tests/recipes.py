@@ -3,8 +3,10 @@
 import argparse
 from typing import Any
 
+import pytest
+
 from lcp_lube.arguments import parse
-from lcp_lube.registry import recipe_line
+from lcp_lube.registry import read_recipe, recipe_line
 
 # Those that do not suit the problem which their first line leads to.
 SUITED = {
@@ -30,11 +32,23 @@ def one_rank(name: str) -> bool:
     return "one rank" in recipe_line(name)
 
 
+def lacking(name: str) -> str:
+    """The solver package that a recipe asks for and this PETSc was built without; empty if there is none."""
+    from petsc4py import PETSc
+
+    packages = {"hypre", "ml", "mumps", "superlu", "superlu_dist", "umfpack", "klu"} & set(read_recipe(name).values())
+    names = {"umfpack": ("umfpack", "suitesparse"), "klu": ("klu", "suitesparse")}
+    has = PETSc.Sys.hasExternalPackage
+    return ", ".join(sorted(p for p in packages if not any(map(has, names.get(p, (p,))))))
+
+
 def attempt(name: str, max_it: int = 60) -> dict[str, Any]:
     """Outcome of a recipe's example and the options that nobody had read by its last step. Collective."""
     from lcp_lube.cli import solution_of
     from lcp_lube.linear.options import unread
 
+    if package := lacking(name):
+        return {"lacks": package}
     left: list[list[str]] = []
     solution = solution_of(example(name, max_it), lambda k, step: left.append(unread()))
     result = {
@@ -49,6 +63,8 @@ def attempt(name: str, max_it: int = 60) -> dict[str, Any]:
 
 def faults(name: str, result: dict[str, Any], outcomes: tuple[str, ...] = ("converged",)) -> list[str]:
     """What is wrong with a result; a recipe whose first line says that it fails may fail."""
+    if "lacks" in result:
+        pytest.skip(f"this PETSc has no {result['lacks']}")
     wrong = [f"option -{option} goes unread" for option in result["unread"]]
     if result["recipe"] != name:
         wrong.append(f"ran as {result['recipe']}")
