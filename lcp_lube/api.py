@@ -14,6 +14,8 @@ from .checkpoint import CHOICES, Checkpointer, load
 from .errors import InputError
 from .linear.options import recipe, set_names
 from .linear.stages import Stages
+from .memory import check as check_memory
+from .memory import resident
 from .march import march
 from .problems.box import BoxProblem
 from .problems.problem import LubricationProblem
@@ -44,6 +46,7 @@ def solve(
     nested: bool | None = None,
     start: tuple[Problem, Fields] | None = None,
     certify: bool = False,
+    memory_check: bool = True,
     checkpoint: str | Path | None = None,
     every: int = 1,
     resume: str | Path | None = None,
@@ -66,6 +69,7 @@ def solve(
     checkpoint, every : write the iterate to this file after every so many steps; see `checkpoint`.
     resume : go on from such a file, as if the run had not been stopped. What is not given anew is as it was begun with.
     certify : also prove a band around the answer (`Solution.enclosure`), for the price of one linear solve at most.
+    memory_check : refuse a run that needs more memory than there is, by an estimate (`memory`).
 
     Returns
     -------
@@ -77,6 +81,7 @@ def solve(
     """
     begin = perf_counter()
     stages = Stages()
+    before = resident()
     with stages("setup"):
         if getattr(scene, "family", "user") != "user":  # whose data are each rank's own
             asked = (scene, method, system, recipe_name, stopping, options, nested, start is None)
@@ -98,7 +103,7 @@ def solve(
     # Who names a method, a matrix or an inner solver means those of the whole scene.
     named = (method, system) != ("auto", "auto") or recipe_name or options or {"ksp_type", "pc_type"} & set_names()
     if not (named or certify or checkpoint or resume) and (part := part_of(scene, problem)):
-        how = {"stopping": stopping, "monitor": monitor, "comm": comm, "nested": nested, "start": start}
+        how = {"stopping": stopping, "monitor": monitor, "comm": comm, "nested": nested, "start": start, "memory_check": memory_check}
         solution = solve_part(part, problem, solve, stopping.eps1, **how)
         if solution.outcome is not Outcome.WRONG_SOLUTION:
             solution.times["total"] = perf_counter() - begin
@@ -114,6 +119,7 @@ def solve(
         shapes, levels, near = saved.shapes, saved.record["levels"], None
     keeper.begin(scene, (chosen.method, chosen.system, recipe_name, chosen.nested, options or {}))
     with recipe(chosen.recipe) as recipe_used:
+        memory = check_memory(problem, chosen, before, memory_check)
         for shape in shapes:
             finest = shape == shapes[-1]
             level_begin = perf_counter()
@@ -209,7 +215,8 @@ def solve(
             "recipe": recipe_used,
             "ksp_type": ksp_type,
             "pc_type": pc_type,
-            "why": chosen.why,
+            "why": [*chosen.why, memory.sentence] if memory else chosen.why,
+            **(memory.settings if memory else {}),
             "details": {key: value for key, value in details.items() if key != "levels"},
         },
         times={**stages.seconds, "total": perf_counter() - begin},

@@ -117,6 +117,7 @@ def parse(own: list[str]) -> argparse.Namespace:
     _scene_options(solve)
     solve.add_argument("--method", default="auto", help="see 'lcp-lube list'; default auto")
     solve.add_argument("--recipe", help="inner solver: options/NAME.opts; explicit PETSc options win over it")
+    solve.add_argument("--no-memory-check", action="store_true", help="begin even if the estimate says that memory is too short")
     solve.add_argument(
         "--certify", action="store_true", help="prove how far the answer is from the exact discrete solution at most (films)"
     )

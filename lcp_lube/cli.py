@@ -91,6 +91,7 @@ def solution_of(args: argparse.Namespace, monitor: Monitor | None = None) -> Sol
         "monitor": monitor,
         "nested": args.nested,
         "certify": args.certify,
+        "memory_check": not args.no_memory_check,
     }
     if getattr(scene, "balance", None) is not None:
         for option in ("accuracy", "checkpoint", "resume"):

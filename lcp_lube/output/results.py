@@ -49,6 +49,7 @@ def as_dict(solution: Solution) -> dict[str, Any]:
         **settings.get("details", {}),
         **({"levels": solution.levels} if solution.levels else {}),
         "memory_mb": peak_memory(solution),
+        **{key: settings.get(key) for key in ("memory_estimate_mb", "memory_base_mb")},
         "time_s": {
             "total": times.get("total"),
             "setup": times.get("setup"),

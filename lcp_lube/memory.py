@@ -1,0 +1,195 @@
+"""How much memory a run takes, estimated before it starts, and how much there is.
+
+A run's peak is what the process holds before it (Python, PETSc and their libraries, about 100 MB a rank), the compiler of
+the sweeps where they are used, and so many bytes a point for data, matrix and inner solver. Those are measured
+(benchmarks/memory.py prints them beside the estimates); a direct solver's grow with the logarithm of the points in 2D.
+A fallback that takes over with a direct solver is not in the estimate: it may need more.
+"""
+
+import os
+import sys
+from dataclasses import dataclass
+from importlib.util import find_spec
+from math import log2
+from pathlib import Path
+
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from .auto import Plan
+from .errors import InputError
+from .problems.solution import Problem
+
+MB = 2**20
+COMPILER = 113 * MB  # numba and LLVM, once they are loaded
+LIBRARIES = 5 * MB  # pages of PETSc and its packages that only a solve touches
+DENSE = 24.5  # bytes for an entry of a dense Jacobian: it, its factors, a copy of them
+
+# Bytes a point by (kind of problem and dimension, system, inner solver): a + b log2(points).
+MEASURED: dict[tuple[str, str, str], tuple[float, float]] = {
+    ("lubrication 1D", "reduced", "petsc"): (740, 0),
+    ("lubrication 1D", "reduced", "mumps"): (1400, 0),
+    ("lubrication 1D", "reduced", "light"): (740, 0),
+    ("lubrication 1D", "full", "superlu"): (1490, 0),
+    ("lubrication 1D", "full", "umfpack"): (1300, 0),
+    ("lubrication 1D", "full", "klu"): (800, 0),
+    ("lubrication 1D", "full", "mumps"): (1250, 0),
+    ("lubrication 1D", "full", "light"): (750, 0),
+    ("lubrication 2D", "", ""): (270, 0),
+    ("lubrication 2D", "cavity", "multigrid"): (800, 0),
+    ("lubrication 2D", "reduced", "multigrid"): (1040, 0),
+    ("lubrication 2D", "reduced", "umfpack"): (410, 82),
+    ("lubrication 2D", "reduced", "superlu"): (900, 75),
+    ("lubrication 2D", "reduced", "mumps"): (1400, 0),
+    ("lubrication 2D", "reduced", "light"): (900, 0),
+    ("lubrication 2D", "full", "umfpack"): (430, 110),
+    ("lubrication 2D", "full", "superlu"): (640, 127),
+    ("lubrication 2D", "full", "mumps"): (-6400, 670),
+    ("lubrication 2D", "full", "light"): (830, 0),
+    ("lubrication 2D", "full", "multigrid"): (1350, 0),
+    ("box 2D", "jacobian", "multigrid"): (920, 0),
+    ("box 2D", "jacobian", "umfpack"): (1330, 0),
+    ("equations 2D", "jacobian", "multigrid"): (550, 0),
+    ("equations 2D", "jacobian", "umfpack"): (1310, 0),
+}
+MULTIGRID = ("hypre", "ml", "gamg", "mg")
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Bytes of all ranks together: base, what they hold before the first point (libraries, compiler), and the peak."""
+
+    base: int
+    peak: int
+
+    @property
+    def sentence(self) -> str:
+        return f"memory: about {self.peak / MB:.0f} MB, {self.base / MB:.0f} MB of it whatever the number of points"
+
+    @property
+    def settings(self) -> dict[str, float]:
+        """For the JSON."""
+        return {"memory_base_mb": self.base / MB, "memory_estimate_mb": self.peak / MB}
+
+
+def resident() -> int:
+    """Bytes that this process holds in memory now."""
+    try:
+        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    except (OSError, ValueError, IndexError):
+        return 100 * MB
+
+
+def available() -> int:
+    """Bytes that this machine, or the control group that the process runs in, can still give."""
+    free = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    try:
+        lines = dict(line.split(":") for line in Path("/proc/meminfo").read_text().splitlines())
+        free = int(lines["MemAvailable"].split()[0]) * 1024
+    except (OSError, ValueError, KeyError):
+        pass
+    return min([free, *_groups(Path("/proc/self/cgroup"), Path("/sys/fs/cgroup"))])
+
+
+def _groups(own: Path, root: Path) -> list[int]:
+    """What the control groups above this process leave it, those that have a limit. Versions 1 and 2.
+
+    Pages of files that could be dropped count as used by a group, but can be had.
+    """
+    left = []
+    try:
+        groups = [line.strip().split(":", 2) for line in own.read_text().splitlines()]
+    except OSError:
+        return []
+    for _, controllers, path in groups:
+        if controllers == "":
+            base, names = root, ("memory.max", "memory.current", "inactive_file")
+        elif "memory" in controllers.split(","):
+            base, names = root / "memory", ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file")
+        else:
+            continue
+        folder = base / path.lstrip("/")
+        for place in (folder, *folder.parents):
+            try:
+                limit, used = ((place / name).read_text().strip() for name in names[:2])
+                stat = dict(line.split() for line in (place / "memory.stat").read_text().splitlines())
+                if limit != "max":
+                    left.append(max(0, int(limit) - int(used) + int(stat.get(names[2], 0))))
+            except (OSError, ValueError):
+                pass
+            if place == base:
+                break
+    return left
+
+
+def inner_solver() -> str:
+    """The kind of inner solver that the options in force describe, as `MEASURED` names it. No option counts as read by it."""
+    options = PETSc.Options().getAll()
+    pc = options.get("pc_type", "")
+    if pc in ("lu", "cholesky"):
+        return options.get("pc_factor_mat_solver_type", "petsc")
+    if any(value in MULTIGRID for name, value in options.items() if name.endswith("pc_type")):
+        return "multigrid"
+    return "light"
+
+
+def bytes_needed(problem: Problem, plan: Plan) -> float | None:
+    """Bytes that a run takes for its points, all ranks together; None if nothing is known of such runs.
+
+    An inner solver that was not measured counts as the most expensive one of the same system.
+    """
+    points, kind = problem.grid.size, f"{problem.kind} {problem.grid.dim}D"
+    if getattr(problem, "dense", False):
+        return DENSE * points**2 * (problem.grid.comm.size if plan.recipe == "redundant_lu" else 1)
+    solver = inner_solver() if plan.system else ""
+    known = {name: fit for (of, system, name), fit in MEASURED.items() if (of, system) == (kind, plan.system)}
+    if not known:
+        return None
+    fits = [known[solver]] if solver in known else list(known.values())
+    each = max(max(a + b * log2(points), 200.0) for a, b in fits)
+    options = PETSc.Options().getAll()
+    if solver == "light" and options.get("ksp_type", "gmres") == "gmres":
+        unknowns = 2 if plan.system == "full" else 1
+        each += 8 * unknowns * min(int(options.get("ksp_gmres_restart", "30")), 200)
+    return each * points
+
+
+def _libraries(problem: Problem, plan: Plan) -> int:
+    """Bytes of what a rank loads in the course of such a run."""
+    compiles = plan.system in ("", "cavity") or (plan.nested and plan.method in ("active-set", "monotone"))
+    if problem.kind == "lubrication" and compiles and "numba" not in sys.modules and find_spec("numba"):
+        return LIBRARIES + COMPILER
+    return LIBRARIES
+
+
+def check(problem: Problem, plan: Plan, before: int, refuse: bool = True) -> Estimate | None:
+    """The run's estimate. Collective.
+
+    Parameters
+    ----------
+    plan : how the run goes; the options of its recipe are in force.
+    before : `resident` before the problem was built.
+    refuse : whether a run that cannot fit is refused.
+
+    Raises
+    ------
+    InputError : on some machine the ranks need more than it has left.
+    """
+    needed, comm = bytes_needed(problem, plan), problem.grid.comm
+    if needed is None:
+        return None
+    fixed = _libraries(problem, plan)
+    base = comm.allreduce(before + fixed)
+    machine = comm.Split_type(MPI.COMM_TYPE_SHARED)
+    share = (needed / comm.size + fixed) * machine.size
+    built = machine.allreduce(resident() - before)  # part of what is needed, and no longer available
+    left = machine.allreduce(available(), MPI.MIN) + built
+    machine.Free()
+    short, there = comm.allreduce((share > left, -left), MPI.MAX)
+    if short and refuse:
+        raise InputError(
+            f"{problem.grid.size} points need about {needed / 1e9:.3g} GB with method {plan.method}"
+            f"{f' on the {plan.system} system' if plan.system else ''}, {-there / 1e9:.3g} GB are available; "
+            f"take fewer points, another method or --no-memory-check"
+        )
+    return Estimate(base, base + int(needed))
