@@ -26,7 +26,7 @@ from lcp_lube import load_scene
 from lcp_lube.chart import precision
 from lcp_lube.chart.experiment import environment, open_store, scene_key
 from lcp_lube.chart.known import FilmScene, known_answer
-from lcp_lube.chart.precision_picture import PEER
+from lcp_lube.chart.precision_words import PEER
 from lcp_lube.compare import read_off
 from lcp_lube.problems.problem import LubricationProblem
 

@@ -17,7 +17,7 @@ from lcp_lube.chart.map_picture import Axis, Panels, tick
 from lcp_lube.chart.map_picture import picture as map_picture
 from lcp_lube.chart.outcome_map import tallies, tally
 from lcp_lube.chart.precision_picture import against_seconds
-from lcp_lube.chart.precision_words import cheapest, error, fastest, front, loose, seconds, sentence
+from lcp_lube.chart.precision_words import cheapest, error, fastest, front, loose, seconds, sentence, which
 from lcp_lube.chart.reference import WRONG, References
 from lcp_lube.chart.starts_picture import apart, chosen, converged, equal_starts, lines_sentence, map_sentence
 from lcp_lube.errors import InputError
@@ -122,6 +122,9 @@ def test_words_name_the_cheapest_run(quick: Path) -> None:
     assert any(line.startswith(f"  fastest within 0.1 %: {best['method']}") for line in lines)
     assert sum(line.startswith("problem") for line in lines) == 2
     assert best["method"] in sentence(rows, "load")
+    other = {**best, "system": "peer", "method": "another code", "wall_s": str(3 * seconds(best)), "cpu_s": "1e9"}
+    found = next(line for line in which([*rows, other]) if line.startswith("| problem1 | 1 %"))
+    assert "| another code, 3 times |" in found
 
 
 def test_failures_are_rows_and_crosses(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -19,6 +19,7 @@ from ..cli import say
 from ..compare import errors
 from ..errors import InputError
 from ..output.resumable import ResumableCsv, Row
+from ..problems.solution import Outcome
 from ..registry import METHODS
 from ..scene import Scene, load_scene
 from ..solvers.newton import Stopping
@@ -26,7 +27,7 @@ from .experiment import KRYLOV_LIMIT, open_store, run, scene_key
 from .known import FilmScene, Known, known_answer, on_grid
 from .log import write_log
 from .precision_picture import draw_all, seconds
-from .precision_words import cheapest, sentence
+from .precision_words import cheapest, sentence, which
 
 SCENES = ("problem1", "problem2", "problem3", "parabolic_slider", "journal", "problem4", "textured_slider")
 SIZES = {1: (50, 100, 200, 500, 1000, 2000, 5000), 2: (31, 63, 127, 255, 511)}  # points a side by dimension
@@ -133,7 +134,8 @@ def chart(sources: Sequence[str], quick: bool = False, results: Path = Path("lcp
     say(table)
     pictures = draw_all(rows, results / stem, store.comm)
     if not quick:
-        write_log(results, "precision", rows, f"{sentence(rows, 'load')}\n\n```text\n{table}\n```", pictures)
+        text = "\n".join([sentence(rows, "load"), "", *which(rows), "", "```text", table, "```"])
+        write_log(results, "precision", rows, text, pictures)
     say(
         f"{', '.join(map(str, pictures))}: {len(rows)} runs, {len(store.rows) - before} of them new; the others stood in "
         f"{store.path} (remove it to run them again)."
@@ -162,7 +164,7 @@ class Bench:
         self._warm: set[str] = set()
 
     def fill(self, store: ResumableCsv, configuration: Configuration, sizes: Sequence[int]) -> None:
-        """Make a configuration's runs on all its grids, from small to large, up to one past the Krylov limit. Collective."""
+        """Make a configuration's runs on all its grids, from small to large, up to one past a limit of iterations. Collective."""
         choices: dict[str, Any] = {
             "method": configuration.method,
             "system": configuration.system,
@@ -175,7 +177,7 @@ class Bench:
                 return
             scene = self.scene.with_shape((n,) * len(self.scene.shape))
             row = self.row(store, {**configuration.key, "n": n}, scene, **choices)
-            if row is None or row["outcome"] == KRYLOV_LIMIT:
+            if row is None or row["outcome"] in (KRYLOV_LIMIT, Outcome.MAX_ITERATIONS):
                 return
 
     def accuracy(self, store: ResumableCsv, tol: float) -> None:
@@ -203,7 +205,7 @@ class Bench:
     def measure(self, scene: Scene, choices: dict[str, Any]) -> dict[str, Any]:
         """A run, its errors and the medians of the repeats' seconds. Collective."""
         kind = f"{choices.get('method')} {choices.get('system')} {choices.get('recipe_name')}"
-        if kind not in self._warm:  # what is compiled and loaded at first use is so before a clock runs
+        if self.repeats > 1 and kind not in self._warm:  # what is compiled and loaded at first use is so before a clock runs
             self._warm.add(kind)
             small = QUICK_SIZES[len(scene.shape)][0]
             run(scene.with_shape((small,) * len(scene.shape)), KRYLOV_MOST, **choices)

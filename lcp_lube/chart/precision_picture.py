@@ -12,7 +12,7 @@ from mpi4py import MPI
 from ..output.resumable import Row
 from ..registry import METHODS
 from .drawing import MARKERS, look, new_figure, save
-from .precision_words import ASKED, by_scene, error, fastest, front, loose, percent, seconds, sentence, time
+from .precision_words import ASKED, PEER, by_scene, error, fastest, front, loose, percent, seconds, sentence, time
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,7 +24,6 @@ AXES = {
     "rupture": "error of the rupture point / L",
 }
 COLUMNS = 2
-PEER = "peer"  # what stands in the column `system` for other codes
 
 
 def draw_all(rows: Sequence[Row], stem: Path, comm: MPI.Comm) -> list[Path]:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from ..output.resumable import Row
 
 LEVELS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+PEER = "peer"  # what stands in the column `system` for other codes
 ASKED = (1e-2, 1e-4)  # what the pictures answer: a per cent, a hundredth of it
 
 
@@ -68,6 +69,25 @@ def cheapest(rows: Sequence[Row]) -> list[str]:
             run = fastest(mine, level)
             if run:
                 lines.append(f"  fastest within {percent(level)}: {describe(run)}")
+    return lines
+
+
+def which(rows: Sequence[Row], quantity: str = "load") -> list[str]:
+    """Which method when, as a table in Markdown: the fastest run for each of ASKED, and how much longer others take."""
+    lines = ["| scene | error of the load | fastest | s | paper's DIN | other codes |", "|---|---|---|---|---|---|"]
+    for scene, mine in by_scene(rows).items():
+        for level in ASKED:
+            best = fastest(mine, level, quantity)
+            if best is None:
+                lines.append(f"| {scene} | {percent(level)} | no run gets there | | | |")
+                continue
+            rivals = []
+            for theirs in ([row for row in mine if row["method"] == "din"], [row for row in mine if row["system"] == PEER]):
+                rival = fastest(theirs, level, quantity)
+                label = f"{rival['method']}, " * (rival["system"] == PEER) if rival else ""
+                rivals.append(f"{label}{seconds(rival) / seconds(best):.2g} times" if rival else "-")
+            name = describe(best).rpartition(": ")[0]
+            lines.append(f"| {scene} | {percent(level)} | {name} | {time(best)} | {' | '.join(rivals)} |")
     return lines
 
 
