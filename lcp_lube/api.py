@@ -17,6 +17,7 @@ from .linear.stages import Stages
 from .memory import check as check_memory
 from .memory import resident
 from .march import march
+from .piezo import solve_fluid
 from .problems.box import BoxProblem
 from .problems.problem import LubricationProblem
 from .problems.solution import Fields, Outcome, Problem, Solution
@@ -100,6 +101,14 @@ def solve(
         raise InputError(f"--certify: scene {scene.name} is no film with cavitation, for which alone the theorem holds")
     if not isinstance(stopping, Stopping):
         stopping = Stopping(**{**dict(zip(("eps1", "eps2"), entry.eps, strict=True)), **(stopping or {})})
+    if law := getattr(getattr(scene, "model", None), "law", None):
+        problem.destroy()
+        if checkpoint or resume or certify:
+            raise InputError(f"--checkpoint, --resume, --certify: not for {scene.name}, whose fluid depends on the pressure")
+        how = {"method": method, "system": system, "recipe_name": recipe_name, "options": options, "monitor": monitor}
+        solution = solve_fluid(scene, law, solve, stopping, **how, comm=comm, nested=nested, start=start)
+        solution.times["total"] = perf_counter() - begin
+        return solution
     # Who names a method, a matrix or an inner solver means those of the whole scene.
     named = (method, system) != ("auto", "auto") or recipe_name or options or {"ksp_type", "pc_type"} & set_names()
     if not (named or certify or checkpoint or resume) and (part := part_of(scene, problem)):
@@ -164,7 +173,7 @@ def solve(
             break
         failed.append((outcome, message, [astuple(step) for step in more]))
         failures += f"{took_over or chosen.method} failed ({message}); "
-        rescue = METHODS[name]
+        rescue = METHODS[name].of(problem.kind)
         # Interior methods converge from anywhere, and only direct inner solves keep up with them on films like this one.
         system, inner = rescue.systems[0], default_recipe(problem, rescue.systems[0], large=False)[0]
         if not chosen.system and not rescue.interior:  # a method without linear systems hands over what it has reached

@@ -11,6 +11,7 @@ from pydantic import Field, field_validator, model_validator
 from .balance import BalanceTable
 from .errors import InputError
 from .problems.exact import ExactSolution, exact_solution
+from .problems.fluid import Law
 from .problems.model import NAMES, OPPOSITE, Model, Side
 from .problems.problem import LubricationProblem
 from .problems.shapes import Block, Sum
@@ -26,6 +27,8 @@ class Fluid(Measured):
 
     mu: Positive = Field(..., description="viscosity, Pa s")
     p_c: Finite = Field(0.0, description="cavitation pressure, Pa")
+    barus: Annotated[Finite, Field(ge=0, lt=1e-3)] = Field(0.0, description="viscosity is mu exp(barus (p - p_c)), 1/Pa")
+    density: Literal["constant", "dowson-higginson"] = Field("constant", description="how the density depends on the pressure")
     p_supply: Finite | None = Field(None, description="pressure of the sides that name none, Pa; default p_c")
 
 
@@ -162,7 +165,13 @@ class BearingScene(Measured, Scene):
             scheme=self.scheme,
             mean_cubes=self.mean_cubes,
             exact=self.exact,
+            law=self._law,
         )
+
+    @property
+    def _law(self) -> Law | None:
+        law = Law(self.fluid.barus, self.fluid.density != "constant")
+        return None if law == Law() else law
 
     def _pressure_unit(self, gap: Sum) -> float:
         """The power of ten next to mu U L/h^2 with the thinnest film: p and r are then of like size."""
@@ -176,7 +185,7 @@ class BearingScene(Measured, Scene):
 
     def exact(self) -> ExactSolution | None:
         gap, (west, east, *_) = self.gap, self._sides()
-        if self.dimension == 2 or {west.kind, east.kind} != {"open"} or west.r or not gap.smooth_between:
+        if self.dimension == 2 or {west.kind, east.kind} != {"open"} or west.r or not gap.smooth_between or self._law:
             return None
         return exact_solution(gap, self.L, self.fluid.mu, self.U, west.p, east.p)
 

@@ -10,6 +10,7 @@ from petsc4py import PETSc
 from ..errors import InputError
 from ..parallel import Array
 from .exact import ExactSolution
+from .fluid import Law
 from .grid import Grid
 from .problem import LubricationProblem
 from .reynolds import Film, box_scheme
@@ -53,6 +54,7 @@ class Model:
     scheme: str
     mean_cubes: bool = False
     exact: Callable[[], ExactSolution | None] | None = None
+    law: Law | None = None  # a fluid that depends on the pressure; `build` makes the problem of the constant one
 
     def __post_init__(self) -> None:
         used = dict(zip(NAMES, self.sides, strict=True) if len(self.lengths) == 2 else zip(NAMES[:2], self.sides, strict=False))
