@@ -99,6 +99,16 @@ def clean_options() -> Iterator[None]:
     assert not left, f"the test left PETSc options behind: {left}"
 
 
+@pytest.fixture(autouse=True)
+def hypre(request: pytest.FixtureRequest) -> None:
+    """`@pytest.mark.hypre`: skipped where PETSc was built without it."""
+    if request.node.get_closest_marker("hypre"):
+        from petsc4py import PETSc
+
+        if not PETSc.Sys.hasExternalPackage("hypre"):
+            pytest.skip("this PETSc has no hypre")
+
+
 @pytest.fixture
 def petsc_options() -> Iterator[Callable[..., None]]:
     """`petsc_options(ksp_type="gmres")` sets PETSc options for one test, as the command line would."""

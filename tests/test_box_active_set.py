@@ -109,7 +109,7 @@ def test_newton_without_bounds_in_contact_is_newton():
     without.destroy()
 
 
-@pytest.mark.parametrize("recipe_name", ["bcgs_amg", "bcgs_ilu", "bcgs_jacobi"])
+@pytest.mark.parametrize("recipe_name", [pytest.param("bcgs_amg", marks=pytest.mark.hypre), "bcgs_ilu", "bcgs_jacobi"])
 def test_any_inner_solver(recipe_name):
     solution = obstacle({**BOTH, "n": 31}, recipe_name=recipe_name)
     assert solution.converged and solution.total("linear_iterations") > 0

@@ -38,6 +38,7 @@ def rows_of(path):
         return list(csv.DictReader(file))
 
 
+@pytest.mark.hypre
 def test_cases_are_kept_and_not_run_again(tmp_path, monkeypatch):
     words = [sys.executable, str(BENCHMARKS / "performance.py"), "line", "--quick", "--results", str(tmp_path)]
     first = subprocess.run(words, capture_output=True, text=True, timeout=120)
@@ -54,6 +55,7 @@ def test_cases_are_kept_and_not_run_again(tmp_path, monkeypatch):
     assert rows_of(tmp_path / "performance_quick.csv") == rows
 
 
+@pytest.mark.hypre
 def test_a_case_that_breaks_is_a_row(tmp_path, monkeypatch):
     monkeypatch.setattr(performance, "cases", lambda *_: [performance.Case("line", "problem1", {"n": -1}, ("default",))])
     monkeypatch.setattr(sys, "argv", ["performance.py", "line", "--quick", "--results", str(tmp_path)])
@@ -70,6 +72,7 @@ def test_printed_seconds_of_the_paper():
     assert performance.printed(case, "active-set", "reduced", "superlu") == ""
 
 
+@pytest.mark.hypre
 def test_chart_scaling(cli):
     run = cli("chart", "scaling", "--quick", ranks=2, timeout=120)
     assert run.status == 0, run.err

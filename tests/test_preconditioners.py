@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from mpi_preconditioners import gathered, main
+from recipes import lacking
 
 from lcp_lube import load_scene, solve
 from lcp_lube.errors import InputError
@@ -106,12 +107,15 @@ def run(scene: str, recipe_name: str | None, method: str = "din", eps: float = 1
 @pytest.mark.parametrize("name", RECIPES)
 @pytest.mark.parametrize("scene, changes", [("problem1", {"n": 40}), ("problem4", {"nx": 17, "ny": 13})], ids=["line", "plane"])
 def test_the_result_does_not_depend_on_the_preconditioner(name, scene, changes):
+    if package := lacking(name):
+        pytest.skip(f"this PETSc has no {package}")
     direct, other = run(scene, "umfpack", **changes), run(scene, name, **changes)
     assert other.converged, other.message
     np.testing.assert_allclose(other.p, direct.p, atol=1e-7 * direct.p.max())
     np.testing.assert_allclose(other.r, direct.r, atol=1e-6)
 
 
+@pytest.mark.hypre
 @pytest.mark.parametrize("method", ["din", "fbn-a", "fbn-i"])
 def test_full_augmentation_with_multigrid_suits_every_method(method):
     """Also where a diagonal is exactly 0, as in Fischer-Burmeister systems; a handful of iterations a step."""
@@ -120,6 +124,7 @@ def test_full_augmentation_with_multigrid_suits_every_method(method):
     assert solution.total("linear_iterations") <= 4 * solution.iterations
 
 
+@pytest.mark.hypre
 def test_multigrid_counts_do_not_grow_with_the_grid():
     def count(n: int) -> float:
         solution = run("problem4", "fieldsplit_schur", eps=1e-4, n=n)
@@ -181,6 +186,7 @@ class FakePC:
         return "a test"
 
 
+@pytest.mark.hypre
 def test_multiplicative_split_fails_and_says_so():
     """BoomerAMG on A, Jacobi on P: P vanishes in the cavity. The recipe's first line says so, and the outcome does."""
     assert "fails" in recipe_line("fieldsplit_multiplicative")
