@@ -136,6 +136,7 @@ def test_near_null_vector_of_a_hard_film():
     solution.destroy()
 
 
+@pytest.mark.hypre
 @pytest.mark.parametrize("name, changes", [("textured_slider", {"K": 5}), ("rough", {"n": 150, "amplitude": 4e-6})])
 def test_few_krylov_iterations_on_hard_films(name, changes, petsc_options):
     """At most 8 BiCGStab iterations to 1e-8 in every step, where plain multigrid takes ten times that."""
