@@ -99,7 +99,7 @@ class Judge:
 
     def by_another_method(self, case, kind, answer):
         """The same damaged scene solved by a method that has nothing in common with the one that was used."""
-        other = {"lubrication": "din-pc", "box": "semismooth"}.get(kind)
+        other = {"lubrication": "monotone", "box": "semismooth"}.get(kind)
         if other is None or kind not in METHODS[other].kinds:
             return None
         solution = solve(cli.scene_of(parse(case.words)), method=other, nested=False)

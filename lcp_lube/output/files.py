@@ -207,18 +207,21 @@ def _fault(path: Path, plot: bool) -> str:
         return "pictures need matplotlib: pip install lcp-lube[plot]"
     if suffix == ".h5" and not PETSc.Sys.hasExternalPackage("hdf5"):
         return "this PETSc was built without HDF5; use .npz, .vts or .vtr"
-    if path.is_dir():
-        return "is a folder"
-    if path.exists() and not path.is_file():
-        return "is no ordinary file"  # opening a pipe waits for ever, and a device would be replaced
-    if not folder.is_dir():
-        return f"folder {folder} does not exist"
     try:
+        if path.is_dir():
+            return "is a folder"
+        if path.exists() and not path.is_file():
+            return "is no ordinary file"  # opening a pipe waits for ever, and a device would be replaced
+        if not folder.is_dir():
+            return f"folder {folder} does not exist"
         with tempfile.TemporaryFile(dir=folder):  # by trying: permission bits say little about root and network disks
             pass
         if path.exists():
             with path.open("ab"):
                 pass
+        path.with_name(f".{path.stem}.0000000{suffix}").exists()  # as `replacing` names it
     except OSError as error:
         return f"cannot be written in {folder}: {error.strerror}"
+    except ValueError as error:  # a name that no file can have
+        return str(error)
     return ""
