@@ -20,7 +20,7 @@ from ..solvers.newton import Stopping
 from .experiment import FELL_BACK, KRYLOV_LIMIT, open_store, run
 from .log import write_log
 from .map_picture import Axis, Panels, chosen, converged, draw, groups, unique
-from .reference import Reference, References
+from .reference import WRONG, Reference, References
 
 COLUMNS = ("distance", "reference", "system", "cpu_s", "command")
 KRYLOV_MOST = 100_000
@@ -198,7 +198,9 @@ def judged(rows: Sequence[Row]) -> str:
     by_distance = [row for row in caught if "from the reference" in row["message"]]
     text = f"Certified answers are within {max(good):.0e} of the reference" if good else ""
     if caught:
-        text += f"; of {len(caught)} wrong ones the certificate saw {len(caught) - len(by_distance)}"
+        alarms = sum(float(row["distance"]) <= WRONG for row in caught)
+        text += f"; of {len(caught) - alarms} wrong ones the certificate saw {len(caught) - len(by_distance) - alarms}"
+        text += f"; it refused {alarms} that are as near as {WRONG:g}" * bool(alarms)
     without = len(rows) - len(known)
     return f"{text}{f'; {without} runs had no reference' * bool(without)}." if text else ""
 

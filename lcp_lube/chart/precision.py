@@ -164,7 +164,7 @@ class Bench:
         self._warm: set[str] = set()
 
     def fill(self, store: ResumableCsv, configuration: Configuration, sizes: Sequence[int]) -> None:
-        """Make a configuration's runs on all its grids, from small to large, up to one past a limit of iterations. Collective."""
+        """Make a configuration's runs on all its grids, from small to large, up to one at a limit of iterations. Collective."""
         choices: dict[str, Any] = {
             "method": configuration.method,
             "system": configuration.system,
