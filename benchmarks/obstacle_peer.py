@@ -1,4 +1,4 @@
-"""Obstacle Bratu with both obstacles touched: our nested active set against PETSc's own VI solver, side by side.
+"""Obstacle Bratu with both obstacles touched: our nested active set and multigrid, and PETSc's own VI solver, in turn.
 
     python benchmarks/obstacle_peer.py [--n 1023] [--repeats 3] [-ksp_type ... for the peer]
 
@@ -132,6 +132,17 @@ def ours(n: int) -> Result:
     return out
 
 
+def multigrid(n: int) -> Result:
+    """The scene by nonlinear multigrid."""
+    scene = load_scene("obstacle_bratu", {**SCENE, "n": n})
+    solution = solve(scene, method="fas", stopping={"eps1": 1e-9})
+    if not solution.converged or solution.settings["took_over"]:
+        raise RuntimeError(solution.message)
+    out = Result(solution.fields["v"], [level["iterations"] for level in solution.levels], [0])
+    solution.destroy()
+    return out
+
+
 def judge(n: int, v: np.ndarray) -> dict[str, Any]:
     """Natural residual of f as it stands, and of f/(dx dy) = -Lap v - lambda e^v (the stricter one by far); contact; sum."""
     problem = problem_of(n)
@@ -147,7 +158,7 @@ def judge(n: int, v: np.ndarray) -> dict[str, Any]:
 
 def run(n: int, repeats: int) -> list[dict[str, Any]]:
     """Both solvers in turn, `repeats` times; medians."""
-    solvers: dict[str, Callable[[int], Result]] = {"ours": ours, "peer": peer}
+    solvers: dict[str, Callable[[int], Result]] = {"ours": ours, "fas": multigrid, "peer": peer}
     seconds: dict[str, list[tuple[float, float]]] = {name: [] for name in solvers}
     found = {}
     for _ in range(repeats):
@@ -178,9 +189,10 @@ def main(arguments: argparse.Namespace) -> None:
     for row in rows:
         store.add({**row, "repeats": arguments.repeats, "load": f"{os.getloadavg()[0]:.1f}", "machine": machine()})
         print("  ".join(f"{name} {row[name]}" for name in COLUMNS))
-    first, second = rows
-    for clock in ("wall_s", "cpu_s"):
-        print(f"peer / ours, {clock}: {float(second[clock]) / float(first[clock]):.2f}")
+    *own, other = rows
+    for row in own:
+        for clock in ("wall_s", "cpu_s"):
+            print(f"peer / {row['solver']}, {clock}: {float(other[clock]) / float(row[clock]):.2f}")
 
 
 if __name__ == "__main__":

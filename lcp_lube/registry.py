@@ -129,10 +129,22 @@ METHODS: dict[str, MethodEntry] = {
     "fas": MethodEntry(
         "lcp_lube.solvers.fas:build",
         "nonlinear multigrid: full multigrid and a few cycles of sweeps, no matrix at all",
+        kinds=("lubrication", "box"),
         systems=(),
         interior=False,
         eps=(1e-8, inf),
         fallback=("active-set", "din-pc", "monotone"),
+        variants={
+            "box": MethodEntry(
+                "lcp_lube.solvers.box_fas:build",
+                "nonlinear multigrid between two obstacles: projected sweeps, coarse grids that know the bounds",
+                kinds=("box",),
+                systems=(),
+                interior=False,
+                eps=(1e-8, inf),
+                fallback=("active-set",),
+            )
+        },
     ),
     "monotone": MethodEntry(
         "lcp_lube.solvers.monotone:build",
@@ -187,7 +199,9 @@ STABILITY: dict[str, Entry] = {
     "conditions": Entry("lcp_lube.chart.conditions:chart", "all subsets of the step-length conditions F, R, C, B (DIN)"),
     "film_ratio": Entry("lcp_lube.chart.film_ratio:chart", "film ratio 1.1 to 1e4 by grid, every method"),
     "supply_speed": Entry("lcp_lube.chart.supply_speed:chart", "supply pressure by speed, every method"),
-    "inner_tolerance": Entry("lcp_lube.chart.inner_tolerance:chart", "loose inner solves by recipe, and what (31) says of them"),
+    "inner_tolerance": Entry(
+        "lcp_lube.chart.inner_tolerance:chart", "loose inner solves by recipe, and what (31) says of them"
+    ),
     "roughness": Entry("lcp_lube.chart.roughness:chart", "standard deviation of a random surface by grid, every method"),
     "turning_point": Entry("lcp_lube.chart.turning_point:chart", "lambda around the turning point of Bratu's equation"),
 }

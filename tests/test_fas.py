@@ -234,6 +234,37 @@ def test_fused_sweeps_are_sweeps_one_after_the_other(count, down):
         np.testing.assert_allclose(z, expected, rtol=1e-12, atol=1e-12)
 
 
+OBSTACLES = {
+    "both bounds": ("obstacle_bratu", {"v_upper": 0.3, "v_lower": "0.28 - 10*((x - 0.2)^2 + (y - 0.2)^2)"}),
+    "no contact": ("obstacle_bratu", {}),
+    "ball, values on the boundary": ("obstacle_ball", {}),
+    "held by the upper bound": ("obstacle_bratu", {"lambda": 7.5, "v_upper": 0.5}),
+}
+
+
+@pytest.mark.parametrize("shape", [(63, 63), (50, 71), (5, 4)])
+@pytest.mark.parametrize("case", OBSTACLES)
+def test_obstacle_problems(case, shape):
+    """The active set's answer, within the bounds, at a bounded factor."""
+    name, changes = OBSTACLES[case]
+    changes = {**changes, "nx": shape[0], "ny": shape[1]}
+    ours = run(name, changes, stopping={"eps1": 1e-9})
+    other = solve(load_scene(name, changes), method="active-set", stopping={"eps1": 1e-9})
+    assert ours.converged and ours.settings["took_over"] is None, ours.message
+    assert ours.iterations == 1 or ours.settings["details"]["convergence_factor"] < 0.35
+    assert ours.certificate.measures["bound_violation"] == 0.0
+    v, w = ours.fields["v"], other.fields["v"]
+    np.testing.assert_allclose(v, w, rtol=0, atol=1e-7 * np.abs(w).max())
+    ours.destroy()
+    other.destroy()
+
+
+def test_obstacle_problem_without_a_solution_is_not_solved():
+    solution = run("obstacle_bratu", {"lambda": 8.0, "v_upper": "inf", "n": 31})
+    assert not solution.converged and solution.outcome is Outcome.NO_SOLUTION
+    solution.destroy()
+
+
 @pytest.fixture(scope="module")
 def serial():
     return {name: mpi_fas.run(name) for name in mpi_fas.CASES}

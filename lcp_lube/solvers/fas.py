@@ -85,7 +85,7 @@ class Fas:
         self.problem, self.stages, self.options, self.eps1 = problem, stages, options, eps1
         self._harmonic, self._truncation = options.weights == "harmonic", TRUNCATIONS[options.truncation]
         with stages("assembly"):
-            self._levels = fas_levels.hierarchy(problem, self._harmonic)
+            self._levels = fas_levels.hierarchy(fas_levels.finest(problem), self._harmonic)
         self._c_norm = problem.reduce.norm(problem.c)
         self._recent: tuple[float, ...] = (inf,) * WINDOW
         self._taken, self._first, self._correction = 0, inf, 0.0

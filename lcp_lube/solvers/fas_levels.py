@@ -8,6 +8,7 @@ from mpi4py import MPI
 
 from ..errors import InputError
 from ..parallel import Array
+from ..problems.grid import Grid
 from ..problems.problem import LubricationProblem
 from . import fas_kernels as kernels
 
@@ -122,19 +123,25 @@ def finest(problem: LubricationProblem) -> Level:
     InputError : the void that leaves a cell is not what enters the next one, which no scheme of this package does.
     """
     grid, s = problem.grid, problem.scheme
-    periodic = (grid.periodic[0], grid.dim == 2 and grid.periodic[1])
-    split = grid.comm.size > 1
     lost, carried = kernels.lost_void(s.b_C, s.b_W)
     if grid.reduce.max(np.array([lost])) > 1e-12 * grid.reduce.max(np.array([carried])):
         raise InputError("--method fas: what leaves a cell of this scheme does not enter the next one; use active-set")
-    lines = grid.box[0]
-    fewest = int(grid.reduce.min(np.array([lines if grid.box[1] == grid.shape[0] else 0.0])))
+    return level_of(grid, s.k_W, s.k_E, s.k_S, s.k_N, s.c)
+
+
+def level_of(grid: Grid, k_W: Array, k_E: Array, k_S: Array, k_N: Array, c: Array) -> Level:
+    """A level from the conductances of every point's faces and a right-hand side. Collective.
+
+    Its points are dealt to the ranks as the grid's are; where these hold parts of lines, or few lines, each holds the whole.
+    """
+    periodic = (grid.periodic[0], grid.dim == 2 and grid.periodic[1])
+    split = grid.comm.size > 1
     nx, ny = grid.shape[0], grid.shape[1] if grid.dim == 2 else 1
-    if split and fewest < FEWEST_LINES:
-        k_W, k_E, k_S, k_N, c = (_whole(problem, a) for a in (s.k_W, s.k_E, s.k_S, s.k_N, s.c))
+    lines = grid.box[0] if grid.box[1] == nx else 0
+    if split and grid.reduce.min(np.array([float(lines)])) < FEWEST_LINES:
+        k_W, k_E, k_S, k_N, c = (whole(grid, a) for a in (k_W, k_E, k_S, k_N, c))
         y0, y1, comm = 0, ny, None
     else:
-        k_W, k_E, k_S, k_N, c = s.k_W, s.k_E, s.k_S, s.k_N, s.c
         y0, y1, comm = grid.y_start, grid.y_end, grid.comm if split else None
     level = _empty(nx, ny, y0, y1, comm, False, periodic)
     level.kx[1:-1, 1 : nx + 1], level.kx[1:-1, nx + 1] = k_W, k_E[:, -1]
@@ -145,15 +152,12 @@ def finest(problem: LubricationProblem) -> Level:
     return level
 
 
-def _whole(problem: LubricationProblem, a: Array) -> Array:
+def whole(grid: Grid, a: Array) -> Array:
     """All points of a coefficient, on every rank. Collective."""
-    grid = problem.grid
-    box = np.broadcast_to(a, grid.box)
     out = np.empty((grid.shape[1] if grid.dim == 2 else 1, grid.shape[0]))
-    for x, y, values in grid.comm.allgather(
-        ((grid.x_start, grid.x_end), (grid.y_start, grid.y_end), np.ascontiguousarray(box))
-    ):
-        out[y[0] : y[1], x[0] : x[1]] = values
+    own = (slice(grid.y_start, grid.y_end), slice(grid.x_start, grid.x_end))
+    for where, values in grid.comm.allgather((own, np.ascontiguousarray(np.broadcast_to(a, grid.box)))):
+        out[where] = values
     return out
 
 
@@ -163,15 +167,15 @@ def _empty(nx: int, ny: int, y0: int, y1: int, comm: MPI.Comm | None, whole: boo
     return Level(nx, ny, y0, y1, comm, whole, periodic, z, c, kx, ky)
 
 
-def hierarchy(problem: LubricationProblem, harmonic: bool) -> list[Level]:
-    """All grids, the finest first. Collective."""
-    levels = [finest(problem)]
-    while (coarse := _coarser(levels[-1], problem, harmonic)) is not None:
+def hierarchy(level: Level, harmonic: bool) -> list[Level]:
+    """A level and all coarser ones. Collective."""
+    levels = [level]
+    while (coarse := _coarser(levels[-1], harmonic)) is not None:
         levels.append(coarse)
     return levels
 
 
-def _coarser(fine: Level, problem: LubricationProblem, harmonic: bool) -> Level | None:
+def _coarser(fine: Level, harmonic: bool) -> Level | None:
     """The grid of every second point, in the directions whose coupling is not much the weaker one. Collective."""
     # Without a point in between, the two ends of a period would be neighbours on the coarse grid and not on the fine one.
     can_x = fine.nx // 2 >= FEWEST and not (fine.periodic[0] and fine.nx % 2)
@@ -199,14 +203,15 @@ def _coarser(fine: Level, problem: LubricationProblem, harmonic: bool) -> Level 
     kernels.coarsen_y_faces(fine.kx, fine.ky, coarse.part(coarse.ky), *flags, beyond_y)
     for a in (coarse.kx, coarse.ky):
         coarse.gather(a)
-    restrict(fine, coarse, coarse.c, harmonic, residual=False)
+    restrict(fine, coarse, coarse.c, harmonic, fine.c)
     coarse.f, coarse.old = coarse.c.copy(), np.zeros_like(coarse.z)
     return coarse
 
 
-def restrict(fine: Level, coarse: Level, out: Array, harmonic: bool, residual: bool = True) -> None:
-    """The fine level's residual, or its right-hand side, on the coarse one. Collective."""
+def restrict(fine: Level, coarse: Level, out: Array, harmonic: bool, given: Array | None = None) -> None:
+    """The fine level's residual, or something else that is given there, on the coarse one. Collective."""
     out[:] = 0.0
-    where = (fine.first, fine.by_x, fine.by_y)
-    kernels.restrict(fine.z, fine.kx, fine.ky, fine.c, coarse.part(out), *where, harmonic, fine.periodic[0], residual)
+    where = (fine.first, fine.by_x, fine.by_y, harmonic, fine.periodic[0], given is None)
+    c = fine.c if given is None else given
+    kernels.restrict(fine.z, fine.kx, fine.ky, c, coarse.part(out), *where)  # type: ignore[arg-type]
     coarse.collect(out)
