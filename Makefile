@@ -45,10 +45,9 @@ format: $(READY) ## let ruff rewrite the code
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
 
-charts: $(READY) ## draw the charts from their csv files
-	$(BIN)/lcp-lube chart precision
-	$(BIN)/lcp-lube chart stability
-	$(BIN)/lcp-lube chart scaling
+charts: $(READY) ## make the runs that benchmarks/results lacks, then draw all charts
+	$(BIN)/python benchmarks/precision_peers.py
+	for chart in precision stability scaling; do $(BIN)/lcp-lube chart $$chart --results benchmarks/results || exit; done
 
 clean: ## remove caches and build products; .venv stays
 	rm -rf build dist *.egg-info .coverage .hypothesis .mypy_cache .pytest_cache .ruff_cache problem4.png

@@ -117,7 +117,9 @@ def parse(own: list[str]) -> argparse.Namespace:
     _scene_options(solve)
     solve.add_argument("--method", default="auto", help="see 'lcp-lube list'; default auto")
     solve.add_argument("--recipe", help="inner solver: options/NAME.opts; explicit PETSc options win over it")
-    solve.add_argument("--no-memory-check", action="store_true", help="begin even if the estimate says that memory is too short")
+    solve.add_argument(
+        "--no-memory-check", action="store_true", help="begin even if the estimate says that memory is too short"
+    )
     solve.add_argument(
         "--certify", action="store_true", help="prove how far the answer is from the exact discrete solution at most (films)"
     )
@@ -171,9 +173,9 @@ def parse(own: list[str]) -> argparse.Namespace:
 
     chart = command("chart", "long experiments: the runs in a csv, the pictures drawn from it")
     charts = chart.add_subparsers(dest="chart", required=True, metavar="precision|stability|scaling", parser_class=Parser)
-    text = "error against the exact solution and what it costs, for every method, system and recipe"
+    text = "errors of load, largest pressure and rupture, and what they cost, for every method, system and recipe"
     precision = charts.add_parser("precision", help=text, description=text, allow_abbrev=False)
-    precision.add_argument("scenes", nargs="*", metavar="SCENE", help="with an exact solution; default problem1 to problem3")
+    precision.add_argument("scenes", nargs="*", metavar="SCENE", help="films; default: seven of them, see chart/precision.py")
     text = "where methods fail: " + "; ".join(f"{name}, {entry.line}" for name, entry in STABILITY.items())
     stability = charts.add_parser("stability", help=text, description=text, allow_abbrev=False)
     stability.add_argument("maps", nargs="*", metavar="MAP", help=f"any of {', '.join(STABILITY)}; default all")

@@ -199,7 +199,8 @@ def judged(rows: Sequence[Row]) -> str:
     text = f"Certified answers are within {max(good):.0e} of the reference" if good else ""
     if caught:
         alarms = sum(float(row["distance"]) <= WRONG for row in caught)
-        text += f"; of {len(caught) - alarms} wrong ones the certificate saw {len(caught) - len(by_distance) - alarms}"
+        wrong = len(caught) - alarms
+        text += f"; of {wrong} wrong ones the certificate saw {wrong - len(by_distance)}" * bool(wrong)
         text += f"; it refused {alarms} that are as near as {WRONG:g}" * bool(alarms)
     without = len(rows) - len(known)
     return f"{text}{f'; {without} runs had no reference' * bool(without)}." if text else ""
