@@ -139,7 +139,8 @@ SCALARS = st.one_of(
     st.integers(-(10**20), 10**20), st.floats(), st.booleans(), TEXT.filter(lambda text: text.isprintable() and '"' not in text)
 )
 KEYS = st.sampled_from(
-    "family name scheme dimension L width mu U p_a p_b p_side p_c n nx ny film form wave h_min h_max x y fluid lambda K seed".split()  # noqa: SIM905
+    """family name scheme dimension L width mu U p_a p_b p_side p_c n nx ny film form wave h_min h_max x y fluid lambda K
+    seed""".split()  # noqa: SIM905
 )
 
 
