@@ -14,9 +14,9 @@ from .checkpoint import CHOICES, Checkpointer, load
 from .errors import InputError
 from .linear.options import recipe, set_names
 from .linear.stages import Stages
+from .march import march
 from .memory import check as check_memory
 from .memory import resident
-from .march import march
 from .piezo import solve_fluid
 from .problems.box import BoxProblem
 from .problems.problem import LubricationProblem
@@ -112,8 +112,8 @@ def solve(
     # Who names a method, a matrix or an inner solver means those of the whole scene.
     named = (method, system) != ("auto", "auto") or recipe_name or options or {"ksp_type", "pc_type"} & set_names()
     if not (named or certify or checkpoint or resume) and (part := part_of(scene, problem)):
-        how = {"stopping": stopping, "monitor": monitor, "comm": comm, "nested": nested, "start": start, "memory_check": memory_check}
-        solution = solve_part(part, problem, solve, stopping.eps1, **how)
+        how = {"stopping": stopping, "monitor": monitor, "comm": comm, "nested": nested, "start": start}
+        solution = solve_part(part, problem, solve, stopping.eps1, **how, memory_check=memory_check)
         if solution.outcome is not Outcome.WRONG_SOLUTION:
             solution.times["total"] = perf_counter() - begin
             return solution
