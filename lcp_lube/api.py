@@ -82,7 +82,7 @@ def solve(
     """
     begin = perf_counter()
     stages = Stages()
-    before = resident()
+    held = resident()
     with stages("setup"):
         if getattr(scene, "family", "user") != "user":  # whose data are each rank's own
             asked = (scene, method, system, recipe_name, stopping, options, nested, start is None)
@@ -106,7 +106,7 @@ def solve(
         if checkpoint or resume or certify:
             raise InputError(f"--checkpoint, --resume, --certify: not for {scene.name}, whose fluid depends on the pressure")
         how = {"method": method, "system": system, "recipe_name": recipe_name, "options": options, "monitor": monitor}
-        solution = solve_fluid(scene, law, solve, stopping, **how, comm=comm, nested=nested, start=start)
+        solution = solve_fluid(scene, law, solve, stopping, **how, comm=comm, nested=nested, start=start, memory_check=memory_check)
         solution.times["total"] = perf_counter() - begin
         return solution
     # Who names a method, a matrix or an inner solver means those of the whole scene.
@@ -128,7 +128,7 @@ def solve(
         shapes, levels, near = saved.shapes, saved.record["levels"], None
     keeper.begin(scene, (chosen.method, chosen.system, recipe_name, chosen.nested, options or {}))
     with recipe(chosen.recipe) as recipe_used:
-        memory = check_memory(problem, chosen, before, memory_check)
+        memory = check_memory(problem, chosen, held, memory_check)
         for shape in shapes:
             finest = shape == shapes[-1]
             level_begin = perf_counter()
