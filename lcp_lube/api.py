@@ -105,8 +105,9 @@ def solve(
         problem.destroy()
         if checkpoint or resume or certify:
             raise InputError(f"--checkpoint, --resume, --certify: not for {scene.name}, whose fluid depends on the pressure")
-        how = {"method": method, "system": system, "recipe_name": recipe_name, "options": options, "monitor": monitor}
-        solution = solve_fluid(scene, law, solve, stopping, **how, comm=comm, nested=nested, start=start, memory_check=memory_check)
+        how: dict[str, Any] = {"method": method, "system": system, "recipe_name": recipe_name, "options": options}
+        how |= {"monitor": monitor, "comm": comm, "nested": nested, "start": start, "memory_check": memory_check}
+        solution = solve_fluid(scene, law, solve, stopping, **how)
         solution.times["total"] = perf_counter() - begin
         return solution
     # Who names a method, a matrix or an inner solver means those of the whole scene.
