@@ -297,7 +297,7 @@ class Checkpoint:
         for name in CHOICES:
             kept = self.record[name]
             if given[name] in (None, "auto") or given[name] == {}:
-                given[name] = kept
+                given[name] = kept if kept != "" else given[name]  # a method without a system
             elif name != "recipe" and json.loads(json.dumps(given[name])) != kept:  # another inner solver may go on
                 raise InputError(f"--resume {self.path}: the run was begun with {name} {kept}, not {given[name]}")
         return given

@@ -17,7 +17,18 @@ from conftest import ENVIRONMENT, Run
 from lcp_lube import checkpoint, load_scene, solve
 from lcp_lube.errors import InputError
 
-NESTED = ["solve", "problem4", "--nx", "190", "--ny", "170", "--eps1", "1e-10"]  # four grids, multigrid inside
+NESTED = [
+    "solve",
+    "problem4",
+    "--nx",
+    "190",
+    "--ny",
+    "170",
+    "--eps1",
+    "1e-10",
+    "--method",
+    "active-set",
+]  # four grids, multigrid inside
 
 
 def start(words, folder, ranks=1, **more):
@@ -135,6 +146,8 @@ CASES = {
     "fbn-a": ("problem1", {"n": 60}, {"method": "fbn-a", "options": {"p0": 2.0}}),
     "active-set": ("problem2", {"n": 60}, {}),
     "iterative": ("problem1", {"n": 40}, {"method": "din", "system": "full", "recipe_name": "gmres_ilu"}),
+    "fas": ("problem4", {"n": 40}, {"method": "fas", "stopping": {"eps1": 1e-10}}),
+    "fas, obstacle": ("obstacle_bratu", {"n": 31}, {"method": "fas"}),
     "active-set, obstacle": ("obstacle_bratu", {"n": 15}, {"method": "active-set"}),
     "interior": ("obstacle_bratu", {"n": 15}, {"method": "interior"}),
     "semismooth": ("obstacle_bratu", {"n": 15}, {"method": "semismooth"}),
@@ -318,7 +331,7 @@ def test_a_file_limit(tmp_path):
     resource.setrlimit(resource.RLIMIT_FSIZE, (limit, before[1]))  # here, as MPI's own files at its start are larger
     try:
         with pytest.raises(InputError) as refused:
-            solve(scene, checkpoint=tmp_path / "c")
+            solve(scene, method="active-set", checkpoint=tmp_path / "c")
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert str(refused.value).endswith("could not be written: File too large; the last one is still there")

@@ -75,6 +75,8 @@ class Fas:
 
     state = ("z", "norm", "_recent", "_first", "_taken")
 
+    state: tuple[str, ...] = ("z", "norm", "_recent", "_taken", "_first")  # what a cycle starts from
+
     def __init__(
         self, problem: LubricationProblem, stages: Stages, options: FasOptions, eps1: float, start: Fields | None = None
     ):
