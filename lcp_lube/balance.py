@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from .scene import Scene
 
 MOST_SOLVES = 30  # on a grid
-DECADES = 1e4  # either side of where a search begins, unless a range is given
+RANGE = {"eccentricity": 1e4, "h_offset": 100.0}  # unless one is given: of e/(1 - e) about 1, of the film about the scene's
 COARSE_TOL = 1e-3  # a coarse grid's load is no better
-ONE_GRID = 2_000  # points up to which no coarser grid is worth its while
+ONE_GRID = 1_000  # points up to which no coarser grid is worth its while
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 
@@ -106,7 +106,9 @@ def variable(scene: "Scene", table: BalanceTable, begin: float | None) -> Variab
         start = 0.5 * (low + high) if value is None or not smallest <= value <= largest else to_t(value)
     else:
         start = to_t(value)
-        low, high = (-log(DECADES), log(DECADES)) if upper == 1.0 else (start - log(DECADES), start + log(DECADES))
+        about = 0.0 if upper == 1.0 else start
+        wide = log(RANGE["eccentricity" if upper == 1.0 else "h_offset"])
+        low, high = about - wide, about + wide
     return Variable(key, to_value, start, low, high, slope)
 
 
@@ -143,26 +145,26 @@ def balanced(
     table: BalanceTable = scene.balance  # type: ignore[attr-defined]
     shapes = [scene.shape]
     if prod(scene.shape) > ONE_GRID and nested is not False:
-        shapes = [shape for shape in level_shapes(scene.shape) if shape == scene.shape or prod(shape) > ONE_GRID // 8]
+        shapes = [shape for shape in level_shapes(scene.shape) if shape == scene.shape or prod(shape) > ONE_GRID]
     known = near.settings.get("balance", {}).get("value") if near is not None else None
     unknown = variable(scene.with_shape(shapes[0]), table, known)
-    t, slope, start, solves = unknown.start, unknown.slope, near, 0
+    t, slope, start, solves, found = unknown.start, unknown.slope, near, 0, False
     for shape in shapes:
-        search = Search(unknown.low, unknown.high, slope)
+        search = Search(unknown.low, unknown.high, slope, explore=not found)
         tol = table.tol if shape == shapes[-1] else max(table.tol, COARSE_TOL)
 
         def solve_at(t: float, near: Solution | None, shape: tuple[int, ...] = shape) -> Solution:
             return solve(scene_at({unknown.key: unknown.to_value(t)}).with_shape(shape), near)
 
-        solution, t, count = _on_grid(solve_at, search, t, start, table.load, tol)
+        solution, t, count, found = _on_grid(solve_at, search, t, start, table.load, tol)
         if start is not None and start is not near:
             start.destroy()
         start, slope, solves = solution, search.slope, solves + count
     value, load = unknown.to_value(t), carried(solution.problem.quantities(solution.fields))
-    found = f"{unknown.key} = {value:.8g} carries {load:.8g}"
-    if solution.converged and not abs(load / table.load - 1.0) <= 2.0 * table.tol:
+    answer = f"{unknown.key} = {value:.8g} carries {load:.8g}"
+    if solution.converged and not found:
         solution.outcome = Outcome.LOAD_NOT_CARRIED
-        solution.message = f"{table.load:g} asked for; nearest to it, {found}, after {count} solves"
+        solution.message = f"{table.load:g} asked for; nearest to it, {answer}, after {count} solves"
     solution.settings |= {
         "balance": {
             "vary": unknown.key,
@@ -172,7 +174,7 @@ def balanced(
             "iterations": count,
             "solves": solves,
         },
-        "why": [*solution.settings["why"], f"balance: {found}, found in {count} solves on this grid, {solves} in all"],
+        "why": [*solution.settings["why"], f"balance: {answer}, found in {count} solves on this grid, {solves} in all"],
     }
     return solution
 
@@ -184,16 +186,17 @@ def _on_grid(
     near: Solution | None,
     load: float,
     tol: float,
-) -> tuple[Solution, float, int]:
-    """The solution whose load comes nearest, its t, and the number of solves. Collective."""
+) -> tuple[Solution, float, int, bool]:
+    """The solution whose load comes nearest, its t, the number of solves, and whether it is the one sought. Collective."""
     best: Solution | None = None
     best_t, best_g = t, inf
     for count in range(1, MOST_SOLVES + 1):
         solution = solve_at(t, best or near)
         if not solution.converged:
             if best is None:
-                return solution, t, count
+                return solution, t, count, False
             solution.destroy()
+            search.leave(t)
             t = 0.5 * (t + best_t)  # back towards what could be solved
             continue
         ratio = carried(solution.problem.quantities(solution.fields)) / load
@@ -208,4 +211,4 @@ def _on_grid(
             break
         t = target
     assert best is not None  # for the type checker: the first solve gave one, or was returned
-    return best, best_t, count
+    return best, best_t, count, abs(best_g) <= tol

@@ -10,6 +10,7 @@ from lcp_lube.balance import MOST_SOLVES, carried
 from lcp_lube.errors import InputError
 from lcp_lube.neighbour import solve_near, solve_or_balance
 from lcp_lube.problems.solution import Outcome
+from lcp_lube.scenes_bearing import BearingScene
 from lcp_lube.solvers.root import Search
 
 
@@ -134,19 +135,19 @@ def test_the_search_finds_every_root_of_a_monotone_function(root, start, slope, 
 
 
 def test_the_search_gives_up():
-    """No root: at the end of its range, or where all that is known is that the value is too small."""
+    """No root: both ends were tried, and what lies between; where all that is known is that the value is too small, too."""
     search = Search(0.0, 10.0, 1.0)
     t, count = 1.0, 0
     while t is not None:
         search.add(t, -1.0 / (1.0 + t))
         t, count = search.next(), count + 1
-    assert search.points[-1][0] == 10.0 and count < 10
+    assert {0.0, 10.0} <= {point[0] for point in search.points} and count < 20
     search = Search(-10.0, 10.0, -2.0)
     t = 0.0
     while t is not None:
         search.add(t, -np.inf)
         t = search.next()
-    assert search.points[-1][0] == -10.0
+    assert {-10.0, 10.0} <= {point[0] for point in search.points} and len(search.points) < 25
 
 
 def test_command(cli, tmp_path):
@@ -191,3 +192,48 @@ def test_ranges_outside_the_domain():
 def test_not_with_accuracy_or_checkpoints(cli):
     done = cli("solve", "journal", "--set", "balance.load=1e3", "--accuracy", 1e-2)
     assert done.status == 2 and "--accuracy: not with [balance]" in done.lines[0]
+
+
+@given(st.floats(-3.9, 3.9), st.floats(0.2, 0.8), st.booleans())
+def test_a_root_behind_a_hump_is_found(place, height, wrong):
+    """g with one hump, wherever the search begins and whatever it is told; what lies below its top is found."""
+
+    def g(t):
+        return 1.0 - (t - place) ** 2 / 4.0 - height
+
+    search, t, count = Search(-4.6, 4.6, 2.0 if wrong else -2.0), 0.0, 0
+    while t is not None and abs(g(t)) > 1e-9 and count < 40:
+        search.add(t, g(t))
+        t, count = search.next(), count + 1
+    assert t is not None and abs(g(t)) <= 1e-9
+
+
+def test_what_cannot_be_evaluated_is_left():
+    """Beyond 3 there is nothing: the search stays on its side, and ends."""
+    search, t, asked = Search(-5.0, 5.0, 1.0), 0.0, []
+    while t is not None:
+        asked.append(t)
+        search.leave(t) if t > 3.0 else search.add(t, t - 10.0)
+        t = search.next()
+    assert max(a for a in asked if a <= 3.0) > 1.0 and len(asked) < 20
+
+
+def test_a_load_that_cavitation_limits():
+    """Dimples suck as the film gets thin: the load has a largest value, below which two levels carry it."""
+    data = {
+        "dimension": 2, "L_mm": 20, "U": 2.0, "nx": 39, "ny": 15, "fluid": {"mu": 0.02, "p_supply": 1e5},
+        "film": [{"shape": "constant", "h_um": 8}, {"shape": "pocket", "depth_um": 10, "x_mm": [2, 9], "y_mm": [3, 17]}],
+    }  # fmt: skip
+    scene_at = lambda load: lambda more: BearingScene(**{**data, "balance": {"load": load}, **more})  # noqa: E731
+    top = 0.0
+    for level in np.linspace(-7e-6, 30e-6, 38):
+        solution = solve_near(BearingScene(**{**data, "h_offset": float(level)}), None)
+        top = max(top, carried(solution.problem.quantities(solution.fields)))
+        solution.destroy()
+    for part, outcome in ((0.9, Outcome.CONVERGED), (1.1, Outcome.LOAD_NOT_CARRIED)):
+        solution = solve_or_balance(scene_at(part * top), None)
+        assert solution.outcome is outcome, solution.message
+        found = solution.settings["balance"]
+        assert found["carried"] == pytest.approx(part * top if part < 1 else top, rel=2e-6 if part < 1 else 0.1)
+        assert found["solves"] <= MOST_SOLVES
+        solution.destroy()

@@ -6,24 +6,32 @@ from math import isfinite
 
 LONGEST_STEP = 2.5  # while there is no bracket
 FLATTEST = 0.05  # slope below which a step is taken as if it were this
+WIDEST_GAP = 1.5  # left between what is known
+PATIENCE = 8  # points without a bracket, after which secant steps are left
 
 
 @dataclass
 class Search:
     """A root of g between low and high: secant steps, kept inside the bracket once there is one.
 
-    g may be -inf where all that is known is that it is too small.
+    Where secant steps lead nowhere, as they may if g is not monotone, the ends are tried, the one towards which g should grow
+    first, and then the widest gaps between what is known. g may be -inf where all that is known is that it is too small.
 
     Parameters
     ----------
-    slope : that of g, to begin with: its sign says where g grows.
+    slope : that of g, to begin with: its sign says where g should grow.
+    explore : where secant steps lead nowhere, look elsewhere.
     """
 
     low: float
     high: float
     slope: float
+    explore: bool = True
     points: list[tuple[float, float]] = field(default_factory=list)  # t, g(t), in the order of their evaluation
     widths: list[float] = field(default_factory=list)  # of the bracket, after each point since there is one
+
+    def __post_init__(self) -> None:
+        self.ends = [self.low, self.high] if self.slope < 0 else [self.high, self.low]
 
     def add(self, t: float, g: float) -> None:
         """Take up a value of g."""
@@ -33,6 +41,13 @@ class Search:
             self.slope = (known[1][1] - known[0][1]) / (known[1][0] - known[0][0])
         if (bracket := self.bracket) is not None:
             self.widths.append(bracket[1] - bracket[0])
+
+    def leave(self, t: float) -> None:
+        """g could not be evaluated here: keep to this side of half the way from the nearest point."""
+        near = min((point[0] for point in self.points), key=lambda known: abs(known - t))
+        middle = 0.5 * (near + t)
+        self.low, self.high = (self.low, middle) if t > near else (middle, self.high)
+        self.ends = [min(max(end, self.low), self.high) for end in self.ends]
 
     @property
     def bracket(self) -> tuple[float, float] | None:
@@ -47,9 +62,22 @@ class Search:
         step = -g / (up * max(abs(self.slope), FLATTEST))
         if (bracket := self.bracket) is None:
             target = min(max(t + min(max(step, -LONGEST_STEP), LONGEST_STEP), self.low), self.high)
-            return None if target in [point[0] for point in self.points] else target
+            return self._elsewhere() if self._known(target) or len(self.points) >= PATIENCE else target
         a, b = bracket
         if b - a <= 1e-14 * max(abs(a), abs(b), 1.0):
             return None
         slow = len(self.widths) > 3 and self.widths[-1] > 0.5 * self.widths[-4]
         return t + step if a < t + step < b and not slow else 0.5 * (a + b)
+
+    def _known(self, t: float) -> bool:
+        return any(abs(t - point[0]) <= 1e-9 * (self.high - self.low) for point in self.points)
+
+    def _elsewhere(self) -> float | None:
+        """An end that was not tried, or the middle of the widest gap."""
+        if not self.explore:
+            return None
+        for end in self.ends:
+            if not self._known(end):
+                return end
+        a, b = max(pairwise(sorted(point[0] for point in self.points)), key=lambda gap: gap[1] - gap[0])
+        return 0.5 * (a + b) if b - a > WIDEST_GAP else None
