@@ -13,8 +13,8 @@ X, Y = Axis("n", "points a side", "n"), Axis("ratio", "film ratio h_max/h_min", 
 
 
 def cases(quick: bool) -> Iterator[Case]:
-    """A smooth film on a line and square dimples on a square (K = 2); quick: two by two."""
-    for scene, sizes in SIZES.items():
+    """A smooth film on a line and square dimples on a square (K = 2); quick: two by two on the line."""
+    for scene, sizes in [*SIZES.items()][: 1 if quick else None]:
         for method in methods():
             for n in sizes[:2] if quick else sizes:
                 for ratio in (2, 1000) if quick else RATIOS:
