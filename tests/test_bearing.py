@@ -1,6 +1,8 @@
 """Bearings from scene files: sides of every kind, films of every shape, against exact solutions and laws."""
 
 import json
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from lcp_lube.problems.grid import Grid
 from lcp_lube.problems.model import Model, Side
 from lcp_lube.problems.transfer import Transfer
 from lcp_lube.scenes_bearing import BearingScene
+from lcp_lube.scenes_film import shape_names
 
 FEW = settings(max_examples=25, deadline=None)
 L, WIDTH = 0.01, 0.006
@@ -455,3 +458,68 @@ def test_another_methods_option_is_not_ignored(cli, given, chosen):
     assert run.status == 2 and run.lines == [
         f"lcp-lube: --set din.gamma: an option of method din, and the method is {chosen}; add --method din"
     ]
+
+
+# Documentation, and anything at all
+
+BLOCKS = re.findall(r"```toml\n(.*?)```", (Path(__file__).parents[1] / "docs" / "scene_files.md").read_text(), re.S)
+
+
+@pytest.mark.parametrize("block", BLOCKS)
+def test_documented_scenes(tmp_path, block):
+    (tmp_path / "documented.toml").write_text(block)
+    solution = solve(load_scene(tmp_path / "documented.toml"))
+    assert solution.converged and len(BLOCKS) == 3
+    solution.destroy()
+
+
+def test_documented_shapes_are_all():
+    text = (Path(__file__).parents[1] / "docs" / "scene_files.md").read_text()
+    for name in shape_names():
+        assert f"`{name}`" in text, name
+
+
+values = st.one_of(
+    st.none(), st.booleans(), st.integers(-3, 300), st.floats(), st.text(max_size=5), st.lists(st.floats(), max_size=3)
+)
+KEYS = [
+    "film",
+    "film.pocket",
+    "film.1.shape",
+    "film.pocket.x",
+    "film.h_start_um",
+    "sides",
+    "sides.west",
+    "sides.east.p",
+    "fluid",
+]
+KEYS += [
+    "fluid.mu",
+    "fluid.p_c",
+    "U",
+    "L",
+    "L_um",
+    "p_in",
+    "dimension",
+    "ny",
+    "scheme",
+    "p_unit",
+    "h_floor",
+    "sides.west.r",
+    "a.b",
+]
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    st.dictionaries(st.sampled_from(KEYS), st.one_of(values, st.dictionaries(st.sampled_from(["p", "h"]), values)), max_size=3)
+)
+def test_any_values_make_a_problem_or_one_line(changes):
+    """Never another exception, whatever a file holds."""
+    try:
+        problem = load_scene("pocketed_pad", {"n": 5, **changes}).build()
+    except InputError as error:
+        assert len(str(error).splitlines()) == 1
+    else:
+        assert problem.scheme.h.min() > 0
+        problem.destroy()
