@@ -8,9 +8,11 @@ A fallback that takes over with a direct solver is not in the estimate: it may n
 
 import os
 import sys
+from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass
 from importlib.util import find_spec
-from math import log2
+from math import log2, prod
 from pathlib import Path
 
 from mpi4py import MPI
@@ -18,7 +20,9 @@ from petsc4py import PETSc
 
 from .auto import Plan
 from .errors import InputError
+from .linear.options import recipe
 from .problems.solution import Problem
+from .scene import Scene
 
 MB = 2**20
 COMPILER = 113 * MB  # numba and LLVM, once they are loaded
@@ -52,6 +56,7 @@ MEASURED: dict[tuple[str, str, str], tuple[float, float]] = {
     ("equations 2D", "jacobian", "multigrid"): (550, 0),
     ("equations 2D", "jacobian", "umfpack"): (1310, 0),
 }
+LARGE = 1_000_000  # points from which building the problem is itself worth a look ahead
 MULTIGRID = ("hypre", "ml", "gamg", "mg")
 
 
@@ -133,6 +138,12 @@ def inner_solver() -> str:
     return "light"
 
 
+def _restart(options: dict[str, str]) -> int:
+    """GMRES's restart, PETSc's default where the option is no whole number, which PETSc itself will refuse."""
+    given = options.get("ksp_gmres_restart", "")
+    return int(given) if given.isdecimal() else 30
+
+
 def bytes_needed(problem: Problem, plan: Plan) -> float | None:
     """Bytes that a run takes for its points, all ranks together; None if nothing is known of such runs.
 
@@ -150,7 +161,7 @@ def bytes_needed(problem: Problem, plan: Plan) -> float | None:
     options = PETSc.Options().getAll()
     if solver == "light" and options.get("ksp_type", "gmres") == "gmres":
         unknowns = 2 if plan.system == "full" else 1
-        each += 8 * unknowns * min(int(options.get("ksp_gmres_restart", "30")), 200)
+        each += 8 * unknowns * min(_restart(options), 200)
     return each * points
 
 
@@ -193,3 +204,30 @@ def check(problem: Problem, plan: Plan, before: int, refuse: bool = True) -> Est
             f"take fewer points, another method or --no-memory-check"
         )
     return Estimate(base, base + int(needed))
+
+
+def look_ahead(scene: Scene, comm: PETSc.Comm | None, choose: Callable[[Problem], Plan]) -> None:
+    """Refuse a large scene before it is built: the estimate is that of its plan, made for a small grid that claims its size.
+
+    Parameters
+    ----------
+    choose : the plan of a problem; it must go by the grid's numbers alone. Collective.
+
+    Raises
+    ------
+    InputError : as `check`.
+    """
+    if scene.family == "user" or prod(scene.shape) < LARGE:
+        return
+    ranks = (comm or PETSc.COMM_WORLD).getSize()
+    small = scene.with_shape(tuple(min(n, max(50, 2 * ranks)) for n in scene.shape)).build(comm)
+    large = copy(small)
+    large.grid = grid = copy(small.grid)
+    grid.shape, grid.size = scene.shape, prod(scene.shape)
+    grid.box = (grid.box[0], grid.shape[0] if grid.box[1] == small.grid.shape[0] else grid.box[1])
+    try:
+        plan = choose(large)
+        with recipe(plan.recipe):
+            check(large, plan, resident())
+    finally:
+        small.destroy()

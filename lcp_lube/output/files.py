@@ -5,7 +5,7 @@ import os
 import tempfile
 import zipfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -219,7 +219,8 @@ def _fault(path: Path, plot: bool) -> str:
         if path.exists():
             with path.open("ab"):
                 pass
-        path.with_name(f".{path.stem}.0000000{suffix}").exists()  # as `replacing` names it
+        with suppress(FileNotFoundError):
+            os.stat(path.with_name(f".{path.stem}.0000000{suffix}"))  # as `replacing` names it; Path.exists() hides errors
     except OSError as error:
         return f"cannot be written in {folder}: {error.strerror}"
     except ValueError as error:  # a name that no file can have
