@@ -6,7 +6,7 @@ rho(p) moves by 3e-10 of itself a pascal, so each solve, started from the last, 
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from petsc4py import PETSc
@@ -34,6 +34,7 @@ class Frozen:
     whole: Scene
     law: Law
     p: Array | None = None
+    family: ClassVar[str] = "user"  # no file's: what is asked of those has been asked of the whole scene
 
     @property
     def name(self) -> str:

@@ -14,7 +14,7 @@ needs no choice: the active-set method's first step is its one linear solve.)
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +45,7 @@ class Part:
 
     whole: Scene
     kind: str
+    family: ClassVar[str] = "user"  # no file's: what is asked of those has been asked of the whole scene
 
     @property
     def name(self) -> str:
