@@ -33,10 +33,11 @@ SCENES = ("problem1", "problem2", "problem3", "parabolic_slider", "journal", "pr
 SIZES = {1: (50, 100, 200, 500, 1000, 2000, 5000), 2: (31, 63, 127, 255, 511)}  # points a side by dimension
 QUICK_SIZES = {1: (50, 100), 2: (15, 31)}
 TOLERANCES = (1e-4, 1e-8)  # eps1 = eps2
+ALL = 10**9
+SLOW = {"monotone": 1000}  # points a side at most, for methods whose steps grow with them
 FINAL = {"active-set", "monotone"}  # end in an exact step whatever the tolerance: the smaller one only
 
 # Recipes by dimension and system, and the most points a side that each is run on; for another system its default one.
-ALL = 10**9
 RECIPES: dict[int, dict[str, dict[str | None, int]]] = {
     1: {"full": {"superlu": ALL, "gmres_ilu": 2000}, "reduced": {"banded": ALL, "bcgs_ilu": ALL}, "cavity": {}},
     2: {
@@ -97,7 +98,7 @@ def configurations(dimension: int, quick: bool = False) -> Iterator[Configuratio
                 first = recipe == (recipes[-1] if dimension == 2 else recipes[0])[0]  # the one for large grids
                 for nested in (False, True) if entry.nested and first else (False,):
                     for eps in tolerances:
-                        yield Configuration(method, nested, system, recipe, eps, most)
+                        yield Configuration(method, nested, system, recipe, eps, min(most, SLOW.get(method, ALL)))
 
 
 def chart(sources: Sequence[str], quick: bool = False, results: Path = Path("lcp_lube_results")) -> int:

@@ -24,6 +24,7 @@ AXES = {
     "rupture": "error of the rupture point / L",
 }
 COLUMNS = 2
+GRID = "error of the grid"
 
 
 def draw_all(rows: Sequence[Row], stem: Path, comm: MPI.Comm) -> list[Path]:
@@ -99,7 +100,7 @@ def parts(rows: Sequence[Row]) -> Figure:
         "Line: error of the grid (the same grid solved to rounding). Marks: what the iteration adds, the largest of a method's "
         f"recipes. The iteration's part is the larger one in {len(over)} of {len(rows)} runs{f': {names}' * bool(names)}."
     )
-    figure, panels = _panels(rows, text, AXES["load"], "points a side", "error of the grid")
+    figure, panels = _panels(rows, text, AXES["load"], "points a side", GRID)
     for scene, mine in by_scene(rows).items():
         axes = panels[scene]
         grids = {int(row["n"]): float(row["load_grid"]) for row in mine}
@@ -156,13 +157,15 @@ def _series(axes: Axes, rows: Sequence[Row], quantity: str, style: dict[str, Any
 
 
 def _answers(axes: Axes, rows: Sequence[Row], quantity: str) -> None:
-    """Lines at the accuracies that are asked for, and under the title who reaches them first."""
+    """Lines at the accuracies that are asked for; under the title who reaches them first, and who is on the front."""
     said = []
     for level in ASKED:
         axes.axhline(level, color="0.5", lw=0.7, ls=":", zorder=0)
         best = fastest(rows, level, quantity)
         said.append(f"{percent(level)}: {best['method']}, {time(best)}" if best else f"{percent(level)}: none")
-    axes.text(0.0, 1.015, "   ".join(said), transform=axes.transAxes, fontsize=6.8, va="bottom")
+    names = ", ".join(dict.fromkeys(row["method"] for row in front(rows, quantity)))
+    text = "   ".join(said) + f"\nfront: {names or 'empty'}"
+    axes.text(0.0, 1.015, text, transform=axes.transAxes, fontsize=6.8, va="bottom")
 
 
 def _limits(axes: Axes, rows: Sequence[Row], quantity: str) -> None:
@@ -173,9 +176,11 @@ def _limits(axes: Axes, rows: Sequence[Row], quantity: str) -> None:
 
 def _panels(rows: Sequence[Row], text: str, ylabel: str, xlabel: str, grey: str = "") -> tuple[Figure, dict[str, Axes]]:
     """Empty panels by scene, and a legend in the place that is left or under them."""
+    from matplotlib.ticker import NullFormatter
+
     scenes = [*by_scene(rows)]
     lines = math.ceil((len(scenes) + 1) / COLUMNS)
-    figure = new_figure(0.9 + 2.05 * lines, text)
+    figure = new_figure(0.9 + 2.15 * lines, text)
     grid = figure.subplots(lines, COLUMNS, squeeze=False)
     panels = {}
     for number, axes in enumerate(grid.ravel()):
@@ -184,8 +189,9 @@ def _panels(rows: Sequence[Row], text: str, ylabel: str, xlabel: str, grey: str 
             continue
         panels[scenes[number]] = axes
         axes.set(xscale="log", yscale="log")
+        axes.xaxis.set_minor_formatter(NullFormatter())
         axes.grid(which="major", color="0.92", lw=0.6)
-        axes.set_title(scenes[number], fontweight="bold", loc="left", pad=13)
+        axes.set_title(scenes[number], fontweight="bold", loc="left", pad=22 if xlabel == "seconds" else 6)
         axes.set_xlabel(xlabel)
         if number % COLUMNS == 0:
             axes.set_ylabel(ylabel)
@@ -196,7 +202,7 @@ def _panels(rows: Sequence[Row], text: str, ylabel: str, xlabel: str, grey: str 
 
 def _tolerance(eps: str) -> dict[str, Any]:
     """Loose tolerances dashed."""
-    return {"ls": "--", "mfc": "white"} if float(eps) > 1e-6 else {"ls": "-"}
+    return {"ls": "--" if float(eps) > 1e-6 else "-"}
 
 
 def _legend(rows: Sequence[Row], grey: str) -> list[Any]:
@@ -206,7 +212,8 @@ def _legend(rows: Sequence[Row], grey: str) -> list[Any]:
     handles = [Line2D([], [], **styles(rows, name), label=name) for name in methods(rows)]
     for eps in dict.fromkeys(row["eps"] for row in rows if row["n"] != "auto"):
         handles.append(Line2D([], [], color="0.3", label=f"eps = {float(eps):g}", ls=_tolerance(eps)["ls"]))
-    handles.append(Line2D([], [], color="0.3", marker="o", mfc="white", ls="none", label="iteration's part larger"))
+    if grey != GRID:
+        handles.append(Line2D([], [], color="0.3", marker="o", mfc="white", ls="none", label="iteration's part larger"))
     if any(row["outcome"] != "converged" for row in rows):
         handles.append(Line2D([], [], color="0.3", marker="x", ls="none", label="failed"))
     return [*handles, *([Line2D([], [], color="0.8", lw=4.0, label=grey)] if grey else [])]
