@@ -16,7 +16,7 @@ from .linear.options import recipe, set_names
 from .linear.stages import Stages
 from .march import march
 from .memory import check as check_memory
-from .memory import resident
+from .memory import look_ahead, resident
 from .piezo import solve_fluid
 from .problems.box import BoxProblem
 from .problems.problem import LubricationProblem
@@ -87,6 +87,8 @@ def solve(
         if getattr(scene, "family", "user") != "user":  # whose data are each rank's own
             asked = (scene, method, system, recipe_name, stopping, options, nested, start is None)
             check_same((comm or PETSc.COMM_WORLD).tompi4py(), f"scene {scene.name} or how to solve it", asked)
+        if memory_check:
+            look_ahead(scene, comm, lambda large: plan(large, scene.name, method, system, recipe_name, nested, options or ()))
         problem = scene.build(comm)
     if start is not None and nested is None:
         nested = False

@@ -39,8 +39,8 @@ MEASURED: dict[tuple[str, str, str], tuple[float, float]] = {
     ("lubrication 1D", "full", "klu"): (800, 0),
     ("lubrication 1D", "full", "mumps"): (1250, 0),
     ("lubrication 1D", "full", "light"): (750, 0),
-    ("lubrication 2D", "", ""): (270, 0),
-    ("lubrication 2D", "cavity", "multigrid"): (800, 0),
+    ("lubrication 2D", "", ""): (220, 0),
+    ("lubrication 2D", "cavity", "multigrid"): (780, 0),
     ("lubrication 2D", "reduced", "multigrid"): (1040, 0),
     ("lubrication 2D", "reduced", "umfpack"): (410, 82),
     ("lubrication 2D", "reduced", "superlu"): (900, 75),
@@ -117,7 +117,7 @@ def _groups(own: Path, root: Path) -> list[int]:
         for place in (folder, *folder.parents):
             try:
                 limit, used = ((place / name).read_text().strip() for name in names[:2])
-                stat = dict(line.split() for line in (place / "memory.stat").read_text().splitlines())
+                stat = dict(line.split() for line in (place / "memory.stat").read_text().splitlines() if line)
                 if limit != "max":
                     left.append(max(0, int(limit) - int(used) + int(stat.get(names[2], 0))))
             except (OSError, ValueError):
@@ -199,11 +199,15 @@ def check(problem: Problem, plan: Plan, before: int, refuse: bool = True) -> Est
     short, there = comm.allreduce((share > left, -left), MPI.MAX)
     if short and refuse:
         raise InputError(
-            f"{problem.grid.size} points need about {needed / 1e9:.3g} GB with method {plan.method}"
-            f"{f' on the {plan.system} system' if plan.system else ''}, {-there / 1e9:.3g} GB are available; "
+            f"{problem.grid.size} points need about {_gb(needed)} GB with method {plan.method}"
+            f"{f' on the {plan.system} system' if plan.system else ''}, {_gb(-there)} GB are available; "
             f"take fewer points, another method or --no-memory-check"
         )
     return Estimate(base, base + int(needed))
+
+
+def _gb(size: float) -> str:
+    return f"{size / 1e9:.0f}" if size >= 1e10 else f"{size / 1e9:.2g}"
 
 
 def look_ahead(scene: Scene, comm: PETSc.Comm | None, choose: Callable[[Problem], Plan]) -> None:

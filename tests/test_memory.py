@@ -1,0 +1,139 @@
+"""Estimates of memory: near the peak, refused when there is too little, and nothing that grows."""
+
+import gc
+from types import SimpleNamespace
+
+import pytest
+
+from lcp_lube import memory
+from lcp_lube.api import solve
+from lcp_lube.auto import plan
+from lcp_lube.errors import InputError
+from lcp_lube.linear.options import recipe
+from lcp_lube.scene import load_scene
+
+GB = 2**30
+
+
+@pytest.mark.parametrize(
+    "words, sizes",
+    [
+        ("problem4 --method din --max-it 1", (50, 100, 160)),  # a direct solver
+        (
+            "problem4 --method active-set --max-it 2 --system cavity --recipe bcgs_amg --set active-set.sweeps=9",
+            (100, 200, 300),
+        ),
+        ("problem4 --method din --recipe gmres_ilu --max-it 1", (120,)),
+        ("problem4 --method fas", (500,)),
+        ("problem1 --method din --max-it 2", (60_000,)),
+    ],
+)
+def test_peaks_are_foreseen(cli, words, sizes):
+    """Within 25 %, each in a process of its own."""
+    for n in sizes:
+        data = cli("solve", *words.split(), "--n", n, "--json").json
+        assert data["memory_estimate_mb"] == pytest.approx(data["memory_mb"], rel=0.25), n
+        assert 0 < data["memory_base_mb"] < data["memory_estimate_mb"]
+
+
+def test_on_several_ranks(cli):
+    data = cli("solve", "problem4", "--n", 50, "--method", "din", "--max-it", 1, "--json", ranks=2).json
+    assert data["memory_estimate_mb"] == pytest.approx(data["memory_mb"], rel=0.25)
+
+
+def test_said_by_explain(cli):
+    run = cli("solve", "problem1", "--explain")
+    assert run.status == 0 and any(line.startswith("memory: about") for line in run.lines)
+
+
+def test_too_large_is_refused_before_it_starts(cli):
+    """One line, status 2, in which the method, the need and what there is stand; nothing is built for that."""
+    run = cli("solve", "problem4", "--n", 25_000, "--method", "din")
+    assert run.status == 2 and len(run.lines) == 1 and not run.out
+    assert "625000000 points" in run.lines[0] and "method din on the full system" in run.lines[0]
+
+
+@pytest.mark.parametrize("name", ["problem1", "problem4", "journal", "obstacle_bratu", "bratu"])
+def test_a_large_scene_is_judged_by_its_plan(name, monkeypatch):
+    """A small grid that claims the size gets the plan and the estimate of the large one."""
+    scene, seen = load_scene(name, {"n": 30}), []
+    monkeypatch.setattr(memory, "LARGE", 1)
+    monkeypatch.setattr(memory, "check", lambda problem, plan, before: seen.append(memory.bytes_needed(problem, plan)))
+    chosen = []
+
+    def choose(problem):
+        chosen.append(plan(problem, name))
+        return chosen[-1]
+
+    problem = scene.with_shape(tuple(300 for _ in scene.shape)).build()
+    memory.look_ahead(scene.with_shape(problem.grid.shape), None, choose)
+    expected = plan(problem, name)
+    assert chosen == [expected]
+    with recipe(expected.recipe):
+        assert seen == [memory.bytes_needed(problem, expected)]
+    problem.destroy()
+
+
+def test_the_override(monkeypatch):
+    monkeypatch.setattr(memory, "available", lambda: 1000)
+    with pytest.raises(InputError, match=r"100 points need about .* GB .*--no-memory-check"):
+        solve(load_scene("problem1"))
+    solution = solve(load_scene("problem1"), memory_check=False)
+    assert solution.converged
+    solution.destroy()
+
+
+def test_every_run_of_a_film_has_an_estimate(petsc_options):
+    """Whatever the inner solver: one that was not measured counts as the most expensive of its system."""
+    problem = load_scene("problem4", {"n": 40}).build()
+    for system in ("full", "reduced", "cavity"):
+        chosen = SimpleNamespace(system=system, recipe=None, nested=False, method="din")
+        with recipe("umfpack"):
+            direct = memory.bytes_needed(problem, chosen)
+        petsc_options(ksp_type="bcgs", pc_type="jacobi")
+        assert 0 < memory.bytes_needed(problem, chosen) <= max(direct, 1000 * 1600)
+        petsc_options(ksp_type="preonly", pc_type="lu", pc_factor_mat_solver_type="cholmod")
+        assert memory.bytes_needed(problem, chosen) >= direct
+        for name in ("ksp_type", "pc_type", "pc_factor_mat_solver_type"):
+            from petsc4py import PETSc
+
+            PETSc.Options().delValue(name)
+    problem.destroy()
+
+
+def test_limits_of_control_groups(tmp_path):
+    """The tightest of those above the process, in version 2 and 1; files that could be dropped do not count as used."""
+    own = tmp_path / "cgroup"
+    v2, v1 = tmp_path / "sys" / "job" / "step", tmp_path / "sys" / "memory" / "job"
+    for folder, values in (
+        (v2, {"memory.max": "max", "memory.current": 5, "memory.stat": "inactive_file 1\n"}),
+        (v2.parent, {"memory.max": 4 * GB, "memory.current": 3 * GB, "memory.stat": f"anon 1\ninactive_file {GB}\n"}),
+        (v1, {"memory.limit_in_bytes": 9 * GB, "memory.usage_in_bytes": GB, "memory.stat": "total_inactive_file 0\n"}),
+    ):
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, value in values.items():
+            (folder / name).write_text(f"{value}\n")
+    own.write_text("0::/job/step\n")
+    assert memory._groups(own, tmp_path / "sys") == [2 * GB]
+    own.write_text("9:memory:/job\n8:cpu:/job\n")
+    assert memory._groups(own, tmp_path / "sys") == [8 * GB]
+    assert memory._groups(tmp_path / "nothing", tmp_path) == []
+    assert 0 < memory.available() < 2**50 and memory.resident() > 10**6
+
+
+def test_200_solves_do_not_grow():
+    """Films by four methods, in 1D and 2D, one after the other in one process."""
+    runs = [("problem1", {"n": 200}, "active-set"), ("problem4", {"n": 12}, "din"), ("problem4", {"n": 12}, "fas")]
+    runs += [("problem1", {"n": 60}, "monotone"), ("obstacle_bratu", {"n": 12}, "auto")]
+
+    def round_of_runs():
+        for name, changes, method in runs:
+            solve(load_scene(name, changes), method=method).destroy()
+        gc.collect()
+
+    for _ in range(5):  # libraries are loaded, pools filled
+        round_of_runs()
+    before = memory.resident()
+    for _ in range(200 // len(runs)):
+        round_of_runs()
+    assert memory.resident() - before < 3 * 2**20
