@@ -313,6 +313,6 @@ def test_json_is_what_the_library_says(cli):
     data = cli("solve", "problem3", "--n", 25, "--method", "din", "--recipe", "superlu", "--json").json
     solution = solve(load_scene("problem3", {"n": 25}), method="din", recipe_name="superlu")
     ours = json.loads(json.dumps(finite(as_dict(solution))))
-    for key in set(data) - {"memory_mb", "time_s"}:
+    for key in (key for key in data if key != "time_s" and not key.startswith("memory_")):
         assert data[key] == ours[key], key
     solution.destroy()
