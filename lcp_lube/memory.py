@@ -199,7 +199,7 @@ def check(problem: Problem, plan: Plan, before: int, refuse: bool = True) -> Est
     short, there = comm.allreduce((share > left, -left), MPI.MAX)
     if short and refuse:
         raise InputError(
-            f"{problem.grid.size} points need about {_gb(needed)} GB with method {plan.method}"
+            f"grid {'x'.join(map(str, problem.grid.shape))}: {problem.grid.size} points need about {_gb(needed)} GB with method {plan.method}"
             f"{f' on the {plan.system} system' if plan.system else ''}, {_gb(-there)} GB are available; "
             f"take fewer points, another method or --no-memory-check"
         )

@@ -50,7 +50,7 @@ def test_too_large_is_refused_before_it_starts(cli):
     """One line, status 2, in which the method, the need and what there is stand; nothing is built for that."""
     run = cli("solve", "problem4", "--n", 25_000, "--method", "din")
     assert run.status == 2 and len(run.lines) == 1 and not run.out
-    assert "625000000 points" in run.lines[0] and "method din on the full system" in run.lines[0]
+    assert "grid 25000x25000: 625000000 points" in run.lines[0] and "method din on the full system" in run.lines[0]
 
 
 @pytest.mark.parametrize("name", ["problem1", "problem4", "journal", "obstacle_bratu", "bratu"])
