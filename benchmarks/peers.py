@@ -71,6 +71,8 @@ def scipy_active_set(problem: LubricationProblem, ordering: str = "COLAMD") -> A
 class MixedForm:
     """The 2n unknowns p_i, r_i side by side: p free and F1 = 0, its rows divided by diag(A); r >= 0, F2 = p >= 0, p r = 0."""
 
+    start = (0.0, 0.1)  # p and r everywhere
+
     def __init__(self, problem: LubricationProblem):
         A, B, n = matrix(problem.A), matrix(problem.B), problem.size
         scale = sp.diags(1.0 / A.diagonal())
@@ -89,8 +91,9 @@ class MixedForm:
         self.upper = self.x.duplicate()
         self.lower.setArray(at_p @ np.full(n, PETSc.NINFINITY))
         self.upper.set(PETSc.INFINITY)
-        # The best of fifteen starts for the semismooth peers: p = 1 bar, r = 0 takes them three to five times the steps.
-        self.x.setArray(at_r @ np.full(n, 0.1))
+        # The best of fifteen starts for the semismooth peers on the textured slider: p = 1 bar, r = 0 takes them three to five
+        # times the steps. (On problems 1 and 4 it is among the worst: precision_peers.py tries several.)
+        self.x.setArray(at_p @ np.full(n, self.start[0]) + at_r @ np.full(n, self.start[1]))
 
     def function(self, solver: object, x: PETSc.Vec, f: PETSc.Vec) -> None:
         self._original.mult(x, f)
