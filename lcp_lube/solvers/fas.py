@@ -73,8 +73,6 @@ class Fas:
     start : fields p and r.
     """
 
-    state = ("z", "norm", "_recent", "_first", "_taken")
-
     state: tuple[str, ...] = ("z", "norm", "_recent", "_taken", "_first")  # what a cycle starts from
 
     def __init__(
@@ -121,8 +119,8 @@ class Fas:
 
     @property
     def fields(self) -> Fields:
-        z = self._levels[0].z[self._own]
-        return {"p": np.maximum(z, 0.0).ravel(), "r": (np.maximum(-z, 0.0) / -self.problem.scheme.b_C).ravel()}
+        p, r = self._kernels.pressure_and_void(self._levels[0].z[self._own], self.problem.scheme.b_C)
+        return {"p": p.ravel(), "r": r.ravel()}
 
     @property
     def krylov(self) -> Krylov | None:

@@ -478,3 +478,15 @@ def lost_void(b_C: Array, b_W: Array) -> tuple[float, float]:
             lost = max(lost, abs(b_W[j, i] + b_C[j, i - 1]))
             most = max(most, abs(b_C[j, i]))
     return lost, most
+
+
+@kernel
+def pressure_and_void(z: Array, b_C: Array) -> tuple[Array, Array]:
+    """p and r of z, whose frame is left out."""
+    p, r = np.empty(z.shape), np.empty(z.shape)
+    for j in range(z.shape[0]):
+        for i in range(z.shape[1]):
+            here = z[j, i]
+            p[j, i] = here if here > 0.0 else 0.0
+            r[j, i] = here / b_C[j, i] if here < 0.0 else 0.0
+    return p, r

@@ -1,7 +1,6 @@
 """Grids of the nonlinear multigrid: their points, how these are dealt to the ranks, and their coefficients."""
 
 from dataclasses import dataclass, field
-from time import perf_counter
 
 import numpy as np
 from mpi4py import MPI
@@ -49,7 +48,6 @@ class Level:
     visits: int = 0
     seconds: float = 0.0
     work: float = 0.0  # relaxed points
-    clock: float = field(default_factory=perf_counter)
 
     @property
     def first(self) -> int:
