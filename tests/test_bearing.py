@@ -11,8 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lcp_lube import InputError, load_scene, solve
+from lcp_lube.formula import Formula
 from lcp_lube.problems.grid import Grid
+from lcp_lube.problems.jumps import face_film
 from lcp_lube.problems.model import Model, Side
+from lcp_lube.problems.shapes import Block, Sum
 from lcp_lube.problems.transfer import Transfer
 from lcp_lube.scenes_bearing import BearingScene
 from lcp_lube.scenes_film import shape_names
@@ -73,6 +76,39 @@ def test_second_order(name, ceiling):
         loads = [found(load_scene(name, {"n": n - 1}))[2]["load"] for n in near]
         errors.append(np.mean([abs(load / exact.load - 1) * (n / cells) ** 2 for load, n in zip(loads, near, strict=True)]))
     assert -np.polyfit(np.log(sizes), np.log(errors), 1)[0] > 1.8 and errors[-1] < ceiling
+
+
+@pytest.mark.parametrize("start", [49, 50, 53, 56])
+def test_edges_may_lie_anywhere_in_a_full_film(start):
+    """A pocket whose edges lie inside cells: still of second order, each n by itself."""
+    exact, sizes = load_scene("pocketed_pad", {"U": 0.02}).exact(), [start * 2**k for k in range(4)]
+    errors = [abs(found(load_scene("pocketed_pad", {"U": 0.02, "n": n}))[2]["load"] / exact.load - 1) for n in sizes]
+    assert max(error * n**2 for error, n in zip(errors, sizes, strict=True)) < 2.0, errors
+
+
+def test_edges_inside_cells_where_the_film_ruptures():
+    """First order there, for only the part before the edge resists."""
+    exact = load_scene("pocketed_pad").exact()
+    for n in (100, 102, 203, 403):
+        assert found(load_scene("pocketed_pad", {"n": n}))[2]["load"] == pytest.approx(exact.load, rel=0.8 / n)
+
+
+def test_pieces_side_by_side_and_in_series():
+    """A step across the flow: C is the mean of cubes; along it: the harmonic one; H follows from Int h^-2 / Int h^-3."""
+
+    def step(t, s):
+        return np.where(t + 0.0 * s < 1.3, 1.0, 2.0)
+
+    nodes, faces, lines = np.array([0.0, 1.0, 2.0, 3.0]), np.array([0.5, 1.5, 2.5]), np.array([0.0, 1.0])
+    cubes, films = face_film(step, nodes, faces, lines, [1.3], [], 1.0)
+    series = 1.0 / (0.3 + 0.7 / 8)
+    np.testing.assert_allclose(cubes, [[1.0, series, 8.0]] * 2, rtol=1e-14)
+    np.testing.assert_allclose(films, [[1.0, series * (0.3 + 0.7 / 4), 2.0]] * 2, rtol=1e-14)
+    cubes, films = face_film(lambda t, s: step(s, t), nodes, faces, lines, [], [1.3], 1.0)
+    np.testing.assert_allclose(cubes, [[1.0] * 3, [0.8 + 0.2 * 8] * 3], rtol=1e-14)
+    np.testing.assert_allclose(films, [[1.0] * 3, [0.8 + 0.2 * 2] * 3], rtol=1e-14)
+    two = face_film(lambda t, s: np.where((t > 1.2) & (t < 1.6), 2.0, 1.0) + 0 * s, nodes, faces, lines, [1.2, 1.6], [], 1.0)
+    np.testing.assert_allclose(two[0][0], [1.0, 1.0 / (0.6 + 0.4 / 8), 1.0], rtol=1e-14)
 
 
 def test_no_cavitation_is_one_linear_solve():
@@ -150,13 +186,19 @@ def test_a_periodic_film_may_be_cut_open_anywhere(cells, scheme):
 
 sides_along = st.sampled_from([(OPEN, OPEN), (Side("closed"), OPEN), (OPEN, Side("closed")), (Side("periodic"),) * 2])
 sides_across = st.sampled_from([(OPEN, OPEN), (Side("closed"), OPEN), (OPEN, Side("mirror")), (Side("periodic"),) * 2])
-films = st.sampled_from(["3e-6 - 100e-6*x", "2e-6 + 1e-6*sin(700*x)*cos(600*y)", "1e-6 + where(x < 0.004, 2e-6, 0)"])
+films = st.sampled_from(
+    [
+        "3e-6 - 100e-6*x",
+        "2e-6 + 1e-6*sin(700*x)*cos(600*y)",
+        "1e-6 + where(x < 0.004, 2e-6, 0)",
+        Block(3e-6, (0.0019, 0.0051), (0.0011, 0.004)),
+    ]
+)
 
 
 def model(along, across, film, scheme):
-    from lcp_lube.formula import Formula
-
-    return Model((L, WIDTH), (*along, *across), Formula(film), 0.01, 1.0, 0.0, 1e7, scheme)
+    gap = Formula(film) if isinstance(film, str) else Sum([Block(1e-6, (-1, 1), (-1, 1)), film])
+    return Model((L, WIDTH), (*along, *across), gap, 0.01, 1.0, 0.0, 1e7, scheme)
 
 
 def has_pressure(sides):

@@ -12,6 +12,7 @@ from petsc4py import PETSc
 from ..errors import InputError
 from ..parallel import Array
 from .grid import Grid
+from .jumps import face_film
 
 SCHEMES = ("nodal", "face", "upwind")
 Film = Callable[[Array, Array], Array]
@@ -145,14 +146,24 @@ def _coefficients(
         return 0.5 * (nodal[:-1] + nodal[1:])
 
     k = p_unit / (6.0 * mu)
-    k_x = (k * cubes(h_face.T, h_x.T) / dx).T
+    jumps = [] if mean_cubes else [getattr(film, "jumps", lambda axis: ())(axis) for axis in "xy"]
+    if any(jumps):
+        across = grid.spacing[1] if grid.dim == 2 else 1.0
+        cubes_x, h_face = face_film(film, x_nodes, x_faces, y[:, 0], *jumps, across)
+    else:
+        cubes_x = cubes(h_face.T, h_x.T).T
+    k_x = (k * cubes_x.T / dx).T
     k_W, k_E = k_x[:, :-1], k_x[:, 1:]  # a face's conductance is stored once
     if grid.dim == 2:
         dy = grid.spacing[1]
         y_nodes, y_faces = grid.nodes_and_faces(1)
         h_y = np.broadcast_to(film(x, y_nodes[:, None]), (ny + 2, nx))
         at_y_faces = np.broadcast_to(film(x, y_faces[:, None]), (ny + 1, nx))
-        k_y = k * cubes(at_y_faces, h_y) * dx / dy**2
+        if any(jumps):
+            cubes_y = face_film(lambda t, s: film(s, t), y_nodes, y_faces, x[0], *jumps[::-1], dx)[0].T
+        else:
+            cubes_y = cubes(at_y_faces, h_y)
+        k_y = k * cubes_y * dx / dy**2
         k_S, k_N = k_y[:-1], k_y[1:]
     else:
         k_S = k_N = np.zeros(grid.box)

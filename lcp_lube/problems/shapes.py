@@ -63,6 +63,9 @@ class Block:
     def breakpoints(self) -> tuple[float, ...]:
         return tuple(x for x in self.x if np.isfinite(x))
 
+    def jumps(self, axis: str) -> tuple[float, ...]:
+        return tuple(t for t in (self.x if axis == "x" else self.y) if np.isfinite(t))
+
 
 @dataclass(frozen=True)
 class DimpleArray:
@@ -93,6 +96,13 @@ class DimpleArray:
         start, end = self.x
         centres = start + (end - start) * (np.arange(self.columns) + 0.5) / self.columns
         return tuple(np.concatenate([centres + k * self.size for k in (-0.5, 0.0, 0.5)]))
+
+    def jumps(self, axis: str) -> tuple[float, ...]:
+        (start, end), count = (self.x, self.columns) if axis == "x" else (self.y, self.rows)
+        if self.form != "square" or not np.isfinite([start, end]).all():
+            return ()  # the edge of a round one is nowhere a line
+        centres = start + (end - start) * (np.arange(count) + 0.5) / count
+        return tuple(np.concatenate([centres - 0.5 * self.size, centres + 0.5 * self.size]))
 
 
 @dataclass(frozen=True)
@@ -165,6 +175,10 @@ class Sum:
     def smooth_between(self) -> bool:
         """Whether the film's jumps and kinks are known, which an exact solution needs."""
         return self.floor is None and all(hasattr(part, "breakpoints") for part in self.parts)
+
+    def jumps(self, axis: str) -> tuple[float, ...]:
+        """x or y (m) of the straight lines across which the film jumps."""
+        return tuple(t for part in self.parts if hasattr(part, "jumps") for t in part.jumps(axis))
 
     def breakpoints(self) -> tuple[float, ...]:
         """x (m) of all jumps, kinks and extrema at y = 0; those extrema that no part has by itself are searched for."""
