@@ -28,7 +28,11 @@ def start(arguments: list[str]) -> None:
     check(arguments)
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     try:
+        import mpi4py
+
+        mpi4py.rc.thread_level = "funneled"  # as PETSc would start it
         import petsc4py
+        from mpi4py import MPI  # noqa: F401  (starts MPI: what it says if it cannot is not caught below)
     except ImportError as error:
         raise InputError(f"PETSc for Python is needed, see 'Installation' in README.md: {error}") from None
     sys.stderr.flush()
