@@ -7,6 +7,7 @@ A fallback that takes over with a direct solver is not in the estimate: it may n
 """
 
 import os
+import resource
 import sys
 from collections.abc import Callable
 from copy import copy
@@ -15,6 +16,7 @@ from importlib.util import find_spec
 from math import log2, prod
 from pathlib import Path
 
+import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -83,6 +85,15 @@ def resident() -> int:
         return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
     except (OSError, ValueError, IndexError):
         return 100 * MB
+
+
+def peak() -> int:
+    """Most bytes that this process has held. Not `ru_maxrss`, which begins with what the parent process held at the fork."""
+    try:
+        lines = dict(line.split(":") for line in Path("/proc/self/status").read_text().splitlines())
+        return int(lines["VmHWM"].split()[0]) * 1024
+    except (OSError, ValueError, KeyError):
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
 def available() -> int:
@@ -198,8 +209,9 @@ def check(problem: Problem, plan: Plan, before: int, refuse: bool = True) -> Est
     machine.Free()
     short, there = comm.allreduce((share > left, -left), MPI.MAX)
     if short and refuse:
+        grid = problem.grid
         raise InputError(
-            f"grid {'x'.join(map(str, problem.grid.shape))}: {problem.grid.size} points need about {_gb(needed)} GB with method {plan.method}"
+            f"grid {'x'.join(map(str, grid.shape))}: {grid.size} points need about {_gb(needed)} GB with method {plan.method}"
             f"{f' on the {plan.system} system' if plan.system else ''}, {_gb(-there)} GB are available; "
             f"take fewer points, another method or --no-memory-check"
         )
@@ -221,13 +233,14 @@ def look_ahead(scene: Scene, comm: PETSc.Comm | None, choose: Callable[[Problem]
     ------
     InputError : as `check`.
     """
-    if scene.family == "user" or prod(scene.shape) < LARGE:
+    size = prod(scene.shape)
+    if scene.family == "user" or size < LARGE or size > np.iinfo(PETSc.IntType).max // 2:  # which the grid refuses by itself
         return
     ranks = (comm or PETSc.COMM_WORLD).getSize()
     small = scene.with_shape(tuple(min(n, max(50, 2 * ranks)) for n in scene.shape)).build(comm)
     large = copy(small)
     large.grid = grid = copy(small.grid)
-    grid.shape, grid.size = scene.shape, prod(scene.shape)
+    grid.shape, grid.size = scene.shape, size
     grid.box = (grid.box[0], grid.shape[0] if grid.box[1] == small.grid.shape[0] else grid.box[1])
     try:
         plan = choose(large)

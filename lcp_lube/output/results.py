@@ -2,7 +2,6 @@
 
 import os
 import platform
-import resource
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ import petsc4py
 from petsc4py import PETSc
 
 from .. import __version__
+from ..memory import peak
 from ..problems.solution import Solution
 from .units import place, quantity
 
@@ -64,7 +64,7 @@ def as_dict(solution: Solution) -> dict[str, Any]:
 
 def peak_memory(solution: Solution) -> float:
     """Largest resident memory so far in MB, summed over the ranks. Collective."""
-    return solution.problem.grid.comm.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0)
+    return solution.problem.grid.comm.allreduce(peak() / 2**20)
 
 
 def versions() -> dict[str, str]:
