@@ -164,7 +164,7 @@ def balanced(
     answer = f"{unknown.key} = {value:.8g} carries {load:.8g}"
     if solution.converged and not found:
         solution.outcome = Outcome.LOAD_NOT_CARRIED
-        solution.message = f"{table.load:g} asked for; nearest to it, {answer}, after {count} solves"
+        solution.message = f"{table.load:g} asked for; the nearest of {count} tried: {answer}"
     solution.settings |= {
         "balance": {
             "vary": unknown.key,

@@ -67,10 +67,15 @@ def parse_axis(text: str) -> Axis:
     if log:
         if min(a, b) <= 0:
             raise InputError(f"--vary {text}: equal ratios need FROM > 0 and TO > 0")
-        return Axis(key, tuple(np.geomspace(a, b, n).tolist()))
+        return Axis(key, tuple(_rounded(number) for number in np.geomspace(a, b, n)))
     numbers = np.linspace(a, b, n)
     whole = all(end.lstrip("+-").isdigit() for end in (start, end)) and bool(np.all(numbers == np.rint(numbers)))
-    return Axis(key, tuple(int(number) if whole else float(number) for number in numbers))
+    return Axis(key, tuple(int(number) if whole else _rounded(number) for number in numbers))
+
+
+def _rounded(number: float) -> float:
+    """0.3, not 0.30000000000000004."""
+    return float(f"{number:.14g}")
 
 
 def _listed(values: str) -> tuple[Any, ...]:

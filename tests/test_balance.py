@@ -90,7 +90,7 @@ def test_a_load_that_cannot_be_carried(name, changes, end):
     found, outcome, message, _ = balance(name, changes)
     assert outcome is Outcome.LOAD_NOT_CARRIED and found["iterations"] < MOST_SOLVES
     assert end is None or found["value"] == pytest.approx(end, rel=1e-3)
-    assert "asked for; nearest to it" in message
+    assert "asked for; the nearest of" in message
 
 
 def test_coarse_grids_come_first():

@@ -6,7 +6,7 @@ from math import isfinite
 
 LONGEST_STEP = 2.5  # while there is no bracket
 FLATTEST = 0.05  # slope below which a step is taken as if it were this
-WIDEST_GAP = 1.5  # left between what is known
+WIDEST_GAP, FINEST_GAP = 1.5, 0.3  # left between what is known, and beside the best point
 PATIENCE = 8  # points without a bracket, after which secant steps are left
 
 
@@ -73,11 +73,14 @@ class Search:
         return any(abs(t - point[0]) <= 1e-9 * (self.high - self.low) for point in self.points)
 
     def _elsewhere(self) -> float | None:
-        """An end that was not tried, or the middle of the widest gap."""
+        """An end that was not tried, or the middle of the widest gap; of those beside the best point the smaller ones too."""
         if not self.explore:
             return None
         for end in self.ends:
             if not self._known(end):
                 return end
-        a, b = max(pairwise(sorted(point[0] for point in self.points)), key=lambda gap: gap[1] - gap[0])
-        return 0.5 * (a + b) if b - a > WIDEST_GAP else None
+        known = sorted(point[0] for point in self.points)
+        best = min(self.points, key=lambda point: abs(point[1]))[0]
+        wide = [(a, b) for a, b in pairwise(known) if b - a > (FINEST_GAP if best in (a, b) else WIDEST_GAP)]
+        a, b = max(wide, key=lambda gap: gap[1] - gap[0], default=(0.0, 0.0))
+        return 0.5 * (a + b) if b > a else None
