@@ -120,6 +120,7 @@ def solve(
         if solution.outcome is not Outcome.WRONG_SOLUTION:
             solution.times["total"] = perf_counter() - begin
             return solution
+        chosen.why.insert(0, f"the whole model: the reduced one's answer ({part.kind}) is not the whole scene's")
     if isinstance(problem, SqueezeProblem):
         if checkpoint or resume or certify or chosen.nested:
             raise InputError(f"--checkpoint, --resume, --certify, --nested: not for scene {scene.name}, which goes on in time")

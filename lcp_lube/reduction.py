@@ -104,16 +104,17 @@ def reduced_solve(scene: Scene, eps1: float = 1e-8, **how: Any) -> Solution:
     if part is None:
         problem.destroy()
         return solve(scene, **how)
-    return solve_part(part, problem, solve, eps1, **how)  # type: ignore[arg-type]
+    return solve_part(part, problem, solve, eps1, **how)
 
 
-def solve_part(part: Part, problem: LubricationProblem, solve: Callable[..., Solution], eps1: float, **how: Any) -> Solution:
+def solve_part(part: Part, problem: Problem, solve: Callable[..., Solution], eps1: float, **how: Any) -> Solution:
     """The whole problem's solution from its part's. Collective.
 
     Parameters
     ----------
     solve : api.solve; how : its arguments. `start` is a neighbour's whole problem and fields. eps1 : tolerance of the run.
     """
+    assert isinstance(problem, LubricationProblem)  # as `part_of` found
     details = {"reduction": part.kind}
     if part.kind == "constant":
         p = next(side.p for side in part.whole.model.sides if side.kind == "open") / problem.p_unit  # type: ignore[attr-defined]

@@ -152,6 +152,19 @@ def test_auto_reduces(name):
         solution.destroy()
 
 
+def test_a_wrong_reduction_is_found_out(monkeypatch):
+    """The certificate is that of the whole scene: a film that only seems symmetric is solved whole."""
+    monkeypatch.setattr("lcp_lube.reduction.SAME", 1.0)
+    scene = bearing({"shape": "formula", "h": "2e-6 - 1e-4*x + 5e-5*y"}, ny=9)
+    assert kind(scene) == "mirror"
+    solution, whole = solve(scene), solve(scene, method="active-set")
+    assert solution.converged and "reduction" not in solution.settings["details"]
+    assert solution.settings["why"][0].startswith("the whole model: the reduced one's answer (mirror) is not")
+    np.testing.assert_allclose(solution.p, whole.p, rtol=0, atol=1e-6 * whole.p.max())
+    for one in (solution, whole):
+        one.destroy()
+
+
 def test_nested_and_from_a_neighbours_answer():
     scene = load_scene("journal", {"nx": 60, "ny": 51})
     first = solve(scene, nested=True)

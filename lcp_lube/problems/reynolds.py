@@ -146,10 +146,11 @@ def _coefficients(
         return 0.5 * (nodal[:-1] + nodal[1:])
 
     k = p_unit / (6.0 * mu)
-    jumps = [] if mean_cubes else [getattr(film, "jumps", lambda axis: ())(axis) for axis in "xy"]
-    if any(jumps):
+    edges = (lambda axis: ()) if mean_cubes else getattr(film, "jumps", lambda axis: ())
+    x_jumps, y_jumps = edges("x"), edges("y")
+    if x_jumps or y_jumps:
         across = grid.spacing[1] if grid.dim == 2 else 1.0
-        cubes_x, h_face = face_film(film, x_nodes, x_faces, y[:, 0], *jumps, across)
+        cubes_x, h_face = face_film(film, x_nodes, x_faces, y[:, 0], x_jumps, y_jumps, across)
     else:
         cubes_x = cubes(h_face.T, h_x.T).T
     k_x = (k * cubes_x.T / dx).T
@@ -159,8 +160,8 @@ def _coefficients(
         y_nodes, y_faces = grid.nodes_and_faces(1)
         h_y = np.broadcast_to(film(x, y_nodes[:, None]), (ny + 2, nx))
         at_y_faces = np.broadcast_to(film(x, y_faces[:, None]), (ny + 1, nx))
-        if any(jumps):
-            cubes_y = face_film(lambda t, s: film(s, t), y_nodes, y_faces, x[0], *jumps[::-1], dx)[0].T
+        if x_jumps or y_jumps:
+            cubes_y = face_film(lambda t, s: film(s, t), y_nodes, y_faces, x[0], y_jumps, x_jumps, dx)[0].T
         else:
             cubes_y = cubes(at_y_faces, h_y)
         k_y = k * cubes_y * dx / dy**2
