@@ -154,7 +154,7 @@ def test_auto_reduces(name):
 
 def test_a_wrong_reduction_is_found_out(monkeypatch):
     """The certificate is that of the whole scene: a film that only seems symmetric is solved whole."""
-    monkeypatch.setattr("lcp_lube.reduction.SAME", 1.0)
+    monkeypatch.setattr("lcp_lube.reduction._is_symmetric", lambda *_: True)
     scene = bearing({"shape": "formula", "h": "2e-6 - 1e-4*x + 5e-5*y"}, ny=9)
     assert kind(scene) == "mirror"
     solution, whole = solve(scene), solve(scene, method="active-set")
