@@ -1,5 +1,6 @@
 """What several tests need: films from random numbers, scenes with any film, matrices as NumPy arrays."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,6 +9,7 @@ from hypothesis import strategies as st
 from petsc4py import PETSc
 from pydantic import PrivateAttr
 
+from lcp_lube.problems.exact import ExactSolution, exact_solution
 from lcp_lube.problems.grid import Grid
 from lcp_lube.problems.problem import LubricationProblem
 from lcp_lube.problems.reynolds import SCHEMES, box_scheme
@@ -42,6 +44,41 @@ class FilmScene(LubricationScene):
     @property
     def gap(self) -> Any:
         return self._film
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """A film between knots at any places: straight, smooth (half a cosine from knot to knot) or in steps."""
+
+    kind: str
+    knots: tuple[float, ...]  # m, from 0 to L
+    heights: tuple[float, ...]  # m
+
+    def __call__(self, x: Any, y: Any = 0.0, /) -> np.ndarray:
+        x = np.broadcast_arrays(np.asarray(x, dtype=float), y)[0]
+        k = np.clip(np.searchsorted(self.knots, x, side="right") - 1, 0, len(self.knots) - 2)
+        knots, h = np.array(self.knots), np.array(self.heights)
+        t = np.clip((x - knots[k]) / (knots[k + 1] - knots[k]), 0, 1)
+        part = {"straight": t, "smooth": np.sin(0.5 * np.pi * t) ** 2, "steps": 0.0}[self.kind]
+        return h[k] + (h[k + 1] - h[k]) * part
+
+    def breakpoints(self) -> tuple[float, ...]:
+        return self.knots
+
+
+def random_films(count: int, seed: int) -> Iterator[tuple[FilmScene, ExactSolution]]:
+    """Scenes with their exact solutions: film ratios up to 20, up to 6 pieces, any of three pressures at either end."""
+    rng = np.random.default_rng(seed)
+    for k in range(count):
+        pieces = rng.integers(2, 7)
+        knots = (0.0, *np.sort(rng.uniform(0.03, 0.97, pieces - 1)) * L, L)
+        kind = ("straight", "smooth", "steps")[k % 3]
+        heights = 5e-6 * rng.uniform(1.5, 6 if kind == "steps" else 20) ** rng.uniform(0, 1, pieces + 1)
+        film = Pieces(kind, knots, tuple(heights))
+        p_a, p_b = (float(p) for p in rng.choice([0.0, 1e5, 3e6], 2))
+        scheme = str(rng.choice(["face", "nodal"]))
+        scene = FilmScene.of(film, p_a=p_a, p_b=p_b, scheme=scheme, name=f"{kind}{k}")
+        yield scene, exact_solution(film, L, MU, U, p_a, p_b)
 
 
 def knots(ratio: float = 20.0) -> st.SearchStrategy[Knots]:

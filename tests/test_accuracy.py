@@ -1,56 +1,19 @@
 """--accuracy: the estimate against exact solutions, where the ladder ends, what is refused."""
 
 import math
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 import pytest
-from films import MU, FilmScene, L, U
+from films import FilmScene, L, Pieces, random_films
 
 from lcp_lube.accuracy import first_shape, solve_to_accuracy
 from lcp_lube.api import solve
 from lcp_lube.errors import InputError
 from lcp_lube.estimate import misplaced_film, relative_error
-from lcp_lube.problems.exact import exact_solution
 from lcp_lube.problems.solution import Outcome
 from lcp_lube.registry import scene_names
 from lcp_lube.scene import load_scene
-
-
-@dataclass(frozen=True)
-class Pieces:
-    """A film between knots at any places: straight, smooth (half a cosine from knot to knot) or in steps."""
-
-    kind: str
-    knots: tuple[float, ...]  # m, from 0 to L
-    heights: tuple[float, ...]  # m
-
-    def __call__(self, x, y=0.0, /):
-        x = np.broadcast_arrays(np.asarray(x, dtype=float), y)[0]
-        k = np.clip(np.searchsorted(self.knots, x, side="right") - 1, 0, len(self.knots) - 2)
-        knots, h = np.array(self.knots), np.array(self.heights)
-        t = np.clip((x - knots[k]) / (knots[k + 1] - knots[k]), 0, 1)
-        part = {"straight": t, "smooth": np.sin(0.5 * np.pi * t) ** 2, "steps": 0.0}[self.kind]
-        return h[k] + (h[k + 1] - h[k]) * part
-
-    def breakpoints(self):
-        return self.knots
-
-
-def random_films(count, seed):
-    """Scenes with their exact solutions: film ratios up to 20, up to 6 pieces, any of three pressures at either end."""
-    rng = np.random.default_rng(seed)
-    for k in range(count):
-        pieces = rng.integers(2, 7)
-        knots = (0.0, *np.sort(rng.uniform(0.03, 0.97, pieces - 1)) * L, L)
-        kind = ("straight", "smooth", "steps")[k % 3]
-        heights = 5e-6 * rng.uniform(1.5, 6 if kind == "steps" else 20) ** rng.uniform(0, 1, pieces + 1)
-        film = Pieces(kind, knots, tuple(heights))
-        p_a, p_b = (float(p) for p in rng.choice([0.0, 1e5, 3e6], 2))
-        scheme = str(rng.choice(["face", "nodal"]))
-        scene = FilmScene.of(film, p_a=p_a, p_b=p_b, scheme=scheme, name=f"{kind}{k}")
-        yield scene, exact_solution(film, L, MU, U, p_a, p_b)
 
 
 def exact_scenes():
