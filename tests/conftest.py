@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -46,10 +47,19 @@ class Run:
 
     @property
     def lines(self) -> list[str]:
-        """Lines on stderr, but for what mpiexec adds to a rank's exit status: its boxed notices."""
-        lines = self.err.splitlines()
-        start = next((k for k, line in enumerate(lines) if line.startswith("-" * 70)), len(lines))
-        return [line for line in lines[:start] if line.strip()]
+        """Lines on stderr, but for what mpiexec adds to a rank's exit status."""
+        return without_notices(self.err)
+
+
+def without_notices(text: str) -> list[str]:
+    """Lines that are not mpiexec's: neither in its boxes, which may come before or after ours, nor in its log."""
+    lines, boxed = [], False
+    for line in text.splitlines():
+        if line.startswith("-" * 70):
+            boxed = not boxed
+        elif line.strip() and (not boxed or line.startswith("lcp-lube: ")) and not re.match(r"\[\S+:\d+\]", line):
+            lines.append(line)
+    return lines
 
 
 def start(arguments: list[str], ranks: int, cwd: Path, timeout: float) -> Run:

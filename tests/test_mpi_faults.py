@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
-from conftest import ENVIRONMENT, TESTS
+from conftest import ENVIRONMENT, TESTS, without_notices
 
 WORDS = "solve problem1 --n 30 --method din --system full --recipe mumps".split()  # noqa: SIM905
 RANKS = 3
@@ -60,10 +60,9 @@ class Job:
         """Status, what was said apart from process ids, and the seconds that the end took."""
         out, err = self.process.communicate(timeout=60)
         seconds = time.monotonic() - self.since
-        lines = [line for line in (self.said + err).splitlines() if not PIDS.match(line)]
-        boxed = next((k for k, line in enumerate(lines) if line.startswith("-" * 70)), len(lines))
         assert out == ""
-        return self.process.returncode, [line for line in lines[:boxed] if line.strip()], seconds
+        lines = [line for line in without_notices(self.said + err) if not PIDS.match(line)]
+        return self.process.returncode, lines, seconds
 
 
 @pytest.mark.parametrize(
