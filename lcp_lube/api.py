@@ -1,6 +1,5 @@
 """solve(scene) -> Solution: choose method, system and recipe, run the outer loop, certify."""
 
-from dataclasses import astuple
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -9,7 +8,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from .alarm import check_same
-from .auto import default_recipe, plan
+from .auto import plan
 from .checkpoint import CHOICES, Checkpointer, load
 from .errors import InputError
 from .linear.options import recipe, set_names
@@ -24,13 +23,9 @@ from .problems.solution import Fields, Outcome, Problem, Solution
 from .problems.squeeze import SqueezeProblem
 from .reduction import part_of, solve_part
 from .registry import METHODS
+from .run import Run
 from .scene import Scene
-from .solvers.enclosure import Enclosure, enclose
-from .solvers.nested import level_shapes
 from .solvers.newton import Monitor, Stopping
-
-# A coarse answer is a start: its front matters, not its last digits. An interior method's layer there must be thin, though.
-COARSE_EPS = {False: 1e-4, True: 1e-8}  # by MethodEntry.interior
 
 
 @np.errstate(over="ignore", invalid="ignore")  # iterates that overflow are an outcome, not a warning
@@ -125,114 +120,28 @@ def solve(
         if checkpoint or resume or certify or chosen.nested:
             raise InputError(f"--checkpoint, --resume, --certify, --nested: not for scene {scene.name}, which goes on in time")
         return march(problem, scene, chosen, stopping, options or {}, monitor, stages)
-    shapes = level_shapes(scene.shape, problem.grid.comm.size) if chosen.nested else [scene.shape]
-    near, previous = start, None  # what the next grid starts from, and the problem on the grid before
-    levels: list[dict[str, Any]] = []
-    if saved is not None:
-        shapes, levels, near = saved.shapes, saved.record["levels"], None
+    run = Run(scene, problem, chosen, stopping, options or {}, monitor, stages, keeper, saved)
     keeper.begin(scene, (chosen.method, chosen.system, recipe_name, chosen.nested, options or {}))
     with recipe(chosen.recipe) as recipe_used:
         memory = check_memory(problem, chosen, held, memory_check)
-        for shape in shapes:
-            finest = shape == shapes[-1]
-            level_begin = perf_counter()
-            with stages("setup"):
-                level = problem if finest else scene.with_shape(shape).build(comm)
-            with stages("prolongation"):
-                guess = level.prolong(*near, entry.interior) if near is not None else None
-            if previous is not None:
-                previous.destroy()
-            coarse_eps = max(COARSE_EPS[entry.interior], stopping.eps1)
-            level_stopping = stopping if finest else Stopping(coarse_eps, np.inf, stopping.max_it)
-            run = entry.load()(level, stages, chosen.system, options or {}, level_stopping, guess)
-            try:
-                if saved is not None and saved.failures:  # another method had taken over
-                    outcome, message, steps = saved.failures[0]
-                else:
-                    before = saved.restore(run, level.grid) if saved is not None else []
-                    saved = None
-                    where: dict[str, Any] = {"shapes": shapes[shapes.index(shape) :], "levels": levels}
-                    outcome, message, steps = keeper.iterate(run, level.grid, level_stopping, monitor, before, **where)
-                krylov = run.krylov
-                ksp_type, pc_type = (krylov.ksp_type, krylov.pc_type) if krylov else (None, None)
-                near = (level, run.fields)
-            finally:
-                run.destroy()
-            if not finest and outcome in (Outcome.NOT_FINITE, Outcome.LINEAR_SOLVER):
-                near = None  # nothing to start from: the next grid begins by itself
-            previous = level
-            levels.append(
-                {
-                    **dict(zip(("nx", "ny"), shape, strict=False)),
-                    "iterations": len(steps),
-                    "linear_iterations": sum(step.linear_iterations for step in steps),
-                    "time_s": perf_counter() - level_begin,
-                }
-            )
-    fields, took_over = run.fields, None
-    details: dict[str, Any] = getattr(run, "details", {})  # what a method tells of itself beyond its steps
-    reached, failures, more, failed = fields, "", steps, []
-    for tried, name in enumerate(entry.fallback if set(options or {}) <= {"p0"} else (), start=1):
-        if outcome is Outcome.CONVERGED:
-            break
-        failed.append((outcome, message, [astuple(step) for step in more]))
-        failures += f"{took_over or chosen.method} failed ({message}); "
-        rescue = METHODS[name].of(problem.kind)
-        # Interior methods converge from anywhere, and only direct inner solves keep up with them on films like this one.
-        system, inner = rescue.systems[0], default_recipe(problem, rescue.systems[0], large=False)[0]
-        if not chosen.system and not rescue.interior:  # a method without linear systems hands over what it has reached
-            next_one = plan(problem, scene.name, name)
-            system, inner = next_one.system, next_one.recipe or inner
-        with recipe(inner):
-            # An interior method begins anew; another may take up what was reached.
-            run = rescue.load()(problem, stages, system, {}, stopping, None if rescue.interior else reached)
-            try:
-                if saved is not None and len(saved.failures) > tried:
-                    outcome, message, more = saved.failures[tried]
-                else:
-                    before = saved.restore(run, problem.grid, reached) if saved is not None else []
-                    saved = None
-                    outcome, message, more = keeper.iterate(
-                        run, problem.grid, stopping, monitor, before, reached, failed=failed
-                    )
-            finally:
-                run.destroy()
-        fields, steps, took_over = run.fields, steps + more, name
-    if took_over:
-        message = f"{failures}{took_over} took over: {message}"
-    certificate = problem.certify(fields, stopping.eps1)
-    enclosure: Enclosure | None = None
-    if certify and isinstance(problem, LubricationProblem):
-        # By the inner solver that has just solved this problem, or would have.
-        solver = chosen if chosen.system else plan(problem, scene.name, "active-set", nested=False)
-        system = METHODS[took_over].systems[0] if took_over else solver.system
-        with recipe(default_recipe(problem, system, large=False)[0] if took_over else solver.recipe), stages("certify"):
-            enclosure = enclose(problem, fields, system, Stages())
+        run.grids(start)
+    run.take_over()
+    outcome, message = run.outcome, run.message
+    certificate = problem.certify(run.fields, stopping.eps1)
+    enclosure = run.enclose(problem) if certify and isinstance(problem, LubricationProblem) else None
     if outcome is not Outcome.CONVERGED and isinstance(problem, BoxProblem):
         outcome, message = problem.explain(outcome, message)
     if outcome is Outcome.CONVERGED and not certificate.holds:
         outcome, message = Outcome.WRONG_SOLUTION, f"{message}, but the certificate fails: {certificate.failure}"
     return Solution(
         problem,
-        fields,
+        run.fields,
         outcome,
         message,
         certificate,
-        steps,
-        settings={
-            "scene": scene.name,
-            "method": chosen.method,
-            "took_over": took_over,
-            "system": chosen.system or None,
-            "scheme": scene.scheme,
-            "recipe": recipe_used,
-            "ksp_type": ksp_type,
-            "pc_type": pc_type,
-            "why": [*chosen.why, memory.sentence] if memory else chosen.why,
-            **(memory.settings if memory else {}),
-            "details": {key: value for key, value in details.items() if key != "levels"},
-        },
+        run.steps,
+        settings={**run.settings(recipe_used, [memory.sentence] if memory else []), **(memory.settings if memory else {})},
         times={**stages.seconds, "total": perf_counter() - begin},
-        levels=levels if chosen.nested else details.get("levels", []),
+        levels=run.levels if chosen.nested else run.details.get("levels", []),
         enclosure=enclosure,
     )
