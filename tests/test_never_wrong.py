@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from petsc4py import PETSc
 
 from lcp_lube import Complementarity
 from lcp_lube.api import solve
@@ -39,6 +40,8 @@ KSPS: dict[str, tuple[dict[str, object], bool]] = {
     "inner tolerance 1": ({"ksp_type": "gmres", "pc_type": "none", "ksp_rtol": 1.0}, False),
     "no inner iteration": ({"ksp_type": "gmres", "pc_type": "none", "ksp_max_it": 0}, False),
 }
+if PETSC_REFUSES_RTOL_1 := PETSc.Sys.getVersion() > (3, 19):
+    del KSPS["inner tolerance 1"]
 
 
 M, Q = np.array([[4.0, -1.0, 0.0], [-1.0, 4.0, 0.0], [0.0, -1.0, 4.0]]), np.array([-1.0, 2.0, -3.0])
@@ -220,7 +223,10 @@ def test_a_certificate_of_nan():
         "problem1 -ksp_type python -ksp_python_type tests.corrupted.Lazy",
         "problem3 --method din -ksp_type python -ksp_python_type tests.corrupted.Noise",
         "problem4 --n 9 -ksp_type gmres -pc_type python -pc_python_type tests.corrupted.NaNPC",
-        "obstacle_bratu --n 9 --method interior -ksp_type gmres -pc_type none -ksp_rtol 1",
+        pytest.param(
+            "obstacle_bratu --n 9 --method interior -ksp_type gmres -pc_type none -ksp_rtol 1",
+            marks=pytest.mark.skipif(PETSC_REFUSES_RTOL_1, reason="newer releases refuse this tolerance"),
+        ),
     ],
 )
 def test_the_command_line(cli, words):
