@@ -114,7 +114,6 @@ class BearingScene(Measured, Scene):
                 )
             if getattr(self.sides, name).kind == "periodic" and getattr(self.sides, OPPOSITE[name]).kind != "periodic":
                 raise ValueError(f"sides.{name} is periodic, sides.{OPPOSITE[name]} is not: both of them or none")
-        self._sides()
         return self
 
     def _pressure(self, name: str) -> float:
