@@ -222,7 +222,7 @@ def _scene_options(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="KEY=VALUE",
-        help="change a scene's value (SI), or METHOD.OPTION=VALUE for a method's parameter, din.gamma=0.4",
+        help="change a scene's value (SI), film.pocket.depth=1e-6 in a table, or METHOD.OPTION for a method's, din.gamma=0.4",
     )
     parser.add_argument("--system", default="auto", help="which matrix the inner solver sees; default auto")
     parser.add_argument(
