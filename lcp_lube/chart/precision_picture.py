@@ -131,7 +131,7 @@ def styles(rows: Sequence[Row], name: str) -> dict[str, Any]:
     if name in peers:
         return {"color": "0.45", "marker": MARKERS[::-1][[*dict.fromkeys(peers)].index(name) % len(MARKERS)]}
     films = [method for method, entry in METHODS.items() if "lubrication" in entry.kinds]
-    return look(films.index(name)) if name in films else {"color": "#882255", "marker": ">"}
+    return look(films.index(name)) if name in films else {"color": "#882255", "marker": "h"}
 
 
 def _errors(rows: Sequence[Row], quantity: str) -> list[float]:
