@@ -47,7 +47,7 @@ RECIPES: dict[int, dict[str, dict[str | None, int]]] = {
     },
 }
 ACCURACIES = {1: (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6), 2: (1e-1, 1e-2, 1e-3, 1e-4)}  # of auto --accuracy
-FINEST = {1: (100_000,), 2: (1023, 1023)}  # grids that it may go to
+FINEST = {1: (100_000,), 2: (1500, 1500)}  # grids that it may go to
 
 REPEATS = 3  # of which the median counts
 LONG = 0.3  # seconds; a longer run is not repeated: its clock is steady enough
