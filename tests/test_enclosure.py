@@ -171,6 +171,7 @@ def test_poor_answers_are_refused(steps):
         ("problem3", {"n": 101, "scheme": "face"}, "din-pc"),
         ("problem4", {"nx": 33, "ny": 28}, "din"),
         ("problem4", {"n": 63}, "fas"),
+        ("rough", {"n": 200}, "fas"),
         ("rough", {"n": 40}, "auto"),
         ("textured_slider", {"K": 1}, "auto"),
         ("journal", {"n": 48}, "auto"),

@@ -21,7 +21,8 @@ from ..problems.solution import Fields
 Mask = NDArray[np.bool_]
 UNIT = 2.0**-53  # largest relative error of one operation
 TINY = 1e-300  # more than all that underflow can add to a sum of 7 terms
-RTOL = 1e-2  # of the solve for e: the signs are tested afterwards, the band need not be sharp
+RTOL = 1e-3  # of the solve for e: the signs are tested afterwards, the band need not be sharp
+RESERVE = 0.04  # of the mean |G|, added everywhere, for what that solve leaves
 REPAIRS = 40  # local corrections of a band before it is given up
 WIDEST = 0.1  # part of the largest pressure: a wider band, though proved, says that the answer is poor
 
@@ -182,7 +183,7 @@ class _Band:
         """
         reduce = self.problem.reduce
         w = np.abs(self.G) + self.slack
-        w += 4 * RTOL * reduce.norm(w) / np.sqrt(self.problem.size)
+        w += RESERVE * reduce.norm(w) / np.sqrt(self.problem.size)
         full = self.z >= 0
         made = make_system(system, self.problem, stages)
         try:
@@ -195,7 +196,8 @@ class _Band:
         """The pair of z + sign e, its e enlarged where needed, if G has that sign there; None if this cannot be shown.
 
         Where the sign fails, the cell's own e is raised by what is lacking; that only takes from its neighbours, so the rest
-        stays proved or is repaired in the next round (Gauss-Seidel in spirit, for an M-function).
+        stays proved or is repaired in the next round (Gauss-Seidel in spirit, for an M-function). No more than that: a cavitated
+        cell hands all of it on downstream.
         """
         most = 16 * self.problem.reduce.max(e)
         for _ in range(REPAIRS):
@@ -205,7 +207,7 @@ class _Band:
             fails = ~(lacking <= 0)
             if not self.problem.reduce.sum(fails.astype(float)):
                 return {"p": p, "r": r}
-            e = np.where(fails, e + 1.5 * (lacking + self.slack) / self.diagonal, e)
+            e = np.where(fails, e + (lacking + self.slack) / self.diagonal, e)
             if not self.problem.reduce.max(e) <= most:
                 break
         return None
