@@ -79,6 +79,14 @@ def test_no_cavity_where_the_stroke_is_weak():
     assert values["p_max_time"] == pytest.approx(0.125, abs=0.005)
 
 
+def test_walls_at_the_cavitation_pressure():
+    """Nothing feeds the film when the plates part: all of it cavitates at once, with the liquid of the thinnest gap."""
+    values = march(n=24, steps=48, t_end=0.6, p_wall=0.0)
+    assert values["rupture_time"] == pytest.approx(0.25, abs=1e-3)
+    assert values["reformation_time"] is None
+    assert values["cavitated_fraction"] == 1
+
+
 def test_cavity_at_the_end():
     values = march(n=49, steps=60, t_end=0.4, front_time=0.45)
     assert values["rupture_time"] is not None
@@ -130,6 +138,11 @@ def test_options_that_do_not_fit():
         solve(scene, system="cavity")
     with pytest.raises(InputError, match="goes on in time"):
         solve(scene, nested=True)
+
+
+def test_data_beyond_all_measure():
+    with pytest.raises(InputError, match="coefficients"):
+        solve(load_scene("squeeze", {"t_end": 1e300}))
 
 
 @pytest.mark.parametrize("ranks", [2, 3])
