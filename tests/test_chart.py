@@ -42,6 +42,7 @@ def quick(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.hypre
 def test_every_method_of_the_registry_is_in_the_chart(quick: Path) -> None:
     rows = [row for row in read(quick / "precision_quick.csv") if row["method"] != "auto --accuracy"]
     films = {method: entry for method, entry in METHODS.items() if "lubrication" in entry.kinds}
@@ -51,6 +52,7 @@ def test_every_method_of_the_registry_is_in_the_chart(quick: Path) -> None:
     assert {row["method"] for row in rows if row["nested"] == "True"} == {m for m, e in films.items() if e.nested}
 
 
+@pytest.mark.hypre
 def test_errors_are_those_of_the_scheme_and_of_the_iteration(quick: Path) -> None:
     """Problem 1 at n = 100: about 1e-4 in the load, the same for all methods; the iteration's part vanishes with eps."""
     rows = [row for row in read(quick / "precision_quick.csv") if converged(row) and row["eps"] == "1e-08"]
@@ -89,6 +91,7 @@ def test_limit_of_fine_grids_is_the_exact_solution() -> None:
         assert off < 10 * float(str(limit[f"{name}_unsure"])) < 1e-3
 
 
+@pytest.mark.hypre
 def test_second_time_nothing_is_run(quick: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     def no_run(*_: Any, **__: Any) -> None:
         raise AssertionError("a run was made again")
