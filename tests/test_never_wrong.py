@@ -94,6 +94,19 @@ def test_inner_solvers_that_lie(name, method, corruption, right, petsc_options):
     solution.destroy()
 
 
+@pytest.mark.parametrize("corruption", KSPS)
+def test_inner_solvers_that_lie_to_the_cavity_system(corruption, petsc_options):
+    """Elimination and scaling stand between the KSP and the method there."""
+    options, may_converge = KSPS[corruption]
+    scene = load_scene("problem4", {"n": 24})
+    good = solve(scene, method="active-set", system="reduced", nested=False)
+    petsc_options(**options)
+    bad = solve(scene, method="active-set", system="cavity", nested=False, stopping=FEW, options={"sweeps": 0})
+    assert_honest(bad, good.fields, may_converge)
+    for solution in (good, bad):
+        solution.destroy()
+
+
 class Claiming:
     """A method that has converged at once, as it says, with `damage` done to fields that were right."""
 
