@@ -15,6 +15,7 @@ _PUBLIC = {
     "Scene": "lcp_lube.scene",
     "load_scene": "lcp_lube.scene",
     "solve": "lcp_lube.api",
+    "solve_or_balance": "lcp_lube.neighbour",
     "solve_to_accuracy": "lcp_lube.accuracy",
     "Solution": "lcp_lube.problems.solution",
 }

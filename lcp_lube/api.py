@@ -75,6 +75,8 @@ def solve(
     ------
     InputError : an unknown name, a value out of range, an option that does not fit.
     """
+    if getattr(scene, "balance", None) is not None:
+        raise InputError(f"scene {scene.name}: [balance] asks for a search, as 'lcp-lube solve' and solve_or_balance make it")
     begin = perf_counter()
     stages = Stages()
     held = resident()

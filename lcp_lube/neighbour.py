@@ -21,6 +21,8 @@ def solve_near(scene: Scene, near: Solution | None, **how: Any) -> Solution:
     -------
     Solution : settings['start'] is 'warm' or 'cold'.
     """
+    if getattr(scene, "balance", None) is not None:  # one trial of its search
+        scene = scene.model_copy(update={"balance": None})
     if near is not None and near.problem.grid.dim == len(scene.shape):
         solution = solve(scene, start=(near.problem, near.fields), **how)
         solution.settings["start"] = "warm"
@@ -32,7 +34,7 @@ def solve_near(scene: Scene, near: Solution | None, **how: Any) -> Solution:
     return solution
 
 
-def solve_or_balance(scene_at: Callable[[dict[str, Any]], Scene], near: Solution | None, **how: Any) -> Solution:
+def solve_or_balance(scene_at: Callable[[dict[str, Any]], Scene], near: Solution | None = None, **how: Any) -> Solution:
     """The solution of a scene, or if it has a [balance] table the one that carries its load. Collective.
 
     Parameters

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lcp_lube import load_scene
+from lcp_lube import load_scene, solve
 from lcp_lube.balance import MOST_SOLVES, carried
+from lcp_lube.compare import compare
 from lcp_lube.errors import InputError
 from lcp_lube.neighbour import solve_near, solve_or_balance
 from lcp_lube.problems.solution import Outcome
@@ -190,6 +191,14 @@ def test_ranges_outside_the_domain():
     ):
         with pytest.raises(InputError, match=message):
             balance(name, {"n": 20, "balance": table})
+
+
+def test_a_balance_is_never_silently_left_out():
+    """Neither by `solve`, nor by commands that make one solve a row."""
+    with pytest.raises(InputError, match=r"journal: \[balance\] asks for a search"):
+        solve(load_scene("journal", {"nx": 20, "ny": 5, "balance.load": 1e3}))
+    with pytest.raises(InputError, match="asks for a search"):
+        compare(load_scene("journal", {"nx": 20, "ny": 5, "balance.load": 1e3}), ["active-set"])
 
 
 def test_not_with_accuracy_or_checkpoints(cli):

@@ -208,3 +208,13 @@ def test_closed_at_the_end():
     assert values["friction"] == pytest.approx(4 * MU * U / h * L, rel=1e-9)
     assert values["load"] == pytest.approx(6 * MU * U / h**2 * L**2 / 2, rel=1e-3)
     assert values["flow"] == pytest.approx({"west": 0.0, "east": 0.0}, abs=1e-15)
+
+
+def test_three_ranks_find_the_same_places_and_flows(cli):
+    """With fewer lines than ranks, so that lines are dealt out too."""
+    one, three = (cli("solve", "journal", "--nx", 31, "--ny", 2, "--json", ranks=ranks).json for ranks in (1, 3))
+    for key in ("p_max_at", "min_h_at", "load_vector"):
+        assert three[key] == pytest.approx(one[key], rel=1e-6)
+    for key in ("rupture", "friction", "side_leakage", "cavitated_area", "power_loss", "min_h"):
+        assert three[key] == pytest.approx(one[key], rel=1e-6)
+    assert three["flow"] == pytest.approx(one["flow"], rel=1e-6)
