@@ -40,6 +40,7 @@ CASES: list[tuple[str, str, tuple[int, ...], int]] = [
     ("box umfpack", "obstacle_bratu", (40, 65), 1),
     ("equations multigrid", "bratu", (200, 400, 700), 1),
     ("equations umfpack", "bratu", (80, 130), 1),
+    ("1D full dense LU", "problem1 --method din --recipe lu --max-it 2", (500, 1000, 1500), 1),
     ("dense", "ehl_line", (500, 1000, 2000), 1),
 ]
 

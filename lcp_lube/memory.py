@@ -30,6 +30,7 @@ MB = 2**20
 COMPILER = 113 * MB  # numba and LLVM, once they are loaded
 LIBRARIES = 5 * MB  # pages of PETSc and its packages that only a solve touches
 DENSE = 24.5  # bytes for an entry of a dense Jacobian: it, its factors, a copy of them
+DENSE_COPY = 17.0  # the same for -mat_type dense, a copy of a sparse matrix
 
 # Bytes a point by (kind of problem and dimension, system, inner solver): a + b log2(points).
 MEASURED: dict[tuple[str, str, str], tuple[float, float]] = {
@@ -163,13 +164,15 @@ def bytes_needed(problem: Problem, plan: Plan) -> float | None:
     points, kind = problem.grid.size, f"{problem.kind} {problem.grid.dim}D"
     if getattr(problem, "dense", False):
         return DENSE * points**2 * (problem.grid.comm.size if plan.recipe == "redundant_lu" else 1)
+    options = PETSc.Options().getAll()
+    if plan.system and options.get("mat_type", "") == "dense":
+        return DENSE_COPY * (2 * points if plan.system == "full" else points) ** 2
     solver = inner_solver() if plan.system else ""
     known = {name: fit for (of, system, name), fit in MEASURED.items() if (of, system) == (kind, plan.system)}
     if not known:
         return None
     fits = [known[solver]] if solver in known else list(known.values())
     each = max(max(a + b * log2(points), 200.0) for a, b in fits)
-    options = PETSc.Options().getAll()
     if solver == "light" and options.get("ksp_type", "gmres") == "gmres":
         unknowns = 2 if plan.system == "full" else 1
         each += 8 * unknowns * min(_restart(options), 200)

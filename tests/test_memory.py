@@ -26,6 +26,7 @@ GB = 2**30
         ("problem4 --method din --recipe gmres_ilu --max-it 1", (120,)),
         ("problem4 --method fas", (500,)),
         ("problem1 --method din --max-it 2", (60_000,)),
+        ("problem1 --method din --max-it 2 --recipe lu", (1000,)),
     ],
 )
 def test_peaks_are_foreseen(cli, words, sizes):
