@@ -88,7 +88,8 @@ def collect(solution: Solution) -> Picture | None:
     stride = (nx, ny)
     fields = {name: (gather(grid, values, stride), unit) for name, (values, unit) in problem.physical(solution.fields).items()}
     quantities = problem.quantities(solution.fields)
-    sign, liquid, more = np.empty(0), np.empty(0), {}
+    sign, liquid = np.empty(0), np.empty(0)
+    more: dict[str, Any] = {}
     if isinstance(problem, LubricationProblem):
         s = problem.scheme
         passing = (s.couette_E.ravel() + s.b_C.ravel() * solution.r) / (problem.U * point_weights(grid))

@@ -72,7 +72,8 @@ def _film_line(picture: Picture) -> Figure:
 def _film_maps(picture: Picture) -> Figure:
     """Maps of p, r and h with the cavity's outline above a section: on the middle line, or where the pressure is larger."""
     figure = new_figure(9.6, 6.9)
-    above, below = np.ravel(figure.subfigures(2, 1, height_ratios=[1.0, 1.05]))
+    halves: Any = figure.subfigures(2, 1, height_ratios=[1.0, 1.05])
+    above, below = halves
     p = picture.fields["p"][0]
     row = int(np.argmax(p)) // picture.x.size
     if p[picture.middle].max() > 0.999 * p[row].max():
