@@ -24,6 +24,7 @@ from .problems.solution import Problem
 SAFETY = 2.0  # of both estimates
 DIFFERENCES = 4  # that Richardson's estimate heeds: a front moves, and one difference can be small by chance
 ANSWER = (1.0, 10.0)  # least and greatest answer to a misplaced jump: relative change over share of Int h^-3
+UNSEEN = 0.05  # share of its h^-3 that the face must miss for a cell without a jump to count: a steep ramp, a narrow ridge
 LINES, PARTS = 17, 16  # lines of a 2D grid on which the film is looked at, and looks between two points
 # Looks, in spacings from the left one of two points: just inside of both, where a film that jumps at a point has its own side.
 _LOOKS = np.clip(np.linspace(0.0, 1.0, PARTS + 1), 1e-7, 1.0 - 1e-7)
@@ -98,5 +99,5 @@ def _misplaced(looks: np.ndarray, face: np.ndarray) -> float:
     off = np.abs(face**-3.0 - mean)
     spread = looks.max(axis=-1) - looks.min(axis=-1)
     jump = np.abs(np.diff(looks, axis=-1)).max(axis=-1) > 0.5 * spread
-    seen = jump & (spread > 1e-9 * looks.mean(axis=-1)) | (off > 0.5 * mean)
+    seen = jump & (spread > 1e-9 * looks.mean(axis=-1)) | (off > UNSEEN * mean)
     return float(np.sum(off[seen]) / np.sum(mean))
