@@ -42,6 +42,8 @@ def run(path: Path, source: str) -> int:
 def _write(path: Path, text: str) -> None:
     if path.suffix != ".toml":
         raise InputError(f"new {path}: a name that ends in .toml is needed")
+    if "\0" in str(path):
+        raise InputError(f"new {path}: a name that no file can have")
     temporary = path.with_name(f".{path.stem}.{os.getpid()}.toml")
     try:
         temporary.write_text(text, encoding="utf-8")

@@ -76,6 +76,8 @@ def furnish(folder: Path) -> None:
         os.mkfifo(folder / name)
     (folder / "gone.npz").symlink_to(folder / "nowhere" / "x.npz")
     (folder / "loop.npz").symlink_to(folder / "loop.npz")
+    (folder / "gone.toml").symlink_to(folder / "nowhere" / "x.toml")
+    (folder / "loop.toml").symlink_to(folder / "loop.toml")
     (folder / "bytes.toml").write_bytes(bytes(range(256)))
     (folder / "empty.toml").write_text("")
     (folder / "long.toml").write_text("h_min = 1e-5\n" + "# " + "long " * 100_000)
@@ -181,8 +183,17 @@ def _options(rng: random.Random, folder: Path) -> Case:
 
 def _files(rng: random.Random, folder: Path) -> Case:
     base = ["solve", "problem1", "--n", "30"]
-    option = rng.choice(["--output", "--plot", "--checkpoint", "--resume", "-options_file", "SCENE"])
+    option = rng.choice(["--output", "--plot", "--checkpoint", "--resume", "-options_file", "SCENE", "new", "sweep"])
     place = rng.choice(PLACES)
+    if option == "new":
+        place = rng.choice(
+            [place, "new.toml", "no/new.toml", "file/new.toml", "gone.toml", "loop.toml", "\x00.toml", "y" * 300 + ".toml"]
+        )
+        return Case(
+            ["new", place, "--from", rng.choice([*scene_names(), *WORDS, "case.toml", "folder.toml", "bytes.toml"])], "new"
+        )
+    if option == "sweep":
+        return Case(["sweep", "problem1", "--n", "20", "--vary", "h_min=1e-5,2e-5", "--output", place], "sweep")
     words = ["solve", place or "none.toml", "--n", "30"] if option == "SCENE" else [*base, option, place]
     return Case(words, "files", base, same=option != "SCENE")
 
