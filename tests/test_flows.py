@@ -201,6 +201,12 @@ def test_periodic_along_the_flow():
     assert values["flow"] == pytest.approx(dict.fromkeys(SIDES, 0.0), abs=1e-15)
 
 
+def test_reformation_round_the_end():
+    """Without a groove the cavity of a journal goes on at the widest film, and ends behind it."""
+    values = found(load_scene("journal", {"nx": 61, "ny": 15, "round": "periodic", "p_side": 2e5}))
+    assert 0 < values["reformation"] < 0.3 * np.pi * 0.1 < 0.5 * np.pi * 0.1 < values["rupture"]
+
+
 def test_closed_at_the_end():
     """What the wall drags to a closed end is pressed back: h^2 dp/dx = 6 mu U, so the drag is 4 mu U L/h."""
     h = 2e-5

@@ -126,6 +126,13 @@ def cavities(x: Array, sign: Array, ends: Array, fronts: dict[str, float]) -> li
     return list(zip(first, last, strict=True))
 
 
+def map_shape(picture: Picture) -> float | None:
+    """Height over width of a map that keeps its shape; None for one that fills its place."""
+    L, width = picture.solution.problem.grid.lengths
+    keeps = picture.along[0] == picture.across[0] and 1 / MOST_SQUARE < L / width < MOST_SQUARE
+    return width / L if keeps else None
+
+
 def colour_map(figure: Figure | SubFigure, axes: Axes, picture: Picture, name: str) -> None:
     """A map of one field with its colour bar; the cells at the sides reach up to them."""
     values, unit = picture.fields[name]
@@ -134,14 +141,13 @@ def colour_map(figure: Figure | SubFigure, axes: Axes, picture: Picture, name: s
     (scale_x, label_x), (scale_y, label_y) = picture.along, picture.across
     dx, dy = (a[1] - a[0] if a.size > 1 else 2 * a[0] for a in (picture.x, picture.y))
     edges = (picture.x[0] - 1.5 * dx, picture.x[-1] + 1.5 * dx, picture.y[0] - 1.5 * dy, picture.y[-1] + 1.5 * dy)
-    same_scale = scale_x == scale_y and 1 / MOST_SQUARE < grid.lengths[0] / grid.lengths[1] < MOST_SQUARE
     image = axes.imshow(
         np.pad(values, 1, mode="edge"),
         extent=tuple(scale * edge for scale, edge in zip((scale_x, scale_x, scale_y, scale_y), edges, strict=True)),
         origin="lower",
         cmap=MAPS.get(name, "viridis"),
         interpolation="nearest",
-        aspect="equal" if same_scale else "auto",
+        aspect="equal" if map_shape(picture) else "auto",
     )
     figure.colorbar(image, ax=axes, location="top", pad=0.02, aspect=30, label=NAMES.get(name, name) + label)
     x_limits, y_limits = (

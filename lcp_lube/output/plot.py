@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..problems.solution import Solution
 from .files import replacing
 from .journal import journal
-from .panels import colour_map, outline, section
+from .panels import colour_map, map_shape, outline, section
 from .picture import Picture, collect, scaled, title
 from .style import BLUE, NAMES, RED, STYLE, fewer_colours, new_figure
 from .units import quantity
@@ -71,8 +71,9 @@ def _film_line(picture: Picture) -> Figure:
 
 def _film_maps(picture: Picture) -> Figure:
     """Maps of p, r and h with the cavity's outline above a section: on the middle line, or where the pressure is larger."""
-    figure = new_figure(9.6, 6.9)
-    halves: Any = figure.subfigures(2, 1, height_ratios=[1.0, 1.05])
+    maps = 1.1 + 2.3 * min(map_shape(picture) or 1.0, 1.0)  # inches; flat maps leave no empty space
+    figure = new_figure(9.6, maps + 3.55)
+    halves: Any = figure.subfigures(2, 1, height_ratios=[maps, 3.55])
     above, below = halves
     p = picture.fields["p"][0]
     row = int(np.argmax(p)) // picture.x.size

@@ -53,8 +53,11 @@ def fronts(problem: LubricationProblem, p: Array, r: Array) -> tuple[float | Non
         p_line[-1] = problem.p_sides[1] / problem.p_unit
     rise = p_line[2:] - p_line[1:-1]
     back = np.where(rise > 0, np.clip(p_line[1:-1] / np.where(rise > 0, rise, 1.0), 0.0, 1.0), 0.5)
-    full_again = ~cavity[1:-1] & cavity[:-2] & (x > rupture) & here
-    reformation = problem.reduce.min(np.where(full_again, x - back * dx, np.inf))
+    behind = x + np.where((x <= rupture) & grid.periodic[0], L, 0.0)  # round the end
+    full_again = ~cavity[1:-1] & cavity[:-2] & (behind > rupture) & here
+    reformation = problem.reduce.min(np.where(full_again, behind - back * dx, np.inf))
+    if np.isfinite(reformation) and reformation >= grid.origin[0] + L and grid.periodic[0]:
+        reformation -= L
     if not np.isfinite(reformation) and problem.p_sides[1] > 0:
         reformation = grid.origin[0] + L - 0.5 * dx  # in the last cell, before a boundary above the cavitation pressure
     return rupture, reformation if np.isfinite(reformation) else None
