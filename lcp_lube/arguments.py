@@ -231,8 +231,8 @@ def _scene_options(parser: argparse.ArgumentParser) -> None:
         default=None,
         help="start from the answers on coarser grids; default: where it pays",
     )
-    parser.add_argument("--eps1", type=float, help="stop when ||F|| <= eps1, default 1e-8 (interior: 8e-8)")
-    parser.add_argument("--eps2", type=float, help="and ||alpha d|| <= eps2, default 1e-8 (box scenes: no such test)")
+    parser.add_argument("--eps1", type=float, help="stop when ||F|| <= eps1, default 1e-8 (fas: 1e-11, interior: 8e-8)")
+    parser.add_argument("--eps2", type=float, help="and ||alpha d|| <= eps2, default 1e-8 (fas and box scenes: no such test)")
     parser.add_argument("--max-it", type=int, default=500, help="at most so many outer iterations, default 500")
     parser.add_argument("--p0", type=float, help="start of p in the scene's p_unit (MPa in the published problems), 1")
     parser.add_argument("--r0", type=float, help="start of r, 0.1")

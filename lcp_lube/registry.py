@@ -132,7 +132,7 @@ METHODS: dict[str, MethodEntry] = {
         kinds=("lubrication", "box"),
         systems=(),
         interior=False,
-        eps=(1e-8, inf),
+        eps=(1e-11, inf),
         fallback=("active-set", "din-pc", "monotone"),
         variants={
             "box": MethodEntry(
