@@ -26,6 +26,7 @@ HOPELESS = 1_000_000  # points on which an estimate that has not come down is ta
 PATIENCE = 4  # grids without a better estimate: rounding has the word
 ASYMPTOTIC = 0.1  # an estimate below it falls by second order at best
 BYTES, BYTES_FAS = {1: 900, 2: 1200}, 300  # memory of a point (`memory.MEASURED`)
+SMALL_CHANGE = 1e8  # bytes that every machine has
 RELATIVE_NORM = ("active-set", "fas")  # methods that measure ||F|| relative to the data
 DEFAULT_QUANTITY = ("load", "sum_v", "k", "sigma")
 
@@ -199,11 +200,18 @@ def _no_room(solution: Solution, shape: tuple[int, ...], finest: tuple[int, ...]
     dense = bool(getattr(problem, "dense", False))
 
     def needed(points: float) -> float:
-        """Bytes on the machine that has the most ranks."""
-        return share * (DENSE * points**2 if dense else each * points)
+        """Bytes of all ranks."""
+        return DENSE * points**2 if dense else each * points
 
     factor = max(1.0, 0.5 * (estimate / tol) ** 0.5) if estimate < ASYMPTOTIC else 1.0
     points = prod(factor * n for n in shape)
+    if needed(points) < SMALL_CHANGE:
+        return ""
+    comm = problem.grid.comm
+    machine = comm.Split_type(MPI.COMM_TYPE_SHARED)
+    share = comm.allreduce(machine.size / comm.size, MPI.MAX)  # of the points, on the machine that has the most ranks
+    machine.Free()
+    left = comm.allreduce(available(), MPI.MIN) / share
     if factor > 1.0 and not finest and (needed(points) > left or points > np.iinfo(PETSc.IntType).max // 2):
         raise InputError(
             f"--accuracy {tol:g}: takes some {ceil(factor * shape[0])} points along x (with {problem.grid.shape[0]} it is "

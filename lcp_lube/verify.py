@@ -103,7 +103,7 @@ def _run_case(case: Case) -> Verdict:
     for grid in case.grids:
         scene = load_scene(case.scene, {**case.data, **grid})
         grids.append(" x ".join(map(str, scene.shape)))
-        solution = solve(scene)
+        solution = solve(scene, **case.how)
         try:
             check_unread()
             values = solution.problem.quantities(solution.fields)

@@ -89,7 +89,7 @@ def test_scheme_of_first_order_fails(monkeypatch):
 
 
 def test_failed_solve_fails(monkeypatch):
-    monkeypatch.setattr(verify, "solve", lambda scene: solve(scene, method="din", stopping={"max_it": 2}))
+    monkeypatch.setattr(verify, "solve", lambda scene, **how: solve(scene, method="din", stopping={"max_it": 2}))
     (verdict,) = verify.verify(quick_cases())
     assert not verdict.passed
     assert len(verdict.failures) == 3
