@@ -68,12 +68,12 @@ class BoxFas:
     The first step is full multigrid, unless a start is given, the others are cycles.
     """
 
-    state = ("v", "norm", "_recent", "_first", "_taken")
+    state: tuple[str, ...] = ("v", "norm", "_recent", "_first", "_taken")
 
     def __init__(self, problem: BoxProblem, stages: Stages, options: BoxFasOptions, start: Fields | None = None):
         from . import box_fas_kernels, fas_kernels, fas_levels
 
-        self._kernels, self._transfer, self._levels_of = box_fas_kernels, fas_kernels, fas_levels
+        self._kernels, self._transfer, self._tools = box_fas_kernels, fas_kernels, fas_levels
         equations = problem.equations
         if not isinstance(equations, ObstacleEquations):
             raise InputError("--method fas: for obstacle problems on a rectangle; use active-set")
@@ -87,14 +87,14 @@ class BoxFas:
         self.norm = self._first = self._residual(self._grids[0])
 
     def _hierarchy(self, equations: ObstacleEquations) -> list[_Grid]:
-        grid, tools = self.problem.grid, self._levels_of
+        grid, tools = self.problem.grid, self._tools
         dx, dy = grid.spacing
         across_x, across_y = np.full(grid.box, dy / dx), np.full(grid.box, dx / dy)
         finest = tools.level_of(grid, across_x, across_x, across_y, across_y, equations.b.reshape(grid.box))
         levels = tools.hierarchy(finest, False)
         bounds, m = np.zeros((2, *finest.z.shape)), np.zeros_like(finest.z)
         for k, bound in enumerate((self.problem.lower, self.problem.upper)):
-            self._put(finest, bounds[k], bound)
+            tools.put(finest, grid, bounds[k], bound)
         m[1:-1, 1:-1] = grid.cell
         rows = slice(None) if finest.comm is None else slice(grid.y_start, grid.y_end)
         x = grid.origin[0] + dx * np.arange(1, grid.shape[0] + 1)
@@ -113,24 +113,14 @@ class BoxFas:
             grids.append(_Grid(coarse, bounds, m, x, lines if not coarse.split else lines[coarse.y0 : coarse.y1]))
         return grids
 
-    def _put(self, level: Any, into: Array, values: Array) -> None:
-        """This rank's values into an array of the finest level. Collective."""
-        grid = self.problem.grid
-        box = values.reshape(grid.box)
-        into[1:-1, 1:-1] = self._levels_of.whole(grid, box) if level.comm is None and grid.comm.size > 1 else box
-        level.share(into)
-
     @property
     def v(self) -> Array:
         """This rank's points."""
-        level, grid = self._grids[0].level, self.problem.grid
-        if level.comm is None:
-            return level.z[grid.y_start + 1 : grid.y_end + 1, grid.x_start + 1 : grid.x_end + 1].ravel()
-        return level.z[1:-1, 1:-1].ravel()
+        return self._tools.own(self._grids[0].level, self.problem.grid).ravel()
 
     @v.setter
     def v(self, value: Array) -> None:
-        self._put(self._grids[0].level, self._grids[0].level.z, value)
+        self._tools.put(self._grids[0].level, self.problem.grid, self._grids[0].level.z, value)
 
     @property
     def fields(self) -> Fields:
@@ -142,19 +132,9 @@ class BoxFas:
 
     @property
     def details(self) -> dict[str, Any]:
-        """As `Fas.details`. Collective."""
-        cycles, levels = self._taken - 1, [grid.level for grid in self._grids]
-        measured = cycles > 0 and 0 < self.norm < inf and 0 < self._first < inf
-        apart = self.problem.reduce.sum(np.array([sum(level.work for level in levels if level.split)]))
-        return {
-            "levels": [
-                {"nx": v.nx, "ny": v.ny, "iterations": v.visits, "linear_iterations": 0, "time_s": v.seconds}
-                for v in reversed(levels)
-            ],
-            "cycles": max(cycles, 0),
-            "work_units": (sum(level.work for level in levels if not level.split) + apart) / self.problem.unknowns,
-            "convergence_factor": (self.norm / self._first) ** (1.0 / cycles) if measured else None,
-        }
+        """What the JSON tells of a run, see `fas_levels.record`. Collective."""
+        levels = [grid.level for grid in self._grids]
+        return self._tools.record(levels, self.problem.grid, self._taken - 1, self._first, self.norm)
 
     def destroy(self) -> None:
         """There is nothing of PETSc's here."""
@@ -263,7 +243,7 @@ class BoxFas:
         self._residual(grid)
         for part in range(2):
             level.share(grid.forces[part])
-            self._levels_of.restrict(level, lower, coarse.forces[part], False, grid.forces[part])
+            self._tools.restrict(level, lower, coarse.forces[part], False, grid.forces[part])
             lower.share(coarse.forces[part])
         self._inject(grid, coarse, lower.old)
         lower.z[:] = lower.old

@@ -82,7 +82,7 @@ class Fas:
         # Compiled or read from numba's cache at this import, 0.2 s: only where the method is used.
         from . import fas_kernels, fas_levels
 
-        self._kernels, self._restrict = fas_kernels, fas_levels.restrict
+        self._kernels, self._tools = fas_kernels, fas_levels
         self.problem, self.stages, self.options, self.eps1 = problem, stages, options, eps1
         self._harmonic, self._truncation = options.weights == "harmonic", TRUNCATIONS[options.truncation]
         with stages("assembly"):
@@ -99,28 +99,16 @@ class Fas:
     @property
     def z(self) -> Array:
         """p, or minus the flow of void, at this rank's points."""
-        return self._levels[0].z[self._own].ravel()
+        return self._tools.own(self._levels[0], self.problem.grid).ravel()
 
     @z.setter
     def z(self, value: Array) -> None:
-        level, grid = self._levels[0], self.problem.grid
-        level.z[self._own] = value.reshape(grid.box)
-        if level.comm is None and grid.comm.size > 1:
-            for where, part in grid.comm.allgather((self._own, value.reshape(grid.box))):
-                level.z[where] = part
-        level.share(level.z)
-
-    @property
-    def _own(self) -> tuple[slice, slice]:
-        """Where this rank's points stand in the finest level's arrays."""
-        grid, first = self.problem.grid, self._levels[0].first
-        rows = slice(grid.y_start + 1, grid.y_end + 1) if self._levels[0].comm is None else slice(1, -1)
-        assert first in (0, grid.y_start)
-        return rows, slice(grid.x_start + 1, grid.x_end + 1)
+        self._tools.put(self._levels[0], self.problem.grid, self._levels[0].z, value)
 
     @property
     def fields(self) -> Fields:
-        p, r = self._kernels.pressure_and_void(self._levels[0].z[self._own], self.problem.scheme.b_C)
+        z = self._tools.own(self._levels[0], self.problem.grid)
+        p, r = self._kernels.pressure_and_void(z, self.problem.scheme.b_C)
         return {"p": p.ravel(), "r": r.ravel()}
 
     @property
@@ -129,24 +117,8 @@ class Fas:
 
     @property
     def details(self) -> dict[str, Any]:
-        """levels: coarse to fine, their visits and own seconds; cycles after full multigrid; work_units: relaxed points over
-        points; convergence_factor: geometric mean of the cycles'. Collective."""
-        cycles = self._taken - 1
-        measured = cycles > 0 and 0 < self.norm < inf and 0 < self._first < inf
-        return {
-            "levels": [
-                {"nx": v.nx, "ny": v.ny, "iterations": v.visits, "linear_iterations": 0, "time_s": v.seconds}
-                for v in reversed(self._levels)
-            ],
-            "cycles": max(cycles, 0),
-            "work_units": self._work() / self.problem.size,
-            "convergence_factor": (self.norm / self._first) ** (1.0 / cycles) if measured else None,
-        }
-
-    def _work(self) -> float:
-        """Points relaxed so far by all ranks, those that all of them relax counted once. Collective."""
-        apart = sum(level.work for level in self._levels if level.split)
-        return sum(level.work for level in self._levels if not level.split) + self.problem.reduce.sum(np.array([apart]))
+        """What the JSON tells of a run, see `fas_levels.record`. Collective."""
+        return self._tools.record(self._levels, self.problem.grid, self._taken - 1, self._first, self.norm)
 
     def destroy(self) -> None:
         """There is nothing of PETSc's here."""
@@ -219,7 +191,7 @@ class Fas:
         coarse = self._levels[k + 1]
         self._relax(level, o.pre, False)
         where = (level.first, level.by_x, level.by_y)
-        self._restrict(level, coarse, coarse.c, self._harmonic)
+        self._tools.restrict(level, coarse, coarse.c, self._harmonic)
         self._kernels.inject(level.z, coarse.part(coarse.old), *where)
         coarse.gather(coarse.old)
         coarse.z[:] = coarse.old

@@ -1,6 +1,9 @@
 """Grids of the nonlinear multigrid: their points, how these are dealt to the ranks, and their coefficients."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from math import inf
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -157,6 +160,38 @@ def whole(grid: Grid, a: Array) -> Array:
     for where, values in grid.comm.allgather((own, np.ascontiguousarray(np.broadcast_to(a, grid.box)))):
         out[where] = values
     return out
+
+
+def own(level: Level, grid: Grid) -> Array:
+    """This rank's points of the finest level's z, without a frame."""
+    columns = slice(grid.x_start + 1, grid.x_end + 1)
+    return level.z[slice(grid.y_start + 1, grid.y_end + 1) if level.comm is None else slice(1, -1), columns]
+
+
+def put(level: Level, grid: Grid, into: Array, values: Array) -> None:
+    """This rank's values into an array of the finest level, and its frame. Collective."""
+    box = values.reshape(grid.box)
+    into[1:-1, 1:-1] = whole(grid, box) if level.comm is None and grid.comm.size > 1 else box
+    level.share(into)
+
+
+def record(levels: Sequence[Level], grid: Grid, cycles: int, first: float, last: float) -> dict[str, Any]:
+    """What the JSON tells of a run. Collective.
+
+    levels: coarse to fine, their visits and own seconds; cycles: after full multigrid; work_units: relaxed points over points;
+    convergence_factor: geometric mean of the cycles', which have taken the norm from `first` to `last`.
+    """
+    apart = grid.reduce.sum(np.array([sum(level.work for level in levels if level.split)]))
+    measured = cycles > 0 and 0 < last < inf and 0 < first < inf
+    return {
+        "levels": [
+            {"nx": v.nx, "ny": v.ny, "iterations": v.visits, "linear_iterations": 0, "time_s": v.seconds}
+            for v in reversed(levels)
+        ],
+        "cycles": max(cycles, 0),
+        "work_units": (sum(level.work for level in levels if not level.split) + apart) / grid.size,
+        "convergence_factor": (last / first) ** (1.0 / cycles) if measured else None,
+    }
 
 
 def _empty(nx: int, ny: int, y0: int, y1: int, comm: MPI.Comm | None, whole: bool, periodic: tuple[bool, bool]) -> Level:
