@@ -41,7 +41,7 @@ FINAL = {"active-set", "monotone"}  # end in an exact step whatever the toleranc
 RECIPES: dict[int, dict[str, dict[str | None, int]]] = {
     1: {"full": {"superlu": ALL, "gmres_ilu": 2000}, "reduced": {"banded": ALL, "bcgs_ilu": ALL}, "cavity": {}},
     2: {
-        "full": {"umfpack": 127, "gmres_ilu": 63, "augmentation_amg": 127},
+        "full": {"umfpack": 127, "gmres_ilu": 63, "augmentation_amg": 63},
         "reduced": {"umfpack": 127, "bcgs_amg": 255},
         "cavity": {"bcgs_amg": ALL},
     },
@@ -52,6 +52,7 @@ FINEST = {1: (100_000,), 2: (1500, 1500)}  # grids that it may go to
 REPEATS = 3  # of which the median counts
 LONG = 0.3  # seconds; a longer run is not repeated: its clock is steady enough
 KRYLOV_MOST = 20_000  # iterations
+ENOUGH = 3.0  # seconds; after such a run a configuration is not tried on larger grids
 
 KEY = ("scene", "data", "n", "method", "nested", "system", "recipe", "eps", "ranks")
 CLOCKS = ("wall_s", "cpu_s")
@@ -165,7 +166,7 @@ class Bench:
         self._warm: set[str] = set()
 
     def fill(self, store: ResumableCsv, configuration: Configuration, sizes: Sequence[int]) -> None:
-        """Make a configuration's runs on all its grids, from small to large, up to one at a limit of iterations. Collective."""
+        """Make a configuration's runs on all its grids, from small to large, until one reaches a limit. Collective."""
         choices: dict[str, Any] = {
             "method": configuration.method,
             "system": configuration.system,
@@ -178,7 +179,8 @@ class Bench:
                 return
             scene = self.scene.with_shape((n,) * len(self.scene.shape))
             row = self.row(store, {**configuration.key, "n": n}, scene, **choices)
-            if row is None or row["outcome"] in (KRYLOV_LIMIT, Outcome.MAX_ITERATIONS):
+            limits = (KRYLOV_LIMIT, Outcome.MAX_ITERATIONS)
+            if row is None or row["outcome"] in limits or float(row["cpu_s"]) > ENOUGH:
                 return
 
     def accuracy(self, store: ResumableCsv, tol: float) -> None:
