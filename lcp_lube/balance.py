@@ -77,12 +77,10 @@ def variable(scene: "Scene", table: BalanceTable, begin: float | None) -> Variab
 
     Raises
     ------
-    InputError : no key, a key without a range, a range that leaves the key's domain.
+    InputError : a key without a range, a range that leaves the key's domain.
     """
     fields = type(scene).model_fields
-    key = table.vary or next((name for name in ("eccentricity", "h_offset") if name in fields), None)
-    if key is None:
-        raise InputError(f"{scene.name}: balance.vary is needed: the key of this scene whose value is to be found")
+    key = table.vary or ("eccentricity" if "eccentricity" in fields else "h_offset")
     value: Any = getattr(scene, key, None) if begin is None else begin
     shift, upper = 0.0, inf
     to_t: Callable[[float], float] = log
@@ -95,6 +93,7 @@ def variable(scene: "Scene", table: BalanceTable, begin: float | None) -> Variab
         problem: Any = scene.build()
         shift = problem.reduce.min(problem.scheme.h) - getattr(scene, key)  # the film is shift + h_offset thick
         problem.destroy()
+        value = value if value + shift > 0 else getattr(scene, key)  # a neighbour's, whose film was thicker
         to_t, to_value, slope = (lambda v: log(v + shift)), (lambda t: exp(t) - shift), -2.0
     elif table.range is None:
         raise InputError(f"{scene.name}: balance.range is needed for balance.vary = {key}: smallest and largest value")

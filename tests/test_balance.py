@@ -193,6 +193,17 @@ def test_ranges_outside_the_domain():
             balance(name, {"n": 20, "balance": table})
 
 
+def test_a_neighbour_with_a_thicker_film():
+    """Its level would close this one's film: the search begins at the scene's own."""
+    near = solve_or_balance(
+        lambda more: load_scene("problem1", {"n": 30, "h_min": 30e-6, "h_max": 60e-6, "balance.load": 8e5, **more})
+    )
+    assert near.settings["balance"]["value"] < -15e-6
+    found, outcome, _, _ = balance("problem1", {"n": 30, "balance.load": 2e5}, near)
+    assert outcome is Outcome.CONVERGED and found["carried"] == pytest.approx(2e5, rel=2e-6)
+    near.destroy()
+
+
 def test_a_balance_is_never_silently_left_out():
     """Neither by `solve`, nor by commands that make one solve a row."""
     with pytest.raises(InputError, match=r"journal: \[balance\] asks for a search"):
