@@ -135,7 +135,7 @@ def ours(n: int) -> Result:
 def multigrid(n: int) -> Result:
     """The scene by nonlinear multigrid."""
     scene = load_scene("obstacle_bratu", {**SCENE, "n": n})
-    solution = solve(scene, method="fas", stopping={"eps1": 1e-9})
+    solution = solve(scene, method="fas")
     if not solution.converged or solution.settings["took_over"]:
         raise RuntimeError(solution.message)
     out = Result(solution.fields["v"], [level["iterations"] for level in solution.levels], [0])
