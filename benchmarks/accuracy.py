@@ -76,23 +76,23 @@ def main() -> None:
                 runs.append((estimate, abs(found / getattr(exact, quantity) - 1)))
         report(f"1D, {quantity} to {tol:g}", runs, missed)
     references = []
-    for scene in planes(args.planes, args.seed):
-        solution = solve(scene.with_shape((1023, 1023)))
-        references.append((scene, solution.problem.quantities(solution.fields)))
+    for plane in planes(args.planes, args.seed):
+        solution = solve(plane.with_shape((1023, 1023)))
+        references.append((plane, solution.problem.quantities(solution.fields)))
         solution.destroy()
     for quantity, tol in product(("load", "p_max"), (3e-2, 1e-2)):
         runs, missed = [], 0
-        for scene, reference in references:
-            found, estimate, reached = value(scene, quantity, tol, (511, 511))
+        for plane, reference in references:
+            found, estimate, reached = value(plane, quantity, tol, (511, 511))
             missed += not reached
             if reached and reference[quantity] > 0:
                 runs.append((estimate, abs(found / reference[quantity] - 1)))
         report(f"2D, {quantity} to {tol:g}", runs, missed)
     for name in ("problem4", "journal", "problem1", "long_journal"):
-        scene, seconds, cpu = load_scene(name), [], []
+        built_in, seconds, cpu = load_scene(name), [], []
         for _ in range(9):
             start, cpu_start = perf_counter(), process_time()
-            value(scene, "load", 1e-2)
+            value(built_in, "load", 1e-2)
             seconds.append(perf_counter() - start)
             cpu.append(process_time() - cpu_start)
         print(f"{name:<24} load to 1 %: {1e3 * median(seconds):.1f} ms, {1e3 * median(cpu):.1f} ms of them computing")

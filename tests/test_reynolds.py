@@ -195,5 +195,5 @@ def test_data_that_overflow_are_refused(changes, found_text):
 
 
 def test_a_film_that_touches_is_refused():
-    with pytest.raises(InputError, match="film 0 m at x = .* m: it must be positive everywhere"):
+    with pytest.raises(InputError, match=r"film 0 m at x = .* m: it must be positive everywhere"):
         make_problem((9,), Knots((1e-5, 0.0, 0.0, 0.0, 1e-5)))
