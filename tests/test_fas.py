@@ -199,7 +199,7 @@ def test_front_spans_are_all_points_near_a_front():
     random = np.random.default_rng(1)
     for _ in range(60):
         ny, nx = random.integers(1, 30, 2)
-        width = int(random.integers(0, 5))
+        width = int(random.integers(0, 14))
         z = np.zeros((ny + 2, nx + 2))
         full = random.random((ny, nx)) < random.choice([0.02, 0.5, 0.98])
         z[1:-1, 1:-1] = np.where(full, 1.0, -1.0)

@@ -119,7 +119,7 @@ def relax_front(z: Array, kx: Array, ky: Array, c: Array, count: int, width: int
 def front_spans(z: Array, width: int) -> tuple[NDArray[np.int32], int]:
     """Row, first column and last column + 1 of the runs of points within `width` cells of a front, and their number."""
     ny, nx = z.shape[0] - 2, z.shape[1] - 2
-    rows, pad = 2 * width + 2, width + 8  # in the masks column i stands at i + pad
+    rows, pad = 2 * width + 2, 2 * width + 8  # in the masks column i stands at i + pad
     # Fronts to the east or north of the points of the last rows, and the first and last column that they take up.
     ring = np.zeros((rows, nx + 2 * pad), dtype=np.uint8)
     low, high = np.full(rows, nx + 1), np.zeros(rows, dtype=np.int64)
