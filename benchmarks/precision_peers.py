@@ -111,7 +111,7 @@ def main() -> None:
         for name in arguments.peers.split(","):
             method, recipe = NAMES[name]
             starts = [(0.0, 0.0)] if name.startswith("scipy") else STARTS
-            for n in (precision.QUICK_SIZES if arguments.quick else precision.SIZES)[dimension]:
+            for n in precision.grids(scene, arguments.quick):
                 key = {"scene": label, "data": data, "n": n, "method": method, "nested": False, "system": PEER}
                 key |= {"recipe": recipe, "eps": TOL, "ranks": 1}
                 row = store.find(**key)

@@ -24,7 +24,7 @@ from ..registry import METHODS
 from ..scene import Scene, load_scene
 from ..solvers.newton import Stopping
 from .experiment import KRYLOV_LIMIT, open_store, run, scene_key
-from .known import FilmScene, Known, known_answer, on_grid
+from .known import FilmScene, Known, dimple_cells, known_answer, on_grid
 from .log import write_log
 from .precision_picture import draw_all, seconds
 from .precision_words import cheapest, sentence, which
@@ -127,7 +127,7 @@ def chart(sources: Sequence[str], quick: bool = False, results: Path = Path("lcp
         bench = Bench(scene, known_answer(scene, results / f"{stem}_references.csv", quick), 1 if quick else REPEATS)
         dimension = len(scene.shape)
         for configuration in configurations(dimension, quick):
-            bench.fill(store, configuration, (QUICK_SIZES if quick else SIZES)[dimension])
+            bench.fill(store, configuration, grids(scene, quick))
         for tol in ACCURACIES[dimension][: 2 if quick else None]:
             bench.accuracy(store, tol)
     wanted = [scene_key(scene) for scene in scenes]
@@ -143,6 +143,14 @@ def chart(sources: Sequence[str], quick: bool = False, results: Path = Path("lcp
         f"{store.path} (remove it to run them again)."
     )
     return 0
+
+
+def grids(scene: Scene, quick: bool) -> tuple[int, ...]:
+    """Points a side of the grids that a scene is run on; dimples on multiples of their own grid, and two coarser ones."""
+    cells = dimple_cells(scene)
+    if cells and not quick:
+        return (cells // 4, cells // 2, cells - 1, 2 * cells - 1, 4 * cells - 1)
+    return (QUICK_SIZES if quick else SIZES)[len(scene.shape)]
 
 
 def film(scene: Scene) -> FilmScene:
