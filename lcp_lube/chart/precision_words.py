@@ -133,6 +133,6 @@ def sentence(rows: Sequence[Row], quantity: str) -> str:
         if ratios:
             text += f"; the paper's DIN (2n system, no coarser grids) takes {ratios[0]:.2g} to {ratios[-1]:.2g} times as long"
         lost = len(scenes) - len(bests)
-        text += f"; on {lost} scenes no run gets there" if lost else ""
+        text += f"; on {lost} of {len(scenes)} scenes no run gets there" if lost else ""
         parts.append(f"{text}." if bests else f"Within {percent(level)}: no run.")
     return f"{' '.join(parts)} {failures(rows)}"
