@@ -3,6 +3,7 @@
 import json
 import os
 import textwrap
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, get_args
 
@@ -53,7 +54,8 @@ def _write(path: Path, text: str) -> None:
     except OSError as error:
         raise InputError(f"new {path}: could not be written: {error.strerror or error}") from None
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):  # a name too long for any file
+            temporary.unlink(missing_ok=True)
 
 
 def template(source: str, folder: Path = Path()) -> str:

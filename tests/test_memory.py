@@ -19,9 +19,10 @@ GB = 2**30
     "words, sizes",
     [
         ("problem4 --method din --max-it 1", (50, 100, 160)),  # a direct solver
-        (
+        pytest.param(
             "problem4 --method active-set --max-it 2 --system cavity --recipe bcgs_amg --set active-set.sweeps=9",
             (100, 200, 300),
+            marks=pytest.mark.hypre,
         ),
         ("problem4 --method din --recipe gmres_ilu --max-it 1", (120,)),
         ("problem4 --method fas", (500,)),
