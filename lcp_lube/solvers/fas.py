@@ -38,9 +38,9 @@ BORDER = 4  # lines on either side of the border between two ranks
 @dataclass(frozen=True)
 class FasOptions:
     """cycle: V, F or W; pre, post: sweeps before and after the coarse grid; front: sweeps over the points within `width`
-    cells of a front after each correction; truncation: of corrections at fronts, none, clip or points; weights: of the
-    interpolation, by the conductances of the faces (harmonic) or the same everywhere (linear); stall: give up where ||G||
-    has not fallen below this part of itself in three cycles."""
+    cells of a front after each correction, both doubled where fronts are rare; truncation: of corrections at fronts, none,
+    clip or points; weights: of the interpolation, by the conductances of the faces (harmonic) or the same everywhere
+    (linear); stall: give up where ||G|| has not fallen below this part of itself in three cycles."""
 
     cycle: str = "F"
     pre: int = 3
@@ -207,7 +207,7 @@ class Fas:
         self._correction = self._kernels.correct(*fine, *where, self._harmonic, self._truncation)  # type: ignore[arg-type]
         level.share(level.z)
         if o.front:
-            level.work += o.front * self._kernels.relax_front(level.z, level.kx, level.ky, level.c, o.front, o.width)
+            level.work += self._kernels.relax_front(level.z, level.kx, level.ky, level.c, o.front, o.width)
             level.share(level.z)
         self._relax(level, o.post, True)
         level.seconds += perf_counter() - begin

@@ -103,16 +103,22 @@ def relax(z: Array, kx: Array, ky: Array, c: Array, m: int, start: int, end: int
 
 @kernel
 def relax_front(z: Array, kx: Array, ky: Array, c: Array, count: int, width: int) -> int:
-    """`count` sweeps, to and fro, over the points within `width` cells of a front; returns how many points these are."""
-    spans, found = front_spans(z, width)
-    points = 0
+    """`count` sweeps, to and fro, over the points within `width` cells of a front; returns how many points were relaxed.
+
+    Where fronts are rare, and twice as wide a strip takes in less than a tenth of the points, it is that, swept twice as often.
+    """
+    spans, found = front_spans(z, 2 * width)
+    points = (spans[:found, 2] - spans[:found, 1]).sum()
+    if points > 0.1 * (z.shape[0] - 2) * (z.shape[1] - 2):
+        spans, found = front_spans(z, width)
+        points = (spans[:found, 2] - spans[:found, 1]).sum()
+    else:
+        count *= 2
     for s in range(count):
         for k in range(found):
             at = found - 1 - k if s % 2 == 1 else k
             relax(z, kx, ky, c, spans[at, 0], spans[at, 1], spans[at, 2])
-    for k in range(found):
-        points += spans[k, 2] - spans[k, 1]
-    return points
+    return count * points
 
 
 @kernel
