@@ -12,6 +12,7 @@ from .problems.solution import Fields, Outcome, Solution, Step
 from .problems.squeeze import SqueezeProblem
 from .registry import METHODS
 from .scene import Scene
+from .solvers.job import Job
 from .solvers.newton import Monitor, Stopping, iterate
 
 
@@ -55,7 +56,7 @@ def march(
         for name, system, recipe_name, own in tries:
             entry = METHODS[name].of(problem.kind)
             with recipe(recipe_name) as recipe_used:
-                run = entry.load()(step, stages, system, own, stopping, None if entry.interior else fields)
+                run = entry.load()(Job(step, stages, system, own, stopping, None if entry.interior else fields))
                 try:
                     outcome, message, steps = iterate(run, stopping, monitor)
                     if name == chosen.method:

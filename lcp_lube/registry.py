@@ -32,7 +32,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class MethodEntry(Entry):
-    """A method: `target` is build(problem, stages, system, options, stopping, start) -> Method.
+    """A method: `target` is build(job: solvers.job.Job) -> Method.
 
     kinds are the problems it solves (`Problem.kind`), systems the matrices it can use, its default first, none
     if it solves no linear systems; nested: it can

@@ -16,6 +16,7 @@ from .problems.solution import Fields, Outcome, Problem, Step
 from .registry import METHODS
 from .scene import Scene
 from .solvers.enclosure import Enclosure, enclose
+from .solvers.job import Job
 from .solvers.nested import level_shapes
 from .solvers.newton import Method, Monitor, Stopping
 
@@ -83,7 +84,7 @@ class Run:
                 previous.destroy()
             coarse = Stopping(max(COARSE_EPS[entry.interior], self.stopping.eps1), np.inf, self.stopping.max_it)
             stopping = self.stopping if shape == finest else coarse
-            method = entry.load()(level, self.stages, self.chosen.system, self.options, stopping, guess)
+            method = entry.load()(Job(level, self.stages, self.chosen.system, self.options, stopping, guess))
             self._iterate(method, level, stopping, 0, shapes=shapes[k:], levels=self.levels)
             near, previous = (level, self.fields), level
             if shape != finest and self.outcome in (Outcome.NOT_FINITE, Outcome.LINEAR_SOLVER):
@@ -113,7 +114,7 @@ class Run:
             with recipe(inner):
                 # An interior method begins anew; another may take up what was reached.
                 start = None if entry.interior else reached
-                method = entry.load()(self.problem, self.stages, system, {}, self.stopping, start)
+                method = entry.load()(Job(self.problem, self.stages, system, {}, self.stopping, start))
                 self._iterate(method, self.problem, self.stopping, k, reached, failed=record)
             self.took_over, steps = name, steps + self.steps
         self.steps = steps

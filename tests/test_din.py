@@ -12,6 +12,7 @@ from lcp_lube.linear.stages import Stages
 from lcp_lube.output.results import as_dict, finite
 from lcp_lube.problems.solution import Outcome
 from lcp_lube.solvers import din
+from lcp_lube.solvers.job import Job
 from lcp_lube.solvers.newton import Stopping
 
 
@@ -178,7 +179,7 @@ def test_start_from_given_fields(run):
     first = run("problem1", {"n": 30}, recipe="superlu")
     problem = first.problem
     start = {name: np.maximum(field, 1e-6) for name, field in first.fields.items()}
-    method = din.build(problem, Stages(), "reduced", {}, Stopping(), start)
+    method = din.build(Job(problem, Stages(), "reduced", start=start))
     assert np.array_equal(method.p, start["p"]) and method.p is not start["p"]
     assert method.norm < 1e-3
     method.destroy()

@@ -12,6 +12,7 @@ from lcp_lube.linear.stages import Stages
 from lcp_lube.problems.flows import SIDES
 from lcp_lube.problems.model import Model, Side
 from lcp_lube.solvers.active_set import build
+from lcp_lube.solvers.job import Job
 from lcp_lube.solvers.newton import Stopping, iterate
 
 OCTAVES, PER_OCTAVE = (50, 100, 200, 400), 8
@@ -157,7 +158,7 @@ def on_sides(shape, film, sides, width=WIDTH):
     """Quantities of a film with sides of any kind; all of them per whole width where half of it is modelled."""
     model = Model((L, width)[: len(shape)], sides, film, MU, U, 0.0, 1e6, "face")
     problem = model.build(shape)
-    run = build(problem, Stages(), "reduced", {}, Stopping())
+    run = build(Job(problem, Stages(), "reduced"))
     outcome, message, _ = iterate(run, Stopping())
     assert outcome == "converged", message
     values = problem.quantities(run.fields)

@@ -16,6 +16,7 @@ from lcp_lube.linear.stages import Stages
 from lcp_lube.problems.solution import Outcome
 from lcp_lube.solvers.box_active_set import build as build_active_set
 from lcp_lube.solvers.interior import Interior, InteriorOptions, build
+from lcp_lube.solvers.job import Job
 from lcp_lube.solvers.newton import Stopping, iterate
 
 TABLE = Path(__file__).parent.parent / "benchmarks" / "published" / "bergamaschi_zilli" / "table1.csv"
@@ -110,7 +111,7 @@ def test_any_box_affine_and_monotone(seed, bounds):
     with recipe("lu"):
         for build_method in (build, build_active_set):
             problem = affine(M, q, lower, upper)
-            run = build_method(problem, Stages(), "jacobian", {}, Stopping())
+            run = build_method(Job(problem, Stages(), "jacobian"))
             outcome, message, _ = iterate(run, Stopping(1e-11, np.inf, 100))
             assert outcome is Outcome.CONVERGED, message
             v = run.fields["v"]

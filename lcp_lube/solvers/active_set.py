@@ -15,19 +15,17 @@ converge from any start, as G is an M-function, so the method cannot cycle for e
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
 from ..linear.krylov import Krylov
-from ..linear.stages import Stages
 from ..linear.system import System, make_system
 from ..parallel import Array
 from ..problems.problem import LubricationProblem
 from ..problems.solution import Fields, Step
+from .job import Job
 from .method_options import make_options
-from .newton import Stopping
 from .relaxation import Relaxation, relaxation
 from .steplength import StepLengthError
 
@@ -157,23 +155,12 @@ class ActiveSet:
         return Step(self.norm, step_norm, 1.0, linear_iterations, rtol=rtol)
 
 
-def build(
-    problem: LubricationProblem,
-    stages: Stages,
-    system: str,
-    options: dict[str, Any],
-    stopping: Stopping,
-    start: Fields | None = None,
-) -> ActiveSet:
+def build(job: Job) -> ActiveSet:
     """The registry's door.
-
-    Parameters
-    ----------
-    start : fields p and r to start from.
 
     Raises
     ------
     InputError : an unknown option or a value out of range.
     """
-    settings = make_options(ActiveSetOptions, "active-set", options)
-    return ActiveSet(problem, make_system(system, problem, stages), settings, stopping.eps1, start)
+    settings = make_options(ActiveSetOptions, "active-set", job.options)
+    return ActiveSet(job.problem, make_system(job.system, job.problem, job.stages), settings, job.stopping.eps1, job.start)

@@ -9,19 +9,17 @@ answer where there is one (nested iteration): on one grid alone the contact area
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
 from ..linear.box_system import BoxSystem
 from ..linear.krylov import Krylov
-from ..linear.stages import Stages
 from ..parallel import Array
 from ..problems.box import BoxProblem
 from ..problems.solution import Fields, Step
+from .job import Job
 from .method_options import make_options
-from .newton import Stopping
 from .steplength import halve_until, inexact_decrease
 
 Trial = tuple[Array, Array, Array]  # v, f(v), R(v)
@@ -109,19 +107,12 @@ class BoxActiveSet:
         return Step(self.norm, step_norm, alpha, iterations, backtracking=cuts, rtol=rtol)
 
 
-def build(
-    problem: BoxProblem,
-    stages: Stages,
-    system: str,
-    options: dict[str, Any],
-    stopping: Stopping,
-    start: Fields | None = None,
-) -> BoxActiveSet:
+def build(job: Job) -> BoxActiveSet:
     """The registry's door.
 
     Raises
     ------
     InputError : an unknown option or a value out of range.
     """
-    settings = make_options(BoxActiveSetOptions, "active-set", options)
-    return BoxActiveSet(problem, BoxSystem(problem, stages), settings, start)
+    settings = make_options(BoxActiveSetOptions, "active-set", job.options)
+    return BoxActiveSet(job.problem, BoxSystem(job.problem, job.stages), settings, job.start)

@@ -23,8 +23,8 @@ from ..problems.box import BoxProblem
 from ..problems.obstacle import ObstacleEquations
 from ..problems.solution import Fields, Step
 from .fas import COARSEST_SWEEPS, WINDOW
+from .job import Job
 from .method_options import make_options
-from .newton import Stopping
 from .steplength import StepLengthError
 
 
@@ -262,16 +262,14 @@ class BoxFas:
         level.seconds += perf_counter() - begin
 
 
-def build(
-    problem: BoxProblem, stages: Stages, system: str, options: dict[str, Any], stopping: Stopping, start: Fields | None = None
-) -> BoxFas:
+def build(job: Job) -> BoxFas:
     """The registry's door.
 
     Raises
     ------
     InputError : an unknown option or a value out of range; numba is missing; no obstacle problem on a rectangle.
     """
-    settings = make_options(BoxFasOptions, "fas", options)
+    settings = make_options(BoxFasOptions, "fas", job.options)
     if find_spec("numba") is None:
         raise InputError("--method fas: its loops need numba, which is not installed (pip install numba)")
-    return BoxFas(problem, stages, settings, start)
+    return BoxFas(job.problem, job.stages, settings, job.start)

@@ -3,19 +3,17 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
 from ..linear.krylov import Krylov
-from ..linear.stages import Stages
 from ..linear.system import System, make_system
 from ..parallel import Array
 from ..problems.problem import LubricationProblem
 from ..problems.solution import Fields, Step
+from .job import Job
 from .method_options import make_options
-from .newton import Stopping
 from .steplength import Centrality, feasible, halve_until, inexact_decrease, reduction
 
 Trial = tuple[Array, Array, Array]  # p, r, F1
@@ -163,24 +161,13 @@ class DIN:
         return alpha, centrality, backtracking, trial(alpha)
 
 
-def build(
-    problem: LubricationProblem,
-    stages: Stages,
-    system: str,
-    options: dict[str, Any],
-    stopping: Stopping,
-    start: Fields | None = None,
-) -> DIN:
+def build(job: Job) -> DIN:
     """The registry's door: DIN on the named system, for the options that were given by name.
-
-    Parameters
-    ----------
-    start : fields p and r to start from, all positive; default p0 and r0 everywhere.
 
     Raises
     ------
     InputError : an unknown option or a value out of range.
     """
-    floor = float(np.clip(stopping.eps1, 1e-12, 1e-4))  # no inner solve need be much better than the outer test
-    settings = make_options(DinOptions, "din", {"tol_min": floor, **options})
-    return DIN(problem, make_system(system, problem, stages), settings, start)
+    floor = float(np.clip(job.stopping.eps1, 1e-12, 1e-4))  # no inner solve need be much better than the outer test
+    settings = make_options(DinOptions, "din", {"tol_min": floor, **job.options})
+    return DIN(job.problem, make_system(job.system, job.problem, job.stages), settings, job.start)

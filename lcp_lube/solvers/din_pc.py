@@ -6,19 +6,17 @@ more centring (one more solve with the same matrix) goes further than a shorter 
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
-from ..linear.stages import Stages
 from ..linear.system import System, make_system
 from ..parallel import Array
 from ..problems.problem import LubricationProblem
 from ..problems.solution import Fields, Step
 from .din import DIN, DinOptions
+from .job import Job
 from .method_options import make_options
-from .newton import Stopping
 from .steplength import feasible, halve_until
 
 CENTRING = (0.0, 0.01, 0.1)  # sigma at least; the next where the step would leave the central path's neighbourhood
@@ -83,20 +81,13 @@ class DinPc(DIN):
         return Step(self.norm, step_norm, alpha, its, cuts, 0, sigma, rtol)
 
 
-def build(
-    problem: LubricationProblem,
-    stages: Stages,
-    system: str,
-    options: dict[str, Any],
-    stopping: Stopping,
-    start: Fields | None = None,
-) -> DinPc:
+def build(job: Job) -> DinPc:
     """The registry's door.
 
     Raises
     ------
     InputError : an unknown option or a value out of range.
     """
-    floor = float(np.clip(stopping.eps1, 1e-12, 1e-4))
-    settings = make_options(DinPcOptions, "din-pc", {"tol_min": floor, **options})
-    return DinPc(problem, make_system(system, problem, stages), settings, start)
+    floor = float(np.clip(job.stopping.eps1, 1e-12, 1e-4))
+    settings = make_options(DinPcOptions, "din-pc", {"tol_min": floor, **job.options})
+    return DinPc(job.problem, make_system(job.system, job.problem, job.stages), settings, job.start)

@@ -24,8 +24,8 @@ from ..parallel import Array
 from ..problems.certificate import certificate_tol
 from ..problems.problem import LubricationProblem
 from ..problems.solution import Fields, Step
+from .job import Job
 from .method_options import make_options
-from .newton import Stopping
 from .steplength import StepLengthError
 
 EPS = float(np.finfo(float).eps)
@@ -228,21 +228,14 @@ class Fas:
         level.work += sweeps * level.nx * (level.z.shape[0] - 2)
 
 
-def build(
-    problem: LubricationProblem,
-    stages: Stages,
-    system: str,
-    options: dict[str, Any],
-    stopping: Stopping,
-    start: Fields | None = None,
-) -> Fas:
+def build(job: Job) -> Fas:
     """The registry's door.
 
     Raises
     ------
     InputError : an unknown option or a value out of range; numba is missing.
     """
-    settings = make_options(FasOptions, "fas", options)
+    settings = make_options(FasOptions, "fas", job.options)
     if find_spec("numba") is None:
         raise InputError("--method fas: its loops need numba, which is not installed (pip install numba)")
-    return Fas(problem, stages, settings, stopping.eps1, start)
+    return Fas(job.problem, job.stages, settings, job.stopping.eps1, job.start)

@@ -6,19 +6,17 @@ phi(p, r) = sqrt(p^2 + r^2) - p - r vanishes exactly where p >= 0, r >= 0 and p 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache, partial
-from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
 from ..linear.krylov import Krylov
-from ..linear.stages import Stages
 from ..linear.system import System, make_system
 from ..parallel import Array
 from ..problems.problem import LubricationProblem
 from ..problems.solution import Fields, Step
+from .job import Job
 from .method_options import make_options
-from .newton import Stopping
 from .steplength import StepLengthError, armijo, halve_until, inexact_decrease
 
 SMALL = np.finfo(float).tiny / np.finfo(float).eps
@@ -156,25 +154,17 @@ class FischerNewton:
         return lambda alpha: armijo(0.5 * norm**2, 0.5 * reduce.norm(*trial(alpha)[2:]) ** 2, alpha, slope, o.beta)
 
 
-def _build(
-    merit: str,
-    problem: LubricationProblem,
-    stages: Stages,
-    system: str,
-    options: dict[str, Any],
-    stopping: Stopping,
-    start: Fields | None = None,
-) -> FischerNewton:
+def _build(merit: str, job: Job) -> FischerNewton:
     """FBN with one of its two rules, for the options that were given by name.
 
     Raises
     ------
     InputError : an unknown option or a value out of range.
     """
-    floor = float(np.clip(stopping.eps1, 1e-12, 1e-4))  # no inner solve need be much better than the outer test
+    floor = float(np.clip(job.stopping.eps1, 1e-12, 1e-4))  # no inner solve need be much better than the outer test
     name = "fbn-a" if merit == "armijo" else "fbn-i"
-    settings = make_options(FischerOptions, name, {"tol_min": floor, **options})
-    return FischerNewton(problem, make_system(system, problem, stages), settings, merit, start)
+    settings = make_options(FischerOptions, name, {"tol_min": floor, **job.options})
+    return FischerNewton(job.problem, make_system(job.system, job.problem, job.stages), settings, merit, job.start)
 
 
 # The registry's doors to the two methods; arguments as `din.build` has them.

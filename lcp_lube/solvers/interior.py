@@ -15,19 +15,17 @@ The paper leaves sigma, mu, the start and the tolerances open; the defaults here
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
 from ..linear.box_system import BoxSystem
 from ..linear.krylov import Krylov
-from ..linear.stages import Stages
 from ..parallel import Array
 from ..problems.box import BoxProblem
 from ..problems.solution import Fields, Step
+from .job import Job
 from .method_options import make_options
-from .newton import Stopping
 from .steplength import feasible, halve_until, inexact_decrease
 
 RTOL = (1e-12, 0.5)  # of the inner solves: what PETSc's test can tell apart, and what still is a solve
@@ -164,18 +162,12 @@ class Interior:
         return alpha, cuts, *trial(alpha)
 
 
-def build(
-    problem: BoxProblem,
-    stages: Stages,
-    system: str,
-    options: dict[str, Any],
-    stopping: Stopping,
-    start: Fields | None = None,
-) -> Interior:
+def build(job: Job) -> Interior:
     """The registry's door.
 
     Raises
     ------
     InputError : an unknown option or a value out of range.
     """
-    return Interior(problem, BoxSystem(problem, stages), make_options(InteriorOptions, "interior", options), start)
+    settings = make_options(InteriorOptions, "interior", job.options)
+    return Interior(job.problem, BoxSystem(job.problem, job.stages), settings, job.start)

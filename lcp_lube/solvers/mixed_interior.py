@@ -14,13 +14,12 @@ from petsc4py import PETSc
 
 from ..errors import InputError
 from ..linear.box_system import BoxSystem
-from ..linear.stages import Stages
 from ..parallel import Array
 from ..problems.box import BoxProblem
 from ..problems.solution import Fields, Step
 from .interior import Interior, InteriorOptions
+from .job import Job
 from .method_options import make_options
-from .newton import Stopping
 from .steplength import StepLengthError
 
 STUCK = 1e-9  # steps shorter than this lead nowhere
@@ -115,21 +114,14 @@ class MixedInterior(Interior):
         return step
 
 
-def build(
-    problem: BoxProblem,
-    stages: Stages,
-    system: str,
-    options: dict[str, Any],
-    stopping: Stopping,
-    start: Fields | None = None,
-) -> MixedInterior:
+def build(job: Job) -> MixedInterior:
     """The registry's door.
 
     Raises
     ------
     InputError : an unknown option or a value out of range.
     """
-    settings = make_options(MixedInteriorOptions, "interior", options)
-    kept = KeptJacobian(problem, settings.keep)
+    settings = make_options(MixedInteriorOptions, "interior", job.options)
+    kept = KeptJacobian(job.problem, settings.keep)
     seen_by_system: Any = kept
-    return MixedInterior(problem, BoxSystem(seen_by_system, stages), kept, settings, start)
+    return MixedInterior(job.problem, BoxSystem(seen_by_system, job.stages), kept, settings, job.start)

@@ -13,7 +13,6 @@ start is needed; sweeps of nonlinear Gauss-Seidel keep supersolutions and carry 
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +24,8 @@ from ..linear.stages import Stages
 from ..parallel import Array
 from ..problems.problem import LubricationProblem
 from ..problems.solution import Fields, Step
+from .job import Job
 from .method_options import make_options
-from .newton import Stopping
 from .relaxation import relaxation
 
 EPS = float(np.finfo(float).eps)
@@ -166,19 +165,12 @@ class Monotone:
         return Step(self.norm, step_norm, 1.0, iterations, rtol=self.options.rtol)
 
 
-def build(
-    problem: LubricationProblem,
-    stages: Stages,
-    system: str,
-    options: dict[str, Any],
-    stopping: Stopping,
-    start: Fields | None = None,
-) -> Monotone:
+def build(job: Job) -> Monotone:
     """The registry's door. The matrices are the reduced system's in sparsity, but its own.
 
     Raises
     ------
     InputError : an unknown option or a value out of range.
     """
-    settings = make_options(MonotoneOptions, "monotone", options)
-    return Monotone(problem, ModelSystem(problem, stages), settings, stopping.eps1, start)
+    settings = make_options(MonotoneOptions, "monotone", job.options)
+    return Monotone(job.problem, ModelSystem(job.problem, job.stages), settings, job.stopping.eps1, job.start)

@@ -12,7 +12,6 @@ until f' has a negative eigenvalue, and the first eigenvector of A. (With inexac
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
@@ -23,8 +22,9 @@ from ..linear.stages import Stages
 from ..parallel import Array
 from ..problems.semilinear import SemilinearProblem
 from ..problems.solution import Fields, Step
+from .job import Job
 from .method_options import make_options
-from .newton import NoSolutionError, Stopping
+from .newton import NoSolutionError
 from .steplength import halve_until, inexact_decrease
 
 LOOSEST = 0.1  # true relative residual of an inner solve that a proof may still lean on
@@ -147,18 +147,11 @@ class PlainNewton:
             obj.destroy()
 
 
-def build(
-    problem: SemilinearProblem,
-    stages: Stages,
-    system: str,
-    options: dict[str, Any],
-    stopping: Stopping,
-    start: Fields | None = None,
-) -> PlainNewton:
+def build(job: Job) -> PlainNewton:
     """The registry's door: Newton's method with the options that were given by name.
 
     Raises
     ------
     InputError : an unknown option or a value out of range.
     """
-    return PlainNewton(problem, stages, make_options(NewtonOptions, "newton", options), start)
+    return PlainNewton(job.problem, job.stages, make_options(NewtonOptions, "newton", job.options), job.start)

@@ -12,7 +12,6 @@ falls, or rises again where that fails, until F alone is solved (proximal pertur
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -22,8 +21,8 @@ from ..linear.stages import Stages
 from ..parallel import Array
 from ..problems.box import BoxProblem
 from ..problems.solution import Fields, Step
+from .job import Job
 from .method_options import make_options
-from .newton import Stopping
 from .steplength import StepLengthError, armijo, halve_until
 
 DESCENT = 1e-10  # d is a direction of descent if its slope is below -DESCENT ||d||^2.1
@@ -195,18 +194,11 @@ class Semismooth:
             obj.destroy()
 
 
-def build(
-    problem: BoxProblem,
-    stages: Stages,
-    system: str,
-    options: dict[str, Any],
-    stopping: Stopping,
-    start: Fields | None = None,
-) -> Semismooth:
+def build(job: Job) -> Semismooth:
     """The registry's door.
 
     Raises
     ------
     InputError : an unknown option or a value out of range.
     """
-    return Semismooth(problem, stages, make_options(SemismoothOptions, "semismooth", options), start)
+    return Semismooth(job.problem, job.stages, make_options(SemismoothOptions, "semismooth", job.options), job.start)
