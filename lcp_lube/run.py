@@ -112,8 +112,9 @@ class Run:
             entry = METHODS[name].of(self.problem.kind)
             system, inner = self._rescue_solver(name)
             with recipe(inner):
-                # An interior method begins anew; another may take up what was reached.
-                start = None if entry.interior else reached
+                # An interior method begins anew; another may take up what was reached, if it is not zero everywhere.
+                anything = self.problem.reduce.max(np.concatenate([np.abs(values) for values in reached.values()]))
+                start = None if entry.interior or anything == 0.0 else reached
                 method = entry.load()(Job(self.problem, self.stages, system, {}, self.stopping, start))
                 self._iterate(method, self.problem, self.stopping, k, reached, failed=record)
             self.took_over, steps = name, steps + self.steps
