@@ -149,7 +149,7 @@ class Fas:
         """
         if self.norm > self.options.stall * self._recent[0] and self.norm > self.eps1:
             if not self.norm < 1.0:
-                self.z = np.zeros(self.problem.grid.local_size)  # says that there is nothing to start from (`run.Run.take_over`)
+                self.z = np.zeros(self.problem.grid.local_size)  # nothing to start from (`run.Run.take_over`)
             raise StepLengthError(f"||G|| is at {self.norm:.1e} of ||c|| after {self._taken} cycles and has stalled")
         with self.stages("cycles"):
             if self._taken == 0:
