@@ -22,7 +22,9 @@ ENVIRONMENT = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_CO
     "OMPI_ALLOW_RUN_AS_ROOT": "1",
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
     "OMPI_MCA_rmaps_base_oversubscribe": "1",
+    # On cores that others use too: ranks that wait give way, and move.
     "OMPI_MCA_mpi_yield_when_idle": "1",
+    "OMPI_MCA_hwloc_base_binding_policy": "none",
     "PYTHONPATH": os.pathsep.join(filter(None, [str(TESTS.parent), os.environ.get("PYTHONPATH", "")])),
 }
 os.environ.setdefault("OMP_NUM_THREADS", "1")
