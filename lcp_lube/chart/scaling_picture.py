@@ -52,7 +52,7 @@ def _seconds(axes: Axes, rows: Sequence[Row]) -> None:
         axes.plot([n for n, _ in points], [1e6 * s / n for n, s in points], label=label, **look(k))
     axes.set(xscale="log", xlabel="points", ylabel="microseconds a point", ylim=(0, None), title="whole solve")
     if series:
-        axes.legend()
+        axes.legend(loc="lower right")
 
 
 def _counts(axes: Axes, rows: Sequence[Row]) -> None:
