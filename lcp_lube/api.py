@@ -4,7 +4,6 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-import numpy as np
 from petsc4py import PETSc
 
 from .alarm import check_same
@@ -16,6 +15,7 @@ from .linear.stages import Stages
 from .march import march
 from .memory import check as check_memory
 from .memory import look_ahead, resident
+from .parallel import overflow_is_no_warning
 from .piezo import solve_fluid
 from .problems.box import BoxProblem
 from .problems.problem import LubricationProblem
@@ -28,7 +28,7 @@ from .scene import Scene
 from .solvers.newton import Monitor, Stopping
 
 
-@np.errstate(over="ignore", invalid="ignore")  # iterates that overflow are an outcome, not a warning
+@overflow_is_no_warning  # but an outcome
 def solve(
     scene: Scene,
     *,

@@ -1,10 +1,29 @@
 """Reductions over arrays that each rank holds its own part of."""
 
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, TypeVar, cast
+
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def overflow_is_no_warning(function: Function) -> Function:
+    """The function, with overflow and NaN in its arithmetic left to its results to tell.
+
+    Not `np.errstate` as a decorator: calls inside one another would leave NumPy's settings changed.
+    """
+
+    @wraps(function)
+    def quiet(*args: Any, **kwargs: Any) -> Any:
+        with np.errstate(over="ignore", invalid="ignore"):
+            return function(*args, **kwargs)
+
+    return cast(Function, quiet)
 
 
 class Reduce:

@@ -211,3 +211,10 @@ def test_on_several_ranks(script, tmp_path, ranks, alone):
         assert record["converged"] and record["difference"] < 1e-9 and record["reduction"] == REDUCED.get(name), name
         for key in ("load", "friction", "p_max", "cavitated_fraction"):
             assert record[key] == pytest.approx(alone[name][key], rel=1e-9), (name, key)
+
+
+def test_numpys_settings_are_the_callers():
+    """A scene that is solved in part calls `solve` inside `solve`."""
+    before = np.geterr()
+    solve(load_scene("problem4", {"n": 12})).destroy()
+    assert np.geterr() == before
