@@ -24,9 +24,9 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
 from films import FilmScene, Knots, L, Pieces, random_films  # noqa: E402
 
-from lcp_lube.accuracy import solve_to_accuracy  # noqa: E402
 from lcp_lube.api import solve  # noqa: E402
-from lcp_lube.scene import Scene, load_scene  # noqa: E402
+from lcp_lube.drivers.accuracy import solve_to_accuracy  # noqa: E402
+from lcp_lube.scenes.scene import Scene, load_scene  # noqa: E402
 
 
 def planes(count: int, seed: int) -> Iterator[Scene]:

@@ -20,7 +20,7 @@ from lcp_lube.api import solve  # noqa: E402
 from lcp_lube.output.files import replacing  # noqa: E402
 from lcp_lube.output.style import BLUE, GREY, RED, STYLE, new_figure  # noqa: E402
 from lcp_lube.problems.solution import Solution  # noqa: E402
-from lcp_lube.scene import load_scene  # noqa: E402
+from lcp_lube.scenes.scene import load_scene  # noqa: E402
 
 LOOKS = ({"color": BLUE, "marker": "o"}, {"color": RED, "marker": "s"})
 

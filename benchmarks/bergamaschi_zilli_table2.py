@@ -71,7 +71,7 @@ def measured(n: int, keep: int, repeat: int) -> dict[str, Any]:
 
 def shares(results: Path, repeat: int, quick: bool) -> None:
     """The seconds by part, and the gain of keeping the Jacobian."""
-    from lcp_lube.output.resumable import ResumableCsv
+    from lcp_lube.base.resumable import ResumableCsv
 
     store = ResumableCsv(results / "bergamaschi_table2_shares.csv", COLUMNS, ("n", "keep"))
     print(f"\n{'n':>5} {'keep':>4} {'it':>3} {'CPU s':>8} {'Jacobian':>9} {'factor':>7} {'solve':>6} {'rest':>6} {'MB':>6}   k")

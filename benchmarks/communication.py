@@ -60,7 +60,7 @@ def count(n: int, ranks: int) -> dict[str, object]:
 
 
 def main() -> None:
-    from lcp_lube.output.resumable import ResumableCsv
+    from lcp_lube.base.resumable import ResumableCsv
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--results", type=Path, default=Path(__file__).parent / "results")

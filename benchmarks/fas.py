@@ -29,13 +29,13 @@ import numpy as np
 from mpi4py import MPI
 
 from lcp_lube import load_scene, solve
+from lcp_lube.base.options import recipe
+from lcp_lube.base.resumable import ResumableCsv
+from lcp_lube.base.stages import Stages
 from lcp_lube.linear.krylov import Krylov
-from lcp_lube.linear.options import recipe
-from lcp_lube.linear.stages import Stages
 from lcp_lube.output.results import machine
-from lcp_lube.output.resumable import ResumableCsv
-from lcp_lube.problems.problem import LubricationProblem
-from lcp_lube.solvers.fas import Fas, FasOptions
+from lcp_lube.problems.film.lubrication import LubricationProblem
+from lcp_lube.solvers.fas.driver import Fas, FasOptions
 
 Values = dict[str, Any]
 KEY = ("experiment", "film", "n", "variant")
@@ -90,8 +90,8 @@ def problem_of(film: str, n: int) -> LubricationProblem:
     name, changes = FILMS[film]
     if name != "bearing":
         return load_scene(name, {**changes, "nx": n, "ny": n}).build()
+    from lcp_lube.problems.film.reynolds import box_scheme
     from lcp_lube.problems.grid import Grid
-    from lcp_lube.problems.reynolds import box_scheme
 
     step = Step(changes["h_start_um"] * 1e-6, changes["h_end_um"] * 1e-6)
     grid, sides = Grid((n, n), (0.1, 0.1)), (1e5,) * 4

@@ -10,11 +10,11 @@ from time import perf_counter
 import numpy as np
 
 from lcp_lube.api import solve
-from lcp_lube.linear.options import recipe
-from lcp_lube.linear.stages import Stages
+from lcp_lube.base.options import recipe
+from lcp_lube.base.stages import Stages
 from lcp_lube.linear.system import make_system
-from lcp_lube.problems.problem import LubricationProblem
-from lcp_lube.scene import load_scene
+from lcp_lube.problems.film.lubrication import LubricationProblem
+from lcp_lube.scenes.scene import load_scene
 from lcp_lube.solvers.enclosure import Enclosure
 from lcp_lube.solvers.monotone import ModelSystem
 

@@ -1,4 +1,4 @@
-"""Peak memory of runs against the estimate made before them, and the constants of lcp_lube/memory.py that fit.
+"""Peak memory of runs against the estimate made before them, and the constants of lcp_lube/drivers/memory.py that fit.
 
 python benchmarks/memory.py [WORD]     only cases whose name contains WORD; each run is a process of its own
 """

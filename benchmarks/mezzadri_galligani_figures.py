@@ -27,7 +27,7 @@ from lcp_lube.output.picture import Picture, collect, scaled, title  # noqa: E40
 from lcp_lube.output.plot import plot  # noqa: E402
 from lcp_lube.output.style import BLUE, MAPS, NAMES, RED, STYLE, new_figure  # noqa: E402
 from lcp_lube.problems.solution import Solution  # noqa: E402
-from lcp_lube.scene import load_scene  # noqa: E402
+from lcp_lube.scenes.scene import load_scene  # noqa: E402
 
 
 def solved(name: str, **changes: Any) -> Solution:

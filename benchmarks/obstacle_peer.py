@@ -32,10 +32,10 @@ import numpy as np
 from petsc4py import PETSc
 
 from lcp_lube import load_scene, solve
+from lcp_lube.base.resumable import ResumableCsv
 from lcp_lube.output.results import machine
-from lcp_lube.output.resumable import ResumableCsv
 from lcp_lube.problems.obstacle import ObstacleProblem
-from lcp_lube.scenes_obstacle import ObstacleScene
+from lcp_lube.scenes.obstacle import ObstacleScene
 
 SCENE = {"lambda": 6.0, "v_upper": 0.3, "v_lower": "0.28 - 10*((x - 0.2)^2 + (y - 0.2)^2)"}
 COARSEST = 31

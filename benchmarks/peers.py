@@ -31,8 +31,8 @@ if __name__ == "__main__":
 from petsc4py import PETSc
 
 from lcp_lube import load_scene
-from lcp_lube.parallel import Array
-from lcp_lube.problems.problem import LubricationProblem
+from lcp_lube.base.parallel import Array
+from lcp_lube.problems.film.lubrication import LubricationProblem
 
 LU = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "umfpack"}
 TOL = 1e-8  # of ||F1||/||c||, as in our runs

@@ -30,15 +30,15 @@ from peers import options  # benchmarks/peers.py
 from peers import run as run_peer
 
 from lcp_lube import load_scene, solve
+from lcp_lube.base.options import recipe
+from lcp_lube.base.resumable import ResumableCsv, Row
 from lcp_lube.linear import cavity
 from lcp_lube.linear.krylov import Krylov
-from lcp_lube.linear.options import recipe
 from lcp_lube.output.results import machine, versions
-from lcp_lube.output.resumable import ResumableCsv, Row
-from lcp_lube.problems.problem import LubricationProblem
+from lcp_lube.problems.film.lubrication import LubricationProblem
 from lcp_lube.registry import PACKAGE
 from lcp_lube.solvers.newton import Stopping
-from lcp_lube.tables import PUBLISHED
+from lcp_lube.studies.tables import PUBLISHED
 
 Values = dict[str, Any]
 KEY = ("experiment", "scene", "n", "variant")

@@ -25,12 +25,12 @@ from peers import MAX_IT, PEERS, TOL, Answer
 from petsc4py import PETSc
 
 from lcp_lube import load_scene
-from lcp_lube.chart import precision
-from lcp_lube.chart.experiment import environment, open_store, scene_key
-from lcp_lube.chart.known import FilmScene, known_answer
-from lcp_lube.chart.precision_words import PEER
-from lcp_lube.compare import read_off
-from lcp_lube.problems.problem import LubricationProblem
+from lcp_lube.problems.film.lubrication import LubricationProblem
+from lcp_lube.studies import precision
+from lcp_lube.studies.compare import read_off
+from lcp_lube.studies.experiment import environment, open_store, scene_key
+from lcp_lube.studies.known import FilmScene, known_answer
+from lcp_lube.studies.precision_words import PEER
 
 NAMES = {
     "scipy": ("SciPy active set", "splu COLAMD"),

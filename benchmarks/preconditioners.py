@@ -20,10 +20,10 @@ import petsc4py
 if __name__ == "__main__":
     petsc4py.init(sys.argv[:1])
 
-from lcp_lube.chart.experiment import KRYLOV_LIMIT, run
-from lcp_lube.output.resumable import ResumableCsv, Row
-from lcp_lube.scene import load_scene
+from lcp_lube.base.resumable import ResumableCsv, Row
+from lcp_lube.scenes.scene import load_scene
 from lcp_lube.solvers.newton import Stopping
+from lcp_lube.studies.experiment import KRYLOV_LIMIT, run
 
 HERE = Path(__file__).parent
 KEY = ("problem", "n", "system", "recipe")

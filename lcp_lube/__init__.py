@@ -10,13 +10,13 @@ from typing import Any
 __version__ = "0.1.0"
 
 _PUBLIC = {
-    "Complementarity": "lcp_lube.complementarity",
+    "Complementarity": "lcp_lube.scenes.user",
     "InputError": "lcp_lube.errors",
-    "Scene": "lcp_lube.scene",
-    "load_scene": "lcp_lube.scene",
+    "Scene": "lcp_lube.scenes.scene",
+    "load_scene": "lcp_lube.scenes.scene",
     "solve": "lcp_lube.api",
-    "solve_or_balance": "lcp_lube.neighbour",
-    "solve_to_accuracy": "lcp_lube.accuracy",
+    "solve_or_balance": "lcp_lube.drivers.neighbour",
+    "solve_to_accuracy": "lcp_lube.drivers.accuracy",
     "Solution": "lcp_lube.problems.solution",
 }
 __all__ = [*_PUBLIC, "__version__"]

@@ -5,8 +5,8 @@ import signal
 import sys
 import traceback
 
-from . import petsc_start
-from .arguments import parse, split
+from .base import petsc as petsc_start
+from .cli.arguments import parse, split
 from .errors import InputError
 
 
@@ -28,13 +28,13 @@ def main(argv: list[str] | None = None) -> int:
         return 0
     from mpi4py import MPI
 
-    from .alarm import Alarm, check_same
+    from .base.alarm import Alarm, check_same
 
     alarm = Alarm()
     if alarm.alone:
         signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # `| head` is no error; PETSc's handler reports a crash
     try:
-        from .cli import run
+        from .cli.main import run
 
         # After the imports, which take seconds on a busy machine: ranks that refuse do so at nearly the same time.
         check_same(MPI.COMM_WORLD, "command line", words)

@@ -6,25 +6,25 @@ from typing import Any
 
 from petsc4py import PETSc
 
-from .alarm import check_same
-from .auto import plan
-from .checkpoint import CHOICES, Checkpointer, load
+from .base.alarm import check_same
+from .base.options import recipe, set_names
+from .base.parallel import overflow_is_no_warning
+from .base.stages import Stages
+from .drivers.checkpoint import CHOICES, Checkpointer, load
+from .drivers.fluid import solve_fluid
+from .drivers.memory import check as check_memory
+from .drivers.memory import look_ahead, resident
+from .drivers.nested import Run
+from .drivers.plan import plan
+from .drivers.symmetry import part_of, solve_part
+from .drivers.time import march
 from .errors import InputError
-from .linear.options import recipe, set_names
-from .linear.stages import Stages
-from .march import march
-from .memory import check as check_memory
-from .memory import look_ahead, resident
-from .parallel import overflow_is_no_warning
-from .piezo import solve_fluid
 from .problems.box import BoxProblem
-from .problems.problem import LubricationProblem
+from .problems.film.lubrication import LubricationProblem
+from .problems.film.squeeze import SqueezeProblem
 from .problems.solution import Fields, Outcome, Problem, Solution
-from .problems.squeeze import SqueezeProblem
-from .reduction import part_of, solve_part
 from .registry import METHODS
-from .run import Run
-from .scene import Scene
+from .scenes.scene import Scene
 from .solvers.newton import Monitor, Stopping
 
 

@@ -127,7 +127,7 @@ METHODS: dict[str, MethodEntry] = {
         eps=(1e-10, inf),
     ),
     "fas": MethodEntry(
-        "lcp_lube.solvers.fas:build",
+        "lcp_lube.solvers.fas.driver:build",
         "nonlinear multigrid: full multigrid and a few cycles of sweeps, no matrix at all",
         kinds=("lubrication", "box"),
         systems=(),
@@ -136,7 +136,7 @@ METHODS: dict[str, MethodEntry] = {
         fallback=("active-set", "din-pc", "monotone"),
         variants={
             "box": MethodEntry(
-                "lcp_lube.solvers.box_fas:build",
+                "lcp_lube.solvers.fas.box:build",
                 "nonlinear multigrid between two obstacles: projected sweeps, coarse grids that know the bounds",
                 kinds=("box",),
                 systems=(),
@@ -174,36 +174,36 @@ DEFAULT_METHOD = {
 }
 
 SYSTEMS: dict[str, Entry] = {
-    "full": Entry("lcp_lube.linear.newton_matrix:FullSystem", "the 2n-by-2n matrix [A B; R P] of the papers"),
+    "full": Entry("lcp_lube.linear.full:FullSystem", "the 2n-by-2n matrix [A B; R P] of the papers"),
     "reduced": Entry("lcp_lube.linear.reduced:ReducedSystem", "the n-by-n M-matrix A diag(theta) - B diag(1 - theta)"),
     "cavity": Entry("lcp_lube.linear.cavity:CavitySystem", "full-film cells alone, the cavitated ones eliminated exactly"),
 }
 
 # A scene file's `family` names the model that validates it and builds its problem.
 FAMILIES: dict[str, Entry] = {
-    "slider": Entry("lcp_lube.scene:SliderScene", "slider with one wave of the film (the published problems)"),
-    "textured": Entry("lcp_lube.scenes_textured:TexturedScene", "flat slider with square dimples"),
-    "journal": Entry("lcp_lube.scenes_journal:JournalScene", "journal bearing with an axial groove at the widest gap"),
-    "rough": Entry("lcp_lube.scenes_textured:RoughScene", "slider with one wave and a random surface"),
-    "bearing": Entry("lcp_lube.scenes_bearing:BearingScene", "a bearing of any kind: film shapes added up, a condition a side"),
-    "squeeze": Entry("lcp_lube.scenes_squeeze:SqueezeScene", "parallel plates that approach and part, in time"),
-    "bratu": Entry("lcp_lube.scenes_semilinear:BratuScene", "Bratu's equation on the unit square"),
-    "obstacle": Entry("lcp_lube.scenes_obstacle:ObstacleScene", "Bratu's equation between two obstacles"),
-    "ehl_line": Entry("lcp_lube.scenes_ehl:EhlLineScene", "elastohydrodynamic line contact"),
-    "poisson_cubic": Entry("lcp_lube.scenes_semilinear:PoissonCubicScene", "Poisson's equation with a cubic term"),
+    "slider": Entry("lcp_lube.scenes.scene:SliderScene", "slider with one wave of the film (the published problems)"),
+    "textured": Entry("lcp_lube.scenes.textured:TexturedScene", "flat slider with square dimples"),
+    "journal": Entry("lcp_lube.scenes.journal:JournalScene", "journal bearing with an axial groove at the widest gap"),
+    "rough": Entry("lcp_lube.scenes.textured:RoughScene", "slider with one wave and a random surface"),
+    "bearing": Entry("lcp_lube.scenes.bearing:BearingScene", "a bearing of any kind: film shapes added up, a condition a side"),
+    "squeeze": Entry("lcp_lube.scenes.squeeze:SqueezeScene", "parallel plates that approach and part, in time"),
+    "bratu": Entry("lcp_lube.scenes.semilinear:BratuScene", "Bratu's equation on the unit square"),
+    "obstacle": Entry("lcp_lube.scenes.obstacle:ObstacleScene", "Bratu's equation between two obstacles"),
+    "ehl_line": Entry("lcp_lube.scenes.ehl:EhlLineScene", "elastohydrodynamic line contact"),
+    "poisson_cubic": Entry("lcp_lube.scenes.semilinear:PoissonCubicScene", "Poisson's equation with a cubic term"),
 }
 
 # The maps of `chart stability`: each makes its runs and draws them.
 STABILITY: dict[str, Entry] = {
-    "starts": Entry("lcp_lube.chart.starts:chart", "starting vectors p0, r0 from 1e-15 to 1e3 by rule for mu (DIN)"),
-    "conditions": Entry("lcp_lube.chart.conditions:chart", "all subsets of the step-length conditions F, R, C, B (DIN)"),
-    "film_ratio": Entry("lcp_lube.chart.film_ratio:chart", "film ratio 1.1 to 1e4 by grid, every method"),
-    "supply_speed": Entry("lcp_lube.chart.supply_speed:chart", "supply pressure by speed, every method"),
+    "starts": Entry("lcp_lube.studies.starts:chart", "starting vectors p0, r0 from 1e-15 to 1e3 by rule for mu (DIN)"),
+    "conditions": Entry("lcp_lube.studies.conditions:chart", "all subsets of the step-length conditions F, R, C, B (DIN)"),
+    "film_ratio": Entry("lcp_lube.studies.film_ratio:chart", "film ratio 1.1 to 1e4 by grid, every method"),
+    "supply_speed": Entry("lcp_lube.studies.supply_speed:chart", "supply pressure by speed, every method"),
     "inner_tolerance": Entry(
-        "lcp_lube.chart.inner_tolerance:chart", "loose inner solves by recipe, and what (31) says of them"
+        "lcp_lube.studies.inner_tolerance:chart", "loose inner solves by recipe, and what (31) says of them"
     ),
-    "roughness": Entry("lcp_lube.chart.roughness:chart", "standard deviation of a random surface by grid, every method"),
-    "turning_point": Entry("lcp_lube.chart.turning_point:chart", "lambda around the turning point of Bratu's equation"),
+    "roughness": Entry("lcp_lube.studies.roughness:chart", "standard deviation of a random surface by grid, every method"),
+    "turning_point": Entry("lcp_lube.studies.turning_point:chart", "lambda around the turning point of Bratu's equation"),
 }
 
 

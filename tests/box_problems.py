@@ -10,7 +10,7 @@ from lcp_lube.api import solve
 from lcp_lube.problems.box import BoxProblem
 from lcp_lube.problems.grid import Grid
 from lcp_lube.problems.solution import Solution
-from lcp_lube.scene import load_scene
+from lcp_lube.scenes.scene import load_scene
 
 BOTH = {"v_upper": 0.3, "v_lower": "0.28 - 10*((x - 0.2)^2 + (y - 0.2)^2)"}
 

@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from petsc4py import PETSc
 from pydantic import PrivateAttr
 
-from lcp_lube.problems.exact import ExactSolution, exact_solution
+from lcp_lube.problems.film.exact import ExactSolution, exact_solution
+from lcp_lube.problems.film.lubrication import LubricationProblem
+from lcp_lube.problems.film.reynolds import SCHEMES, box_scheme
 from lcp_lube.problems.grid import Grid
-from lcp_lube.problems.problem import LubricationProblem
-from lcp_lube.problems.reynolds import SCHEMES, box_scheme
-from lcp_lube.scene import LubricationScene
+from lcp_lube.scenes.scene import LubricationScene
 
 L, WIDTH, MU, U = 0.1, 0.07, 0.015, 5.0
 

@@ -76,7 +76,7 @@ def run(
 ) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     """Record and whole fields of one solve; the options that nobody read are in the record."""
     from lcp_lube import load_scene, solve
-    from lcp_lube.linear.options import unread
+    from lcp_lube.base.options import unread
 
     left: list[str] = []
     solution = solve(

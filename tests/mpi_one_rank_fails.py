@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 from lcp_lube.__main__ import main
 from lcp_lube.errors import InputError
-from lcp_lube.linear import newton_matrix
+from lcp_lube.linear import full as newton_matrix
 
 FAILURES: dict[str, BaseException] = {
     "error": ZeroDivisionError("on purpose"),

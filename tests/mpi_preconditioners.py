@@ -19,11 +19,11 @@ if __name__ == "__main__":
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from lcp_lube.linear.augmentation import AugmentationPC
-from lcp_lube.linear.newton_matrix import FullSystem
-from lcp_lube.linear.options import recipe
-from lcp_lube.linear.saddle import SaddlePC
-from lcp_lube.scene import load_scene
+from lcp_lube.base.options import recipe
+from lcp_lube.linear.full import FullSystem
+from lcp_lube.linear.pc.augmentation import AugmentationPC
+from lcp_lube.linear.pc.splittings import SaddlePC
+from lcp_lube.scenes.scene import load_scene
 
 COMM = MPI.COMM_WORLD
 # Scene, changes, sign of D_p and D_r: positive in DIN, negative in Fischer-Burmeister Newton.

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from side_scenes import SCENES
 
 from lcp_lube import load_scene, solve
-from lcp_lube.reduction import reduced_solve
+from lcp_lube.drivers.symmetry import reduced_solve
 
 KEYS = ("load", "friction", "p_max", "cavitated_fraction")
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from lcp_lube.arguments import parse
+from lcp_lube.cli.arguments import parse
 from lcp_lube.registry import read_recipe, recipe_line
 
 # Those that do not suit the problem which their first line leads to.
@@ -44,8 +44,8 @@ def lacking(name: str) -> str:
 
 def attempt(name: str, max_it: int = 60) -> dict[str, Any]:
     """Outcome of a recipe's example and the options that nobody had read by its last step. Collective."""
-    from lcp_lube.cli import solution_of
-    from lcp_lube.linear.options import unread
+    from lcp_lube.base.options import unread
+    from lcp_lube.cli.main import solution_of
 
     if package := lacking(name):
         return {"lacks": package}

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from films import FilmScene, L, Pieces, random_films
 
-from lcp_lube.accuracy import first_shape, solve_to_accuracy
 from lcp_lube.api import solve
+from lcp_lube.drivers.accuracy import first_shape, solve_to_accuracy
+from lcp_lube.drivers.estimate import misplaced_film, relative_error
 from lcp_lube.errors import InputError
-from lcp_lube.estimate import misplaced_film, relative_error
 from lcp_lube.problems.solution import Outcome
 from lcp_lube.registry import scene_names
-from lcp_lube.scene import load_scene
+from lcp_lube.scenes.scene import load_scene
 
 
 def exact_scenes():

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from petsc4py import PETSc
 
 from lcp_lube.api import solve
+from lcp_lube.drivers.levels import level_shapes
 from lcp_lube.errors import InputError
 from lcp_lube.problems.solution import Outcome
-from lcp_lube.scene import load_scene
-from lcp_lube.solvers.nested import level_shapes
+from lcp_lube.scenes.scene import load_scene
 from lcp_lube.solvers.newton import Stopping
 
 
@@ -172,7 +172,7 @@ def test_auto_in_the_plane(monkeypatch):
     pytest.importorskip("numba")
     sweeps = run("problem4", {"n": 20})
     assert sweeps.settings["method"] == "fas" and sweeps.converged and sweeps.total("linear_iterations") == 0
-    monkeypatch.setattr("lcp_lube.auto.find_spec", lambda name: None)
+    monkeypatch.setattr("lcp_lube.drivers.plan.find_spec", lambda name: None)
     steps = run("problem4", {"n": 20})
     assert steps.settings["method"] == "active-set" and steps.converged
     np.testing.assert_allclose(sweeps.p, steps.p, atol=1e-6)
@@ -191,7 +191,7 @@ def test_auto_without_what_it_likes_best(scene, changes, missing, recipe, monkey
         pytest.skip("this PETSc has no ML")
     best = run(scene, changes, method="active-set")
     sys = SimpleNamespace(hasExternalPackage=lambda name: name not in missing and has(name))
-    monkeypatch.setattr("lcp_lube.auto.PETSc", SimpleNamespace(Sys=sys))
+    monkeypatch.setattr("lcp_lube.drivers.plan.PETSc", SimpleNamespace(Sys=sys))
     if "numba" in missing:
         for module in ("lcp_lube.linear.cavity", "lcp_lube.solvers.relaxation"):
             monkeypatch.setattr(f"{module}.find_spec", lambda name: None)

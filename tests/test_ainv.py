@@ -10,15 +10,15 @@ from hypothesis import strategies as st
 from petsc4py import PETSc
 
 from lcp_lube.api import solve
-from lcp_lube.compiled import compiled
+from lcp_lube.base.compiled import compiled
 from lcp_lube.errors import InputError
-from lcp_lube.linear.ainv import biconjugate, factorise, scaling
 from lcp_lube.linear.krylov import Krylov, LinearSolverError
-from lcp_lube.scene import load_scene
+from lcp_lube.linear.pc.ainv import biconjugate, factorise, scaling
+from lcp_lube.scenes.scene import load_scene
 from lcp_lube.solvers.newton import Stopping
 
 LOOSE = Stopping(eps1=1e-9, eps2=0.1)
-AINV = {"pc_type": "python", "pc_python_type": "lcp_lube.linear.ainv.AINV"}
+AINV = {"pc_type": "python", "pc_python_type": "lcp_lube.linear.pc.ainv.AINV"}
 
 
 def random_matrix(seed, n, symmetric):

@@ -8,14 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lcp_lube import load_scene, solve
-from lcp_lube.balance import MOST_SOLVES, carried
-from lcp_lube.compare import compare
+from lcp_lube.drivers.balance import MOST_SOLVES, carried
+from lcp_lube.drivers.neighbour import solve_near, solve_or_balance
+from lcp_lube.drivers.root import Search
 from lcp_lube.errors import InputError
-from lcp_lube.neighbour import solve_near, solve_or_balance
 from lcp_lube.problems.solution import Outcome
-from lcp_lube.scene import parse_changes
-from lcp_lube.scenes_bearing import BearingScene
-from lcp_lube.solvers.root import Search
+from lcp_lube.scenes.bearing import BearingScene
+from lcp_lube.scenes.scene import parse_changes
+from lcp_lube.studies.compare import compare
 
 
 def direct(name, changes):

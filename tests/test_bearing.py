@@ -11,14 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lcp_lube import InputError, load_scene, solve
-from lcp_lube.formula import Formula
+from lcp_lube.problems.film.edges import face_film
+from lcp_lube.problems.film.model import Model, Side
+from lcp_lube.problems.film.shapes import Block, Sum
 from lcp_lube.problems.grid import Grid
-from lcp_lube.problems.jumps import face_film
-from lcp_lube.problems.model import Model, Side
-from lcp_lube.problems.shapes import Block, Sum
 from lcp_lube.problems.transfer import Transfer
-from lcp_lube.scenes_bearing import BearingScene
-from lcp_lube.scenes_film import shape_names
+from lcp_lube.scenes.bearing import BearingScene
+from lcp_lube.scenes.film import shape_names
+from lcp_lube.scenes.formula import Formula
 
 FEW = settings(max_examples=25, deadline=None)
 L, WIDTH = 0.01, 0.006

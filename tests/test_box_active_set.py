@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from box_problems import BOTH, affine, obstacle
 
+from lcp_lube.base.options import recipe
 from lcp_lube.errors import InputError
-from lcp_lube.linear.box_system import BoxSystem
-from lcp_lube.linear.options import recipe
+from lcp_lube.linear.box import BoxSystem
 from lcp_lube.problems.solution import Outcome
-from lcp_lube.scene import load_scene
+from lcp_lube.scenes.scene import load_scene
 
 
 @pytest.mark.parametrize("n, lower, upper, sum_v", [(64, 49, 743, 0.18903751), (256, 661, 11112, 0.18914745)])

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from lcp_lube import load_scene, solve
 from lcp_lube.problems.certificate import Certificate, certificate_tol
-from lcp_lube.problems.film import Wave
+from lcp_lube.problems.film.gaps import Wave
 
 
 @pytest.fixture(scope="module")

@@ -11,18 +11,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lcp_lube.api import solve
-from lcp_lube.chart import experiment, known, precision, turning_point
-from lcp_lube.chart.log import NAME, write_log
-from lcp_lube.chart.map_picture import Axis, Panels, tick
-from lcp_lube.chart.map_picture import picture as map_picture
-from lcp_lube.chart.outcome_map import tallies, tally
-from lcp_lube.chart.precision_picture import against_seconds
-from lcp_lube.chart.precision_words import cheapest, error, fastest, front, loose, seconds, sentence, which
-from lcp_lube.chart.reference import WRONG, References
-from lcp_lube.chart.starts_picture import apart, chosen, converged, equal_starts, lines_sentence, map_sentence
 from lcp_lube.errors import InputError
 from lcp_lube.registry import METHODS, STABILITY, MethodEntry
-from lcp_lube.scene import load_scene
+from lcp_lube.scenes.scene import load_scene
+from lcp_lube.studies import experiment, known, precision, turning_point
+from lcp_lube.studies.log import NAME, write_log
+from lcp_lube.studies.map_picture import Axis, Panels, tick
+from lcp_lube.studies.map_picture import picture as map_picture
+from lcp_lube.studies.outcome_map import tallies, tally
+from lcp_lube.studies.precision_picture import against_seconds
+from lcp_lube.studies.precision_words import cheapest, error, fastest, front, loose, seconds, sentence, which
+from lcp_lube.studies.reference import WRONG, References
+from lcp_lube.studies.starts_picture import apart, chosen, converged, equal_starts, lines_sentence, map_sentence
 
 Row = dict[str, str]
 

@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 from conftest import ENVIRONMENT, Run
 
-from lcp_lube import checkpoint, load_scene, solve
+from lcp_lube import load_scene, solve
+from lcp_lube.drivers import checkpoint
 from lcp_lube.errors import InputError
 
 NESTED = [

@@ -9,13 +9,13 @@ from petsc4py import PETSc
 
 from lcp_lube.api import solve
 from lcp_lube.errors import InputError
-from lcp_lube.linear.cimmino import Cimmino
 from lcp_lube.linear.krylov import Krylov, LinearSolverError
-from lcp_lube.scene import load_scene
+from lcp_lube.linear.pc.cimmino import Cimmino
+from lcp_lube.scenes.scene import load_scene
 from lcp_lube.solvers.newton import Stopping
 
-PC = {"pc_type": "python", "pc_python_type": "lcp_lube.linear.cimmino.Cimmino"}
-CG = {"ksp_type": "python", "ksp_python_type": "lcp_lube.linear.cimmino.CimminoCG", "pc_type": "none"}
+PC = {"pc_type": "python", "pc_python_type": "lcp_lube.linear.pc.cimmino.Cimmino"}
+CG = {"ksp_type": "python", "ksp_python_type": "lcp_lube.linear.pc.cimmino.CimminoCG", "pc_type": "none"}
 
 
 def petsc(A):

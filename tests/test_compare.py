@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from lcp_lube import InputError, load_scene, solve
-from lcp_lube.compare import compare, exact_errors, table
 from lcp_lube.output.results import as_dict
+from lcp_lube.studies.compare import compare, exact_errors, table
 
 
 def test_rows_are_the_runs_that_solve_makes() -> None:

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lcp_lube import InputError, load_scene, solve
-from lcp_lube.linear.stages import Stages
+from lcp_lube.base.stages import Stages
 from lcp_lube.output.results import as_dict, finite
 from lcp_lube.problems.solution import Outcome
 from lcp_lube.solvers import din
@@ -193,7 +193,7 @@ def test_a_start_that_overflows_is_told(run):
 
 def test_nan_in_a_step_is_told(run, monkeypatch):
     """A direction with a NaN ends the run as not_finite: no answer is made of it."""
-    from lcp_lube.linear.newton_matrix import FullSystem
+    from lcp_lube.linear.full import FullSystem
 
     honest = FullSystem.solve
 

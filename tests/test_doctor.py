@@ -7,7 +7,7 @@ import pytest
 from conftest import ENVIRONMENT
 from mpi4py import MPI
 
-from lcp_lube import doctor
+from lcp_lube.cli import doctor
 
 KEYS = {"versions", "solver_packages", "blas", "mpi", "mpiexec", "ranks", "cores", "memory_gb", "self_check", "ok", "advice"}
 
@@ -36,7 +36,7 @@ def test_the_last_line_is_the_verdict(capsys, monkeypatch):
 
 def test_a_wrong_answer_fails_the_check(monkeypatch):
     """Nothing but the exact solution tells a wrong load from a right one."""
-    from lcp_lube.problems.problem import LubricationProblem
+    from lcp_lube.problems.film.lubrication import LubricationProblem
 
     honest = LubricationProblem.quantities
     monkeypatch.setattr(

@@ -9,10 +9,10 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from lcp_lube.api import solve
+from lcp_lube.base.options import recipe
+from lcp_lube.base.stages import Stages
 from lcp_lube.errors import InputError
-from lcp_lube.linear.options import recipe
-from lcp_lube.linear.stages import Stages
-from lcp_lube.scene import load_scene
+from lcp_lube.scenes.scene import load_scene
 from lcp_lube.solvers.active_set import ActiveSet, ActiveSetOptions
 from lcp_lube.solvers.enclosure import balance, conditions, enclose
 from lcp_lube.solvers.newton import Stopping, iterate
@@ -221,9 +221,9 @@ ENDS = {  # ends in x, in y: what stands in docs/guaranteed_bounds.md
 def test_which_sides_satisfy_them(case):
     from films import MU, U
 
+    from lcp_lube.problems.film.lubrication import LubricationProblem
+    from lcp_lube.problems.film.reynolds import box_scheme
     from lcp_lube.problems.grid import Grid
-    from lcp_lube.problems.problem import LubricationProblem
-    from lcp_lube.problems.reynolds import box_scheme
 
     ends, holds = ENDS[case]
     grid, sides = Grid((7, 5), (0.1, 0.07), ends=ends), (1e5, 1e5, 2e5, 3e5)

@@ -11,8 +11,8 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from lcp_lube.errors import InputError
-from lcp_lube.problems.exact import exact_solution
-from lcp_lube.problems.film import FORMS, SHAPES, Wave
+from lcp_lube.problems.film.exact import exact_solution
+from lcp_lube.problems.film.gaps import FORMS, SHAPES, Wave
 
 CD, DC = FORMS
 L, MU, U = 0.1, 0.015, 5.0

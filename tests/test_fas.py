@@ -14,7 +14,7 @@ from lcp_lube.api import solve
 from lcp_lube.errors import InputError
 from lcp_lube.output.results import as_dict
 from lcp_lube.problems.solution import Outcome
-from lcp_lube.scene import load_scene
+from lcp_lube.scenes.scene import load_scene
 
 pytest.importorskip("numba")
 
@@ -194,7 +194,7 @@ def test_json_and_a_start():
 
 
 def test_front_spans_are_all_points_near_a_front():
-    from lcp_lube.solvers.fas_kernels import front_spans
+    from lcp_lube.solvers.fas.kernels import front_spans
 
     random = np.random.default_rng(1)
     for _ in range(60):
@@ -216,7 +216,7 @@ def test_front_spans_are_all_points_near_a_front():
 @pytest.mark.parametrize("count", [1, 2, 3, 4])
 @pytest.mark.parametrize("down", [False, True])
 def test_fused_sweeps_are_sweeps_one_after_the_other(count, down):
-    from lcp_lube.solvers.fas_kernels import sweep
+    from lcp_lube.solvers.fas.kernels import sweep
 
     random = np.random.default_rng(2)
     for ny, nx in ((1, 9), (2, 3), (7, 4), (12, 31)):

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lcp_lube.errors import InputError
-from lcp_lube.problems.film import FORMS, SHAPES, Wave
+from lcp_lube.problems.film.gaps import FORMS, SHAPES, Wave
 
 CD, DC = FORMS
 H_MIN, H_MAX, L = 15e-6, 25e-6, 0.1

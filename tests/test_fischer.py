@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lcp_lube import load_scene, solve
+from lcp_lube.base.options import recipe
+from lcp_lube.base.parallel import Array
 from lcp_lube.errors import InputError
-from lcp_lube.linear.newton_matrix import FullSystem
-from lcp_lube.linear.options import recipe
-from lcp_lube.parallel import Array
+from lcp_lube.linear.full import FullSystem
 from lcp_lube.problems.solution import Outcome, Solution
 from lcp_lube.solvers.fischer import FischerNewton, FischerOptions, derivatives, fischer_burmeister
 from lcp_lube.solvers.newton import Stopping, iterate

@@ -8,9 +8,9 @@ from films import MU, WIDTH, FilmScene, Knots, L, U, knots, make_problem, pressu
 from hypothesis import given, settings
 
 from lcp_lube import load_scene, solve
-from lcp_lube.linear.stages import Stages
-from lcp_lube.problems.flows import SIDES
-from lcp_lube.problems.model import Model, Side
+from lcp_lube.base.stages import Stages
+from lcp_lube.problems.film.flows import SIDES
+from lcp_lube.problems.film.model import Model, Side
 from lcp_lube.solvers.active_set import build
 from lcp_lube.solvers.job import Job
 from lcp_lube.solvers.newton import Stopping, iterate

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lcp_lube import InputError, load_scene, solve
-from lcp_lube.problems.exact import exact_solution
-from lcp_lube.problems.fluid import Law, effective
+from lcp_lube.problems.film.exact import exact_solution
+from lcp_lube.problems.film.fluid import Law, effective
 
 BOTH = Law(2e-8, True)
 pressures = st.floats(0, 1e9)

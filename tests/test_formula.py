@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lcp_lube.errors import InputError
-from lcp_lube.formula import Formula
+from lcp_lube.scenes.formula import Formula
 
 X, Y = np.linspace(0.1, 0.9, 5)[None, :], np.linspace(0.1, 0.7, 4)[:, None]
 

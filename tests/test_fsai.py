@@ -9,12 +9,12 @@ from petsc4py import PETSc
 
 from lcp_lube.api import solve
 from lcp_lube.errors import InputError
-from lcp_lube.linear.fsai import lower_pattern, rows_of_G
 from lcp_lube.linear.krylov import Krylov, LinearSolverError
-from lcp_lube.scene import load_scene
+from lcp_lube.linear.pc.fsai import lower_pattern, rows_of_G
+from lcp_lube.scenes.scene import load_scene
 from lcp_lube.solvers.newton import Stopping
 
-FSAI = {"ksp_type": "cg", "pc_type": "python", "pc_python_type": "lcp_lube.linear.fsai.FSAI"}
+FSAI = {"ksp_type": "cg", "pc_type": "python", "pc_python_type": "lcp_lube.linear.pc.fsai.FSAI"}
 
 
 def petsc(A):

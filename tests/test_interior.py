@@ -9,10 +9,10 @@ from box_problems import BOTH, affine, obstacle
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from lcp_lube.base.options import recipe
+from lcp_lube.base.stages import Stages
 from lcp_lube.errors import InputError
-from lcp_lube.linear.box_system import BoxSystem
-from lcp_lube.linear.options import recipe
-from lcp_lube.linear.stages import Stages
+from lcp_lube.linear.box import BoxSystem
 from lcp_lube.problems.solution import Outcome
 from lcp_lube.solvers.box_active_set import build as build_active_set
 from lcp_lube.solvers.interior import Interior, InteriorOptions, build

@@ -4,7 +4,7 @@ import pytest
 
 from lcp_lube.api import solve
 from lcp_lube.errors import InputError
-from lcp_lube.scene import load_scene
+from lcp_lube.scenes.scene import load_scene
 
 
 def numbers(name, changes):

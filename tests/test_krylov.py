@@ -6,8 +6,8 @@ from films import FilmScene, Knots, make_problem
 from petsc4py import PETSc
 
 from lcp_lube import InputError, load_scene, solve
+from lcp_lube.linear.full import FullSystem
 from lcp_lube.linear.krylov import Krylov, LinearSolverError, reason_name
-from lcp_lube.linear.newton_matrix import FullSystem
 from lcp_lube.problems.solution import Outcome
 
 

@@ -5,12 +5,12 @@ from types import SimpleNamespace
 
 import pytest
 
-from lcp_lube import memory
 from lcp_lube.api import solve
-from lcp_lube.auto import plan
+from lcp_lube.base.options import recipe
+from lcp_lube.drivers import memory
+from lcp_lube.drivers.plan import plan
 from lcp_lube.errors import InputError
-from lcp_lube.linear.options import recipe
-from lcp_lube.scene import load_scene
+from lcp_lube.scenes.scene import load_scene
 
 GB = 2**30
 

@@ -7,11 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lcp_lube.api import solve
+from lcp_lube.base.options import recipe
+from lcp_lube.base.stages import Stages
 from lcp_lube.errors import InputError
-from lcp_lube.linear.options import recipe
-from lcp_lube.linear.stages import Stages
 from lcp_lube.problems.solution import Outcome
-from lcp_lube.scene import load_scene
+from lcp_lube.scenes.scene import load_scene
 from lcp_lube.solvers.job import Job
 from lcp_lube.solvers.monotone import ModelSystem, build
 from lcp_lube.solvers.newton import Stopping, iterate
@@ -101,7 +101,7 @@ def test_last_resort_of_auto(film, monkeypatch):
     """With all that stands before it made to fail, the answer is still found, and the message tells how."""
     from lcp_lube.solvers.active_set import ActiveSet
     from lcp_lube.solvers.din_pc import DinPc
-    from lcp_lube.solvers.fas import Fas
+    from lcp_lube.solvers.fas.driver import Fas
     from lcp_lube.solvers.steplength import StepLengthError
 
     def fail(self):

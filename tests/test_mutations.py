@@ -17,12 +17,13 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 from petsc4py import PETSc
 
-from lcp_lube import cli, load_scene, solve
+from lcp_lube import load_scene, solve
 from lcp_lube.__main__ import main
-from lcp_lube.arguments import parse, split
+from lcp_lube.cli import main as cli
+from lcp_lube.cli.arguments import parse, split
 from lcp_lube.errors import InputError
 from lcp_lube.registry import METHODS
-from lcp_lube.scene import parse_changes
+from lcp_lube.scenes.scene import parse_changes
 
 COUNT = int(os.environ.get("LCP_LUBE_MUTATIONS", "160"))
 LIMIT = 60.0  # seconds a case may take on a machine with as many jobs as cores

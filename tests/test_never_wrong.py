@@ -6,10 +6,10 @@ from petsc4py import PETSc
 
 from lcp_lube import Complementarity
 from lcp_lube.api import solve
-from lcp_lube.linear.stages import Stages
+from lcp_lube.base.stages import Stages
 from lcp_lube.problems.solution import Outcome, Step
 from lcp_lube.registry import MethodEntry
-from lcp_lube.scene import load_scene
+from lcp_lube.scenes.scene import load_scene
 from lcp_lube.solvers.enclosure import enclose
 
 SCENES = {
@@ -182,7 +182,7 @@ def test_certificates_of_numbers_that_are_none(name, value, right):
 
 def test_a_system_of_the_wrong_sign(monkeypatch):
     """Newton matrices times -1 in every method on films: each ends as not converged."""
-    from lcp_lube.linear.newton_matrix import FullSystem
+    from lcp_lube.linear.full import FullSystem
     from lcp_lube.linear.reduced import ReducedSystem
 
     for system in (FullSystem, ReducedSystem):

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from lcp_lube.api import solve
 from lcp_lube.errors import InputError
 from lcp_lube.problems.solution import Outcome
-from lcp_lube.scene import load_scene
+from lcp_lube.scenes.scene import load_scene
 
 
 @pytest.mark.parametrize("method", ["active-set", "interior"])

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from recipes import attempt, faults, one_rank
 
 from lcp_lube import InputError, load_scene, solve
-from lcp_lube.linear.options import check_unread, explain_error, known_names, recipe, set_names, unread
+from lcp_lube.base.options import check_unread, explain_error, known_names, recipe, set_names, unread
 from lcp_lube.registry import read_recipe, recipe_line, recipe_names
 
 

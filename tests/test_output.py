@@ -22,7 +22,7 @@ from lcp_lube.errors import InputError
 from lcp_lube.output import files, panels, picture
 from lcp_lube.output.plot import draw, plot
 from lcp_lube.problems.solution import Outcome, Solution
-from lcp_lube.scene import load_scene
+from lcp_lube.scenes.scene import load_scene
 
 HDF5 = PETSc.Sys.hasExternalPackage("hdf5")
 SCENES = {"problem2": {"n": 11}, "problem4": {"nx": 11, "ny": 7}}

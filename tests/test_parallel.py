@@ -6,7 +6,7 @@ from mpi4py import MPI
 from mpi_job import DIRECT, ITERATIVE, run
 from petsc4py import PETSc
 
-from lcp_lube.parallel import Reduce
+from lcp_lube.base.parallel import Reduce
 
 RANKS = [2, 3]
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from lcp_lube.scene import load_scene
+from lcp_lube.scenes.scene import load_scene
 
 BENCHMARKS = Path(__file__).parent.parent / "benchmarks"
 sys.path.insert(0, str(BENCHMARKS))

@@ -6,17 +6,17 @@ from mpi_preconditioners import gathered, main
 from recipes import lacking
 
 from lcp_lube import load_scene, solve
+from lcp_lube.base.options import recipe
 from lcp_lube.errors import InputError
-from lcp_lube.linear.fields import TwoFields
-from lcp_lube.linear.newton_matrix import FullSystem
-from lcp_lube.linear.options import recipe
+from lcp_lube.linear.full import FullSystem
+from lcp_lube.linear.pc.fields import TwoFields
 from lcp_lube.problems.solution import Outcome, Solution
 from lcp_lube.registry import read_recipe, recipe_line
 from lcp_lube.solvers.newton import Stopping
 
 SMALL = ("problem4", {"nx": 7, "ny": 6})
-AUGMENTATION = {"pc_type": "python", "pc_python_type": "lcp_lube.linear.augmentation.AugmentationPC"}
-SADDLE = {"pc_type": "python", "pc_python_type": "lcp_lube.linear.saddle.SaddlePC"}
+AUGMENTATION = {"pc_type": "python", "pc_python_type": "lcp_lube.linear.pc.augmentation.AugmentationPC"}
+SADDLE = {"pc_type": "python", "pc_python_type": "lcp_lube.linear.pc.splittings.SaddlePC"}
 SPLIT = {key: value for key, value in read_recipe("fieldsplit_schur").items() if not key.startswith("fieldsplit_p_pc")}
 RECIPES = """augmentation augmentation_identity augmentation_amg saddle_jacobi saddle_gs saddle_approx saddle_amg
     fieldsplit_schur fieldsplit_gamg fieldsplit_schur_p""".split()  # noqa: SIM905
@@ -214,7 +214,10 @@ AUG, SAD = AUGMENTATION, SADDLE
         ({**AUG, "augmentation_pc_type": "amg"}, "-augmentation_pc_type amg: no such PC type"),
         ({**AUG, "system": "reduced"}, "it needs a matrix of the two fields p and r"),
         ({**SAD, "mat_type": "dense"}, "it needs a matrix of the two fields p and r"),
-        ({**SAD, "pc_python_type": "lcp_lube.linear.saddle.SadlePC"}, "-pc_python_type lcp_lube.linear.saddle.SadlePC: "),
+        (
+            {**SAD, "pc_python_type": "lcp_lube.linear.pc.splittings.SadlePC"},
+            "-pc_python_type lcp_lube.linear.pc.splittings.SadlePC: ",
+        ),
         ({"pc_type": "fieldsplit", "system": "reduced"}, "-pc_type fieldsplit: it needs a matrix of two fields"),
         ({"pc_type": "fieldsplit", "fieldsplit_order": "r,q"}, "-fieldsplit_order r,q: allowed are p,r in any order"),
     ],

@@ -6,13 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lcp_lube.api import solve
+from lcp_lube.base.options import recipe
 from lcp_lube.errors import InputError
 from lcp_lube.linear.cavity import CavitySystem
+from lcp_lube.linear.full import FullSystem
 from lcp_lube.linear.nearnull import NearNull
-from lcp_lube.linear.newton_matrix import FullSystem
-from lcp_lube.linear.options import recipe
 from lcp_lube.linear.reduced import ReducedSystem
-from lcp_lube.scene import load_scene
+from lcp_lube.scenes.scene import load_scene
 from lcp_lube.solvers.newton import Stopping
 
 HARD = [("rough", {"nx": 23, "ny": 17, "amplitude": 6e-6}), ("textured_slider", {"K": 1}), ("problem4", {"nx": 9, "ny": 14})]

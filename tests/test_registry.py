@@ -56,8 +56,8 @@ def test_recipe_syntax(tmp_path, monkeypatch):
 def test_import_starts_neither_petsc_nor_mpi():
     """So that a program may still call petsc4py.init(argv) first, which is a silent no-op once PETSc runs."""
     code = (
-        "import sys, lcp_lube, lcp_lube.arguments, lcp_lube.registry, lcp_lube.errors, lcp_lube.__main__\n"
-        "lcp_lube.arguments.parse(['solve', 'problem1'])\n"
+        "import sys, lcp_lube, lcp_lube.cli.arguments, lcp_lube.registry, lcp_lube.errors, lcp_lube.__main__\n"
+        "lcp_lube.cli.arguments.parse(['solve', 'problem1'])\n"
         "sys.exit(any(name in sys.modules for name in ('petsc4py.PETSc', 'mpi4py.MPI', 'numpy')))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

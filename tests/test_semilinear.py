@@ -6,10 +6,10 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from lcp_lube.api import solve
+from lcp_lube.base.stages import Stages
 from lcp_lube.errors import InputError
-from lcp_lube.linear.stages import Stages
 from lcp_lube.problems.solution import Outcome
-from lcp_lube.scene import load_scene
+from lcp_lube.scenes.scene import load_scene
 from lcp_lube.solvers.newton import Stopping
 from lcp_lube.solvers.plain_newton import NewtonOptions, PlainNewton
 

@@ -5,7 +5,7 @@ import pytest
 from lcp_lube.api import solve
 from lcp_lube.errors import InputError
 from lcp_lube.problems.solution import Outcome
-from lcp_lube.scene import load_scene
+from lcp_lube.scenes.scene import load_scene
 
 EXACT = {
     "rupture_time": 0.2500791572,

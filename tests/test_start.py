@@ -7,8 +7,8 @@ import sys
 import pytest
 from conftest import ENVIRONMENT
 
-from lcp_lube import petsc_start
 from lcp_lube.__main__ import main
+from lcp_lube.base import petsc as petsc_start
 from lcp_lube.errors import InputError
 
 
@@ -60,7 +60,7 @@ def test_an_error_that_names_no_option_is_told_with_it(cli, options, message):
 
 def test_one_thread_unless_more_are_asked_for(tmp_path):
     """Set before PETSc is loaded, whose OpenMP reads it then."""
-    code = "import os, sys; from lcp_lube.petsc_start import start; start([]); print(os.environ['OMP_NUM_THREADS'])"
+    code = "import os, sys; from lcp_lube.base.petsc import start; start([]); print(os.environ['OMP_NUM_THREADS'])"
     for given, expected in ((None, "1"), ("2", "2")):
         environment = {key: value for key, value in ENVIRONMENT.items() if key != "OMP_NUM_THREADS"}
         environment |= {"OMP_NUM_THREADS": given} if given else {}

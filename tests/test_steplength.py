@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from mpi4py import MPI
 
-from lcp_lube.parallel import Reduce
+from lcp_lube.base.parallel import Reduce
 from lcp_lube.solvers.steplength import (
     MAX_HALVINGS,
     Centrality,

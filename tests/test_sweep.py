@@ -12,13 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lcp_lube import solve
-from lcp_lube.arguments import parse
+from lcp_lube.cli.arguments import parse
+from lcp_lube.cli.sweep import Axis, parse_axis, points, sweep
+from lcp_lube.cli.sweep import run as run_command
+from lcp_lube.drivers.neighbour import solve_near
 from lcp_lube.errors import InputError
-from lcp_lube.neighbour import solve_near
 from lcp_lube.problems.solution import Outcome
-from lcp_lube.scene import load_scene
-from lcp_lube.sweep import Axis, parse_axis, points, sweep
-from lcp_lube.sweep import run as run_command
+from lcp_lube.scenes.scene import load_scene
 
 JOURNAL = {"nx": 31, "ny": 9}
 

@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lcp_lube import InputError, tables
-from lcp_lube.tables import PAPERS, find_table, matches, row_command, run_command, run_published_table
+from lcp_lube import InputError
+from lcp_lube.studies import tables
+from lcp_lube.studies.tables import PAPERS, find_table, matches, row_command, run_command, run_published_table
 
 COUNTS = {"it": "iterations", "back": "backtracking", "cent": "centrality", "linear_it": "linear_iterations"}
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from lcp_lube import InputError, load_scene
-from lcp_lube.scene import scene_names
-from lcp_lube.template import run, template
+from lcp_lube.scenes.scene import scene_names
+from lcp_lube.scenes.template import run, template
 
 
 def without_name(scene):

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import pytest
 
-from lcp_lube import verify
 from lcp_lube.api import solve
-from lcp_lube.problems import reynolds
+from lcp_lube.cli import verify
+from lcp_lube.cli.verify import quick_cases, table
+from lcp_lube.problems.film import reynolds
 from lcp_lube.registry import scene_names
-from lcp_lube.verify import quick_cases, table
-from lcp_lube.verify_cases import CASES
+from lcp_lube.studies.verify_cases import CASES
 
 
 @pytest.fixture(scope="module")

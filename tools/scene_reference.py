@@ -9,10 +9,10 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
-from lcp_lube.faults import models_of, tags_of
 from lcp_lube.registry import FAMILIES, SCENE_DIR, scene_names
-from lcp_lube.scene import scene_line
-from lcp_lube.units import SUFFIXES, Measured
+from lcp_lube.scenes.faults import models_of, tags_of
+from lcp_lube.scenes.scene import scene_line
+from lcp_lube.scenes.units import SUFFIXES, Measured
 
 PAGE = Path(__file__).parent.parent / "docs" / "guide" / "scenes.md"
 LIMITS = {"exclusiveMinimum": "> {:g}", "minimum": ">= {:g}", "exclusiveMaximum": "< {:g}", "maximum": "<= {:g}"}

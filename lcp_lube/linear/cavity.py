@@ -20,13 +20,13 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import coo_array
 
+from ..base.parallel import Array
+from ..base.stages import Stages
 from ..errors import InputError
-from ..parallel import Array
-from ..problems.problem import LubricationProblem
+from ..problems.film.lubrication import LubricationProblem
 from .cavity_rows import schur_rows
 from .krylov import Krylov
 from .nearnull import COARSEST, NearNull
-from .stages import Stages
 
 CYCLES = 1  # from w = 1 or the last w; more of them gain nothing (benchmarks/README.md)
 

@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import compiled
-from ..parallel import Array
-from ..problems.reynolds import BoxScheme
+from ..base.compiled import compiled
+from ..base.parallel import Array
+from ..problems.film.reynolds import BoxScheme
 
 
 def schur_rows(scheme: BoxScheme, numbers: NDArray[np.int64], index: type) -> tuple[NDArray, NDArray, Array]:

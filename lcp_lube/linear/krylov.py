@@ -6,9 +6,9 @@ from contextlib import contextmanager
 import numpy as np
 from petsc4py import PETSc
 
+from ..base.options import explain_error, set_names
+from ..base.threads import one_thread_for_superlu_dist
 from ..errors import InputError
-from .options import explain_error, set_names
-from .threads import one_thread_for_superlu_dist
 
 ZERO_PIVOT = (71, 81)  # PETSc's codes for LU and Cholesky: the matrix is singular, not the options wrong
 MAX_INNER_ITERATIONS = 10_000  # the paper's limit; -ksp_max_it overrides it

@@ -9,7 +9,7 @@ De Sterck et al.). On S diag(w) constants are near-null again.
 import numpy as np
 from petsc4py import PETSc
 
-from ..parallel import Array
+from ..base.parallel import Array
 
 COARSEST = 200
 LEAK = 1e-4  # right-hand side, in parts of diag(S): larger ones let the boundary's distance show, which spoils w

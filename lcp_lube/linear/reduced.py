@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from ..parallel import Array
-from ..problems.problem import LubricationProblem
-from ..problems.reynolds import coo, csr
+from ..base.parallel import Array
+from ..base.stages import Stages
+from ..problems.film.lubrication import LubricationProblem
+from ..problems.film.reynolds import coo, csr
 from .krylov import Krylov
-from .stages import Stages
 
 
 class ReducedSystem:

@@ -2,11 +2,11 @@
 
 from typing import Protocol
 
-from ..parallel import Array
-from ..problems.problem import LubricationProblem
+from ..base.parallel import Array
+from ..base.stages import Stages
+from ..problems.film.lubrication import LubricationProblem
 from ..registry import SYSTEMS
 from .krylov import Krylov
-from .stages import Stages
 
 
 class System(Protocol):

@@ -13,8 +13,8 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from ..base.parallel import Array
 from ..errors import InputError, nearest
-from ..parallel import Array
 from ..problems.grid import Grid
 from ..problems.solution import Solution
 from .results import as_dict, finite

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..parallel import Array
-from ..problems.quantities import open_pressures
+from ..base.parallel import Array
+from ..problems.film.quantities import open_pressures
 from .picture import Picture, largest, scaled
 from .style import BLUE, CAVITY, GREY, LIQUID, MAPS, NAMES, RED, WALL
 from .units import prefix

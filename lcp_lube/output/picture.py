@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from ..parallel import Array
-from ..problems.exact import ExactSolution
-from ..problems.flows import point_weights
-from ..problems.fronts import cavity_sign, middle_row
-from ..problems.problem import LubricationProblem
+from ..base.parallel import Array
+from ..problems.film.exact import ExactSolution
+from ..problems.film.flows import point_weights
+from ..problems.film.fronts import cavity_sign, middle_row
+from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Solution
 from .files import coordinates, gather, taken
 from .units import prefix, quantity

@@ -11,7 +11,7 @@ import petsc4py
 from petsc4py import PETSc
 
 from .. import __version__
-from ..memory import peak
+from ..drivers.memory import peak
 from ..problems.solution import Solution
 from .units import place, quantity
 

@@ -11,8 +11,8 @@ from typing import Any, Protocol
 import numpy as np
 from petsc4py import PETSc
 
+from ..base.parallel import Array, Reduce
 from ..errors import InputError
-from ..parallel import Array, Reduce
 from .certificate import Certificate, certificate_tol
 from .grid import Grid
 from .solution import Fields, Outcome

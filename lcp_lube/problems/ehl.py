@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from ..parallel import Array
+from ..base.parallel import Array
 from .box import BoxProblem
 from .certificate import Certificate, certificate_tol
 from .grid import Grid

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from ..base.parallel import Array, Reduce
 from ..errors import InputError
-from ..parallel import Array, Reduce
 
 BYTES_PER_POINT = 250  # of the coefficients, A, B and the fields alone: no run needs less
 

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
+from ..base.parallel import Array
 from ..errors import InputError
-from ..parallel import Array
 from .box import BoxProblem
+from .film.reynolds import sides
 from .grid import Grid
-from .reynolds import sides
 from .semilinear import Bratu, SemilinearProblem
 from .solution import Fields, Outcome
 from .transfer import Transfer

@@ -5,10 +5,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..parallel import Array, Reduce
+from ..base.parallel import Array, Reduce
 from .certificate import Certificate, certificate_tol
+from .film.reynolds import assemble, sides
 from .grid import Grid
-from .reynolds import assemble, sides
 from .solution import Fields
 from .transfer import Transfer
 

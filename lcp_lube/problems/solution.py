@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, Protocol
 
-from ..parallel import Array, Reduce
+from ..base.parallel import Array, Reduce
 from .certificate import Certificate
 from .grid import Grid
 

@@ -4,7 +4,7 @@ import numpy as np
 import scipy.sparse
 from petsc4py import PETSc
 
-from ..parallel import Array
+from ..base.parallel import Array
 from .grid import Grid
 
 

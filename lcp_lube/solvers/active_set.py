@@ -18,11 +18,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.parallel import Array
 from ..errors import InputError
 from ..linear.krylov import Krylov
 from ..linear.system import System, make_system
-from ..parallel import Array
-from ..problems.problem import LubricationProblem
+from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Fields, Step
 from .job import Job
 from .method_options import make_options

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.parallel import Array
 from ..errors import InputError
 from ..linear.system import System, make_system
-from ..parallel import Array
-from ..problems.problem import LubricationProblem
+from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Fields, Step
 from .din import DIN, DinOptions
 from .job import Job

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.parallel import Array
+from ..base.stages import Stages
 from ..linear.krylov import LinearSolverError
-from ..linear.stages import Stages
 from ..linear.system import make_system
-from ..parallel import Array
-from ..problems.problem import LubricationProblem
+from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Fields
 
 Mask = NDArray[np.bool_]

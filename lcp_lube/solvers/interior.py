@@ -18,10 +18,10 @@ from functools import lru_cache
 
 import numpy as np
 
+from ..base.parallel import Array
 from ..errors import InputError
-from ..linear.box_system import BoxSystem
+from ..linear.box import BoxSystem
 from ..linear.krylov import Krylov
-from ..parallel import Array
 from ..problems.box import BoxProblem
 from ..problems.solution import Fields, Step
 from .job import Job

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..linear.stages import Stages
+from ..base.stages import Stages
 from ..problems.solution import Fields
 from .newton import Stopping
 

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
+from ..base.parallel import Array
 from ..errors import InputError
-from ..linear.box_system import BoxSystem
-from ..parallel import Array
+from ..linear.box import BoxSystem
 from ..problems.box import BoxProblem
 from ..problems.solution import Fields, Step
 from .interior import Interior, InteriorOptions

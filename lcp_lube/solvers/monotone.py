@@ -17,12 +17,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.parallel import Array
+from ..base.stages import Stages
 from ..errors import InputError
 from ..linear.krylov import Krylov
 from ..linear.reduced import ReducedSystem
-from ..linear.stages import Stages
-from ..parallel import Array
-from ..problems.problem import LubricationProblem
+from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Fields, Step
 from .job import Job
 from .method_options import make_options

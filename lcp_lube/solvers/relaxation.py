@@ -10,9 +10,9 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from ..compiled import compiled
-from ..parallel import Array
-from ..problems.problem import LubricationProblem
+from ..base.compiled import compiled
+from ..base.parallel import Array
+from ..problems.film.lubrication import LubricationProblem
 
 
 def relaxation(problem: LubricationProblem) -> "Relaxation | None":

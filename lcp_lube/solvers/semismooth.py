@@ -15,10 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.parallel import Array
+from ..base.stages import Stages
 from ..errors import InputError
 from ..linear.krylov import Krylov, LinearSolverError
-from ..linear.stages import Stages
-from ..parallel import Array
 from ..problems.box import BoxProblem
 from ..problems.solution import Fields, Step
 from .job import Job

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..parallel import Array, Reduce
+from ..base.parallel import Array, Reduce
 
 MAX_HALVINGS = 99
 

@@ -1,0 +1,253 @@
+"""The command line's grammar. Own options begin with two dashes; every single-dash option is PETSc's. No PETSc here."""
+
+import argparse
+import re
+from pathlib import Path
+from typing import Any, NoReturn
+
+from .. import __version__
+from ..errors import InputError, nearest
+from ..registry import METHODS, STABILITY, scene_names
+
+
+class Parser(argparse.ArgumentParser):
+    """argparse, but an error is an InputError: one line, with the nearest legal name."""
+
+    def error(self, message: str) -> NoReturn:
+        unknown = re.match(r"unrecognized arguments: (--\S+)", message)
+        if unknown:
+            message = f"{unknown[1]}: no such option{nearest(unknown[1].partition('=')[0], self.option_names())}"
+        wrong = re.match(r"argument (\S+): invalid choice: '(.*?)' \(choose from (.*)\)", message)
+        if wrong:
+            legal = [name.strip("' ") for name in wrong[3].split(",")]
+            message = f"{wrong[1]} {wrong[2]}: allowed are {', '.join(legal)}{nearest(wrong[2], legal)}"
+        raise InputError(message)
+
+    def option_names(self) -> list[str]:
+        """Of this parser and of its commands: the error of an unknown option is raised at the top."""
+        own = [option for action in self._actions for option in action.option_strings]
+        below = [parser for action in self._actions if isinstance(action.choices, dict) for parser in action.choices.values()]
+        return [*own, *(name for parser in below for name in parser.option_names())]
+
+
+def split(argv: list[str]) -> tuple[list[str], list[str]]:
+    """Ours and PETSc's arguments. A PETSc option takes the next word as its value unless that begins with a dash.
+
+    `--` options and their values, and words that no PETSc option takes, are ours; so is a scene's name.
+
+    Raises
+    ------
+    InputError : -options_file names a file that PETSc would abort on.
+    """
+    own: list[str] = []
+    petsc: list[str] = []
+    words = list(argv)
+    while words:
+        word = words.pop(0)
+        if not re.match(r"-[A-Za-z]", word) or word == "-h":
+            own.append(word)
+            continue
+        petsc.append(word)
+        if words and (not words[0].startswith("-") or re.match(r"-[\d.]", words[0])):
+            petsc.append(words.pop(0))
+        if word == "-options_file":
+            if petsc[-1] == word:
+                raise InputError("-options_file: a file name is needed")
+            check_options_file(petsc[-1])
+    _free_scene(own, petsc)
+    return own, petsc
+
+
+def check_options_file(name: str) -> None:
+    """Raise InputError for a file that PETSc would abort on: unreadable, or a line that is no option."""
+    try:
+        if Path(name).exists() and not (Path(name).is_file() or Path(name).is_dir()):
+            raise InputError(f"-options_file {name}: is no ordinary file")  # a pipe would be empty when PETSc reads it
+        lines = Path(name).read_text(encoding="utf-8").splitlines()
+    except InputError:
+        raise
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "not a text file"
+        raise InputError(f"-options_file {name}: {reason}") from None
+    if Path(name).suffix in (".yml", ".yaml"):
+        return
+    for number, line in enumerate(lines, start=1):
+        words = line.partition("#")[0].split()
+        if words and words[0].lower() != "alias" and not re.match(r"--?[A-Za-z]", words[0]):
+            raise InputError(f"-options_file {name}, line {number}: {words[0]}: an option that begins with a dash is needed")
+
+
+def _free_scene(own: list[str], petsc: list[str]) -> None:
+    """Give SCENE back where a PETSc option before it has taken it for its value: `solve -log_view problem1`.
+
+    Changes both lists in place, if no word of ours and exactly one value of PETSc's is a scene.
+    """
+
+    def is_scene(word: str) -> bool:
+        return word.endswith(".toml") or word in scene_names()
+
+    if own[:1] not in (["solve"], ["compare"], ["sweep"]) or any(is_scene(word) for word in own):
+        return
+    taken = [k for k, word in enumerate(petsc) if is_scene(word) and petsc[k - 1] != "-options_file"]
+    if len(taken) == 1:
+        own.insert(1, petsc.pop(taken[0]))
+
+
+def parse(own: list[str]) -> argparse.Namespace:
+    """The command and its options.
+
+    Raises
+    ------
+    InputError : an unknown option or command, a missing or malformed value.
+    """
+    parser = Parser(
+        prog="lcp-lube",
+        description="Cavitation in lubricated bearings as a complementarity problem, solved with PETSc.",
+        epilog="Every single-dash option goes to PETSc (-ksp_type gmres -pc_type ilu -log_view); put them after SCENE. "
+        "-help lists them.",
+        allow_abbrev=False,
+    )
+    parser.add_argument("--version", action="version", version=f"lcp-lube {__version__}")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=Parser)
+
+    def command(name: str, text: str) -> argparse.ArgumentParser:
+        return commands.add_parser(name, help=text, description=text, allow_abbrev=False)
+
+    solve = command("solve", "solve a scene")
+    _scene_options(solve)
+    solve.add_argument("--method", default="auto", help="see 'lcp-lube list'; default auto")
+    solve.add_argument("--recipe", help="inner solver: options/NAME.opts; explicit PETSc options win over it")
+    solve.add_argument(
+        "--no-memory-check", action="store_true", help="begin even if the estimate says that memory is too short"
+    )
+    solve.add_argument(
+        "--certify", action="store_true", help="prove how far the answer is from the exact discrete solution at most (films)"
+    )
+    solve.add_argument(
+        "--accuracy",
+        type=float,
+        metavar="TOL",
+        help="finer and finer grids until the load's estimated relative error is below TOL; --n, --nx, --ny: no finer ones",
+    )
+    solve.add_argument("--quantity", metavar="NAME", help="what --accuracy is about: load (default), p_max, friction, ...")
+    solve.add_argument("--output", action="append", default=[], metavar="FILE", help=".npz, .vts (ParaView) or .h5")
+    solve.add_argument("--plot", metavar="FILE.png", help="picture of p, r and h")
+    solve.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")
+    solve.add_argument("--explain", action="store_true", help="say on stderr what was chosen, and why")
+    solve.add_argument("--monitor", action="store_true", help="a line an iteration on stderr")
+
+    solve.add_argument("--checkpoint", metavar="FILE", help="save the iterate here, in one piece, so that --resume can go on")
+    solve.add_argument("--every", type=int, metavar="N", help="a checkpoint after every N steps, default 1")
+    solve.add_argument("--resume", metavar="FILE", help="go on from a checkpoint of this scene, on any number of ranks")
+
+    compare = command("compare", "several methods and recipes on one scene, in one table")
+    _scene_options(compare)
+    compare.add_argument("--methods", default="din", metavar="A,B,...", help="default din")
+    compare.add_argument("--recipes", default="", metavar="A,B,...", help="default: the default recipe")
+    compare.add_argument("--json", action="store_true", help="a JSON list of the runs")
+
+    sweep = command("sweep", "a scene at many values of its keys: one csv row a point, warm starts")
+    _scene_options(sweep)
+    sweep.add_argument("--method", default="auto", help="see 'lcp-lube list'; default auto")
+    sweep.add_argument("--recipe", help="inner solver: options/NAME.opts; explicit PETSc options win over it")
+    sweep.add_argument(
+        "--vary",
+        action="append",
+        required=True,
+        metavar="KEY=FROM:TO:N",
+        help="N values from FROM to TO, both among them (FROM:TO:N:log: at equal ratios), or a list A,B,C; several --vary: all "
+        "combinations, the last varying fastest",
+    )
+    sweep.add_argument(
+        "--output", type=Path, metavar="FILE.csv", help="filled row by row; points that stand there are not solved again"
+    )
+    sweep.add_argument(
+        "--warm", action=argparse.BooleanOptionalAction, default=True, help="start from the neighbour's answer; default yes"
+    )
+
+    table = command("table", "reproduce a published table beside the printed one")
+    table.add_argument("number", type=int, metavar="K")
+    table.add_argument("--paper", default="mezzadri", choices=["mezzadri", "bergamaschi"])
+    table.add_argument("--quick", action="store_true", help="leave the long rows out")
+    _results_option(table)
+
+    chart = command("chart", "long experiments: the runs in a csv, the pictures drawn from it")
+    charts = chart.add_subparsers(dest="chart", required=True, metavar="precision|stability|scaling", parser_class=Parser)
+    text = "errors of load, largest pressure and rupture, and what they cost, for every method, system and recipe"
+    precision = charts.add_parser("precision", help=text, description=text, allow_abbrev=False)
+    precision.add_argument("scenes", nargs="*", metavar="SCENE", help="films; default: seven of them, see studies/precision.py")
+    text = "where methods fail: " + "; ".join(f"{name}, {entry.line}" for name, entry in STABILITY.items())
+    stability = charts.add_parser("stability", help=text, description=text, allow_abbrev=False)
+    stability.add_argument("maps", nargs="*", metavar="MAP", help=f"any of {', '.join(STABILITY)}; default all")
+    text = "a whole solve's cost by grid and by ranks: run it under mpiexec -n 1, 2, 4, ... in turn"
+    scaling = charts.add_parser("scaling", help=text, description=text, allow_abbrev=False)
+    for parser_of_chart in (precision, stability, scaling):
+        parser_of_chart.add_argument("--quick", action="store_true", help="a small chart in seconds, with a csv of its own")
+        _results_option(parser_of_chart)
+
+    verify = command("verify", "known answers: ours, reference, error, observed order, verdict")
+    verify.add_argument("--quick", action="store_true", help="one case in a moment")
+    verify.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")
+
+    doctor = command("doctor", "what is installed, what is missing, and a short self-check on one and two ranks")
+    doctor.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")
+
+    new = command("new", "a commented scene file to edit, which solves to the same numbers as the scene that it is made from")
+    new.add_argument("file", type=Path, metavar="FILE.toml")
+    new.add_argument("--from", dest="source", required=True, metavar="SCENE", help="a .toml file or a built-in name")
+
+    command("list", "scenes, methods, systems and recipes, each with a line")
+    return parser.parse_args(own)
+
+
+def _results_option(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--results",
+        type=Path,
+        default=Path("lcp_lube_results"),
+        metavar="DIR",
+        help="where the runs are kept: those that are there are not made again; default lcp_lube_results",
+    )
+
+
+def _scene_options(parser: argparse.ArgumentParser) -> None:
+    """What both `solve` and `compare` take."""
+    parser.add_argument("scene", metavar="SCENE", help="a .toml file or a built-in name, see 'lcp-lube list'")
+    parser.add_argument("--n", type=int, help="interior points (a side, in 2D)")
+    parser.add_argument("--nx", type=int)
+    parser.add_argument("--ny", type=int)
+    parser.add_argument("--film", help="sinusoid or parabola (published problems)")
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="change a scene's value (SI), film.pocket.depth=1e-6 in a table, or METHOD.OPTION for a method's, din.gamma=0.4",
+    )
+    parser.add_argument("--system", default="auto", help="which matrix the inner solver sees; default auto")
+    parser.add_argument(
+        "--nested",
+        action=argparse.BooleanOptionalAction,
+        default=None,
+        help="start from the answers on coarser grids; default: where it pays",
+    )
+    parser.add_argument("--eps1", type=float, help="stop when ||F|| <= eps1, default 1e-8 (fas: 1e-11, interior: 8e-8)")
+    parser.add_argument("--eps2", type=float, help="and ||alpha d|| <= eps2, default 1e-8 (fas and box scenes: no such test)")
+    parser.add_argument("--max-it", type=int, default=500, help="at most so many outer iterations, default 500")
+    parser.add_argument("--p0", type=float, help="start of p in the scene's p_unit (MPa in the published problems), 1")
+    parser.add_argument("--r0", type=float, help="start of r, 0.1")
+    parser.add_argument("--mu", help="perturbation: mu1, mu2 (default) or adaptive")
+    parser.add_argument("--conditions", help="step-length conditions, any of the letters FRCB; default FCB")
+
+
+def scene_changes(args: argparse.Namespace) -> tuple[list[str], list[str]]:
+    """The --set assignments for the scene (KEY or TABLE.KEY) and those for a method (METHOD.OPTION)."""
+    words = {text: text.partition("=")[0].partition(".") for text in args.set}
+    method = [text for text, (owner, dot, _) in words.items() if dot and owner.strip() in METHODS]
+    return [text for text in args.set if text not in method], method
+
+
+def method_options(args: argparse.Namespace) -> dict[str, Any]:
+    """The method's options that have a flag of their own, where given."""
+    named = {"p0": args.p0, "r0": args.r0, "mu": args.mu, "conditions": args.conditions}
+    return {name: value for name, value in named.items() if value is not None}

@@ -1,0 +1,165 @@
+"""`lcp-lube verify`: the known answers (`verify_cases`), ours beside them, and a verdict."""
+
+import argparse
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from ..api import solve
+from ..base.options import check_unread
+from ..output.results import finite
+from ..scenes.scene import load_scene
+from ..studies.verify_cases import CASES, QUICK, Case, Reference
+
+ROUNDING = 1e-9  # relative error that no finer grid has to improve on
+
+
+@dataclass(frozen=True)
+class Row:
+    """One quantity of one case: what each grid gave, coarse to fine; NaN where a solve failed."""
+
+    quantity: str
+    reference: Reference
+    source: str
+    grids: list[str]
+    values: list[float]
+    errors: list[float]
+    order: float | None
+
+    @property
+    def fault(self) -> str:
+        """What is wrong: the finest error beyond its bound, or the order, where one is asked for; else empty."""
+        if not self.errors[-1] <= self.reference.tol:  # NaN is wrong too
+            return f"{self.errors[-1]:.1e} > {self.reference.tol:.0e}"
+        needed = self.reference.order
+        if needed is None or self.errors[-1] <= ROUNDING or (self.order is not None and self.order >= needed):
+            return ""
+        return f"order {self.order:.2f}" if self.order is not None else "no order"
+
+    @property
+    def passed(self) -> bool:
+        return not self.fault
+
+    def as_dict(self) -> dict[str, Any]:
+        return {
+            "quantity": self.quantity,
+            "ours": self.values[-1],
+            "reference": self.reference.value,
+            "source": self.source,
+            "grids": self.grids,
+            "values": self.values,
+            "errors": self.errors,
+            "tol": self.reference.tol,
+            "order": self.order,
+            "order_needed": self.reference.order,
+            "passed": self.passed,
+        }
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A case that was run."""
+
+    case: Case
+    rows: list[Row]
+    failures: list[str]  # of solves
+    seconds: float
+
+    @property
+    def passed(self) -> bool:
+        return not self.failures and all(row.passed for row in self.rows)
+
+    def as_dict(self) -> dict[str, Any]:
+        return {
+            "case": self.case.name,
+            "scene": self.case.scene,
+            "data": self.case.data,
+            "passed": self.passed,
+            "failures": self.failures,
+            "note": self.case.note,
+            "rows": [row.as_dict() for row in self.rows],
+            "time_s": self.seconds,
+        }
+
+
+def verify(cases: Sequence[Case] = CASES) -> list[Verdict]:
+    """Run the cases. Collective."""
+    return [_run_case(case) for case in cases]
+
+
+def quick_cases() -> list[Case]:
+    """The one case of a short self-check."""
+    return [case for case in CASES if case.name == QUICK]
+
+
+def _run_case(case: Case) -> Verdict:
+    begin = perf_counter()
+    found, spacings, grids, failures = [], [], [], []
+    for grid in case.grids:
+        scene = load_scene(case.scene, {**case.data, **grid})
+        grids.append(" x ".join(map(str, scene.shape)))
+        solution = solve(scene, **case.how)
+        try:
+            check_unread()
+            values = solution.problem.quantities(solution.fields)
+            found.append({**values, **case.derive(solution, values)} if solution.converged else {})
+            spacings.append(float(np.max(solution.problem.grid.spacing)))
+            if not solution.converged:
+                failures.append(f"{grids[-1]}: {solution.outcome}, {solution.message}")
+        finally:
+            solution.destroy()
+    rows = [_row(name, reference, case, grids, found, spacings) for name, reference in case.references.items()]
+    return Verdict(case, rows, failures, perf_counter() - begin)
+
+
+def _row(
+    name: str, reference: Reference, case: Case, grids: list[str], found: list[dict[str, Any]], spacings: list[float]
+) -> Row:
+    values = [np.nan if (value := values.get(name)) is None else float(value) for values in found]
+    errors = [abs(value / reference.value - 1.0) for value in values]
+    order = None
+    if len(errors) > 1 and errors[0] > 0 and errors[-1] > 0:
+        order = float(np.log(errors[0] / errors[-1]) / np.log(spacings[0] / spacings[-1]))
+    return Row(name, reference, reference.source or case.source, grids, values, errors, order)
+
+
+def table(verdicts: Sequence[Verdict]) -> str:
+    """Ours, reference, errors by grid, order and verdict, for people."""
+    lines = [f"{'quantity':<33} {'ours':>15} {'reference':>15}  {'relative error by grid':<26} order (needed)   verdict"]
+    for verdict in verdicts:
+        case, grids = verdict.case, ", ".join(verdict.rows[0].grids)
+        data = "".join(f", {key} = {value}" for key, value in case.data.items())
+        lines += ["", f"{case.name} ({case.scene}{data}; {grids}): {case.source}"]
+        lines += [f"  {failure}" for failure in verdict.failures]
+        for row in verdict.rows:
+            errors = " ".join(f"{error:8.1e}" for error in row.errors)
+            order = "-" if row.order is None or row.errors[-1] <= ROUNDING else f"{row.order:.2f}"
+            needed = f"({row.reference.order:g})" if row.reference.order else ""
+            verdict_word = "ok" if row.passed else f"FAIL: {row.fault}"
+            lines.append(
+                f"  {row.quantity:<31} {row.values[-1]:15.9g} {row.reference.value:15.9g}  {errors:<26} "
+                f"{order:>5} {needed:<10} {verdict_word}"
+            )
+        if case.note:
+            lines.append(f"  ({case.note})")
+    good = sum(verdict.passed for verdict in verdicts)
+    seconds = sum(verdict.seconds for verdict in verdicts)
+    return "\n".join([*lines, "", f"{good} of {len(verdicts)} cases pass, {seconds:.1f} s"])
+
+
+def run(args: argparse.Namespace) -> int:
+    """The command; exit status 1 if a case fails. Collective."""
+    verdicts = verify(quick_cases() if args.quick else CASES)
+    passed = all(verdict.passed for verdict in verdicts)
+    if MPI.COMM_WORLD.rank == 0:
+        if args.json:
+            cases = [verdict.as_dict() for verdict in verdicts]
+            print(json.dumps(finite({"passed": passed, "cases": cases})), flush=True)
+        else:
+            print(table(verdicts), flush=True)
+    return 0 if passed else 1

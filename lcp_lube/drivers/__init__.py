@@ -1,0 +1,1 @@
+"""A scene's way to an answer."""

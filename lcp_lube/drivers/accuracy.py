@@ -1,0 +1,222 @@
+"""Accuracy asked for: grids from coarse to fine, until the estimated relative error of a quantity is below a tolerance."""
+
+from collections.abc import Sequence
+from math import ceil, inf, isfinite, prod
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from ..api import solve
+from ..errors import InputError, nearest
+from ..problems.solution import Fields, Outcome, Problem, Solution
+from ..registry import METHODS
+from ..scenes.scene import Scene
+from ..solvers.newton import Stopping
+from .estimate import misplaced_film, relative_error
+from .memory import DENSE, available
+from .plan import SMALL
+
+COARSEST = {1: 12, 2: 4}  # points a side at least on the first grid
+ALGEBRAIC = 1e-2  # ||F|| relative to the tolerance: it was seen to leave up to 2.4 times itself in a load
+ALLOWED = (1e-10, 0.5)  # tolerances
+HOPELESS = 1_000_000  # points on which an estimate that has not come down is taken to stay up
+PATIENCE = 4  # grids without a better estimate: rounding has the word
+ASYMPTOTIC = 0.1  # an estimate below it falls by second order at best
+BYTES, BYTES_FAS = {1: 900, 2: 1200}, 300  # memory of a point (`memory.MEASURED`)
+SMALL_CHANGE = 1e8  # bytes that every machine has
+RELATIVE_NORM = ("active-set", "fas")  # methods that measure ||F|| relative to the data
+DEFAULT_QUANTITY = ("load", "sum_v", "k", "sigma")
+
+
+def solve_to_accuracy(
+    scene: Scene,
+    tol: float,
+    quantity: str | None = None,
+    *,
+    finest: tuple[int, ...] | None = None,
+    stopping: Stopping | dict[str, Any] | None = None,
+    nested: bool | None = None,
+    comm: PETSc.Comm | None = None,
+    **how: Any,
+) -> Solution:
+    """Solve a scene on finer and finer grids until a quantity is good to a tolerance, and no further. Collective.
+
+    Parameters
+    ----------
+    tol : relative error allowed, 1e-10 to 0.5.
+    quantity : which number of `Problem.quantities` it is about; default 'load', of other scenes 'sum_v', 'k', 'sigma'.
+    finest : points a side that no grid may exceed; default: what memory holds.
+    stopping : tolerances of the nonlinear iteration; by default no tighter than `tol` needs.
+    nested : False: no grid starts from the answer on the one before.
+    how : method, system, recipe_name, options, monitor, certify of `solve`.
+
+    Returns
+    -------
+    Solution : on the last grid. settings['accuracy_estimate'] is the estimated relative error, `levels` has every grid with its
+        value and estimate. Where grids end before the estimate is below `tol`: outcome ACCURACY.
+
+    Raises
+    ------
+    InputError : no such quantity, a tolerance out of range or that no memory can hold; and what `solve` raises.
+    """
+    if not ALLOWED[0] <= tol <= ALLOWED[1]:
+        raise InputError(f"--accuracy {tol:g}: allowed are relative errors from {ALLOWED[0]:g} to {ALLOWED[1]:g}")
+    begin = perf_counter()
+    shape = first_shape(scene.shape, (comm or PETSc.COMM_WORLD).getSize())
+    solution: Solution | None = None
+    values: list[float] = []
+    misplaced: list[float] = []
+    levels: list[dict[str, Any]] = []
+    times: dict[str, float] = {}
+    end = ""
+    while not end:
+        level_begin, before = perf_counter(), solution
+        solution = solve(
+            scene.with_shape(shape),
+            stopping=_stopping(stopping, tol, before),
+            start=_start(before, prod(shape)) if nested is not False else None,
+            nested=False,
+            comm=comm,
+            **how,
+        )
+        if before is not None:
+            before.destroy()
+        problem = solution.problem
+        found = problem.quantities(solution.fields)
+        quantity = quantity or next((name for name in DEFAULT_QUANTITY if name in found), "")
+        values.append(_value(found, quantity, scene) if solution.converged else np.nan)
+        misplaced.append(misplaced_film(problem))
+        estimate = relative_error(values, misplaced)
+        levels.append(
+            {
+                **dict(zip(("nx", "ny"), problem.grid.shape, strict=False)),
+                "iterations": solution.iterations,
+                "linear_iterations": solution.total("linear_iterations"),
+                "time_s": perf_counter() - level_begin,
+                "value": values[-1],
+                "estimate": estimate,
+            }
+        )
+        times = {name: times.get(name, 0.0) + seconds for name, seconds in solution.times.items()}
+        shape = tuple(int(n + meshes) for n, meshes in zip(shape, problem.grid.meshes, strict=True))  # half the spacing
+        end = _end([level["estimate"] for level in levels], values, tol, problem.grid.size) or _no_room(
+            solution, shape, finest, estimate, tol
+        )
+    assert solution is not None and quantity is not None  # for the type checker: there is a first grid
+    if solution.converged and not estimate <= tol:
+        solution.outcome = Outcome.ACCURACY
+        solution.message = f"{quantity} to {estimate:.1e} only, {tol:g} was asked for: {end}"
+    solution.settings |= {"accuracy": tol, "accuracy_quantity": quantity, "accuracy_estimate": estimate}
+    solution.settings["why"] = [*solution.settings["why"], *ladder(levels, quantity, tol)]
+    solution.levels = levels
+    solution.times = {**times, "total": perf_counter() - begin}
+    return solution
+
+
+def first_shape(shape: tuple[int, ...], ranks: int = 1) -> tuple[int, ...]:
+    """The coarsest grid, of the scene's own proportions, from which doubling leads on; every rank gets two lines at least."""
+
+    def enough(n: tuple[int, ...]) -> bool:
+        return min(n) >= COARSEST[len(n)] and (ranks == 1 or n[-1] >= 2 * ranks)
+
+    while enough(half := tuple((n - 1) // 2 for n in shape)):
+        shape = half
+    return shape
+
+
+def ladder(levels: list[dict[str, Any]], quantity: str, tol: float) -> list[str]:
+    """The grids as lines of text: grid, value, estimate, seconds."""
+    lines = [f"accuracy: {quantity} to {tol:g}", f"{'grid':>12}  {quantity:>16}  estimate  seconds"]
+    for level in levels:
+        grid = " x ".join(str(level[side]) for side in ("nx", "ny") if side in level)
+        estimate = f"{level['estimate']:.1e}" if isfinite(level["estimate"]) else "-"
+        lines.append(f"{grid:>12}  {level['value']:16.9g}  {estimate:>8}  {level['time_s']:7.3f}")
+    return lines
+
+
+def _end(estimates: Sequence[float], values: Sequence[float], tol: float, points: int) -> str:
+    """Why this grid is the last one; empty if it is not."""
+    if estimates[-1] <= tol:
+        return "reached"
+    if len(values) > 1 and np.isnan(values[-2:]).all():
+        return "no value on the last two grids"
+    best = int(np.argmin(estimates))
+    # A film with a layer thinner than these grids stays far off for long, and then converges.
+    settled = estimates[best] < ASYMPTOTIC or points > HOPELESS
+    if settled and len(estimates) - best > PATIENCE:
+        return f"{PATIENCE} finer grids gave no better estimate than {estimates[best]:.1e}"
+    return ""
+
+
+def _stopping(given: Stopping | dict[str, Any] | None, tol: float, before: Solution | None) -> Stopping | dict[str, Any] | None:
+    """The tolerances given, filled up for a method whose ||F|| is relative to the data: no tighter than `tol` needs."""
+    if isinstance(given, Stopping) or before is None or before.problem.kind != "lubrication":
+        return given
+    if before.settings["method"] not in RELATIVE_NORM or any(before.problem.grid.periodic):
+        return given  # what feeds a ring is a small part of what goes round: its balance needs digits
+    return {"eps1": float(np.clip(ALGEBRAIC * tol, 1e-12, 1e-4)), "eps2": inf, **(given or {})}
+
+
+def _start(before: Solution | None, points: int) -> tuple[Problem, Fields] | None:
+    """What the next grid starts from, where that pays: a small film is solved sooner than sweeps are compiled."""
+    if before is None or before.outcome in (Outcome.NOT_FINITE, Outcome.LINEAR_SOLVER):
+        return None
+    if before.problem.kind == "lubrication" and points <= SMALL:
+        return None
+    entry = METHODS[before.settings["method"]].of(before.problem.kind)
+    return (before.problem, before.fields) if entry.nested else None
+
+
+def _value(found: dict[str, Any], quantity: str, scene: Scene) -> float:
+    """The quantity among those found; NaN where it has no value on this grid, a front that is not there, say."""
+    numbers = [name for name, value in found.items() if isinstance(value, int | float) and not isinstance(value, bool)]
+    if quantity not in found or not (found[quantity] is None or quantity in numbers):
+        near = nearest(quantity, numbers)
+        raise InputError(
+            f"--quantity {quantity}: scene {scene.name} has no such number{near}; allowed are {', '.join(numbers)}"
+        )
+    return np.nan if found[quantity] is None else float(found[quantity])
+
+
+def _no_room(solution: Solution, shape: tuple[int, ...], finest: tuple[int, ...] | None, estimate: float, tol: float) -> str:
+    """Why the next grid cannot be; empty if it can. Collective.
+
+    Raises
+    ------
+    InputError : even with second order from here on, the tolerance is out of memory's reach.
+    """
+    problem, name = solution.problem, " x ".join(map(str, shape))
+    if finest and any(n > most for n, most in zip(shape, finest, strict=True)):
+        return f"a finer grid than {' x '.join(map(str, finest))} is not allowed"
+    comm = problem.grid.comm
+    machine = comm.Split_type(MPI.COMM_TYPE_SHARED)
+    share = machine.size / comm.size  # of the points, on this machine
+    machine.Free()
+    left, share = comm.allreduce(available(), MPI.MIN), comm.allreduce(share, MPI.MAX)
+    each = BYTES_FAS if solution.settings["method"] == "fas" else BYTES[len(shape)]
+    dense = bool(getattr(problem, "dense", False))
+
+    def needed(points: float) -> float:
+        """Bytes of all ranks."""
+        return DENSE * points**2 if dense else each * points
+
+    factor = max(1.0, 0.5 * (estimate / tol) ** 0.5) if estimate < ASYMPTOTIC else 1.0
+    points = prod(factor * n for n in shape)
+    if needed(points) < SMALL_CHANGE:
+        return ""
+    comm = problem.grid.comm
+    machine = comm.Split_type(MPI.COMM_TYPE_SHARED)
+    share = comm.allreduce(machine.size / comm.size, MPI.MAX)  # of the points, on the machine that has the most ranks
+    machine.Free()
+    left = comm.allreduce(available(), MPI.MIN) / share
+    if factor > 1.0 and not finest and (needed(points) > left or points > np.iinfo(PETSc.IntType).max // 2):
+        raise InputError(
+            f"--accuracy {tol:g}: takes some {ceil(factor * shape[0])} points along x (with {problem.grid.shape[0]} it is "
+            f"{estimate:.1e}), {needed(points) / 1e9:.0f} GB; {left / 1e9:.0f} GB are available"
+        )
+    if needed(prod(shape)) > left:
+        return f"a grid of {name} needs {needed(prod(shape)) / 1e9:.0f} GB, {left / 1e9:.0f} GB are available"
+    return ""

@@ -1,0 +1,213 @@
+"""Load balance: the eccentricity, film level or other value at which a film carries the load that is asked for.
+
+With t = log(e/(1 - e)) for an eccentricity e, the logarithm of the thinnest film for a film level, and that of any other value,
+the load W follows powers of e^t over wide ranges, so log(W/load) is nearly linear in t: a secant iteration, kept inside the
+bracket once there is one, finds its root in a handful of solves, each started from the nearest answer. On large grids the
+search begins on coarse ones.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import exp, inf, log, prod
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from ..errors import InputError
+from ..problems.solution import Outcome, Solution
+from .levels import level_shapes
+from .root import Search
+
+if TYPE_CHECKING:
+    from ..scenes.scene import Scene
+
+MOST_SOLVES = 30  # on a grid
+RANGE = {"eccentricity": 1e4, "h_offset": 100.0}  # unless one is given: of e/(1 - e) about 1, of the film about the scene's
+COARSE_TOL = 1e-3  # a coarse grid's load is no better
+ONE_GRID = 1_000  # points up to which no coarser grid is worth its while
+
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+
+
+class BalanceTable(BaseModel):
+    """[balance] of a scene file: the load to carry, and the key whose value is to be found for it."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    load: Annotated[Number, Field(gt=0)] = Field(
+        ..., description="load to carry, N (1D: N/m): a journal's bearing_load, else load_above_ambient"
+    )
+    vary: str | None = Field(None, description="key to find; default eccentricity (journals), else h_offset, the film's level")
+    range: tuple[Number, Number] | None = Field(None, description="values allowed for it, in its unit")
+    tol: Annotated[Number, Field(gt=1e-12, lt=1)] = Field(1e-6, description="relative error of the load")
+
+    @model_validator(mode="after")
+    def _ordered(self) -> "BalanceTable":
+        if self.range is not None and not self.range[0] < self.range[1]:
+            raise ValueError(f"range = {list(self.range)}: smallest < largest is needed")
+        return self
+
+
+def carried(values: dict[str, Any]) -> float:
+    """The load that a balance is about, of `Problem.quantities`: N (1D: N/m)."""
+    return float(values.get("bearing_load", values["load_above_ambient"]))
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A key of the scene and the variable t that stands for its value.
+
+    start, low, high : of t; slope : d log W/dt to begin with.
+    """
+
+    key: str
+    to_value: Callable[[float], float]
+    start: float
+    low: float
+    high: float
+    slope: float
+
+
+def variable(scene: "Scene", table: BalanceTable, begin: float | None) -> Variable:
+    """What is to be found. Collective.
+
+    Parameters
+    ----------
+    begin : value where the search begins; default the scene's, or the middle of the range.
+
+    Raises
+    ------
+    InputError : a key without a range, a range that leaves the key's domain.
+    """
+    fields = type(scene).model_fields
+    key = table.vary or ("eccentricity" if "eccentricity" in fields else "h_offset")
+    value: Any = getattr(scene, key, None) if begin is None else begin
+    shift, upper = 0.0, inf
+    to_t: Callable[[float], float] = log
+    to_value: Callable[[float], float] = exp
+    slope = 1.0
+    if key.rpartition(".")[2] == "eccentricity":
+        to_t, to_value, upper = _logit, lambda t: 1.0 / (1.0 + exp(-t)), 1.0
+        value = 0.5 if value is None else min(max(value, 1e-3), 0.999)
+    elif key == "h_offset":
+        problem: Any = scene.build()
+        shift = problem.reduce.min(problem.scheme.h) - getattr(scene, key)  # the film is shift + h_offset thick
+        problem.destroy()
+        value = value if value + shift > 0 else getattr(scene, key)  # a neighbour's, whose film was thicker
+        to_t, to_value, slope = (lambda v: log(v + shift)), (lambda t: exp(t) - shift), -2.0
+    elif table.range is None:
+        raise InputError(f"{scene.name}: balance.range is needed for balance.vary = {key}: smallest and largest value")
+    if table.range is not None:
+        smallest, largest = table.range
+        if not (smallest + shift > 0 and largest < upper):
+            raise InputError(f"{scene.name}: balance.range = {list(table.range)}: allowed for {key} is {-shift:g} to {upper:g}")
+        low, high = to_t(smallest), to_t(largest)
+        start = 0.5 * (low + high) if value is None or not smallest <= value <= largest else to_t(value)
+    else:
+        start = to_t(value)
+        about = 0.0 if upper == 1.0 else start
+        wide = log(RANGE["eccentricity" if upper == 1.0 else "h_offset"])
+        low, high = about - wide, about + wide
+    return Variable(key, to_value, start, low, high, slope)
+
+
+def _logit(e: float) -> float:
+    return log(e / (1.0 - e))
+
+
+def balanced(
+    scene_at: Callable[[dict[str, Any]], "Scene"],
+    solve: Callable[["Scene", Solution | None], Solution],
+    near: Solution | None = None,
+    nested: bool | None = None,
+) -> Solution:
+    """The solution of the scene that carries the load of its [balance] table. Collective.
+
+    Parameters
+    ----------
+    scene_at : the scene with some of its values changed, by key.
+    solve : solve(scene, near) -> Solution, near being one to start from.
+    near : the solution of a neighbouring scene, perhaps a balance as well.
+    nested : False: no search on coarser grids.
+
+    Returns
+    -------
+    Solution : settings['balance'] has vary, value, load (asked for), carried, iterations (solves on this grid) and solves (on
+        all grids). Where no value carries the load: the one that comes nearest, with the outcome LOAD_NOT_CARRIED; where a
+        solve failed and no other could stand in for it, that one with its own outcome.
+
+    Raises
+    ------
+    InputError : what `variable` and `solve` raise.
+    """
+    scene = scene_at({})
+    table: BalanceTable = scene.balance  # type: ignore[attr-defined]
+    shapes = [scene.shape]
+    if prod(scene.shape) > ONE_GRID and nested is not False:
+        shapes = [shape for shape in level_shapes(scene.shape) if shape == scene.shape or prod(shape) > ONE_GRID]
+    known = near.settings.get("balance", {}).get("value") if near is not None else None
+    unknown = variable(scene.with_shape(shapes[0]), table, known)
+    t, slope, start, solves, found = unknown.start, unknown.slope, near, 0, False
+    for shape in shapes:
+        search = Search(unknown.low, unknown.high, slope, explore=not found)
+        tol = table.tol if shape == shapes[-1] else max(table.tol, COARSE_TOL)
+
+        def solve_at(t: float, near: Solution | None, shape: tuple[int, ...] = shape) -> Solution:
+            return solve(scene_at({unknown.key: unknown.to_value(t)}).with_shape(shape), near)
+
+        solution, t, count, found = _on_grid(solve_at, search, t, start, table.load, tol)
+        if start is not None and start is not near:
+            start.destroy()
+        start, slope, solves = solution, search.slope, solves + count
+    value, load = unknown.to_value(t), carried(solution.problem.quantities(solution.fields))
+    answer = f"{unknown.key} = {value:.8g} carries {load:.8g}"
+    if solution.converged and not found:
+        solution.outcome = Outcome.LOAD_NOT_CARRIED
+        solution.message = f"{table.load:g} asked for; the nearest of {count} tried: {answer}"
+    solution.settings |= {
+        "balance": {
+            "vary": unknown.key,
+            "value": value,
+            "load": table.load,
+            "carried": load,
+            "iterations": count,
+            "solves": solves,
+        },
+        "why": [*solution.settings["why"], f"balance: {answer}, found in {count} solves on this grid, {solves} in all"],
+    }
+    return solution
+
+
+def _on_grid(
+    solve_at: Callable[[float, Solution | None], Solution],
+    search: Search,
+    t: float,
+    near: Solution | None,
+    load: float,
+    tol: float,
+) -> tuple[Solution, float, int, bool]:
+    """The solution whose load comes nearest, its t, the number of solves, and whether it is the one sought. Collective."""
+    best: Solution | None = None
+    best_t, best_g = t, inf
+    for count in range(1, MOST_SOLVES + 1):
+        solution = solve_at(t, best or near)
+        if not solution.converged:
+            if best is None:
+                return solution, t, count, False
+            solution.destroy()
+            search.leave(t)
+            t = 0.5 * (t + best_t)  # back towards what could be solved
+            continue
+        ratio = carried(solution.problem.quantities(solution.fields)) / load
+        g = log(ratio) if ratio > 0 else -inf
+        search.add(t, g)
+        if best is None or abs(g) < abs(best_g):
+            best, solution, best_t, best_g = solution, best, t, g
+        if solution is not None:
+            solution.destroy()
+        target = None if abs(best_g) <= tol else search.next()
+        if target is None:
+            break
+        t = target
+    assert best is not None  # for the type checker: the first solve gave one, or was returned
+    return best, best_t, count, abs(best_g) <= tol

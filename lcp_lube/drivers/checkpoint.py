@@ -1,0 +1,303 @@
+"""Checkpoints: a run's iterate in one file (`checkpoint_file`), from which it goes on as if it had not been stopped.
+
+Saved are the attributes that a method's step starts from (`Method.state`), the scene, the choices that were made, the grid that
+was reached and the steps so far. On as many ranks as before the run takes the same steps; any other number can go on with it.
+"""
+
+import json
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import astuple, dataclass, fields, is_dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from .. import __version__
+from ..errors import InputError
+from ..problems.grid import Grid
+from ..problems.solution import Fields, Outcome, Step
+from ..scenes.scene import Scene
+from ..solvers.newton import Method, Monitor, Stopping, iterate
+from . import checkpoint_file
+
+# What a run is made of, apart from its scene: the same on every resume.
+CHOICES = ("method", "system", "recipe", "nested", "options")
+Entry = tuple[str, Any]
+
+
+def _leaves(owner: Any, names: tuple[str, ...]) -> list[Entry]:
+    """The arrays and numbers behind dotted attribute names, those inside tuples and dataclasses one by one."""
+
+    def walk(name: str, value: Any) -> Iterator[Entry]:
+        if isinstance(value, tuple):
+            for k, part in enumerate(value):
+                yield from walk(f"{name}.{k}", part)
+        elif is_dataclass(value):
+            for part in fields(value):
+                yield from walk(f"{name}.{part.name}", getattr(value, part.name))
+        else:
+            yield name, value
+
+    found: list[Entry] = []
+    for name in names:
+        value = owner
+        for part in name.split("."):
+            value = getattr(value, part)
+        found += walk(name, value)
+    return found
+
+
+def _rebuilt(name: str, old: Any, values: dict[str, Any]) -> Any:
+    """The value of an attribute like `old`, from its leaves."""
+    if isinstance(old, tuple):
+        return tuple(_rebuilt(f"{name}.{k}", part, values) for k, part in enumerate(old))
+    if is_dataclass(old) and not isinstance(old, type):
+        return replace(
+            old, **{part.name: _rebuilt(f"{name}.{part.name}", getattr(old, part.name), values) for part in fields(old)}
+        )
+    new = values[name]
+    return new.astype(old.dtype) if isinstance(old, np.ndarray) else new
+
+
+def state_names(method: Method) -> tuple[str, ...]:
+    """Names of the attributes that the method, and the system that it uses, cannot do without.
+
+    Raises
+    ------
+    InputError : the method does not say (`state`): it cannot be taken up again.
+    """
+    own = getattr(method, "state", ())
+    if not own:
+        raise InputError(f"--checkpoint: a run of {type(method).__name__} cannot be taken up again; choose another --method")
+    return (*own, *(f"system.{name}" for name in getattr(getattr(method, "system", None), "state", ())))
+
+
+class Checkpointer:
+    """Runs the outer loop and writes checkpoints of it; `api.solve` tells it where the run is. Every method is collective.
+
+    Parameters
+    ----------
+    path : the file; None: no checkpoints, the loop alone.
+    every : steps between two checkpoints, over all grids of a nested run.
+    comm : all ranks of the run.
+
+    Raises
+    ------
+    InputError : every < 1, or the file cannot be written.
+    """
+
+    def __init__(self, path: str | Path | None, every: int = 1, comm: MPI.Comm = MPI.COMM_WORLD):
+        self.active, self.path, self.every, self.comm = path is not None, Path(path or ""), every, comm
+        if every < 1:
+            raise InputError(f"--every {every}: at least 1 is needed")
+        if self.active and (reason := comm.bcast(checkpoint_file.not_writable(self.path) if comm.rank == 0 else None)):
+            raise InputError(f"--checkpoint {path}: {reason}")
+        self.record: dict[str, Any] = {}
+        self.steps: list[Step] = []
+        self._run: Method | None = None
+        self._reached: Fields = {}
+        self._grid: Grid | None = None
+        self._since = 0
+        self._saved = False
+        self._signal = 0
+
+    def begin(self, scene: Scene, choices: tuple[Any, ...]) -> None:
+        """What is solved and how: the values of CHOICES."""
+        if self.active:
+            self.record = {"scene": scene_record(scene), **dict(zip(CHOICES, choices, strict=True)), "failed": []}
+
+    def iterate(
+        self,
+        run: Method,
+        grid: Grid,
+        stopping: Stopping,
+        monitor: Monitor | None,
+        before: list[Step],
+        reached: Fields | None = None,
+        **record: Any,
+    ) -> tuple[Outcome, str, list[Step]]:
+        """`newton.iterate`, with checkpoints.
+
+        Parameters
+        ----------
+        reached : fields that they are to hold too: those of a method that failed, where the next one may start.
+        record : what they are to say of the run from here on.
+
+        Raises
+        ------
+        InputError : the method cannot be taken up again, or a checkpoint cannot be written.
+        KeyboardInterrupt, SystemExit : SIGINT or SIGTERM came, and the step that it met is saved.
+        """
+        if not self.active:
+            return iterate(run, stopping, monitor, before)
+        state_names(run)
+        self._run, self._grid, self.steps = run, grid, list(before)
+        self._reached = {f"reached.{name}": values for name, values in (reached or {}).items()}
+        self.record |= record
+        with self._listening():
+            return iterate(run, stopping, self._watching(monitor), before)
+
+    def _watching(self, monitor: Monitor | None) -> Monitor:
+        """The monitor, and after it the checkpoints that are due, and one when the run is told to end."""
+
+        def watch(k: int, step: Step) -> None:
+            if monitor is not None:
+                monitor(k, step)
+            self.steps.append(step)
+            self._since += 1
+            told = self.comm.allreduce(self._signal, MPI.MAX)
+            if told or self._since >= self.every:
+                self.save()
+            if told == signal.SIGTERM:
+                raise SystemExit(128 + told)
+            if told:
+                raise KeyboardInterrupt(f"--resume {self.path} goes on")
+
+        return watch
+
+    @contextmanager
+    def _listening(self) -> Iterator[None]:
+        """SIGINT, and SIGTERM as batch systems send it ahead of time, let the step end and be saved; a second one does not."""
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+
+        def note(number: int, _: Any) -> None:
+            if self._signal:
+                raise KeyboardInterrupt
+            self._signal = number
+
+        before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+    def save(self) -> None:
+        """Write the file.
+
+        Raises
+        ------
+        InputError : it cannot be written; the last checkpoint is still there then.
+        """
+        assert self._run is not None and self._grid is not None
+        leaves = [*_leaves(self._run, state_names(self._run)), *self._reached.items()]
+        header = {
+            **self.record,
+            "version": __version__,
+            "steps": [astuple(step) for step in self.steps],
+            "scalars": {name: _plain(value) for name, value in leaves if not isinstance(value, np.ndarray)},
+        }
+        arrays = [(name, np.asarray(value, dtype=float)) for name, value in leaves if isinstance(value, np.ndarray)]
+        try:
+            checkpoint_file.write(self.path, self._grid, header, arrays)
+        except OSError as error:
+            kept = "; the last one is still there" if self._saved else ""
+            raise InputError(f"--checkpoint {self.path}: could not be written: {error}{kept}") from None
+        self._since, self._saved = 0, True
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """What a file holds: `record` as it was given to the `Checkpointer`, the grid, the steps; the state stays in the file."""
+
+    path: Path
+    record: dict[str, Any]
+    shape: tuple[int, ...]
+    steps: list[Step]
+    start: int
+
+    def restore(self, run: Method, grid: Grid, reached: Fields | None = None) -> list[Step]:
+        """Put the saved state into a run made anew, and fields into `reached`; returns the steps that it had taken. Collective.
+
+        Raises
+        ------
+        InputError : the state is another method's, or damaged.
+        """
+        names = [name for name, _ in self.record["arrays"]]
+        old = [*_leaves(run, state_names(run)), *((f"reached.{name}", values) for name, values in (reached or {}).items())]
+        expected = [name for name, value in old if isinstance(value, np.ndarray)]
+        if names != expected or {name for name, _ in old} != {*names, *self.record["scalars"]}:
+            raise InputError(f"--resume {self.path}: not the state of {type(run).__name__} on this system")
+        try:
+            arrays = checkpoint_file.read_arrays(self.path, grid, self.record, self.start)
+        except InputError as error:
+            raise InputError(f"--resume {self.path}: {error}") from None
+        values = {**self.record["scalars"], **arrays}
+        for name in state_names(run):
+            *path, last = name.split(".")
+            owner: Any = run
+            for part in path:
+                owner = getattr(owner, part)
+            setattr(owner, last, _rebuilt(name, getattr(owner, last), values))
+        for name in reached or {}:
+            reached[name] = values[f"reached.{name}"]  # type: ignore[index]
+        return list(self.steps)
+
+    @property
+    def shapes(self) -> list[tuple[int, ...]]:
+        """The grids from the one that was reached to the finest."""
+        return [tuple(shape) for shape in self.record["shapes"]]
+
+    @property
+    def failures(self) -> list[tuple[Outcome, str, list[Step]]]:
+        """How the methods ended whose fallback was running."""
+        failed = self.record["failed"]
+        return [(Outcome(outcome), message, [Step(*step) for step in steps]) for outcome, message, steps in failed]
+
+    def settle(self, **given: Any) -> dict[str, Any]:
+        """How the run was begun, for what is not given anew: None, 'auto' or nothing.
+
+        Raises
+        ------
+        InputError : something else is given than the run was begun with.
+        """
+        for name in CHOICES:
+            kept = self.record[name]
+            if given[name] in (None, "auto") or given[name] == {}:
+                given[name] = kept if kept != "" else given[name]  # a method without a system
+            elif name != "recipe" and json.loads(json.dumps(given[name])) != kept:  # another inner solver may go on
+                raise InputError(f"--resume {self.path}: the run was begun with {name} {kept}, not {given[name]}")
+        return given
+
+
+def load(path: str | Path, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> Checkpoint:
+    """Read a checkpoint of this scene. Collective.
+
+    Raises
+    ------
+    InputError : no checkpoint, one of another scene, of another version, cut short or damaged.
+    """
+    path = Path(path)
+    try:
+        header, start = checkpoint_file.read_header(path, comm)
+    except InputError as error:
+        raise InputError(f"--resume {path}: {error}") from None
+    reason = _other_scene(header["scene"], scene_record(scene))
+    if header["version"] != __version__:
+        reason = f"written by lcp_lube {header['version']}, this is {__version__}"
+    if reason:
+        raise InputError(f"--resume {path}: {reason}")
+    return Checkpoint(path, header, tuple(header["shape"]), [Step(*step) for step in header["steps"]], start)
+
+
+def scene_record(scene: Scene) -> dict[str, Any]:
+    """A scene's data as JSON holds them."""
+    return json.loads(json.dumps({"class": type(scene).__name__, **scene.model_dump(mode="json")}, default=str))
+
+
+def _other_scene(old: dict[str, Any], new: dict[str, Any]) -> str:
+    changed = [key for key in {**old, **new} if key != "name" and old.get(key) != new.get(key)]
+    if not changed:
+        return ""
+    key = changed[0]
+    return f"a checkpoint of another scene: its {key} is {old.get(key)}, here it is {new.get(key)}"
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else value

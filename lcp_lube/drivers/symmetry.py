@@ -1,0 +1,231 @@
+"""No more model than a scene needs: what does not vary is not solved for, what mirrors itself is solved once.
+
+In the order in which they are looked for:
+
+constant : the film is everywhere the same, and so is the pressure at every open side: that is the answer.
+line : film and sides do not depend on y (both sides along the flow closed or periodic): one line is solved in 1D.
+mirror : the film is symmetric about the middle of the width, and the sides south and north are alike: half the width is solved,
+    with a closed side in the middle. For an odd number of lines the middle one lies on that side and has half cells.
+
+The reduced equations are the whole problem's own, with like unknowns put in one: their answer, spread out again, is certified
+on the whole problem's data like any other, and where that fails the whole problem is solved. (A film that does not cavitate
+needs no choice: the active-set method's first step is its one linear solve.)
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from ..base.parallel import Array
+from ..problems.film.lubrication import LubricationProblem
+from ..problems.film.model import Model, Side
+from ..problems.grid import Grid
+from ..problems.solution import Outcome, Problem, Solution
+from ..scenes.scene import Scene
+
+SAME = 1e-12  # relative difference that coordinates' rounding leaves between two values of one film
+
+SAMPLE = 5  # lines that are compared first
+
+SENTENCES = {
+    "constant": "nothing to solve: the film is the same everywhere, and the pressure at every side",
+    "line": "solved in 1D: neither the film nor the sides depend on y",
+    "mirror": "half the width is solved: the film and the sides are symmetric about its middle",
+}
+
+
+@dataclass(frozen=True)
+class Part:
+    """What is left of a scene; to `solve` it is a scene like any other.
+
+    kind : a key of SENTENCES. shape : that of the whole scene's grid, in 1D for 'line'.
+    """
+
+    whole: Scene
+    kind: str
+    family: ClassVar[str] = "user"  # no file's: what is asked of those has been asked of the whole scene
+
+    @property
+    def name(self) -> str:
+        return self.whole.name
+
+    @property
+    def scheme(self) -> str | None:
+        return self.whole.scheme
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return self.whole.shape[:1] if self.kind == "line" else self.whole.shape
+
+    def with_shape(self, shape: tuple[int, ...]) -> "Part":
+        return Part(self.whole.with_shape(shape), self.kind)
+
+    def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
+        """The discrete problem of the part. Collective."""
+        model: Model = self.whole.model  # type: ignore[attr-defined]
+        if self.kind == "line":
+            return replace(model, lengths=model.lengths[:1], exact=None).build(self.shape, comm)
+        nx, ny = self.shape
+        west, east, south, _ = model.sides
+        south = south if south.kind == "open" else Side("closed")
+        half = (west, east, south, Side("mirror" if ny % 2 else "closed"))
+        lengths = (model.lengths[0], 0.5 * model.lengths[1])
+        return replace(model, lengths=lengths, sides=half, exact=None).build((nx, (ny + 1) // 2), comm)
+
+
+def part_of(scene: Scene, problem: Problem) -> Part | None:
+    """The least part of a scene that gives its whole answer; None where that is the scene itself. Collective."""
+    if type(problem) is not LubricationProblem or not isinstance(getattr(scene, "model", None), Model):
+        return None
+    model: Model = scene.model  # type: ignore[attr-defined]
+    grid = problem.grid
+    west, east, *ends = model.sides
+    pressures = {side.p for side in model.sides[: 2 * grid.dim] if side.kind == "open"}
+    if len(pressures) == 1 and not west.r and "closed" not in (west.kind, east.kind) and _is_constant(problem):
+        return Part(scene, "constant")
+    if grid.dim == 1:
+        return None
+    if "open" not in (ends[0].kind, ends[1].kind) and _all_lines_are_one(problem):
+        return Part(scene, "line")
+    faces = not (model.mean_cubes and model.scheme == "upwind")  # whether the discretisation asks for the film there
+    if ends[0] == ends[1] and grid.shape[1] // 2 >= grid.comm.size and _is_symmetric(problem, faces):
+        return Part(scene, "mirror")
+    return None
+
+
+def reduced_solve(scene: Scene, eps1: float = 1e-8, **how: Any) -> Solution:
+    """`api.solve` of what is left of a scene, whatever method is named. Collective."""
+    from ..api import solve
+
+    problem = scene.build(how.get("comm"))
+    part = part_of(scene, problem)
+    if part is None:
+        problem.destroy()
+        return solve(scene, **how)
+    return solve_part(part, problem, solve, eps1, **how)
+
+
+def solve_part(part: Part, problem: Problem, solve: Callable[..., Solution], eps1: float, **how: Any) -> Solution:
+    """The whole problem's solution from its part's. Collective.
+
+    Parameters
+    ----------
+    solve : api.solve; how : its arguments. `start` is a neighbour's whole problem and fields. eps1 : tolerance of the run.
+    """
+    assert isinstance(problem, LubricationProblem)  # as `part_of` found
+    details = {"reduction": part.kind}
+    if part.kind == "constant":
+        p = next(side.p for side in part.whole.model.sides if side.kind == "open") / problem.p_unit  # type: ignore[attr-defined]
+        n = problem.grid.local_size
+        fields = {"p": np.full(n, p), "r": np.zeros(n)}
+        settings = {
+            "scene": part.name,
+            "method": "none",
+            "scheme": part.scheme,
+            "why": [SENTENCES["constant"]],
+            "details": details,
+        }
+        certificate = problem.certify(fields, eps1)
+        outcome = Outcome.CONVERGED if certificate.holds else Outcome.WRONG_SOLUTION
+        return Solution(problem, fields, outcome, "nothing to solve", certificate, [], settings)
+    if how.get("start") is not None:
+        small = part.build(problem.grid.dm.comm)
+        neighbour, found = how["start"]
+        near = problem.prolong(neighbour, found, False)
+        take = _Pick(problem.grid, small.grid, *_numbers(small.grid))
+        how["start"] = (small, {name: take(values) for name, values in near.items()})
+    solution = solve(part, **how)
+    if how.get("start") is not None:
+        how["start"][0].destroy()
+    small_problem = solution.problem
+    j, i = _numbers(problem.grid)
+    spread = _Pick(small_problem.grid, problem.grid, *((0 * j, i) if part.kind == "line" else (_mirrored(problem.grid, j), i)))
+    fields = {name: spread(values) for name, values in solution.fields.items()}
+    small_problem.destroy()
+    certificate = problem.certify(fields, eps1)
+    outcome, message = solution.outcome, solution.message
+    if outcome is Outcome.CONVERGED and not certificate.holds:
+        outcome, message = Outcome.WRONG_SOLUTION, f"{message}, but the certificate fails: {certificate.failure}"
+    settings = {
+        **solution.settings,
+        "why": [SENTENCES[part.kind], *solution.settings["why"]],
+        "details": {**solution.settings["details"], **details},
+    }
+    return replace(
+        solution, problem=problem, fields=fields, outcome=outcome, message=message, certificate=certificate, settings=settings
+    )
+
+
+def _is_constant(problem: LubricationProblem) -> bool:
+    """Whether all points and faces have one film thickness. Collective."""
+    h, largest = problem.scheme.h, problem.reduce.max(problem.scheme.h)
+    return _all_close(problem, [(h, largest)]) and _all_close(problem, [(faces, largest) for faces in _films(problem)])
+
+
+def _all_lines_are_one(problem: LubricationProblem) -> bool:
+    """Whether the film does not depend on y. Collective."""
+    grid, film = problem.grid, problem.film
+    x_nodes, x_faces = grid.nodes_and_faces(0)
+    first = np.array([[grid.origin[1]]])
+    if not _all_close(problem, [(problem.scheme.h, film(grid.x, first))]):
+        return False
+    lines = [film(x[None, :], first) for x in (x_nodes, x_faces, x_nodes)]
+    return _all_close(problem, list(zip(_films(problem), lines, strict=True)))
+
+
+def _is_symmetric(problem: LubricationProblem, faces: bool) -> bool:
+    """Whether h(x, y) = h(x, width - y), at the points, and on the faces too. Collective."""
+    grid = problem.grid
+    mirror = 2 * grid.origin[1] + grid.lengths[1]
+    some = np.unique(np.linspace(0, grid.box[0] - 1, SAMPLE).round().astype(int))  # most films that are not tell so at once
+    if not _all_close(problem, [(problem.scheme.h[some], problem.film(grid.x, mirror - grid.y[some]))]):
+        return False
+    pairs = list(zip(_films(problem), _films(problem, mirror), strict=True))
+    return _all_close(problem, pairs if faces else pairs[:1])
+
+
+def _films(problem: LubricationProblem, mirror: float | None = None) -> list[Array]:
+    """The film at the points, x faces and y faces, or at y = mirror - theirs."""
+    grid, film = problem.grid, problem.film
+    x_nodes, x_faces = grid.nodes_and_faces(0)
+    y_nodes, y_faces = grid.nodes_and_faces(1) if grid.dim == 2 else (np.zeros(1), np.zeros(0))
+    lines = [line if mirror is None else mirror - line for line in (y_nodes, y_nodes, y_faces)]
+    return [film(x[None, :], y[:, None]) for x, y in zip((x_nodes, x_faces, x_nodes), lines, strict=True)]
+
+
+def _all_close(problem: LubricationProblem, pairs: list[tuple[Array, Any]]) -> bool:
+    worst = max(float(np.max(np.abs(a / b - 1.0), initial=0.0)) for a, b in pairs)
+    return bool(problem.reduce.max(np.array([worst])) <= SAME)
+
+
+def _numbers(grid: Grid) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Line and column numbers of the owned points; they broadcast to `grid.box`."""
+    return np.arange(grid.y_start, grid.y_end)[:, None], np.arange(grid.x_start, grid.x_end)[None, :]
+
+
+def _mirrored(grid: Grid, j: NDArray[np.int64]) -> NDArray[np.int64]:
+    return np.minimum(j, grid.shape[1] - 1 - j)
+
+
+class _Pick:
+    """Values at the points of one grid taken from numbered points of another: line j, column i. Collective."""
+
+    def __init__(self, source: Grid, target: Grid, j: NDArray[np.int64], i: NDArray[np.int64]):
+        self.source, self.target = source, target
+        natural = np.broadcast_to(j * source.shape[0] + i, target.box).ravel().astype(PETSc.IntType)
+        self._from = PETSc.IS().createGeneral(source.dm.getAO().app2petsc(natural), comm=target.dm.comm)
+        self._to = PETSc.IS().createStride(target.local_size, target.first, 1, comm=target.dm.comm)
+
+    def __call__(self, field: Array) -> Array:
+        source, target = self.source.dm.createGlobalVec(), self.target.dm.createGlobalVec()
+        source.setArray(field)
+        scatter = PETSc.Scatter().create(source, self._from, target, self._to)
+        scatter.scatter(source, target)
+        values = target.array_r.copy()
+        for obj in (scatter, source, target):
+            obj.destroy()
+        return values

@@ -1,0 +1,95 @@
+"""The 2n-by-2n Newton matrix [A B; D_p D_r] of the papers as one PETSc AIJ Mat, ordered by field inside each rank."""
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from ..base.parallel import Array
+from ..base.stages import Stages
+from ..problems.film.lubrication import LubricationProblem
+from ..problems.film.reynolds import coo, csr
+from .krylov import Krylov
+
+
+class FullSystem:
+    """A dp + B dr = f1, D_p dp + D_r dr = f2 through a KSP on the 2n-by-2n matrix.
+
+    The sparsity is fixed when the object is made; `solve` refreshes the values of D_p and D_r alone changing. Rank k
+    holds the p and then the r of its points. Python preconditioners find `fields` (index sets of p and r) and `problem`
+    as attributes of the matrix.
+    """
+
+    def __init__(self, problem: LubricationProblem, stages: Stages | None = None):
+        self.problem = problem
+        self.stages = stages or Stages()
+        grid = problem.grid
+        nl = grid.local_size
+        comm = grid.dm.comm
+        with self.stages("assembly"):
+            starts = grid.starts
+            own_p = (2 * grid.first + np.arange(nl)).astype(PETSc.IntType)
+            own_r = own_p + nl
+            # Row k of the complementarity block is (D_p)_k, (D_r)_k: refreshed alone by `solve`.
+            self._rows = own_r
+            self._pointers = np.arange(0, 2 * nl + 1, 2, dtype=PETSc.IntType)
+            self._columns = np.stack([own_p, own_r], axis=1).ravel()
+            self._values = np.ones(2 * nl)
+            rows, columns, values = [], [], []
+            for entries, field in ((problem.scheme.pressure_entries(), 0), (problem.scheme.void_entries(), 1)):
+                for i, j, v in coo(grid, entries):
+                    rows.append(_number(i, 0, starts))
+                    columns.append(_number(j, field, starts))
+                    values.append(v)
+            rows.append(np.repeat(own_r, 2))
+            columns.append(self._columns)
+            values.append(self._values)
+            pointers, sorted_columns, order = csr(np.concatenate(rows), np.concatenate(columns), 2 * grid.first, 2 * nl)
+            size = (2 * nl, 2 * grid.size)
+            self.mat = PETSc.Mat().createAIJ(
+                (size, size), csr=(pointers, sorted_columns, np.concatenate(values)[order]), comm=comm
+            )
+            self.fields = {name: PETSc.IS().createGeneral(own, comm=comm) for name, own in (("p", own_p), ("r", own_r))}
+            self.mat.setAttr("fields", self.fields)
+            self.mat.setAttr("problem", problem)
+            self._x, self._b = self.mat.createVecs()
+            self.krylov = Krylov(self.mat, self.fields)
+
+    @property
+    def direct(self) -> bool:
+        return self.krylov.direct
+
+    def solve(self, D_p: Array, D_r: Array, f1: Array, f2: Array, rtol: float) -> tuple[Array, Array, int]:
+        """dp, dr and the number of linear iterations. Collective.
+
+        Raises
+        ------
+        LinearSolverError : breakdown, a failed factorisation, or a result that is not finite.
+        """
+        with self.stages("Jacobian"):
+            self._values[0::2], self._values[1::2] = D_p, D_r
+            self.mat.setValuesIJV(self._pointers, self._columns, self._values, rowmap=self._rows)
+            self.mat.assemble()
+        return self.resolve(f1, f2, rtol)
+
+    def resolve(self, f1: Array, f2: Array, rtol: float) -> tuple[Array, Array, int]:
+        """Solve once more with the matrix of the last `solve`: a factorisation is not repeated. Collective."""
+        nl = f1.size
+        b = self._b.array_w
+        b[:nl], b[nl:] = f1, f2
+        del b  # gives the array back to the vector
+        with self.stages("KSP"):
+            iterations = self.krylov.solve(self._b, self._x, rtol)
+        x = self._x.array_r.copy()
+        return x[:nl], x[nl:], iterations
+
+    def destroy(self) -> None:
+        """Free the PETSc objects; a python PC must not outlive this."""
+        self.krylov.destroy()
+        for obj in (self.mat, self._x, self._b, *self.fields.values()):
+            obj.destroy()
+
+
+def _number(points: NDArray, field: int, starts: NDArray) -> NDArray:
+    """2n numbers of field 0 (p) or 1 (r) at PETSc point numbers: rank k holds points starts[k] to starts[k+1]."""
+    owner = np.searchsorted(starts, points, side="right") - 1
+    return points + (starts[owner + 1] if field else starts[owner])

@@ -1,0 +1,1 @@
+"""Preconditioners of the papers, and PETSc's under other names."""

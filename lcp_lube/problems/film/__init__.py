@@ -1,0 +1,1 @@
+"""Films: geometry, discretisation, and what is read off an answer."""

@@ -1,0 +1,83 @@
+"""Films that jump inside a cell: the conductance and the Couette film of its faces, so that an edge may lie anywhere.
+
+Between two neighbouring points a distance d apart a film h(t) that is full carries, by p' = 6 mu (U h - Q)/h^3 with one Q,
+
+    Q = U H - C (p_2 - p_1)/(6 mu d),    C = d / Int h^-3 dt,    H = Int h^-2 dt / Int h^-3 dt :
+
+resistances in series. Where h does not jump, C = h^3 and H = h in the middle, to second order, and that is what is taken.
+Across the flow the pieces of a face stand side by side: their C and H are averaged by their lengths. (Where a film ruptures at
+an edge inside a cell, only the part before it resists, which the coefficients cannot know: that error is of first order.)
+"""
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.parallel import Array
+
+GAUSS = (0.5 - 0.5 / np.sqrt(3.0), 0.5 + 0.5 / np.sqrt(3.0))
+MARGIN = 1e-9  # of a spacing: an edge so near a point, or a face's end, is on it
+
+
+def face_film(
+    film: Callable[[Array, Array], Array],
+    nodes: Array,
+    faces: Array,
+    lines: Array,
+    jumps: Sequence[float],
+    jumps_across: Sequence[float],
+    width: float,
+) -> tuple[Array, Array]:
+    """C and H of all faces along t, of the lines at s; shape (lines, faces).
+
+    Parameters
+    ----------
+    film : h(t, s) in m for arrays that broadcast. nodes, faces : t of the points (one more than faces) and of the faces, m.
+    lines : s of the lines of points, each `width` m wide. jumps, jumps_across : t and s of the film's edges, m.
+    """
+    columns, pieces = _pieces(nodes[:-1], nodes[1:], jumps)
+
+    def along(s: Array) -> tuple[Array, Array]:
+        h = np.broadcast_to(film(faces[None, :], s[:, None]), (s.size, faces.size))
+        cubes, films = h**3, np.array(h)
+        if columns.size:
+            resistance = drag = 0.0
+            for a, b in pairwise(pieces):
+                for part in GAUSS:
+                    piece = np.broadcast_to(film((a + part * (b - a))[None, :], s[:, None]), (s.size, columns.size))
+                    resistance = resistance + 0.5 * (b - a) / piece**3
+                    drag = drag + 0.5 * (b - a) / piece**2
+            cubes[:, columns] = (pieces[-1] - pieces[0]) / resistance
+            films[:, columns] = drag / resistance
+        return cubes, films
+
+    cubes, films = along(lines)
+    rows, strips = _pieces(lines - 0.5 * width, lines + 0.5 * width, jumps_across)
+    if rows.size:
+        cubes[rows] = films[rows] = 0.0
+        for a, b in pairwise(strips):
+            share = ((b - a) / width)[:, None]
+            part_cubes, part_films = along(0.5 * (a + b))
+            cubes[rows] += share * part_cubes
+            films[rows] += share * part_films
+    return cubes, films
+
+
+def _pieces(start: Array, end: Array, jumps: Sequence[float]) -> tuple[NDArray[np.int64], Array]:
+    """Numbers of the intervals with jumps inside, and their ends with the jumps in between, one row a place.
+
+    Shape (most jumps in an interval + 2, intervals with jumps); intervals with fewer of them have pieces of no length.
+    """
+    places = np.unique(np.asarray(jumps, dtype=float))
+    margin = MARGIN * (end - start)
+    first = np.searchsorted(places, start + margin)
+    last = np.searchsorted(places, end - margin)
+    found = np.flatnonzero((last > first) & (end > start))
+    most = int(np.max(last[found] - first[found], initial=0))
+    rows = [start[found]]
+    for k in range(most):
+        inside = first[found] + k < last[found]
+        rows.append(np.where(inside, places[np.minimum(first[found] + k, places.size - 1)], end[found]))
+    return found, np.array([*rows, end[found]])

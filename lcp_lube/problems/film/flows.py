@@ -1,0 +1,78 @@
+"""What flows through the sides of a film, and what drags at its wall."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...base.parallel import Array
+from ..grid import Grid
+from .reynolds import sides
+
+if TYPE_CHECKING:
+    from .lubrication import LubricationProblem
+
+SIDES = ("west", "east", "south", "north")
+
+
+def point_weights(grid: Grid) -> Array:
+    """Share of a cell that belongs to each owned point: 1, and 1/2 on a mirror line."""
+    *_, north = sides(grid, ("mirror",))
+    return np.broadcast_to(np.where(north, 0.5, 1.0), grid.box).ravel()
+
+
+def side_flows(problem: LubricationProblem, p: Array, r: Array) -> dict[str, float]:
+    """Volume flow out of the film through each side, m3/s (1D: m2/s); their sum is zero. Collective.
+
+    Half of the equation's terms, (U h (1 - r) - h^3/(6 mu) dp/dx)/2: one wall moves. The box scheme balances the cells around
+    the points, whose outer faces stand half a spacing inside the sides: exact for west and east, where the flow of a line does
+    not change on the way. Along a side y = const of constant pressure, the strip between the outer faces and the side carries
+    Couette flow alone, U h (1 - r)/2 of the line of points beside it; what it loses between west and east leaves by the side.
+    """
+    grid, s = problem.grid, problem.scheme
+    west, east, south, north = problem.boundary_flows(p, r)
+    if grid.dim == 1:
+        return {"west": -0.5 * west, "east": 0.5 * east}
+    at_west, at_east, *at_ends = sides(grid)
+    leaving = s.couette_E + s.b_C * r.reshape(grid.box)
+    total = problem.reduce.sum
+    strips = [  # enters at the west, leaves at the east
+        (0.5 * total(np.where(at_west & end, s.couette_W, 0.0)), 0.5 * total(np.where(at_east & end, leaving, 0.0)))
+        for end in at_ends
+    ]
+    half = 0.5 * grid.spacing[1]
+    return {
+        "west": -half * (west + sum(enters for enters, _ in strips)),
+        "east": half * (east + sum(leaves for _, leaves in strips)),
+        "south": half * (strips[0][0] - strips[0][1] - south),
+        "north": half * (strips[1][0] - strips[1][1] + north),
+    }
+
+
+def friction(problem: LubricationProblem, p_pa: Array, r: Array) -> float:
+    """Drag on the moving wall, N (1D: N/m): integral of mu U (1 - r)/h + (h/2) dp/dx, the void carrying no shear. Collective.
+
+    By the midpoint rule over the x faces, where the box scheme knows the liquid's share of the film: it is that of the Couette
+    flow, in the cavity Q/(U h_face). In 2D the strips along open sides y = const have the shear of the lines beside them, and
+    no pressure term, p being constant there. The half cells at closed sides have no flow, so h^2 dp/dx = 6 mu U where full.
+
+    Parameters
+    ----------
+    p_pa : pressure in Pa above the cavitation pressure, r : void fraction; owned points.
+    """
+    grid, s, film = problem.grid, problem.scheme, problem.film
+    dx, muU, weight = grid.spacing[0], problem.mu * problem.U, point_weights(grid).reshape(grid.box)
+    p, r = p_pa.reshape(grid.box), r.reshape(grid.box)
+    first, last, south, north = sides(grid)
+    walls = sides(grid, ("closed",))[:2]
+    p_east = np.where(last, problem.p_sides[1], grid.ghosted(p_pa)[1:-1, 2:])
+    h_west, h_east = (np.broadcast_to(film(grid.x + step, grid.y), grid.box) for step in (-dx / 2, dx / 2))
+    passes = ~np.broadcast_to(walls[1], grid.box)  # the east face
+    liquid = 1.0 + s.b_C * r / np.where(passes, s.couette_E, np.inf)
+    shear = np.where(passes, liquid / h_east, 0.0) + np.where(first, 1.0 / h_west, 0.0)
+    for wall in walls:
+        shear = shear + np.where(wall, 0.5 * np.where(p > 0, 4.0, 1.0 - r) / s.h, 0.0)
+    push = np.where(passes, 0.5 * h_east * (p_east - p), 0.0) + np.where(first, 0.5 * h_west * (p - problem.p_sides[0]), 0.0)
+    per_row = muU * dx * shear * (1.0 + 0.5 * south + 0.5 * north) + push
+    return problem.reduce.sum(per_row * weight) * (grid.spacing[1] if grid.dim == 2 else 1.0)

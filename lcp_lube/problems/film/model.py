@@ -1,0 +1,131 @@
+"""The data of one steady film problem, whole or reduced, and the step from them to the discrete problem."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from petsc4py import PETSc
+
+from ...base.parallel import Array
+from ...errors import InputError
+from ..grid import Grid
+from .exact import ExactSolution
+from .fluid import Law
+from .lubrication import LubricationProblem
+from .reynolds import Film, box_scheme
+
+NAMES = ("west", "east", "south", "north")
+OPPOSITE = dict(zip(NAMES, ("east", "west", "north", "south"), strict=True))
+
+
+@dataclass(frozen=True)
+class Side:
+    """What one side of the film is.
+
+    kind : 'open' (pressure given), 'closed' (nothing flows through: a wall in the way, or a line of symmetry), 'periodic'
+    (the film goes on at the opposite side) or 'mirror' (closed, with points on it: what `reduction` cuts along).
+    p : pressure above the cavitation pressure, Pa (open). r : void fraction that enters (west, with p = 0).
+    """
+
+    kind: str = "open"
+    p: float = 0.0
+    r: float = 0.0
+
+
+@dataclass(frozen=True)
+class Model:
+    """A film over [0, L] or [0, L] x [0, Ly] in SI units; the letters are those of `LubricationProblem`.
+
+    sides : west, east, south, north (the last two in 2D).
+
+    Raises
+    ------
+    InputError : sides that contradict one another, or leave the pressure's level open.
+    """
+
+    lengths: tuple[float, ...]
+    sides: tuple[Side, Side, Side, Side]
+    gap: Film
+    mu: float
+    U: float
+    p_c: float
+    p_unit: float
+    scheme: str
+    mean_cubes: bool = False
+    exact: Callable[[], ExactSolution | None] | None = None
+    law: Law | None = None  # a fluid that depends on the pressure; `build` makes the problem of the constant one
+
+    def __post_init__(self) -> None:
+        used = dict(zip(NAMES, self.sides, strict=True) if len(self.lengths) == 2 else zip(NAMES[:2], self.sides, strict=False))
+        for name, side in used.items():
+            if side.kind == "periodic" and used[OPPOSITE[name]].kind != "periodic":
+                raise InputError(f"sides.{name} is periodic, sides.{OPPOSITE[name]} is not: both of them or none")
+            if side.r and (name != "west" or side.p):
+                raise InputError(f"sides.{name}.r = {side.r:g}: void enters by the west side alone, and there at p = p_c")
+        pressures = [side.p for side in used.values() if side.kind == "open"]
+        if not pressures:
+            raise InputError("no side has a pressure: without one the level of p is open; give at least one side a p")
+        if self.sides[0].kind == "periodic" and not max(pressures) > 0:
+            raise InputError("periodic along the flow, and no side above the cavitation pressure: nothing feeds the film")
+
+    @property
+    def film(self) -> Film:
+        """The gap, asked beyond a side that is not open only for what lies inside."""
+        dims = len(self.lengths)
+        kinds = [tuple(side.kind for side in self.sides[2 * k : 2 * k + 2]) for k in range(dims)]
+        if all(pair == ("open", "open") for pair in kinds):
+            return self.gap
+        return _Inside(self.gap, self.lengths, [pair == ("periodic", "periodic") for pair in kinds])
+
+    def build(self, shape: Sequence[int], comm: PETSc.Comm | None = None) -> LubricationProblem:
+        """The discrete problem on (nx,) or (nx, ny) points. Collective.
+
+        Raises
+        ------
+        InputError : more ranks than the grid can be dealt to, a film that is not positive.
+        """
+        west, east, south, north = self.sides
+        grid = Grid(shape, self.lengths, comm, ends=((west.kind, east.kind), (south.kind, north.kind)))
+        p_sides = tuple(side.p if side.kind == "open" else 0.0 for side in self.sides)
+        film = self.film
+        scheme = box_scheme(
+            grid,
+            self.gap,
+            mu=self.mu,
+            U=self.U,
+            scheme=self.scheme,
+            p_sides=p_sides,  # type: ignore[arg-type]
+            p_unit=self.p_unit,
+            mean_cubes=self.mean_cubes,
+            r_in=west.r,
+        )
+        return LubricationProblem(
+            grid,
+            scheme,
+            mu=self.mu,
+            U=self.U,
+            p_unit=self.p_unit,
+            p_sides=p_sides,  # type: ignore[arg-type]
+            p_c=self.p_c,
+            film=film,
+            exact=self.exact,
+        )
+
+
+@dataclass(frozen=True)
+class _Inside:
+    """A film that goes on periodically, or keeps its value, beyond [0, length]."""
+
+    gap: Film
+    lengths: Sequence[float]
+    periodic: Sequence[bool]
+
+    def __call__(self, x: ArrayLike, y: ArrayLike | None = None, /) -> Array:
+        places = [np.asarray(a, dtype=float) for a in (x, 0.0 if y is None else y)]
+        for side, (length, periodic) in enumerate(zip(self.lengths, self.periodic, strict=True)):
+            places[side] = places[side] % length if periodic else np.clip(places[side], 0.0, length)
+        return self.gap(*places)
+
+    def breakpoints(self) -> tuple[float, ...]:
+        return self.gap.breakpoints()  # type: ignore[attr-defined]

@@ -1,0 +1,156 @@
+"""A measured film: a table of heights from a CSV or NPY file, checked when it is read, interpolated between its points."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from scipy.interpolate import CubicSpline, RectBivariateSpline, RegularGridInterpolator
+
+from ...base.parallel import Array
+from ...errors import InputError
+
+METHODS = {"linear": 2, "cubic": 4, "nearest": 1}  # and the points that each needs along a side
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Heights z (m) on the lines x (m) and y (m) of a rectangular lattice, z[j, i] at x[i], y[j]; y = [0] in 1D."""
+
+    x: Array
+    y: Array
+    z: Array
+    method: str
+
+    @cached_property
+    def _values(self) -> Callable[[Array, Array], Array]:
+        """z at points y and x."""
+        if self.y.size == 1:
+            if self.method == "cubic":
+                spline = CubicSpline(self.x, self.z[0])
+                return lambda y, x: spline(x)
+            line = RegularGridInterpolator((self.x,), self.z[0], method=self.method)
+            return lambda y, x: line(x[..., None])
+        if self.method == "cubic":
+            return RectBivariateSpline(self.y, self.x, self.z, kx=3, ky=3, s=0).ev
+        plane = RegularGridInterpolator((self.y, self.x), self.z, method=self.method)
+        return lambda y, x: plane(np.stack([y, x], axis=-1))
+
+    def __call__(self, x: Array, y: Array) -> Array:
+        """h (m) at x and y (m), which broadcast; beyond the profile its value at the edge."""
+        x, y = np.broadcast_arrays(np.clip(x, self.x[0], self.x[-1]), np.clip(y, self.y[0], self.y[-1]))
+        return self._values(y, x)
+
+
+class PiecewiseLinear(Profile):
+    """A profile in 1D whose kinks are its points: an exact solution can be had."""
+
+    def breakpoints(self) -> tuple[float, ...]:
+        return tuple(self.x)
+
+
+def read_profile(
+    path: Path, lengths: tuple[float, ...], method: str, height_unit: float, length_unit: float, uneven: bool = False
+) -> Profile:
+    """A profile over [0, L] or [0, L] x [0, Ly].
+
+    Parameters
+    ----------
+    path : .csv with rows x, h (1D, or 2D where h does not depend on y) or x, y, h in any order, or .npy with h at
+        equidistant points from side to side: (nx,) or (ny, nx). A .csv may have lines that begin with #, and one head line.
+    method : 'linear', 'cubic' or 'nearest'.
+    height_unit, length_unit : metres in the file's unit of h, and of x and y (.csv).
+    uneven : the x of a .csv may lie at uneven distances.
+
+    Raises
+    ------
+    InputError : an unreadable file, a missing row or value, a value that is no number, a profile that does not reach the sides.
+    """
+    try:
+        if path.suffix.lower() == ".npy":
+            x, y, z = _from_array(path, lengths)
+        elif path.suffix.lower() == ".csv":
+            x, y, z = _from_rows(path, length_unit, uneven)
+        else:
+            raise InputError(f"profile {path}: allowed are .csv and .npy")
+    except OSError as error:
+        raise InputError(f"profile {path}: {error.strerror or error}") from None
+    if not np.isfinite(z).all():
+        j, i = np.argwhere(~np.isfinite(z))[0]
+        raise InputError(f"profile {path}: h is {z[j, i]} at x = {x[i]:g}, y = {y[j]:g} m")
+    for name, line, length in zip("xy", (x, y), lengths, strict=False):
+        if line.size > 1 and not (line[0] <= 1e-6 * length and line[-1] >= (1 - 1e-6) * length):
+            raise InputError(f"profile {path}: {name} from {line[0]:g} to {line[-1]:g} m; 0 to {length:g} m is needed")
+        if 1 < line.size < METHODS[method]:
+            raise InputError(f"profile {path}: {line.size} points in {name}; {method} interpolation needs {METHODS[method]}")
+    kind = PiecewiseLinear if y.size == 1 and method == "linear" else Profile
+    return kind(x, y, z * height_unit, method)
+
+
+def _from_array(path: Path, lengths: tuple[float, ...]) -> tuple[Array, Array, Array]:
+    try:
+        z = np.load(path, allow_pickle=False)
+    except ValueError:
+        raise InputError(f"profile {path}: no array of numbers in NumPy's format") from None
+    if not (isinstance(z, np.ndarray) and z.ndim in (1, 2) and z.ndim <= len(lengths) and min(z.shape) > 1):
+        raise InputError(f"profile {path}: shape {getattr(z, 'shape', None)}; (nx,) or, in 2D, (ny, nx) is needed, 2 and more")
+    if z.dtype.kind not in "fiu":
+        raise InputError(f"profile {path}: entries of type {z.dtype}; numbers are needed")
+    z = np.atleast_2d(z.astype(float))
+    x = np.linspace(0.0, lengths[0], z.shape[1])
+    return x, np.linspace(0.0, lengths[1], z.shape[0]) if z.shape[0] > 1 else np.zeros(1), z
+
+
+def _from_rows(path: Path, unit: float, uneven: bool) -> tuple[Array, Array, Array]:
+    rows: list[list[float]] = []
+    columns = 0
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except UnicodeDecodeError:
+        raise InputError(f"profile {path}: not a text file") from None
+    last = max((k for k, line in enumerate(lines) if line.strip()), default=-1)
+    for number, line in enumerate(lines[: last + 1], start=1):
+        if line.lstrip().startswith("#"):
+            continue
+        words = [word.strip() for word in line.replace(";", ",").split(",")]
+        try:
+            row = [float(word) for word in words]
+        except ValueError:
+            if not rows and not columns and all(words):
+                columns = len(words)  # the head line
+                continue
+            raise InputError(f"profile {path}, line {number}: {line.strip()[:40]!r}: a row of numbers is missing") from None
+        columns = columns or len(row)
+        if len(row) != columns or columns not in (2, 3):
+            raise InputError(f"profile {path}, line {number}: {len(row)} values; x, h or x, y, h are needed in every row")
+        if not np.isfinite(row).all():
+            raise InputError(f"profile {path}, line {number}: {line.strip()[:40]!r}: a value is no finite number")
+        rows.append(row)
+    if len(rows) < 2:
+        raise InputError(f"profile {path}: {len(rows)} rows; 2 and more are needed")
+    table = np.array(rows)
+    x, at_x = np.unique(table[:, 0] * unit, return_inverse=True)
+    y, at_y = np.unique(table[:, 1] * unit, return_inverse=True) if columns == 3 else (np.zeros(1), np.zeros(len(rows), int))
+    z = np.full((y.size, x.size), np.nan)
+    z[at_y, at_x] = table[:, -1]
+    if len(rows) > z.size:
+        raise InputError(f"profile {path}: {len(rows)} rows for {z.size} points: some points are there twice")
+    if np.isnan(z).any():
+        j, i = np.argwhere(np.isnan(z))[0]
+        raise InputError(f"profile {path}: the row for x = {x[i] / unit:g}, y = {y[j] / unit:g} is missing")
+    for name, line in (("x", x), ("y", y)):
+        _check_even(path, name, line / unit, uneven)
+    return x, y, z
+
+
+def _check_even(path: Path, name: str, line: Array, uneven: bool) -> None:
+    """Almost all distances equal and some of them doubled or more: rows are missing."""
+    steps = np.diff(line)
+    if uneven or steps.size < 5:
+        return
+    in_steps = steps / np.median(steps)
+    gaps = np.flatnonzero((in_steps > 1.5) & (np.abs(in_steps - np.rint(in_steps)) < 0.02))
+    if gaps.size and np.mean(np.abs(in_steps - 1.0) < 0.01) > 0.7:
+        after = line[gaps[0]]
+        raise InputError(f"profile {path}: a row is missing after {name} = {after:g} (uneven = true if that is meant)")

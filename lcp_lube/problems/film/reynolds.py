@@ -1,0 +1,274 @@
+"""Box scheme of the steady Reynolds equation with cavitation: film -> coefficients of A p + B r = c."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from ...base.parallel import Array
+from ...errors import InputError
+from ..grid import Grid
+from .edges import face_film
+
+SCHEMES = ("nodal", "face", "upwind")
+Film = Callable[[Array, Array], Array]
+LARGE = 1e100  # coefficients whose squares still have a norm
+
+
+@dataclass(frozen=True)
+class BoxScheme:
+    """Coefficients on the owned points, each of shape (ny_local, nx_local); a row is a balance per unit width.
+
+    The flow balance of point i, with p in units of p_unit, is
+
+        sum over faces of k_face (p_i - p_neighbour) + b_C r_i + b_W r_west = c_i        [m2/s]
+
+    k_W, k_E = p_unit h^3/(6 mu dx);  k_S, k_N = p_unit h^3 dx/(6 mu dy2) (absent in 1D).
+    Dirichlet neighbours are in c; `k_*` keeps their conductance, for A's diagonal and the boundary fluxes.
+    """
+
+    k_W: Array
+    k_E: Array
+    k_S: Array
+    k_N: Array
+    b_C: Array
+    b_W: Array
+    c: Array
+    couette_W: Array  # U h at the west and east face of a cell without void: the flux balance that c holds
+    couette_E: Array
+    h: Array  # film at the points, m
+
+    def pressure_entries(self) -> list[tuple[int, int, Array]]:
+        """Row entries of A as (dj, di, value)."""
+        centre = self.k_W + self.k_E + self.k_S + self.k_N
+        entries = [(0, 0, centre), (0, -1, -self.k_W), (0, 1, -self.k_E)]
+        if self.k_S.any() or self.k_N.any():
+            entries += [(-1, 0, -self.k_S), (1, 0, -self.k_N)]
+        return entries
+
+    def void_entries(self) -> list[tuple[int, int, Array]]:
+        """Row entries of B as (dj, di, value)."""
+        return [(0, 0, self.b_C), (0, -1, self.b_W)]
+
+
+def box_scheme(
+    grid: Grid,
+    film: Film,
+    *,
+    mu: float,
+    U: float,
+    scheme: str,
+    p_sides: tuple[float, float, float, float],
+    p_unit: float,
+    mean_cubes: bool = False,
+    r_in: float = 0.0,
+) -> BoxScheme:
+    """Coefficients of the box scheme on the owned points; the grid's ends say what its sides are.
+
+    Parameters
+    ----------
+    film : h(x, y) in metres for arrays of coordinates in metres that broadcast.
+    mu, U : viscosity in Pa s, speed of the moving wall in m/s (U > 0: the flow goes to larger x).
+    scheme : form of the Couette flux. 'nodal' (paper, eq. 7): U (h_face - (h r)_upwind); 'face': U h_face (1 - r_upwind);
+        'upwind': U (h (1 - r))_upwind.
+    p_sides : Dirichlet pressures above the cavitation pressure at west, east, south, north in Pa (south, north: 2D only);
+        read where the grid's end is open.
+    p_unit : pressure unit in Pa; p in the equations is measured in it.
+    mean_cubes : take h^3 at a face as the mean of the nodal values (scene 5) instead of the film at the face.
+    r_in : void fraction that enters at an open west side.
+
+    Raises
+    ------
+    InputError : a film that is not positive, or data so large or small that a coefficient overflows or vanishes.
+    """
+    with np.errstate(all="ignore"):
+        box = _coefficients(grid, film, mu, U, scheme, p_sides, p_unit, mean_cubes, r_in)
+    reduce = grid.reduce
+    faces = [box.k_W, box.k_E] + ([box.k_S, box.k_N] if grid.dim == 2 else [])
+    walls = zip(sides(grid, ("closed", "mirror")), faces, strict=False)
+    conducting = [np.where(wall, np.inf, k) if wall.any() else k for wall, k in walls]
+    smallest = min(map(reduce.min, [box.h, *conducting]))
+    largest = max(map(reduce.max, [*faces, np.abs(box.b_C), np.abs(box.c)]))
+    if not (smallest > 1 / LARGE and largest < LARGE):
+        with np.errstate(all="ignore"):
+            check_film(grid, film)
+        raise InputError(
+            f"film {reduce.min(box.h):g} to {reduce.max(box.h):g} m, mu = {mu:g} Pa s, U = {U:g} m/s, p_unit = {p_unit:g} Pa: "
+            f"flow balance with coefficients {smallest:g} to {largest:g}, allowed are {1 / LARGE:g} to {LARGE:g} (SI units?)"
+        )
+    return box
+
+
+def check_film(grid: Grid, film: Film) -> None:
+    """Raise InputError with the place where the film is thinnest, unless it is positive on all nodes and faces. Collective."""
+    x_nodes, x_faces = grid.nodes_and_faces(0)
+    y_nodes, y_faces = grid.nodes_and_faces(1) if grid.dim == 2 else (np.zeros(1), np.zeros(1))
+    lowest = (np.inf, 0.0, 0.0)
+    for x, y in ((x_nodes, y_nodes), (x_faces, y_nodes), (x_nodes, y_faces)):
+        x, y = x[None, :], y[:, None]
+        h = np.nan_to_num(np.broadcast_to(film(x, y), (y.size, x.size)), nan=-np.inf, posinf=np.inf, neginf=-np.inf)
+        j, i = np.unravel_index(np.argmin(h), h.shape)
+        lowest = min(lowest, (float(h[j, i]), float(x[0, i]), float(y[j, 0])))
+    h_min, at_x, at_y = grid.comm.allreduce(lowest, MPI.MIN)
+    if not h_min > 0:
+        where = f"x = {at_x:g}" + (f", y = {at_y:g}" if grid.dim == 2 else "")
+        found = f"{h_min:g} m" if np.isfinite(h_min) else "no number"
+        raise InputError(f"film {found} at {where} m: it must be positive everywhere")
+
+
+def _coefficients(
+    grid: Grid,
+    film: Film,
+    mu: float,
+    U: float,
+    scheme: str,
+    p_sides: tuple[float, float, float, float],
+    p_unit: float,
+    mean_cubes: bool,
+    r_in: float,
+) -> BoxScheme:
+    dx, (ny, nx) = grid.spacing[0], grid.box
+    x_nodes, x_faces = grid.nodes_and_faces(0)
+    x, y = x_nodes[None, 1:-1], grid.y
+    h_x = np.broadcast_to(film(x_nodes[None, :], y), (ny, nx + 2))
+    h_face = np.broadcast_to(film(x_faces[None, :], y), (ny, nx + 1))
+    h = np.array(h_x[:, 1:-1])
+
+    def cubes(at_faces: Array, at_nodes: Array) -> Array:
+        """h^3 at the faces, which come first to last along axis 0."""
+        if not mean_cubes:
+            return at_faces**3
+        nodal = at_nodes**3
+        return 0.5 * (nodal[:-1] + nodal[1:])
+
+    k = p_unit / (6.0 * mu)
+    edges = (lambda axis: ()) if mean_cubes else getattr(film, "jumps", lambda axis: ())
+    x_jumps, y_jumps = edges("x"), edges("y")
+    if x_jumps or y_jumps:
+        across = grid.spacing[1] if grid.dim == 2 else 1.0
+        cubes_x, h_face = face_film(film, x_nodes, x_faces, y[:, 0], x_jumps, y_jumps, across)
+    else:
+        cubes_x = cubes(h_face.T, h_x.T).T
+    k_x = (k * cubes_x.T / dx).T
+    k_W, k_E = k_x[:, :-1], k_x[:, 1:]  # a face's conductance is stored once
+    if grid.dim == 2:
+        dy = grid.spacing[1]
+        y_nodes, y_faces = grid.nodes_and_faces(1)
+        h_y = np.broadcast_to(film(x, y_nodes[:, None]), (ny + 2, nx))
+        at_y_faces = np.broadcast_to(film(x, y_faces[:, None]), (ny + 1, nx))
+        if x_jumps or y_jumps:
+            cubes_y = face_film(lambda t, s: film(s, t), y_nodes, y_faces, x[0], y_jumps, x_jumps, dx)[0].T
+        else:
+            cubes_y = cubes(at_y_faces, h_y)
+        k_y = k * cubes_y * dx / dy**2
+        k_S, k_N = k_y[:-1], k_y[1:]
+    else:
+        k_S = k_N = np.zeros(grid.box)
+
+    first = (np.arange(grid.x_start, grid.x_end) == 0)[None, :]
+    h_W = h_x[:, :-2]
+    if scheme == "upwind":
+        couette_W, couette_E = U * h_W, U * h
+    else:
+        couette_W, couette_E = U * h_face[:, :-1], U * h_face[:, 1:]
+    if scheme == "face":
+        b_C, b_W = -couette_E, couette_W
+    else:
+        b_C, b_W = -U * h, U * h_W
+    open_west, *_ = sides(grid)
+    if r_in:
+        couette_W = couette_W - np.where(open_west, b_W * r_in, 0.0)
+    if not grid.periodic[0]:
+        b_W = np.where(first, 0.0, b_W)  # what enters is in c
+    if any(end != "open" for pair in grid.ends for end in pair):
+        # Column sums stay >= 0, those of A and B are 0 in the cells away from open sides. b_C stays at a closed east side: in
+        # every solution with flow r is 0 there, as what arrives must be pressed back.
+        west, east, south, north = sides(grid, ("closed", "mirror"))
+        k_W, k_E = np.where(west, 0.0, k_W), np.where(east, 0.0, k_E)
+        k_S, k_N = np.where(south, 0.0, k_S), np.where(north, 0.0, k_N)
+        couette_W, couette_E = np.where(west, 0.0, couette_W), np.where(east, 0.0, couette_E)
+        half = np.where(sides(grid, ("mirror",))[3], 0.5, 1.0)  # the cells of the line on the mirror
+        k_W, k_E, b_C, b_W, couette_W, couette_E = (half * a for a in (k_W, k_E, b_C, b_W, couette_W, couette_E))
+
+    c = couette_W - couette_E
+    for conductance, points, p_side in zip((k_W, k_E, k_S, k_N), side_points(grid), p_sides, strict=True):
+        c[points] += conductance[points] * (p_side / p_unit)
+    return BoxScheme(k_W, k_E, k_S, k_N, b_C, b_W, c, couette_W, couette_E, h)
+
+
+def sides(grid: Grid, kinds: Sequence[str] = ("open",)) -> tuple[NDArray[np.bool_], ...]:
+    """Masks (they broadcast to `grid.box`) of the owned points at the west, east, south and north end, if of these kinds."""
+    i = np.arange(grid.x_start, grid.x_end)[None, :]
+    j = np.arange(grid.y_start, grid.y_end)[:, None]
+    masks = [i == 0, i == grid.shape[0] - 1]
+    masks += [j == 0, j == grid.shape[1] - 1] if grid.dim == 2 else [np.zeros((1, 1), dtype=bool)] * 2
+    found = [end in kinds for pair in grid.ends for end in pair] + [False, False]
+    return tuple(mask & is_found for mask, is_found in zip(masks, found, strict=False))
+
+
+def side_points(grid: Grid) -> tuple[tuple[slice | NDArray, slice | NDArray], ...]:
+    """The owned points at the open ends of `sides` as indices into arrays of `grid.box`."""
+    west, east, south, north = (np.flatnonzero(mask) for mask in sides(grid))
+    every = slice(None)
+    return (every, west), (every, east), (south, every), (north, every)
+
+
+def coo(grid: Grid, entries: Sequence[tuple[int, int, NDArray]]) -> Iterator[tuple[NDArray, NDArray, NDArray]]:
+    """Global rows, columns and values of stencil entries; neighbours outside the domain are left out."""
+    number = grid.neighbours()
+    ny, nx = grid.box
+    rows = number[1:-1, 1:-1]
+    for dj, di, values in entries:
+        columns = number[1 + dj : 1 + dj + ny, 1 + di : 1 + di + nx]
+        inside = columns >= 0
+        yield rows[inside], columns[inside], np.broadcast_to(values, grid.box)[inside]
+
+
+def csr(rows: NDArray, columns: NDArray, first: int, count: int) -> tuple[NDArray, NDArray, NDArray]:
+    """CSR structure of COO entries in `count` owned rows from `first` on.
+
+    Returns row pointers, columns (sorted in each row), and the order that takes COO values to CSR values.
+    """
+    order = np.lexsort((columns, rows))
+    pointers = np.zeros(count + 1, dtype=PETSc.IntType)
+    np.cumsum(np.bincount(rows - first, minlength=count), out=pointers[1:])
+    return pointers, columns[order].astype(PETSc.IntType), order
+
+
+def assemble(grid: Grid, entries: list[tuple[int, int, Array]]) -> PETSc.Mat:
+    """A distributed n-by-n AIJ matrix from stencil entries."""
+    number = grid.neighbours().astype(PETSc.IntType)
+    ny, nx = grid.box
+    # Columns ascend with (dj, di) inside a rank; only at its edges do they have to be sorted.
+    ordered = sorted(entries, key=lambda entry: entry[:2])
+    columns = np.stack([number[1 + dj : 1 + dj + ny, 1 + di : 1 + di + nx] for dj, di, _ in ordered], axis=-1)
+    inside = columns >= 0
+    values = np.stack([np.broadcast_to(values, grid.box) for *_, values in ordered], axis=-1)[inside]
+    pointers = np.zeros(ny * nx + 1, dtype=PETSc.IntType)
+    np.cumsum(inside.sum(axis=-1).ravel(), out=pointers[1:])
+    rows = scipy.sparse.csr_matrix((values, columns[inside], pointers), shape=(ny * nx, grid.size))
+    rows.sort_indices()
+    size = (grid.local_size, grid.size)
+    return PETSc.Mat().createAIJWithArrays((size, size), (rows.indptr, rows.indices, rows.data), comm=grid.dm.comm)
+
+
+def term_squares(
+    p: Array, r: Array, k_W: Array, k_E: Array, k_S: Array, k_N: Array, b_C: Array, b_W: Array, c: Array
+) -> tuple[float, float, float]:
+    """Sums of the squares of A p, B r and A p + B r - c over this rank's points, for `compiled`; p and r have a frame."""
+    ny, nx = c.shape
+    pressure, void, balance = 0.0, 0.0, 0.0
+    for j in range(ny):
+        for i in range(nx):
+            here = p[j + 1, i + 1]
+            x = k_W[j, i] * (here - p[j + 1, i]) + k_E[j, i] * (here - p[j + 1, i + 2])
+            y = k_S[j, i] * (here - p[j, i + 1]) + k_N[j, i] * (here - p[j + 2, i + 1])
+            a, b = x + y, b_C[j, i] * r[j + 1, i + 1] + b_W[j, i] * r[j + 1, i]
+            pressure += a * a
+            void += b * b
+            balance += (a + b - c[j, i]) ** 2
+    return pressure, void, balance

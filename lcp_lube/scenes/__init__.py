@@ -1,0 +1,1 @@
+"""What is asked: scene files and the models that validate them."""

@@ -1,0 +1,201 @@
+"""Bearings of any kind: a film made of named shapes, a fluid, and a condition for each side."""
+
+import math
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from petsc4py import PETSc
+from pydantic import Field, field_validator, model_validator
+
+from ..drivers.balance import BalanceTable
+from ..errors import InputError
+from ..problems.film.exact import ExactSolution, exact_solution
+from ..problems.film.fluid import Law
+from ..problems.film.lubrication import LubricationProblem
+from ..problems.film.model import NAMES, OPPOSITE, Model, Side
+from ..problems.film.shapes import Block, Sum
+from .film import Extent, FilmPart
+from .scene import Count, Finite, Positive, Scene
+from .units import Measured, metres
+
+SAMPLES = 65  # points a side of the film from which the pressure unit is taken: the same on every grid
+
+
+class Fluid(Measured):
+    """The lubricant; pressures are absolute, as everywhere in a bearing's file."""
+
+    mu: Positive = Field(..., description="viscosity, Pa s")
+    p_c: Finite = Field(0.0, description="cavitation pressure, Pa")
+    barus: Annotated[Finite, Field(ge=0, lt=1e-3)] = Field(0.0, description="viscosity is mu exp(barus (p - p_c)), 1/Pa")
+    density: Literal["constant", "dowson-higginson"] = Field("constant", description="how the density depends on the pressure")
+    p_supply: Finite | None = Field(None, description="pressure of the sides that name none, Pa; default p_c")
+
+
+class SideTable(Measured):
+    """One side of the film."""
+
+    kind: Literal["pressure", "symmetry", "closed", "periodic"] = Field(
+        "pressure", description="pressure given; symmetry or closed: nothing flows through; periodic, with the opposite side"
+    )
+    p: Finite | None = Field(None, description="pressure, Pa; default fluid.p_supply")
+    r: Annotated[Finite, Field(ge=0, lt=1)] = Field(0.0, description="void fraction that enters (west, at p = p_c)")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _short(cls, data: Any) -> Any:
+        """A number is a pressure, a word a kind."""
+        if isinstance(data, (int, float)) and not isinstance(data, bool):
+            return {"p": data}
+        return {"kind": data} if isinstance(data, str) else data
+
+    @model_validator(mode="after")
+    def _meant(self) -> "SideTable":
+        if self.kind != "pressure":
+            for key in ("p", "r"):
+                if getattr(self, key):
+                    raise ValueError(f"{key} = {getattr(self, key):g}: the side is {self.kind}")
+        return self
+
+
+class SidesTable(Measured):
+    """West (x = 0, where the flow enters), east (x = L), south (y = 0) and north (y = width)."""
+
+    west: SideTable = Field(SideTable(), description="x = 0: a pressure in Pa, 'symmetry', 'closed', 'periodic', or {p, r}")
+    east: SideTable = Field(SideTable(), description="x = L")
+    south: SideTable = Field(SideTable(), description="y = 0 (2D)")
+    north: SideTable = Field(SideTable(), description="y = width (2D)")
+
+
+class BearingScene(Measured, Scene):
+    """A bearing under a wall that moves in x: its film is the sum of the [[film]] shapes. SI units, pressures absolute."""
+
+    family: Literal["bearing"] = "bearing"
+    dimension: Literal[1, 2] = Field(1, description="1: a film h(x), per metre of width; 2: h(x, y)")
+    L: Positive = metres(..., "length in the direction of motion")
+    width: Positive | None = metres(None, "width in y; default L (2D)")
+    U: Positive = Field(..., description="speed of the moving wall, towards larger x, m/s")
+    p_in: Finite | None = Field(None, description="pressure of the west side, Pa: short for sides.west.p")
+    p_out: Finite | None = Field(None, description="pressure of the east side, Pa: short for sides.east.p")
+    fluid: Fluid = Field(..., description="the lubricant")
+    film: list[FilmPart] = Field(..., min_length=1, description="shapes, which are added up")
+    h_floor: Positive | None = metres(None, "smallest film: the sum is cut there; default no cut")
+    sides: SidesTable = Field(SidesTable(), description="condition at each side")
+    scheme: Literal["nodal", "face", "upwind"] = Field("face", description="form of the Couette flux")
+    mean_cubes: bool = Field(False, description="h^3 at a face as the mean of the nodal values")
+    p_unit: Positive | None = Field(None, description="pressure unit of the equations, Pa; default from mu U L/h^2")
+    h_offset: Finite = metres(0.0, "added to the film everywhere: its level")
+    balance: BalanceTable | None = Field(None, description="load to carry, and what is found for it")
+    n: Count = Field(100, description="points a side")
+    nx: Count | None = Field(None, description="points in x; default n")
+    ny: Count | None = Field(None, description="points in y; default n (2D)")
+
+    @field_validator("film", mode="before")
+    @classmethod
+    def _one_shape(cls, film: Any) -> Any:
+        return [film] if isinstance(film, dict) else film
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "BearingScene":
+        if self.dimension == 1:
+            for key in ("ny", "width"):
+                if getattr(self, key) is not None:
+                    raise ValueError(f"{key} = {getattr(self, key)}: the scene is one-dimensional (dimension = 2 is not set)")
+            for name in NAMES[2:]:
+                if name in self.sides.model_fields_set:
+                    raise ValueError(f"sides.{name}: the scene is one-dimensional (dimension = 2 is not set)")
+        for name, key in (("west", "p_in"), ("east", "p_out")):
+            if getattr(self, key) is not None and getattr(self.sides, name).model_fields_set - {"r"}:
+                raise ValueError(f"{key} and sides.{name} are both given: one of them is allowed")
+        for name in NAMES[: 2 * self.dimension]:
+            if (p := self._pressure(name)) < self.fluid.p_c:
+                raise ValueError(
+                    f"sides.{name}: p = {p:g}: at least the cavitation pressure p_c = {self.fluid.p_c:g} is needed"
+                )
+            if getattr(self.sides, name).kind == "periodic" and getattr(self.sides, OPPOSITE[name]).kind != "periodic":
+                raise ValueError(f"sides.{name} is periodic, sides.{OPPOSITE[name]} is not: both of them or none")
+        return self
+
+    def _pressure(self, name: str) -> float:
+        """Absolute pressure of a side, Pa."""
+        given = {"west": self.p_in, "east": self.p_out}.get(name)
+        candidates = (given, getattr(self.sides, name).p, self.fluid.p_supply, self.fluid.p_c)
+        return next(p for p in candidates if p is not None)
+
+    def _sides(self) -> tuple[Side, Side, Side, Side]:
+        sides = []
+        for name in NAMES:
+            table: SideTable = getattr(self.sides, name)
+            if table.kind == "pressure":
+                sides.append(Side("open", self._pressure(name) - self.fluid.p_c, table.r))
+            else:
+                sides.append(Side("periodic" if table.kind == "periodic" else "closed"))
+        return tuple(sides)  # type: ignore[return-value]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        nx = self.nx or self.n
+        return (nx,) if self.dimension == 1 else (nx, self.ny or self.n)
+
+    @property
+    def side_lengths(self) -> tuple[float, ...]:
+        """L, and the width in 2D, m."""
+        return (self.L,) if self.dimension == 1 else (self.L, self.width or self.L)
+
+    @property
+    def gap(self) -> Sum:
+        """The film h(x, y) in metres."""
+        extent = Extent(self.side_lengths, self._folder or Path())
+        level = [Block(self.h_offset, (-math.inf, math.inf), (-math.inf, math.inf))] if self.h_offset else []
+        return Sum([*(table.part(extent) for table in self.film), *level], self.h_floor)
+
+    @property
+    def model(self) -> Model:
+        """What is discretised."""
+        gap = self.gap
+        return Model(
+            lengths=self.side_lengths,
+            sides=self._sides(),
+            gap=gap,
+            mu=self.fluid.mu,
+            U=self.U,
+            p_c=self.fluid.p_c,
+            p_unit=self.p_unit or self._pressure_unit(gap),
+            scheme=self.scheme,
+            mean_cubes=self.mean_cubes,
+            exact=self.exact,
+            law=self._law,
+        )
+
+    @property
+    def _law(self) -> Law | None:
+        law = Law(self.fluid.barus, self.fluid.density != "constant")
+        return None if law == Law() else law
+
+    def _pressure_unit(self, gap: Sum) -> float:
+        """The power of ten next to mu U L/h^2 with the thinnest film: p and r are then of like size."""
+        places = [(np.arange(SAMPLES) + 0.5) / SAMPLES * length for length in self.side_lengths]
+        h = gap(places[0][None, :], places[1][:, None] if self.dimension == 2 else None)
+        positive = h[np.isfinite(h) & (h > 0)]
+        if not positive.size:
+            return 1e6  # the discretisation says where the film is not positive
+        unit = self.fluid.mu * self.U * self.L / float(positive.min()) ** 2
+        return 10.0 ** round(math.log10(unit)) if 1e-90 < unit < 1e90 else 1e6
+
+    def exact(self) -> ExactSolution | None:
+        gap, (west, east, *_) = self.gap, self._sides()
+        if self.dimension == 2 or {west.kind, east.kind} != {"open"} or west.r or not gap.smooth_between or self._law:
+            return None
+        return exact_solution(gap, self.L, self.fluid.mu, self.U, west.p, east.p)
+
+    def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
+        """The discrete problem on this scene's grid. Collective.
+
+        Raises
+        ------
+        InputError : more ranks than the grid can be dealt to, a film that is not positive, a profile that cannot be read.
+        """
+        try:
+            return self.model.build(self.shape, comm)
+        except InputError as error:
+            raise InputError(f"{self.name}: {error}") from None

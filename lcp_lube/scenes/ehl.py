@@ -1,0 +1,51 @@
+"""Scenes of elastohydrodynamic contact."""
+
+from typing import Annotated, Literal
+
+from petsc4py import PETSc
+from pydantic import Field, model_validator
+
+from ..problems.ehl import EhlProblem
+from ..problems.grid import Grid
+from .scene import Finite, NotNegative, Positive, Scene
+
+
+class EhlLineScene(Scene):
+    """Line contact of two elastic rollers, dimensionless; defaults are Kostreva's data. The Jacobian is dense.
+
+    n counts the unknowns: n - 1 pressures at start + i dx, dx = (end - start)/n, and k.
+    """
+
+    alpha: NotNegative = Field(2.832, description="how fast viscosity grows with pressure")
+    lam: Positive = Field(6.057, alias="lambda", description="speed parameter")
+    x: tuple[Finite, Finite] = Field((-3.0, 2.0), description="the interval; p = 0 at its ends")
+    k0: Finite = Field(1.6, description="start of k; p starts from the positive part of 1 - x^2/4")
+    rows: Literal["flow", "divergence"] = Field(
+        "flow", description="flow equations as q_i - q_{i-1}, or that over dx: what ||F|| measures"
+    )
+    n: Annotated[int, Field(strict=True, ge=2, le=46_340)] = Field(200, description="unknowns: n - 1 pressures and k")
+
+    @model_validator(mode="after")
+    def _interval(self) -> "EhlLineScene":
+        if not self.x[0] < self.x[1]:
+            raise ValueError(f"x = {list(self.x)}: start < end is needed")
+        return self
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return (self.n,)
+
+    def with_shape(self, shape: tuple[int, ...]) -> "EhlLineScene":
+        return self.model_copy(update={"n": shape[0]})
+
+    def build(self, comm: PETSc.Comm | None = None) -> EhlProblem:
+        """The discrete problem. Collective.
+
+        Raises
+        ------
+        InputError : more ranks than unknowns.
+        """
+        dx = (self.x[1] - self.x[0]) / self.n
+        # The grid's last point is the end of the interval, where p = 0 and the place is k's.
+        grid = Grid((self.n,), ((self.n + 1) * dx,), comm, (self.x[0], 0.0))
+        return EhlProblem(grid, self.alpha, self.lam, self.k0, 1.0 if self.rows == "flow" else 1.0 / dx)

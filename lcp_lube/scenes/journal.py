@@ -1,0 +1,108 @@
+"""Journal bearings, unwrapped from one axial groove at the widest gap to the same groove again."""
+
+import math
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from ..base.parallel import Array
+from ..problems.film.exact import ExactSolution, exact_solution
+from ..problems.film.flows import side_flows
+from ..problems.film.gaps import JournalGap, Raised
+from ..problems.film.lubrication import LubricationProblem
+from ..problems.film.model import Side
+from .scene import LubricationScene, Positive
+
+
+class JournalScene(LubricationScene):
+    """A journal of diameter D turning in a bush of width B: x = D phi/2 from the groove at h_max, y along the axis.
+
+    h = c (1 + eccentricity cos phi), c = psi D/2; the groove keeps p = p_a = p_b and no void, the ends p = p_side. L, width, U
+    and p_unit follow from D, width_over_diameter, omega and psi; dimension 1 is the infinitely long bearing. Without a groove
+    (round = "periodic") the film goes on at phi = 2 pi, and the ends, at p_side > 0, feed it.
+    """
+
+    derived: ClassVar[tuple[str, ...]] = ("L", "U", "width", "p_unit")
+    dimension: Literal[1, 2] = 2
+    eccentricity: Annotated[float, Field(ge=0, lt=1, description="relative eccentricity")] = 0.5
+    width_over_diameter: Positive = Field(1.0, description="B/D (2D)")
+    round: Literal["groove", "periodic"] = Field("groove", description="at phi = 0: an axial groove, or nothing (2D)")
+    D: Positive = Field(0.1, description="diameter, m")
+    psi: Annotated[float, Field(gt=0, lt=1, description="relative clearance c/(D/2)")] = 1e-3
+    omega: Positive = Field(100.0, description="angular velocity, rad/s")
+    mu: Positive = 0.02
+    L: Positive = Field(1.0, description="follows from D")
+    U: Positive = Field(1.0, description="follows from D and omega")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _derived(cls, data: Any) -> Any:
+        for key in cls.derived:
+            if key in data:
+                raise ValueError(f"{key} = {data[key]}: follows from D, width_over_diameter, omega, psi and mu in this scene")
+        fields = cls.model_fields
+        D, omega, mu, psi = (data.get(key, fields[key].default) for key in ("D", "omega", "mu", "psi"))
+        ratio = data.get("width_over_diameter", fields["width_over_diameter"].default)
+        try:
+            derived = {"L": math.pi * D, "U": 0.5 * D * omega, "p_unit": mu * omega / psi**2}
+            if data.get("dimension", 2) == 2:
+                derived["width"] = ratio * D
+        except (TypeError, ZeroDivisionError, OverflowError):
+            return data  # the fields' own checks say what is wrong
+        return {**data, **{key: value for key, value in derived.items() if value > 0 and math.isfinite(value)}}
+
+    @model_validator(mode="after")
+    def _fed(self) -> "JournalScene":
+        if self.round == "periodic":
+            if self.dimension == 1 or not self.p_side > 0:
+                found = "dimension = 1" if self.dimension == 1 else f"p_side = {self.p_side:g}"
+                raise ValueError(f"{found}: without a groove (round = periodic) the ends feed the film: 2D, p_side > 0")
+            if self.p_a or self.p_b:
+                raise ValueError(f"p_a = {self.p_a:g}, p_b = {self.p_b:g}: there is no groove (round = periodic)")
+        return self
+
+    @property
+    def sides(self) -> tuple[Side, Side, Side, Side]:
+        if self.round == "groove":
+            return super().sides
+        return Side("periodic"), Side("periodic"), Side(p=self.p_side), Side(p=self.p_side)
+
+    @property
+    def gap(self) -> JournalGap:
+        return JournalGap(0.5 * self.psi * self.D, self.eccentricity, self.L)
+
+    def exact(self) -> ExactSolution | None:
+        if self.dimension == 2:
+            return None
+        return exact_solution(Raised(self.gap, self.h_offset), self.L, self.mu, self.U, self.p_a, self.p_b)
+
+    def build(self, comm: Any = None) -> LubricationProblem:
+        problem = super().build(comm)
+        problem.extras = self._bearing_numbers
+        return problem
+
+    def _bearing_numbers(self, problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any]:
+        """Sommerfeld number W psi^2/(B D mu omega), attitude angle, load, side leakage as Q/((D/2)^3 psi omega). Collective.
+
+        bearing_load is in N (1D: N/m), load_vector its parts towards the narrowest gap and across, in the sense of rotation.
+        """
+        grid = problem.grid
+        phi = 2.0 * np.pi * np.broadcast_to(grid.x, grid.box).ravel() / self.L
+        width = self.width if grid.dim == 2 and self.width else 1.0
+        groove = 0.5 * (self.p_a + self.p_b) * (grid.shape[1] if grid.dim == 2 else 1)
+        # Towards the narrowest gap, and across: the film's force on the journal, trapezoidal along x.
+        towards = grid.cell * (-problem.reduce.dot(p, np.cos(phi)) * problem.p_unit - groove)
+        across = grid.cell * problem.reduce.dot(p, np.sin(phi)) * problem.p_unit
+        load = math.hypot(towards, across)
+        numbers: dict[str, Any] = {
+            "sommerfeld": load * self.psi**2 / (width * self.D * self.mu * self.omega),
+            "attitude_deg": math.degrees(math.atan2(across, towards)),
+            "bearing_load": load,
+            "load_vector": [towards, across],
+        }
+        if grid.dim == 2:
+            flow = side_flows(problem, p, r)
+            leakage = flow["south"] + flow["north"]
+            numbers["side_leakage_number"] = leakage / ((0.5 * self.D) ** 3 * self.psi * self.omega)
+        return numbers

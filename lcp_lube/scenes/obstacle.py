@@ -1,0 +1,73 @@
+"""Scenes of obstacle problems: -Lap v = lambda e^v on a rectangle, between two obstacles given by formulas."""
+
+from typing import Annotated
+
+from petsc4py import PETSc
+from pydantic import Field, PrivateAttr, field_validator, model_validator
+
+from ..problems.grid import Grid
+from ..problems.obstacle import ObstacleProblem
+from .formula import Formula, FormulaText
+from .scene import Scene
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Surface = Annotated[float | str, FormulaText]
+
+
+class ObstacleScene(Scene):
+    """-Lap v = lambda e^v where v touches no obstacle, v_lower <= v <= v_upper; defaults are the paper's data.
+
+    Surfaces are numbers or formulas in x and y; inf and -inf stand for no obstacle.
+    """
+
+    lam: Finite = Field(6.0, alias="lambda", description="strength of the source")
+    v_lower: Surface = Field(0.0, description="lower obstacle, a number or a formula in x and y")
+    v_upper: Surface = Field(4.0, description="upper obstacle, a number or a formula in x and y")
+    v0: Surface | None = Field(
+        None, description="start; default 0.01, or v_upper where lambda lies beyond the turning point 6.808"
+    )
+    boundary: Surface = Field(0.0, description="v on the boundary")
+    x: tuple[Finite, Finite] = Field((0.0, 1.0), description="the rectangle's sides")
+    y: tuple[Finite, Finite] = Field((0.0, 1.0), description="the rectangle's sides")
+    n: int = Field(64, description="interior points a side")
+    nx: int | None = Field(None, description="interior points in x; default n")
+    ny: int | None = Field(None, description="interior points in y; default n")
+    _coarse: bool = PrivateAttr(False)
+
+    @field_validator("n", "nx", "ny")
+    @classmethod
+    def _interior(cls, n: int | None) -> int | None:
+        if n is not None and n < 1:
+            raise ValueError("leaves no interior point; allowed are 1 and more")
+        return n
+
+    @model_validator(mode="after")
+    def _rectangle(self) -> "ObstacleScene":
+        for name in ("x", "y"):
+            start, end = getattr(self, name)
+            if not start < end:
+                raise ValueError(f"{name} = {[start, end]}: start < end is needed")
+        return self
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return self.nx or self.n, self.ny or self.n
+
+    def with_shape(self, shape: tuple[int, ...]) -> "ObstacleScene":
+        """The same scene on a grid that serves this one."""
+        scene = self.model_copy(update={"nx": shape[0], "ny": shape[1]})
+        scene._coarse = True
+        return scene
+
+    def build(self, comm: PETSc.Comm | None = None) -> ObstacleProblem:
+        """The discrete problem on this scene's grid. Collective.
+
+        Raises
+        ------
+        InputError : obstacles that cross, a formula without a value, more ranks than the grid can be dealt to.
+        """
+        lengths = (self.x[1] - self.x[0], self.y[1] - self.y[0])
+        grid = Grid(self.shape, lengths, comm, (self.x[0], self.y[0]))
+        v0 = None if self.v0 is None else Formula(self.v0)
+        surfaces = (Formula(self.v_lower), Formula(self.v_upper), v0, Formula(self.boundary))
+        return ObstacleProblem(grid, self.lam, *surfaces, coarse=self._coarse)

@@ -1,0 +1,239 @@
+"""Scenes: a TOML file with the data of one bearing, validated, from which a Problem is built."""
+
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from petsc4py import PETSc
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError, model_validator
+
+from ..drivers.balance import BalanceTable
+from ..errors import InputError, nearest
+from ..problems.film.exact import ExactSolution, exact_solution
+from ..problems.film.gaps import Raised, Wave
+from ..problems.film.lubrication import LubricationProblem
+from ..problems.film.model import Model, Side
+from ..problems.film.reynolds import Film
+from ..problems.solution import Problem
+from ..registry import FAMILIES, SCENE_DIR, scene_names
+from .changes import changed
+from .faults import first_fault, known_keys
+
+# Strict: neither true nor "1e-5" is a number.
+Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Positive = Annotated[Finite, Field(gt=0)]
+NotNegative = Annotated[Finite, Field(ge=0)]
+Count = Annotated[int, Field(strict=True, ge=1, le=2**31 - 2)]
+
+
+class Scene(BaseModel):
+    """What every scene has; a family (registry.FAMILIES) adds its data and builds its problem."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    family: str = "slider"
+    name: str = ""
+    scheme: str | None = None
+    _folder: Path | None = PrivateAttr(None)  # of the scene's file: other files' names are relative to it
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Numbers of interior points, (nx,) or (nx, ny)."""
+        raise NotImplementedError
+
+    def with_shape(self, shape: tuple[int, ...]) -> "Scene":
+        """The same scene on another grid."""
+        return self.model_copy(update=dict(zip(("nx", "ny"), shape, strict=False)))
+
+    def build(self, comm: PETSc.Comm | None = None) -> Problem:
+        """The discrete problem on this scene's grid. Collective."""
+        raise NotImplementedError
+
+
+class LubricationScene(Scene):
+    """A film over [0, L] or [0, L] x [0, width], in SI units; a family adds its film, `gap`.
+
+    Pressures are above the cavitation pressure p_c, which is added to what is reported.
+    """
+
+    dimension: Literal[1, 2] = 1
+    L: Positive = Field(0.1, description="length in the direction of motion, m")
+    width: Positive | None = Field(None, description="width Ly, m; default L (2D)")
+    mu: Positive = Field(0.015, description="viscosity, Pa s")
+    U: Positive = Field(5.0, description="speed of the moving wall, m/s")
+    p_a: NotNegative = Field(0.0, description="pressure at x = 0, Pa above p_c")
+    p_b: NotNegative = Field(0.0, description="pressure at x = L, Pa above p_c")
+    p_side: NotNegative = Field(0.0, description="pressure at y = 0 and y = width, Pa above p_c (2D)")
+    p_c: Finite = Field(0.0, description="cavitation pressure, Pa")
+    scheme: Literal["nodal", "face", "upwind"] = Field("face", description="form of the Couette flux")
+    mean_cubes: bool = Field(False, description="h^3 at a face as the mean of the nodal values")
+    p_unit: Positive = Field(1e6, description="pressure unit of the equations, Pa")
+    h_offset: Finite = Field(0.0, description="added to the film everywhere, m: its level")
+    balance: BalanceTable | None = Field(None, description="load to carry, and what is found for it")
+    n: Count = Field(100, description="interior points a side")
+    nx: Count | None = Field(None, description="interior points in x; default n")
+    ny: Count | None = Field(None, description="interior points in y; default n (2D)")
+
+    @model_validator(mode="after")
+    def _one_dimensional(self) -> "LubricationScene":
+        for key in ("ny", "width", "p_side"):
+            if self.dimension == 1 and getattr(self, key):
+                raise ValueError(f"{key} = {getattr(self, key)}: the scene is one-dimensional")
+        return self
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        nx = self.nx or self.n
+        return (nx,) if self.dimension == 1 else (nx, self.ny or self.n)
+
+    @property
+    def gap(self) -> Film:
+        """The film h(x, y) in metres."""
+        raise NotImplementedError
+
+    def exact(self) -> ExactSolution | None:
+        """The exact solution; None where none is known."""
+        return None
+
+    @property
+    def sides(self) -> tuple[Side, Side, Side, Side]:
+        """West, east, south and north: a pressure each, unless a family says otherwise."""
+        west, east, ends = (Side(p=p) for p in (self.p_a, self.p_b, self.p_side))
+        return west, east, ends, ends
+
+    @property
+    def model(self) -> Model:
+        """What is discretised."""
+        return Model(
+            lengths=(self.L,) if self.dimension == 1 else (self.L, self.width or self.L),
+            sides=self.sides,
+            gap=Raised(self.gap, self.h_offset) if self.h_offset else self.gap,  # type: ignore[arg-type]
+            mu=self.mu,
+            U=self.U,
+            p_c=self.p_c,
+            p_unit=self.p_unit,
+            scheme=self.scheme,
+            mean_cubes=self.mean_cubes,
+            exact=self.exact,
+        )
+
+    def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
+        """The discrete problem on this scene's grid. Collective.
+
+        Raises
+        ------
+        InputError : more ranks than the grid can be dealt to.
+        """
+        return self.model.build(self.shape, comm)
+
+
+class SliderScene(LubricationScene):
+    """A slider with one wave of the film; defaults are the published problems' data."""
+
+    film: Literal["sinusoid", "parabola"] = "sinusoid"
+    form: Literal["convergent-divergent", "divergent-convergent"] = "convergent-divergent"
+    wave: tuple[NotNegative, NotNegative] = Field((0.0, 1.0), description="where the wave starts and ends, in parts of L")
+    h_min: Positive = Field(15e-6, description="smallest film, m")
+    h_max: Positive = Field(25e-6, description="largest film, m")
+    scheme: Literal["nodal", "face", "upwind"] = Field("nodal", description="form of the Couette flux")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "SliderScene":
+        if self.h_max < self.h_min:
+            raise ValueError(f"h_max = {self.h_max:g}: at least h_min = {self.h_min:g} is needed")
+        if not self.wave[0] < self.wave[1] <= 1:
+            raise ValueError(f"wave = {list(self.wave)}: 0 <= start < end <= 1 is needed")
+        return self
+
+    @property
+    def gap(self) -> Wave:
+        start, end = (self.L * part for part in self.wave)
+        return Wave(self.film, self.form, self.h_min, self.h_max, start, end - start)
+
+    def exact(self) -> ExactSolution | None:
+        if self.dimension == 2:
+            return None
+        return exact_solution(Raised(self.gap, self.h_offset), self.L, self.mu, self.U, self.p_a, self.p_b)
+
+
+def scene_line(name: str) -> str:
+    """First line of a built-in scene: what it is."""
+    return (SCENE_DIR / f"{name}.toml").read_text().partition("\n")[0].lstrip("# ")
+
+
+def load_scene(source: str | Path, changes: dict[str, Any] | None = None) -> Scene:
+    """A scene from a built-in name or a .toml file, with some of its values changed.
+
+    Raises
+    ------
+    InputError : no such scene, an unreadable file, an unknown key, a value of the wrong type or out of range; one line
+        that names the file, the key, what was found and what is allowed.
+    """
+    changes = changes or {}
+    data, path, name = read_scene(source)
+    family = changes.get("family", data.get("family", "slider"))
+    model = family_of(source, family)
+    try:
+        scene: Scene = model(**{"name": name, **changed(data, changes, {name, family}, set(known_keys(model)))})
+    except ValidationError as error:
+        raise InputError(f"{source}: {first_fault(error, model)}") from None
+    scene._folder = path.parent
+    return scene
+
+
+def read_scene(source: str | Path) -> tuple[dict[str, Any], Path, str]:
+    """What the file of a scene says, the file, and the scene's name.
+
+    Raises
+    ------
+    InputError : no such scene, an unreadable file.
+    """
+    source = str(source)
+    if source.endswith(".toml"):
+        path, name = Path(source), Path(source).stem
+    elif source in scene_names():
+        path, name = SCENE_DIR / f"{source}.toml", source
+    else:
+        raise InputError(
+            f"scene {source}: neither a .toml file nor a built-in name{nearest(source, scene_names())}; see 'lcp-lube list'"
+        )
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:  # ValueError: no UTF-8, no TOML, a number too long for Python
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise InputError(f"{source}: {reason}") from None
+    if not data:
+        raise InputError(f"{source}: the file sets nothing; 'family' and the data of a bearing are needed")
+    return data, path, name
+
+
+def family_of(source: str | Path, family: Any) -> Any:
+    """The model of a family.
+
+    Raises
+    ------
+    InputError : no such family.
+    """
+    if family not in [*FAMILIES]:  # which may be no string at all
+        raise InputError(f"{source}: family = {family}: allowed are {', '.join(FAMILIES)}{nearest(str(family), FAMILIES)}")
+    return FAMILIES[family].load()
+
+
+def parse_changes(assignments: Iterable[str]) -> dict[str, Any]:
+    """{'h_min': 1e-5} from ['h_min=1e-5']; values as TOML, bare words as strings.
+
+    Raises
+    ------
+    InputError : not of the form KEY=VALUE.
+    """
+    changes = {}
+    for text in assignments:
+        key, equals, value = (part.strip() for part in text.partition("="))
+        if not (key and equals and value):
+            raise InputError(f"--set {text}: KEY=VALUE is needed")
+        try:
+            changes[key] = tomllib.loads(f"value = {value}")["value"]
+        except (ValueError, RecursionError):
+            changes[key] = value
+    return changes

@@ -1,0 +1,61 @@
+"""Scene of a squeeze film: plates that approach and part, with a cavity that opens and fills again."""
+
+import math
+from typing import Annotated, Literal
+
+from petsc4py import PETSc
+from pydantic import Field, model_validator
+
+from ..problems.film.squeeze import SqueezeProblem
+from ..problems.grid import Grid
+from .scene import Count, NotNegative, Positive, Scene
+
+
+class SqueezeScene(Scene):
+    """Parallel plates, h = h_mean + h_amplitude cos(2 pi cycles t), 0 <= x <= 1, p = p_wall at both ends; dimensionless."""
+
+    scheme: Literal["bdf2", "euler"] = Field("bdf2", description="time: two-step backward difference, or implicit Euler")
+    h_mean: Positive = Field(0.375, description="mean gap")
+    h_amplitude: NotNegative = Field(0.125, description="amplitude of the gap, less than the mean")
+    cycles: Positive = Field(2.0, description="strokes in a unit of time")
+    p_wall: NotNegative = Field(0.025, description="pressure at both ends above the cavitation pressure")
+    t_end: Positive = Field(0.75, description="end of the march")
+    front_time: Positive = Field(0.5, description="when the front's place is told")
+    steps: Annotated[int, Field(strict=True, ge=2, le=10_000_000)] = Field(300, description="time steps")
+    n: Count = Field(199, description="interior points")
+
+    @model_validator(mode="after")
+    def _possible(self) -> "SqueezeScene":
+        if not self.h_amplitude < self.h_mean:
+            raise ValueError(f"h_amplitude = {self.h_amplitude:g}: less than h_mean = {self.h_mean:g} is needed")
+        return self
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return (self.n,)
+
+    def with_shape(self, shape: tuple[int, ...]) -> "SqueezeScene":
+        """Time steps in proportion: both errors are of the same order."""
+        steps = max(2, round(self.steps * (shape[0] + 1) / (self.n + 1)))
+        return self.model_copy(update={"n": shape[0], "steps": steps})
+
+    def gap(self, t: float) -> float:
+        """h at time t."""
+        return self.h_mean + self.h_amplitude * math.cos(2.0 * math.pi * self.cycles * t)
+
+    def build(self, comm: PETSc.Comm | None = None) -> SqueezeProblem:
+        """The march. Collective.
+
+        Raises
+        ------
+        InputError : more ranks than the grid can be dealt to.
+        """
+        return SqueezeProblem(
+            Grid((self.n,), (1.0,), comm),
+            self.gap,
+            p_wall=self.p_wall,
+            t_end=self.t_end,
+            steps=self.steps,
+            second_order=self.scheme == "bdf2",
+            front_time=self.front_time,
+        )

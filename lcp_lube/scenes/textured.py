@@ -1,0 +1,59 @@
+"""Scenes whose films are hard on solvers: dimples and roughness."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from ..problems.film.textures import Dimples, Rough
+from .scene import Count, LubricationScene, NotNegative, Positive, SliderScene
+
+
+class TexturedScene(LubricationScene):
+    """Textured slider of the FBNS codes: 80 mm square, K x K cells with a square dimple each, 100 kPa all round.
+
+    The reference grid has 30 K interior points a side; others see the same film.
+    """
+
+    dimension: Literal[2] = 2
+    L: Positive = 0.08
+    K: Annotated[int, Field(ge=1, le=1000, description="cells a side")] = 4
+    h: Positive = Field(15e-6, description="film between the dimples, m")
+    depth: Positive = Field(12e-6, description="depth of the dimples, m")
+    mu: Positive = 0.03
+    p_a: NotNegative = 70e3
+    p_b: NotNegative = 70e3
+    p_side: NotNegative = 70e3
+    p_c: float = 30e3
+    scheme: Literal["nodal", "face", "upwind"] = "upwind"
+    mean_cubes: bool = True
+    p_unit: Positive = 1e5
+
+    @model_validator(mode="before")
+    @classmethod
+    def _reference_grid(cls, data: Any) -> Any:
+        if isinstance(data, dict) and "n" not in data and isinstance(data.get("K", 4), int):
+            data = {**data, "n": 30 * data.get("K", 4)}
+        return data
+
+    @property
+    def gap(self) -> Dimples:
+        return Dimples(self.h, self.depth, self.L, self.K)
+
+
+class RoughScene(SliderScene):
+    """Problem 1's wave over a square, with a random surface of given standard deviation, by default 0.1 MPa all round."""
+
+    dimension: Literal[2] = 2
+    seed: Annotated[int, Field(ge=0)] = 1
+    amplitude: NotNegative = Field(2.5e-6, description="standard deviation of the surface, m")
+    cells: Count = Field(40, description="meshes of the random surface along a side")
+    h_floor: Positive = Field(1e-6, description="smallest film that the surface leaves, m")
+    scheme: Literal["nodal", "face", "upwind"] = "face"
+    p_a: NotNegative = 1e5
+    p_b: NotNegative = 1e5
+    p_side: NotNegative = 1e5
+
+    @property
+    def gap(self) -> Any:
+        wave = super().gap
+        return Rough(wave, self.amplitude, self.seed, self.cells, (self.L, self.width or self.L), self.h_floor)

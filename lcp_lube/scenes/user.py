@@ -1,0 +1,218 @@
+"""A complementarity problem of the user's own, for `solve`: F, its Jacobian, bounds, a start.
+
+import numpy as np
+from lcp_lube import Complementarity, solve
+
+problem = Complementarity(lambda x: (x - 1) ** 2 - 1.01, lambda x: np.diag(2 * (x - 1)), lower=[0], upper=[np.inf], x0=[0])
+print(solve(problem).fields["v"])       # [2.00498756]
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from petsc4py import PETSc
+
+from ..base.parallel import Array
+from ..errors import InputError
+from ..problems.box import BoxProblem
+from ..problems.certificate import Certificate, certificate_tol
+from ..problems.grid import Grid
+from ..problems.solution import Fields
+from .scene import Scene
+
+
+class Complementarity(Scene):
+    """l <= x <= u and F(x): F_i >= 0 where x_i = l_i, F_i <= 0 where x_i = u_i, F_i = 0 between. `solve` takes it as a scene.
+
+    Parameters
+    ----------
+    F : x -> F(x), arrays of shape (n,).
+    J : x -> F'(x): an (n, n) array, a SciPy sparse array, or a PETSc matrix with its whole diagonal stored (its rows where
+        lower = upper are overwritten); a sparse one has the same pattern every time.
+    lower, upper : bounds, shape (n,); -inf and inf where there are none (both: x_i is free, and F_i(x) = 0 an equation).
+    x0 : start, shape (n,); moved into the bounds.
+
+    With a communicator, `solve(problem, comm=...)`, all five are of the rank's own entries, J gives a PETSc matrix of that
+    layout, and `n` is the whole number of unknowns. Without one every rank solves by itself.
+    """
+
+    F: Callable[[Array], Any]
+    J: Callable[[Array], Any]
+    lower: Any
+    upper: Any
+    x0: Any
+    n: int
+
+    def __init__(
+        self,
+        F: Callable[[Array], Any],
+        J: Callable[[Array], Any],
+        lower: ArrayLike,
+        upper: ArrayLike,
+        x0: ArrayLike,
+        *,
+        n: int | None = None,
+        name: str = "user",
+    ):
+        parts = [_vector(value, label) for value, label in ((lower, "lower"), (upper, "upper"), (x0, "x0"))]
+        sizes = [part.size for part in parts]
+        if len(set(sizes)) > 1 or not sizes[0]:
+            raise InputError(f"lower, upper and x0 have {sizes} entries: the same number is needed, at least 1")
+        data = {"lower": parts[0], "upper": parts[1], "x0": parts[2], "n": sizes[0] if n is None else n}
+        super().__init__(**{"family": "user", "name": name, "F": F, "J": J, **data})
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return (self.n,)
+
+    def build(self, comm: PETSc.Comm | None = None) -> "UserProblem":
+        """The problem on a line of n points. Collective.
+
+        Raises
+        ------
+        InputError : bounds that cross, a start that is no number, F or J of a wrong shape, parts that don't fit the ranks.
+        """
+        grid = Grid((self.n,), (self.n + 1.0,), comm or PETSc.COMM_SELF)
+        sizes = list(zip(grid.comm.allgather(self.x0.size), np.diff(grid.starts), strict=True))
+        for rank, (given, owned) in enumerate(sizes):  # all ranks look at all of them, and raise together
+            if given != owned:
+                raise InputError(f"x0 has {given} entries on rank {rank}, which owns {owned} of {self.n}")
+        return UserProblem(grid, Callbacks(grid, self.F, self.J, self.lower, self.upper), self.lower, self.upper, self.x0)
+
+
+class Callbacks:
+    """F and J of the user as `Equations`; where l = u the equation is x = l."""
+
+    def __init__(self, grid: Grid, F: Callable[[Array], Any], J: Callable[[Array], Any], lower: Array, upper: Array):
+        self.grid, self._F, self._J = grid, F, J
+        self._value = lower
+        self._fixed = lower == upper
+        self._any_fixed = grid.reduce.sum(self._fixed.astype(float)) > 0
+        self._mat: PETSc.Mat | None = None
+
+    def residual(self, v: Array) -> Array:
+        """F(v). Collective.
+
+        Raises
+        ------
+        InputError : F gives no vector of n real numbers.
+        """
+        with np.errstate(all="ignore"):  # inf and NaN are told by the outer loop, or avoided by the line search
+            F = _vector(self._F(v), "F(x)")
+        if F.size != v.size:
+            raise InputError(f"F(x) has {F.size} entries, x has {v.size}")
+        return np.where(self._fixed, v - self._value, F)
+
+    def jacobian(self, v: Array) -> PETSc.Mat:
+        """F'(v). Collective.
+
+        Raises
+        ------
+        InputError : J gives no n-by-n matrix, or a sparse one of another pattern than before.
+        """
+        with np.errstate(all="ignore"):
+            J = self._J(v)
+        mat = J if isinstance(J, PETSc.Mat) else self._sparse(J) if hasattr(J, "tocsr") else self._dense(J)
+        if self._any_fixed:
+            mat.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
+            mat.zeroRows((self.grid.first + np.flatnonzero(self._fixed)).astype(PETSc.IntType), 1.0)
+        return mat
+
+    def _dense(self, J: Any) -> PETSc.Mat:
+        values = np.asarray(J, dtype=float)
+        n = self.grid.size
+        if values.shape != (n, n):
+            raise InputError(f"J(x) has shape {values.shape}: {(n, n)} is needed")
+        if self._mat is None:
+            self._mat = PETSc.Mat().createDense((n, n), comm=self.grid.dm.comm)
+            self._mat.setUp()
+        self._mat.getDenseArray()[:] = values
+        self._mat.assemble()
+        return self._mat
+
+    def _sparse(self, J: Any) -> PETSc.Mat:
+        csr = J.tocsr()
+        n = self.grid.size
+        if csr.shape != (n, n):
+            raise InputError(f"J(x) has shape {csr.shape}: {(n, n)} is needed")
+        if self._mat is None:
+            self._mat = _aij(csr, self.grid.dm.comm)
+        self._mat.zeroEntries()
+        try:
+            self._mat.setValuesCSR(csr.indptr.astype(PETSc.IntType), csr.indices.astype(PETSc.IntType), csr.data.astype(float))
+        except PETSc.Error:
+            raise InputError("J(x) has entries where the first one had none: store its zeros too, or let J be dense") from None
+        self._mat.assemble()
+        return self._mat
+
+    def scale(self, v: Array) -> float:
+        """F is the user's: its own units count."""
+        return 1.0
+
+    def destroy(self) -> None:
+        if self._mat is not None:
+            self._mat.destroy()
+
+
+class UserProblem(BoxProblem):
+    """The box problem behind a `Complementarity`.
+
+    dense: J gives dense matrices, for LAPACK.
+    """
+
+    kind = "user"
+
+    def __init__(self, grid: Grid, equations: Callbacks, lower: Array, upper: Array, x0: Array):
+        super().__init__(grid, equations, lower, upper, x0)
+        # An equation x = l needs no bounds, and interior methods no inside of its box.
+        fixed = lower == upper
+        self.lower, self.upper = np.where(fixed, -np.inf, lower), np.where(fixed, np.inf, upper)
+        self.dense = "dense" in self.jacobian(self.v0).getType()
+
+    def certify(self, fields: Fields, eps1: float) -> Certificate:
+        """Certificate of v, in the units of F. Collective.
+
+        residual: largest natural residual |mid(v - u, F, v - l)|;
+        rounding: the machine's epsilon times ||F'|| ||v|| (largest row sum, largest entry), below which F says nothing:
+        iterates that run off to infinity may have F = 0 by rounding alone.
+        """
+        v = fields["v"]
+        rows = self.jacobian(v).norm(PETSc.NormType.NORM_INFINITY)
+        return Certificate(
+            measures={
+                "residual": self.reduce.max(np.abs(self.natural_residual(v, self.residual(v)))),
+                "rounding": float(np.finfo(float).eps) * rows * self.reduce.max(np.abs(v)),
+            },
+            tol=certificate_tol(eps1),
+        )
+
+
+def _vector(value: Any, label: str) -> Array:
+    """A new vector of floats.
+
+    Raises
+    ------
+    InputError : not a sequence of real numbers.
+    """
+    try:
+        if np.iscomplexobj(value):
+            raise TypeError
+        vector = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"{label}: a sequence of real numbers is needed") from None
+    if vector.ndim != 1:
+        raise InputError(f"{label} has shape {vector.shape}: one dimension is needed")
+    return vector
+
+
+def _aij(csr: Any, comm: PETSc.Comm) -> PETSc.Mat:
+    """An empty PETSc matrix with the pattern of a SciPy one and the whole diagonal, which PETSc wants to be stored."""
+    from scipy.sparse import csr_array, eye_array
+
+    ones = csr_array((np.ones(csr.indices.size), csr.indices, csr.indptr), shape=csr.shape)
+    pattern = (ones + eye_array(csr.shape[0])).tocsr()
+    pattern.sort_indices()
+    parts = (pattern.indptr.astype(PETSc.IntType), pattern.indices.astype(PETSc.IntType), np.zeros(pattern.nnz))
+    return PETSc.Mat().createAIJ(csr.shape, csr=parts, comm=comm)

@@ -1,0 +1,1 @@
+"""Nonlinear multigrid (full approximation scheme)."""

@@ -1,0 +1,277 @@
+"""Nonlinear multigrid for obstacle problems: projected sweeps, full multigrid, and coarse grids that know the bounds.
+
+FAS as in `fas`, for l <= v <= u and f(v) = A v - b - dx dy g(v). A coarse grid's bounds are the fine one's at its points
+(Brandt and Cryer); forces of the bounds are passed on only to coarse points in contact, so that a solution is a fixed point;
+what a correction takes beyond a bound is cut off, and some sweeps near the edges of the contact put these right to the point,
+which the coarse grid knows to its own mesh only. In FASCD (Bueler and Farrell) the bounds are split over the grids instead.
+"""
+
+from dataclasses import dataclass
+from importlib.util import find_spec
+from itertools import pairwise
+from math import inf
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from ...base.parallel import Array
+from ...base.stages import Stages
+from ...errors import InputError
+from ...linear.krylov import Krylov
+from ...problems.box import BoxProblem
+from ...problems.obstacle import ObstacleEquations
+from ...problems.solution import Fields, Step
+from ..job import Job
+from ..method_options import make_options
+from ..steplength import StepLengthError
+from .driver import COARSEST_SWEEPS, WINDOW
+
+
+@dataclass(frozen=True)
+class BoxFasOptions:
+    """cycle: V, F or W; pre, post: sweeps before and after the coarse grid; front: sweeps over the points within `width`
+    cells of the edge of a contact after each correction; stall: give up where the residual has not fallen below this part of
+    itself in three cycles."""
+
+    cycle: str = "F"
+    pre: int = 2
+    post: int = 2
+    front: int = 12
+    width: int = 3
+    stall: float = 0.3
+
+    def __post_init__(self) -> None:
+        if self.cycle not in ("V", "F", "W"):
+            raise InputError(f"fas.cycle = {self.cycle}: allowed are V, F, W")
+        for name in ("pre", "post", "front", "width"):
+            if getattr(self, name) < 0:
+                raise InputError(f"fas.{name} = {getattr(self, name)}: at least 0 is needed")
+        if self.pre + self.post == 0:
+            raise InputError("fas.pre = fas.post = 0: at least one sweep is needed")
+        if not 0 < self.stall <= 1:
+            raise InputError(f"fas.stall = {self.stall}: allowed are numbers above 0, up to 1")
+
+
+class _Grid:
+    """What a level of an obstacle problem has beyond a `fas_levels.Level`: bounds, cell areas, coordinates, work space."""
+
+    def __init__(self, level: Any, bounds: Array, m: Array, x: Array, y: Array):
+        self.level, self.bounds, self.m, self.x, self.y = level, bounds, m, x, y
+        self.prepared, self.forces = (np.zeros((2, *level.z.shape)) for _ in range(2))
+        self.g, self.slope = (np.zeros_like(level.z) for _ in range(2))
+
+
+class BoxFas:
+    """The iterates v; `newton.iterate` runs it. `norm` is that of the active set: max |D R(v)| against the terms of f.
+
+    The first step is full multigrid, unless a start is given, the others are cycles.
+    """
+
+    state: tuple[str, ...] = ("v", "norm", "_recent", "_first", "_taken")
+
+    def __init__(self, problem: BoxProblem, stages: Stages, options: BoxFasOptions, start: Fields | None = None):
+        from . import box_kernels as box_fas_kernels
+        from . import kernels as fas_kernels
+        from . import levels as fas_levels
+
+        self._kernels, self._transfer, self._tools = box_fas_kernels, fas_kernels, fas_levels
+        equations = problem.equations
+        if not isinstance(equations, ObstacleEquations):
+            raise InputError("--method fas: for obstacle problems on a rectangle; use active-set")
+        self.problem, self.stages, self.options = problem, stages, options
+        self._source = equations.semilinear.source
+        with stages("assembly"):
+            self._grids = self._hierarchy(equations)
+        self._recent: tuple[float, ...] = (inf,) * WINDOW
+        self._taken, self._first = 0 if start is None else 1, inf
+        self.v = problem.v0 if start is None else np.clip(start["v"], problem.lower, problem.upper)
+        self.norm = self._first = self._residual(self._grids[0])
+
+    def _hierarchy(self, equations: ObstacleEquations) -> list[_Grid]:
+        grid, tools = self.problem.grid, self._tools
+        dx, dy = grid.spacing
+        across_x, across_y = np.full(grid.box, dy / dx), np.full(grid.box, dx / dy)
+        finest = tools.level_of(grid, across_x, across_x, across_y, across_y, equations.b.reshape(grid.box))
+        levels = tools.hierarchy(finest, False)
+        bounds, m = np.zeros((2, *finest.z.shape)), np.zeros_like(finest.z)
+        for k, bound in enumerate((self.problem.lower, self.problem.upper)):
+            tools.put(finest, grid, bounds[k], bound)
+        m[1:-1, 1:-1] = grid.cell
+        rows = slice(None) if finest.comm is None else slice(grid.y_start, grid.y_end)
+        x = grid.origin[0] + dx * np.arange(1, grid.shape[0] + 1)
+        y = (grid.origin[1] + dy * np.arange(1, grid.shape[1] + 1))[rows]
+        grids = [_Grid(finest, bounds, m, x, y)]
+        for fine, coarse in pairwise(levels):
+            bounds, m = np.zeros((2, *coarse.z.shape)), np.zeros_like(coarse.z)
+            for k in range(2):
+                self._transfer.inject(grids[-1].bounds[k], coarse.part(bounds[k]), fine.first, fine.by_x, fine.by_y)
+                coarse.gather(bounds[k])
+            tools.restrict(fine, coarse, m, False, grids[-1].m)
+            x = x[1::2] if fine.by_x else x
+            every = grid.origin[1] + dy * np.arange(1, grid.shape[1] + 1)
+            stride = 2 ** sum(level.by_y for level in levels[: len(grids)])
+            lines = every[stride - 1 :: stride][: coarse.ny]
+            grids.append(_Grid(coarse, bounds, m, x, lines if not coarse.split else lines[coarse.y0 : coarse.y1]))
+        return grids
+
+    @property
+    def v(self) -> Array:
+        """This rank's points."""
+        return self._tools.own(self._grids[0].level, self.problem.grid).ravel()
+
+    @v.setter
+    def v(self, value: Array) -> None:
+        self._tools.put(self._grids[0].level, self.problem.grid, self._grids[0].level.z, value)
+
+    @property
+    def fields(self) -> Fields:
+        return {"v": self.v}
+
+    @property
+    def krylov(self) -> Krylov | None:
+        return None
+
+    @property
+    def details(self) -> dict[str, Any]:
+        """What the JSON tells of a run, see `fas_levels.record`. Collective."""
+        levels = [grid.level for grid in self._grids]
+        return self._tools.record(levels, self.problem.grid, self._taken - 1, self._first, self.norm)
+
+    def destroy(self) -> None:
+        """There is nothing of PETSc's here."""
+
+    def advance(self) -> Step:
+        """Full multigrid, or one cycle. Collective.
+
+        Raises
+        ------
+        StepLengthError : the residual has stalled.
+        """
+        if self.norm > self.options.stall * self._recent[0]:
+            raise StepLengthError(f"the residual is at {self.norm:.1e} after {self._taken} cycles and has stalled")
+        before = self.v
+        with self.stages("cycles"):
+            if self._taken == 0:
+                self._full_multigrid()
+            else:
+                self._cycle(0, self.options.cycle)
+            self._taken += 1
+        self._recent = (*self._recent[1:], self.norm if self._taken > 1 else inf)
+        self.norm = self._residual(self._grids[0])
+        if self._taken == 1:
+            self._first = self.norm
+        reduce, after = self.problem.reduce, self.v
+        return Step(self.norm, reduce.max(np.abs(after - before)) / (reduce.max(np.abs(after)) or 1.0), 1.0)
+
+    def _evaluate(self, grid: _Grid, slope: bool = False) -> None:
+        """g, and its slope if wanted, at v."""
+        v, x, y = grid.level.z[1:-1, 1:-1], grid.x[None, :], grid.y[:, None]
+        grid.g[1:-1, 1:-1] = self._source.value(x, y, v)
+        if slope:
+            grid.slope[1:-1, 1:-1] = self._source.slope(x, y, v)
+
+    def _residual(self, grid: _Grid) -> float:
+        """Fill `forces` with the residual, free and held; returns the finest grid's norm. Collective."""
+        level, reduce = grid.level, self.problem.reduce
+        self._evaluate(grid)
+        largest, terms = self._kernels.residual(
+            level.z, level.kx, level.ky, level.c, grid.m, grid.g, grid.bounds, grid.forces[0], grid.forces[1]
+        )
+        if level is not self._grids[0].level:
+            return largest
+        terms = reduce.sum(np.array([terms])) if level.comm is not None else terms
+        return reduce.max(np.array([largest])) / (terms / self.problem.unknowns or 1.0)
+
+    def _relax(self, grid: _Grid, sweeps: int, down: bool, near: bool = False) -> None:
+        """Linearise at v and sweep, at first the points near the edges of the contact if wanted. Collective."""
+        level, o = grid.level, self.options
+        self._evaluate(grid, slope=True)
+        self._kernels.linearise(
+            level.z, level.kx, level.ky, level.c, grid.m, grid.g, grid.slope, grid.prepared[0], grid.prepared[1]
+        )
+        arrays = (level.z, level.kx, level.ky, grid.bounds, grid.prepared)
+        if near and o.front:
+            touching = np.where((level.z <= grid.bounds[0]) | (level.z >= grid.bounds[1]), -1.0, 1.0)
+            spans, found = self._transfer.front_spans(touching, o.width)
+            level.work += o.front * self._kernels.sweep_spans(*arrays, spans, found, o.front)
+            level.share(level.z)
+        for count in [1] * sweeps if level.split else [sweeps] * bool(sweeps):
+            self._kernels.sweep(*arrays, count, down)
+            level.share(level.z)
+        level.work += sweeps * level.nx * (level.z.shape[0] - 2)
+
+    def _full_multigrid(self) -> None:
+        """From the coarsest grid up, one cycle on each. Collective."""
+        for fine, coarse in pairwise(self._grids):  # the start, seen from the coarse grids
+            self._inject(fine, coarse, coarse.level.z)
+            coarse.level.c[:] = coarse.level.f
+        for k in reversed(range(len(self._grids))):
+            if k + 1 < len(self._grids):
+                level, coarse_level = self._grids[k].level, self._grids[k + 1].level
+                level.z[:] = 0.0
+                self._add(level, coarse_level, np.zeros_like(coarse_level.part(coarse_level.z)))
+                self._clip(self._grids[k])
+            self._cycle(k, self.options.cycle)
+
+    def _inject(self, fine: _Grid, coarse: _Grid, into: Array) -> None:
+        level = fine.level
+        self._transfer.inject(level.z, coarse.level.part(into), level.first, level.by_x, level.by_y)
+        coarse.level.gather(into)
+
+    def _add(self, level: Any, coarse: Any, old: Array) -> None:
+        """Add the interpolated difference of the coarse grid's v and `old`."""
+        arrays = (level.z, coarse.part(coarse.z), old, level.kx, level.ky)
+        self._transfer.correct(*arrays, level.first, level.by_x, level.by_y, False, 0)
+
+    def _clip(self, grid: _Grid) -> None:
+        np.clip(grid.level.z, grid.bounds[0], grid.bounds[1], out=grid.level.z)
+        grid.level.share(grid.level.z)
+
+    def _cycle(self, k: int, kind: str) -> None:
+        """One cycle from level k down and back. Collective."""
+        begin, o = perf_counter(), self.options
+        grid = self._grids[k]
+        level = grid.level
+        level.visits += 1
+        if k + 1 == len(self._grids):
+            for s in range(4):
+                self._relax(grid, max(COARSEST_SWEEPS, 2 * level.nx, 2 * level.ny) // 4, s % 2 == 1)
+            level.seconds += perf_counter() - begin
+            return
+        coarse = self._grids[k + 1]
+        lower = coarse.level
+        self._relax(grid, o.pre, False)
+        self._residual(grid)
+        for part in range(2):
+            level.share(grid.forces[part])
+            self._tools.restrict(level, lower, coarse.forces[part], False, grid.forces[part])
+            lower.share(coarse.forces[part])
+        self._inject(grid, coarse, lower.old)
+        lower.z[:] = lower.old
+        self._evaluate(coarse)
+        self._kernels.coarse_right_side(
+            lower.z, lower.kx, lower.ky, coarse.m, coarse.g, coarse.bounds, coarse.forces[0], coarse.forces[1], lower.c
+        )
+        level.seconds += perf_counter() - begin
+        self._cycle(k + 1, kind)
+        if kind != "V" and k + 2 < len(self._grids):
+            self._cycle(k + 1, "V" if kind == "F" else kind)
+        begin = perf_counter()
+        self._add(level, lower, lower.part(lower.old))
+        self._clip(grid)
+        self._relax(grid, o.post, True, near=True)
+        level.seconds += perf_counter() - begin
+
+
+def build(job: Job) -> BoxFas:
+    """The registry's door.
+
+    Raises
+    ------
+    InputError : an unknown option or a value out of range; numba is missing; no obstacle problem on a rectangle.
+    """
+    settings = make_options(BoxFasOptions, "fas", job.options)
+    if find_spec("numba") is None:
+        raise InputError("--method fas: its loops need numba, which is not installed (pip install numba)")
+    return BoxFas(job.problem, job.stages, settings, job.start)

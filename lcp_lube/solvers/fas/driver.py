@@ -1,0 +1,242 @@
+"""Nonlinear multigrid: the full approximation scheme (FAS) for the flow balance in z, where a whole solve costs a few sweeps.
+
+    G(z) = A max(z, 0) + B max(-z, 0) / -b_C - c = 0
+
+G is an M-function, so that nonlinear Gauss-Seidel converges from any start, and what it leaves is smooth away from the fronts:
+a coarser grid's business. It solves G_H(z_H) = G_H(injected z) + restricted residual, and z is corrected by the interpolated
+difference. A point is not moved across its front by that: it stops there, and the sweeps decide. What the coarse grid cannot
+know, where the front lies inside its cells, is put right by some more sweeps within a few cells of the front, which are few
+points. Full multigrid, from the coarsest grid up, gives the start. See docs/nonlinear_multigrid.md.
+"""
+
+from dataclasses import dataclass
+from importlib.util import find_spec
+from math import inf
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from ...base.parallel import Array
+from ...base.stages import Stages
+from ...errors import InputError
+from ...linear.krylov import Krylov
+from ...problems.certificate import certificate_tol
+from ...problems.film.lubrication import LubricationProblem
+from ...problems.solution import Fields, Step
+from ..job import Job
+from ..method_options import make_options
+from ..steplength import StepLengthError
+
+EPS = float(np.finfo(float).eps)
+WINDOW = 3  # cycles over which the fall of ||G|| is judged
+TRUNCATIONS = {"none": 0, "clip": 1, "points": 2}  # see `fas_kernels.correct`
+COARSEST_SWEEPS = 40
+BORDER = 4  # lines on either side of the border between two ranks
+
+
+@dataclass(frozen=True)
+class FasOptions:
+    """cycle: V, F or W; pre, post: sweeps before and after the coarse grid; front: sweeps over the points within `width`
+    cells of a front after each correction, both doubled where fronts are rare; truncation: of corrections at fronts, none,
+    clip or points; weights: of the interpolation, by the conductances of the faces (harmonic) or the same everywhere
+    (linear); stall: give up where ||G|| has not fallen below this part of itself in three cycles."""
+
+    cycle: str = "F"
+    pre: int = 3
+    post: int = 3
+    front: int = 10
+    width: int = 3
+    truncation: str = "clip"
+    weights: str = "harmonic"
+    stall: float = 0.3
+
+    def __post_init__(self) -> None:
+        for name, legal in (("cycle", ("V", "F", "W")), ("truncation", TRUNCATIONS), ("weights", ("harmonic", "linear"))):
+            if getattr(self, name) not in legal:
+                raise InputError(f"fas.{name} = {getattr(self, name)}: allowed are {', '.join(legal)}")
+        for name in ("pre", "post", "front", "width"):
+            if getattr(self, name) < 0:
+                raise InputError(f"fas.{name} = {getattr(self, name)}: at least 0 is needed")
+        if self.pre + self.post == 0:
+            raise InputError("fas.pre = fas.post = 0: at least one sweep is needed")
+        if not 0 < self.stall <= 1:
+            raise InputError(f"fas.stall = {self.stall}: allowed are numbers above 0, up to 1")
+
+
+class Fas:
+    """The iterates z; `newton.iterate` runs it. `norm` is that of `active_set`, ||G(z)|| / ||c||.
+
+    The first step is full multigrid, the others are cycles; a given start takes full multigrid's place.
+
+    Parameters
+    ----------
+    start : fields p and r.
+    """
+
+    state: tuple[str, ...] = ("z", "norm", "_recent", "_taken", "_first")  # what a cycle starts from
+
+    def __init__(
+        self, problem: LubricationProblem, stages: Stages, options: FasOptions, eps1: float, start: Fields | None = None
+    ):
+        # numba starts with this import, 0.4 s: only where the method is used.
+        from . import kernels as fas_kernels
+        from . import levels as fas_levels
+
+        self._kernels, self._tools = fas_kernels, fas_levels
+        self.problem, self.stages, self.options, self.eps1 = problem, stages, options, eps1
+        self._harmonic, self._truncation = options.weights == "harmonic", TRUNCATIONS[options.truncation]
+        with stages("assembly"):
+            self._levels = fas_levels.hierarchy(fas_levels.finest(problem), self._harmonic)
+        self._c_norm = problem.reduce.norm(problem.c)
+        self._recent: tuple[float, ...] = (inf,) * WINDOW
+        self._taken, self._first, self._correction = 0, inf, 0.0
+        if start is not None:
+            self.z = start["p"] + problem.scheme.b_C.ravel() * start["r"]
+            self._taken = 1
+        self.norm = self._norm()
+        self._first = self.norm
+
+    @property
+    def z(self) -> Array:
+        """p, or minus the flow of void, at this rank's points."""
+        return self._tools.own(self._levels[0], self.problem.grid).ravel()
+
+    @z.setter
+    def z(self, value: Array) -> None:
+        self._tools.put(self._levels[0], self.problem.grid, self._levels[0].z, value)
+
+    @property
+    def fields(self) -> Fields:
+        z = self._tools.own(self._levels[0], self.problem.grid)
+        p, r = self._kernels.pressure_and_void(z, self.problem.scheme.b_C)
+        return {"p": p.ravel(), "r": r.ravel()}
+
+    @property
+    def krylov(self) -> Krylov | None:
+        return None
+
+    @property
+    def details(self) -> dict[str, Any]:
+        """What the JSON tells of a run, see `fas_levels.record`. Collective."""
+        return self._tools.record(self._levels, self.problem.grid, self._taken - 1, self._first, self.norm)
+
+    def destroy(self) -> None:
+        """There is nothing of PETSc's here."""
+
+    def _norm(self) -> float:
+        """||G|| / ||c||; where rounding in G's sums alone exceeds eps1, on very fine grids, relative to that. Collective.
+
+        Many small residuals of one sign are a flow that is lost. Where little flows through the sides of a film, the
+        certificate sees more of it than ||G|| does: then eps1 times the ratio of the mass defect to a tenth of what may be.
+        """
+        level = self._levels[0]
+        sums = np.array(self._kernels.norms(level.z, level.kx, level.ky, level.c))
+        if level.comm is not None:
+            level.comm.Allreduce(sums.copy(), sums)
+        residual, terms = np.sqrt(sums)
+        norm = float(residual / (max(self._c_norm, 16 * EPS * terms / self.eps1) or 1.0))
+        if norm > self.eps1:
+            return norm
+        fields = self.fields
+        return max(norm, self.eps1 * self.problem.mass_defect(fields["p"], fields["r"]) / (0.1 * certificate_tol(self.eps1)))
+
+    def advance(self) -> Step:
+        """Full multigrid, or one cycle; the step is what the coarse grids corrected. Collective.
+
+        Raises
+        ------
+        StepLengthError : ||G|| has stalled.
+        """
+        if self.norm > self.options.stall * self._recent[0] and self.norm > self.eps1:
+            if not self.norm < 1.0:
+                self.z = np.zeros(self.problem.grid.local_size)  # nothing to start from (`run.Run.take_over`)
+            raise StepLengthError(f"||G|| is at {self.norm:.1e} of ||c|| after {self._taken} cycles and has stalled")
+        with self.stages("cycles"):
+            if self._taken == 0:
+                self._full_multigrid()
+            else:
+                self._cycle(0, self.options.cycle)
+            self._taken += 1
+        self._recent = (*self._recent[1:], self.norm if self._taken > 1 else inf)
+        with self.stages("norm"):
+            self.norm = self._norm()
+        if not np.isfinite(self.norm):
+            self.z = np.zeros(self.problem.grid.local_size)  # as above
+        if self._taken == 1:
+            self._first = self.norm
+        step = self.problem.reduce.comm.allreduce(self._correction) if self._levels[0].comm is not None else self._correction
+        return Step(self.norm, float(np.sqrt(step)), 1.0)
+
+    def _full_multigrid(self) -> None:
+        """From the coarsest grid up, one cycle on each. Collective."""
+        for k in reversed(range(len(self._levels))):
+            level = self._levels[k]
+            if k:
+                level.c[:] = level.f
+            if k + 1 < len(self._levels):
+                coarse = self._levels[k + 1]
+                where = (level.first, level.by_x, level.by_y, self._harmonic)
+                self._kernels.interpolate(level.z, coarse.part(coarse.z), level.kx, level.ky, *where)
+                level.share(level.z)
+            self._cycle(k, self.options.cycle)
+
+    def _cycle(self, k: int, kind: str) -> None:
+        """One cycle from level k down and back. Collective."""
+        begin, o = perf_counter(), self.options
+        level = self._levels[k]
+        level.visits += 1
+        if k + 1 == len(self._levels):
+            for s in range(2):
+                self._relax(level, max(COARSEST_SWEEPS, 2 * level.nx, 2 * level.ny) // 2, s == 1)
+            level.seconds += perf_counter() - begin
+            return
+        coarse = self._levels[k + 1]
+        self._relax(level, o.pre, False)
+        where = (level.first, level.by_x, level.by_y)
+        self._tools.restrict(level, coarse, coarse.c, self._harmonic)
+        self._kernels.inject(level.z, coarse.part(coarse.old), *where)
+        coarse.gather(coarse.old)
+        coarse.z[:] = coarse.old
+        self._kernels.add_balance(coarse.old, coarse.kx, coarse.ky, coarse.c)
+        level.seconds += perf_counter() - begin
+        self._cycle(k + 1, kind)
+        if kind != "V" and k + 2 < len(self._levels):
+            self._cycle(k + 1, "V" if kind == "F" else kind)
+        begin = perf_counter()
+        fine = (level.z, coarse.part(coarse.z), coarse.part(coarse.old), level.kx, level.ky)
+        self._correction = self._kernels.correct(*fine, *where, self._harmonic, self._truncation)  # type: ignore[arg-type]
+        level.share(level.z)
+        if o.front:
+            level.work += self._kernels.relax_front(level.z, level.kx, level.ky, level.c, o.front, o.width)
+            level.share(level.z)
+        self._relax(level, o.post, True)
+        level.seconds += perf_counter() - begin
+
+    def _relax(self, level: Any, sweeps: int, down: bool) -> None:
+        """Sweeps without a word between them; then, where other ranks go on, once more over the lines that border on theirs.
+
+        That makes up for what these did not hear of: the factor is that of one rank, where without it it doubles.
+        """
+        if sweeps:
+            self._kernels.sweep(level.z, level.kx, level.ky, level.c, sweeps, down)
+            level.share(level.z)
+        if sweeps and level.split:
+            for first in (0, level.z.shape[0] - BORDER - 2):
+                rows, faces = slice(first, first + BORDER + 2), slice(first, first + BORDER + 3)
+                self._kernels.sweep(level.z[rows], level.kx[rows], level.ky[faces], level.c[rows], 1, down)
+            level.share(level.z)
+        level.work += sweeps * level.nx * (level.z.shape[0] - 2)
+
+
+def build(job: Job) -> Fas:
+    """The registry's door.
+
+    Raises
+    ------
+    InputError : an unknown option or a value out of range; numba is missing.
+    """
+    settings = make_options(FasOptions, "fas", job.options)
+    if find_spec("numba") is None:
+        raise InputError("--method fas: its loops need numba, which is not installed (pip install numba)")
+    return Fas(job.problem, job.stages, settings, job.stopping.eps1, job.start)

@@ -1,0 +1,250 @@
+"""Grids of the nonlinear multigrid: their points, how these are dealt to the ranks, and their coefficients."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import inf
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from ...base.parallel import Array
+from ...errors import InputError
+from ...problems.film.lubrication import LubricationProblem
+from ...problems.grid import Grid
+from . import kernels
+
+FEWEST = 3  # points a side of the coarsest grid, at least
+FEWEST_LINES = 8  # of a rank; grids with fewer are held whole by every rank
+STRONG = 4.0  # times the mean conductance of the other direction: then points are left out in the strong one alone
+
+
+@dataclass
+class Level:
+    """One grid: lines y0 to y1 of an nx by ny grid, in arrays with a frame of neighbours (`fas_kernels`).
+
+    Attributes
+    ----------
+    z, c : iterate and right-hand side; old : the finer level's values that z started from; f : right-hand side of the coarse
+        problem proper, for full multigrid.
+    kx, ky : conductances of the x and y faces.
+    comm : the ranks, None where this one holds the whole grid and need not tell anyone.
+    whole : every rank holds the whole grid, though comm has several.
+    by_x, by_y : which points the next coarser grid leaves out.
+    """
+
+    nx: int
+    ny: int
+    y0: int
+    y1: int
+    comm: MPI.Comm | None
+    whole: bool
+    periodic: tuple[bool, bool]
+    z: Array
+    c: Array
+    kx: Array
+    ky: Array
+    f: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    old: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    by_x: bool = False
+    by_y: bool = False
+    visits: int = 0
+    seconds: float = 0.0
+    work: float = 0.0  # relaxed points
+
+    @property
+    def first(self) -> int:
+        """Number of the line in row 1 of the arrays."""
+        return 0 if self.whole or self.comm is None else self.y0
+
+    def part(self, a: Array) -> Array:
+        """The rows of this rank, with their frame; the array itself unless every rank holds the whole."""
+        if not self.whole:
+            return a
+        return a[self.y0 : self.y1 + 2 + (a.shape[0] - self.ny - 2)]
+
+    def share(self, a: Array) -> Array:
+        """Bring the frame up to date: rows of the neighbouring ranks, and beyond periodic sides. Collective."""
+        n = self.ny if self.comm is None or self.whole else self.y1 - self.y0
+        rows, columns = a.shape[0] - n - 1, a.shape[1] - self.nx - 1  # of the frame behind the last point: 1, of faces 2
+        if self.comm is not None and not self.whole:
+            below, above = self._neighbours(self.comm)
+            behind = a[n + 1 :].copy()
+            self.comm.Sendrecv(a[n].copy(), above, recvbuf=a[0], source=below)
+            self.comm.Sendrecv(a[1 : 1 + rows].copy(), below, recvbuf=behind, source=above)
+            a[n + 1 :] = behind
+        elif self.periodic[1]:
+            a[0], a[n + 1 :] = a[n], a[1 : 1 + rows]
+        if self.periodic[0]:
+            a[:, 0] = a[:, self.nx]
+            a[:, self.nx + 1 :] = a[:, 1 : 1 + columns]
+        return a
+
+    def gather(self, a: Array) -> Array:
+        """`share` after each rank has computed its own rows, `part(a)`: where all hold the whole, give them all. Collective."""
+        if self.comm is not None and self.whole:
+            end = self.y1 + 1 + (a.shape[0] - self.ny - 2 if self.y1 == self.ny else 0)
+            np.concatenate(self.comm.allgather(np.ascontiguousarray(a[self.y0 + 1 : end])), out=a[1:-1])
+        return self.share(a)
+
+    @property
+    def split(self) -> bool:
+        """Whether other ranks hold other lines."""
+        return self.comm is not None and not self.whole
+
+    def _neighbours(self, comm: MPI.Comm) -> tuple[int, int]:
+        """The ranks that hold the lines before and behind this one's."""
+        rank, size, ring = comm.rank, comm.size, self.periodic[1]
+        below = rank - 1 if rank else (size - 1 if ring else MPI.PROC_NULL)
+        return below, rank + 1 if rank < size - 1 else (0 if ring else MPI.PROC_NULL)
+
+    def collect(self, a: Array) -> Array:
+        """Add up what the ranks have put into each other's rows, in `part(a)` of an array that was zero. Collective."""
+        if self.comm is not None and self.whole:
+            self.comm.Allreduce(MPI.IN_PLACE, a)
+        if self.comm is not None and not self.whole:
+            below, above = self._neighbours(self.comm)
+            from_below, from_above = np.zeros_like(a[0]), np.zeros_like(a[0])
+            self.comm.Sendrecv(a[-1].copy(), above, recvbuf=from_below, source=below)
+            self.comm.Sendrecv(a[0].copy(), below, recvbuf=from_above, source=above)
+            a[1] += from_below
+            a[-2] += from_above
+        elif self.periodic[1]:
+            a[-2] += a[0]
+            a[1] += a[-1]
+        a[0], a[-1], a[:, 0], a[:, -1] = 0.0, 0.0, 0.0, 0.0
+        return a
+
+
+def finest(problem: LubricationProblem) -> Level:
+    """The problem's own grid. Collective.
+
+    Raises
+    ------
+    InputError : the void that leaves a cell is not what enters the next one, which no scheme of this package does.
+    """
+    grid, s = problem.grid, problem.scheme
+    lost, carried = kernels.lost_void(s.b_C, s.b_W)
+    if grid.reduce.max(np.array([lost])) > 1e-12 * grid.reduce.max(np.array([carried])):
+        raise InputError("--method fas: what leaves a cell of this scheme does not enter the next one; use active-set")
+    return level_of(grid, s.k_W, s.k_E, s.k_S, s.k_N, s.c)
+
+
+def level_of(grid: Grid, k_W: Array, k_E: Array, k_S: Array, k_N: Array, c: Array) -> Level:
+    """A level from the conductances of every point's faces and a right-hand side. Collective.
+
+    Its points are dealt to the ranks as the grid's are; where these hold parts of lines, or few lines, each holds the whole.
+    """
+    periodic = (grid.periodic[0], grid.dim == 2 and grid.periodic[1])
+    split = grid.comm.size > 1
+    nx, ny = grid.shape[0], grid.shape[1] if grid.dim == 2 else 1
+    lines = grid.box[0] if grid.box[1] == nx else 0
+    if split and grid.reduce.min(np.array([float(lines)])) < FEWEST_LINES:
+        k_W, k_E, k_S, k_N, c = (whole(grid, a) for a in (k_W, k_E, k_S, k_N, c))
+        y0, y1, comm = 0, ny, None
+    else:
+        y0, y1, comm = grid.y_start, grid.y_end, grid.comm if split else None
+    level = _empty(nx, ny, y0, y1, comm, False, periodic)
+    level.kx[1:-1, 1 : nx + 1], level.kx[1:-1, nx + 1] = k_W, k_E[:, -1]
+    level.ky[1 : y1 - y0 + 1, 1:-1], level.ky[y1 - y0 + 1, 1:-1] = k_S, k_N[-1]
+    level.c[1:-1, 1:-1] = c
+    for a in (level.kx, level.ky):
+        level.share(a)
+    return level
+
+
+def whole(grid: Grid, a: Array) -> Array:
+    """All points of a coefficient, on every rank. Collective."""
+    out = np.empty((grid.shape[1] if grid.dim == 2 else 1, grid.shape[0]))
+    own = (slice(grid.y_start, grid.y_end), slice(grid.x_start, grid.x_end))
+    for where, values in grid.comm.allgather((own, np.ascontiguousarray(np.broadcast_to(a, grid.box)))):
+        out[where] = values
+    return out
+
+
+def own(level: Level, grid: Grid) -> Array:
+    """This rank's points of the finest level's z, without a frame."""
+    columns = slice(grid.x_start + 1, grid.x_end + 1)
+    return level.z[slice(grid.y_start + 1, grid.y_end + 1) if level.comm is None else slice(1, -1), columns]
+
+
+def put(level: Level, grid: Grid, into: Array, values: Array) -> None:
+    """This rank's values into an array of the finest level, and its frame. Collective."""
+    box = values.reshape(grid.box)
+    into[1:-1, 1:-1] = whole(grid, box) if level.comm is None and grid.comm.size > 1 else box
+    level.share(into)
+
+
+def record(levels: Sequence[Level], grid: Grid, cycles: int, first: float, last: float) -> dict[str, Any]:
+    """What the JSON tells of a run. Collective.
+
+    levels: coarse to fine, their visits and own seconds; cycles: after full multigrid; work_units: relaxed points over points;
+    convergence_factor: geometric mean of the cycles', which have taken the norm from `first` to `last`.
+    """
+    apart = grid.reduce.sum(np.array([sum(level.work for level in levels if level.split)]))
+    measured = cycles > 0 and 0 < last < inf and 0 < first < inf
+    return {
+        "levels": [
+            {"nx": v.nx, "ny": v.ny, "iterations": v.visits, "linear_iterations": 0, "time_s": v.seconds}
+            for v in reversed(levels)
+        ],
+        "cycles": max(cycles, 0),
+        "work_units": (sum(level.work for level in levels if not level.split) + apart) / grid.size,
+        "convergence_factor": (last / first) ** (1.0 / cycles) if measured else None,
+    }
+
+
+def _empty(nx: int, ny: int, y0: int, y1: int, comm: MPI.Comm | None, whole: bool, periodic: tuple[bool, bool]) -> Level:
+    n = ny if whole or comm is None else y1 - y0
+    z, c, kx, ky = (np.zeros(shape) for shape in ((n + 2, nx + 2), (n + 2, nx + 2), (n + 2, nx + 3), (n + 3, nx + 2)))
+    return Level(nx, ny, y0, y1, comm, whole, periodic, z, c, kx, ky)
+
+
+def hierarchy(level: Level, harmonic: bool) -> list[Level]:
+    """A level and all coarser ones. Collective."""
+    levels = [level]
+    while (coarse := _coarser(levels[-1], harmonic)) is not None:
+        levels.append(coarse)
+    return levels
+
+
+def _coarser(fine: Level, harmonic: bool) -> Level | None:
+    """The grid of every second point, in the directions whose coupling is not much the weaker one. Collective."""
+    # Without a point in between, the two ends of a period would be neighbours on the coarse grid and not on the fine one.
+    can_x = fine.nx // 2 >= FEWEST and not (fine.periodic[0] and fine.nx % 2)
+    can_y = fine.ny // 2 >= FEWEST and not (fine.periodic[1] and fine.ny % 2)
+    mean_x, mean_y = (float(fine.part(k)[1:-1, 1:-1].mean()) for k in (fine.kx, fine.ky))
+    if fine.comm is not None:
+        mean_x, mean_y = (fine.comm.allreduce(mean) for mean in (mean_x, mean_y))
+    by_x = can_x and (mean_y <= STRONG * mean_x or not can_y)
+    by_y = can_y and (mean_x <= STRONG * mean_y or not can_x)
+    if not (by_x or by_y):
+        return None
+    fine.by_x, fine.by_y = by_x, by_y
+    nx, ny = fine.nx // 2 if by_x else fine.nx, fine.ny // 2 if by_y else fine.ny
+    y0, y1 = (fine.y0 // 2, fine.y1 // 2) if by_y else (fine.y0, fine.y1)
+    comm = None if fine.whole else fine.comm
+    whole = comm is not None and comm.allreduce(y1 - y0, MPI.MIN) < FEWEST_LINES
+    if comm is None:
+        y0, y1 = 0, ny
+    coarse = _empty(nx, ny, y0, y1, comm, whole, fine.periodic)
+    last = fine.comm is None or fine.whole or fine.y1 == fine.ny
+    beyond_x = by_x and fine.nx % 2 == 0 and not fine.periodic[0]
+    beyond_y = by_y and fine.ny % 2 == 0 and not fine.periodic[1] and last
+    flags = (fine.first, by_x, by_y, harmonic)
+    kernels.coarsen_x_faces(fine.kx, fine.ky, coarse.part(coarse.kx), *flags, beyond_x)
+    kernels.coarsen_y_faces(fine.kx, fine.ky, coarse.part(coarse.ky), *flags, beyond_y)
+    for a in (coarse.kx, coarse.ky):
+        coarse.gather(a)
+    restrict(fine, coarse, coarse.c, harmonic, fine.c)
+    coarse.f, coarse.old = coarse.c.copy(), np.zeros_like(coarse.z)
+    return coarse
+
+
+def restrict(fine: Level, coarse: Level, out: Array, harmonic: bool, given: Array | None = None) -> None:
+    """The fine level's residual, or something else that is given there, on the coarse one. Collective."""
+    out[:] = 0.0
+    where = (fine.first, fine.by_x, fine.by_y, harmonic, fine.periodic[0], given is None)
+    c = fine.c if given is None else given
+    kernels.restrict(fine.z, fine.kx, fine.ky, c, coarse.part(out), *where)  # type: ignore[arg-type]
+    coarse.collect(out)

@@ -1,0 +1,125 @@
+"""What the charts share: where their runs are kept, and one run as a row."""
+
+from collections.abc import Callable, Sequence
+from datetime import date
+from hashlib import sha256
+from importlib.util import find_spec
+from pathlib import Path
+from time import perf_counter, process_time
+from typing import Any
+
+from ..api import solve
+from ..base.options import LATE, set_names
+from ..base.resumable import ResumableCsv
+from ..errors import InputError
+from ..output.results import as_dict, machine, versions
+from ..problems.solution import Outcome, Solution, Step
+from ..scenes.scene import Scene
+from .compare import exact_errors, read_off
+from .reference import WRONG, Reference
+
+# Outcomes of the charts, beside those of `Outcome`: left by us, and solved, but by the method's fallback.
+KRYLOV_LIMIT, FELL_BACK = "krylov_limit", "fell_back"
+RECORD = """outcome iterations linear_iterations centrality backtracking c1 c2 ksp_type pc_type load rupture min_p min_r
+    machine petsc date message""".split()  # noqa: SIM905
+
+
+def open_store(path: Path, key: Sequence[str], columns: Sequence[str]) -> ResumableCsv:
+    """The csv of a chart, with the columns `key`, `columns` and RECORD. Collective.
+
+    Raises
+    ------
+    InputError : matplotlib is missing, PETSc options are set that would change every run, or the csv cannot be read.
+    """
+    if find_spec("matplotlib") is None:
+        raise InputError("chart: pictures need matplotlib: pip install lcp-lube[plot]")
+    foreign = sorted(set_names() - LATE)
+    if foreign:
+        raise InputError(f"-{foreign[0]}: the runs of a chart bring their own inner solvers")
+    return ResumableCsv(path, [*key, *columns, *RECORD], key)
+
+
+def scene_key(scene: Scene) -> tuple[str, str]:
+    """A scene's name, and a digest of its data but for the grid: a scene file that was edited is run again."""
+    data = scene.model_dump_json(exclude={"name", "n", "nx", "ny"}, exclude_defaults=True)
+    return scene.name, sha256(data.encode()).hexdigest()[:8]
+
+
+def environment() -> dict[str, str]:
+    """What a run's seconds depend on, and when it was made."""
+    return {"machine": machine(), "petsc": versions()["petsc"], "date": date.today().isoformat()}
+
+
+class _Enough(Exception):
+    """Leaves a run from within its monitor."""
+
+
+def run(
+    scene: Scene,
+    krylov_limit: float = float("inf"),
+    reference: Reference | None = None,
+    steps: list[Step] | None = None,
+    solver: Callable[..., Solution] = solve,
+    **choices: Any,
+) -> dict[str, Any]:
+    """One run, however it ends: RECORD, `wall_s`, `cpu_s` (this rank's), errors and the rest of the JSON's keys. Collective.
+
+    Further keys: `read_off` (`compare.read_off`), `points`, `krylov`: Krylov iterations on all grids.
+
+    Parameters
+    ----------
+    scene, choices : as the solver takes them.
+    reference : gives `distance` and `reference`; a certified answer that is as far from it as WRONG is a wrong one.
+    steps : filled with the record of every step.
+    solver : `api.solve`, or what has its arguments.
+    krylov_limit : the run is left after the step in which its Krylov iterations pass this number; of its answer nothing is
+        then known. Counted in iterations, not in seconds: a limit that falls on the same step on every machine.
+
+    Raises
+    ------
+    InputError : the run was refused.
+    """
+    steps = [] if steps is None else steps
+
+    def monitor(k: int, step: Step) -> None:
+        steps.append(step)
+        if sum(step.linear_iterations for step in steps) > krylov_limit:
+            raise _Enough
+
+    begin, cpu_begin = perf_counter(), process_time()
+    try:
+        solution = solver(scene, monitor=monitor, **choices)
+    except _Enough:
+        return {
+            **environment(),
+            "outcome": KRYLOV_LIMIT,
+            "message": f"left after {krylov_limit:,.0f} Krylov iterations with ||F|| = {steps[-1].norm:.2e}",
+            "wall_s": perf_counter() - begin,
+            "cpu_s": process_time() - cpu_begin,
+            "iterations": len(steps),
+            **{name: sum(getattr(s, name) for s in steps) for name in ("linear_iterations", "centrality", "backtracking")},
+            "krylov": sum(step.linear_iterations for step in steps),
+            "c1": steps[-1].norm,
+            "c2": steps[-1].step_norm,
+        }
+    clocks = {"wall_s": solution.times["total"], "cpu_s": process_time() - cpu_begin}
+    try:
+        data = as_dict(solution)
+        # 'auto' is all that it does; of a method that was asked for by name a rescue by another one is a failure.
+        outcome: dict[str, Any] = (
+            {"outcome": FELL_BACK} if solution.settings["took_over"] and choices.get("method", "auto") != "auto" else {}
+        )
+        if reference is not None:
+            far = reference.distance(solution.problem, solution.fields)
+            outcome |= {"distance": None if far is None else f"{far:.3e}", "reference": reference.how}
+            if solution.converged and (not reference.solvable or (far is not None and not far <= WRONG)):
+                why = f"{far:.1e} from the reference" if far is not None else "although there is no solution"
+                outcome |= {"outcome": Outcome.WRONG_SOLUTION, "message": f"{solution.message}, {why}"}
+        more = {
+            "read_off": read_off(solution.problem, data),
+            "points": solution.problem.grid.size,
+            "krylov": sum(step.linear_iterations for step in steps),
+        }
+        return {**environment(), **data, **exact_errors(solution.problem, data), **more, **clocks, **outcome}
+    finally:
+        solution.destroy()

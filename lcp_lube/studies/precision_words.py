@@ -1,0 +1,138 @@
+"""What the precision chart says in words: which run is cheapest for an accuracy, and what fails, from the rows alone."""
+
+from collections import Counter
+from collections.abc import Sequence
+
+from ..base.resumable import Row
+
+LEVELS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+PEER = "peer"  # what stands in the column `system` for other codes
+ASKED = (1e-2, 1e-4)  # what the pictures answer: a per cent, a hundredth of it
+
+
+def seconds(row: Row) -> float:
+    """What a run costs: seconds by the clock, or of the processor where that is less, because other jobs slowed the clock."""
+    return min(float(row["wall_s"]), float(row["cpu_s"]))
+
+
+def error(row: Row, quantity: str) -> float | None:
+    """The error to draw; None for a run that failed.
+
+    The larger one of the whole error and of its parts, that of the grid and that of the iteration: where they happen to cancel
+    a run is not accurate.
+    """
+    values = [float(row[name]) for part in ("error", "grid", "iteration") if row.get(name := f"{quantity}_{part}")]
+    return max(values) if row["outcome"] == "converged" and values else None
+
+
+def loose(row: Row, quantity: str) -> bool:
+    """Whether the iteration's part of the error is the larger one."""
+    return float(row.get(f"{quantity}_iteration") or 0.0) > float(row.get(f"{quantity}_grid") or 0.0)
+
+
+def published(row: Row) -> bool:
+    """Whether a run is the paper's DIN: on the 2n system, from its own start."""
+    return (row["method"], row["system"], row["nested"]) == ("din", "full", "False")
+
+
+def front(rows: Sequence[Row], quantity: str) -> list[Row]:
+    """The Pareto front, from fast to accurate: no other run beats one in seconds and, by one part in ten, in error."""
+    best: list[Row] = []
+    least = float("inf")
+    for row in sorted(rows, key=seconds):
+        here = error(row, quantity)
+        if here is not None and here < 0.9 * least:
+            best.append(row)
+            least = here
+    return best
+
+
+def fastest(rows: Sequence[Row], level: float, quantity: str = "load") -> Row | None:
+    """The run of least seconds whose error is at most `level`."""
+    good = [row for row in rows if (here := error(row, quantity)) is not None and here <= level]
+    return min(good, key=seconds, default=None)
+
+
+def by_scene(rows: Sequence[Row]) -> dict[str, list[Row]]:
+    found: dict[str, list[Row]] = {}
+    for row in rows:
+        found.setdefault(row["scene"], []).append(row)
+    return found
+
+
+def cheapest(rows: Sequence[Row]) -> list[str]:
+    """Lines of a table: for each scene and method the seconds of its fastest run within each of LEVELS, and which one it is."""
+    lines = []
+    for scene, mine in by_scene(rows).items():
+        head = f"{scene}: seconds of the fastest run whose load is within"
+        lines.append(head + "".join(f"{percent(level):>10}" for level in LEVELS))
+        for method in dict.fromkeys(row["method"] for row in mine):
+            runs = [fastest([row for row in mine if row["method"] == method], level) for level in LEVELS]
+            cells = "".join(f"{seconds(run):>10.2g}" if run else f"{'-':>10}" for run in runs)
+            lines.append(f"  {method:<{len(head) - 2}}{cells}")
+        for level in LEVELS:
+            run = fastest(mine, level)
+            if run:
+                lines.append(f"  fastest within {percent(level)}: {describe(run)}")
+    return lines
+
+
+def which(rows: Sequence[Row], quantity: str = "load") -> list[str]:
+    """Which method when, as a table in Markdown: the fastest run for each of ASKED, and how much longer others take."""
+    lines = ["| scene | error of the load | fastest | s | paper's DIN | other codes |", "|---|---|---|---|---|---|"]
+    for scene, mine in by_scene(rows).items():
+        for level in ASKED:
+            best = fastest(mine, level, quantity)
+            if best is None:
+                lines.append(f"| {scene} | {percent(level)} | no run gets there | | | |")
+                continue
+            rivals = []
+            for theirs in (list(filter(published, mine)), [row for row in mine if row["system"] == PEER]):
+                rival = fastest(theirs, level, quantity)
+                label = f"{rival['method']}, " * (rival["system"] == PEER) if rival else ""
+                rivals.append(f"{label}{seconds(rival) / seconds(best):.2g} times" if rival else "-")
+            name = describe(best).rpartition(": ")[0]
+            lines.append(f"| {scene} | {percent(level)} | {name} | {time(best)} | {' | '.join(rivals)} |")
+    return lines
+
+
+def describe(row: Row) -> str:
+    """A run in a few words."""
+    nested = ", nested" * (row["nested"] == "True" and row["n"] != "auto")
+    inner = f"{row['system']} system, {row['recipe']}, " if row["system"] not in ("auto", "peer") else ""
+    return f"{row['method']}{nested}, {inner}eps {float(row['eps']):g}, n = {row['n']}: {time(row)}"
+
+
+def time(row: Row) -> str:
+    """Its seconds, as 2.1 ms or 1.3 s."""
+    value = seconds(row)
+    return f"{value:.2g} s" if value >= 1 else f"{1e3 * value:.2g} ms" if value < 0.1 else f"{1e3 * value:.0f} ms"
+
+
+def percent(level: float) -> str:
+    return f"{100 * level:g} %"
+
+
+def failures(rows: Sequence[Row]) -> str:
+    """How many runs failed, by method."""
+    failed = Counter(row["method"] for row in rows if row["outcome"] != "converged")
+    where = ", ".join(f"{method} {count}" for method, count in failed.most_common())
+    return f"{failed.total()} of {len(rows)} runs failed{f' ({where})' * bool(failed)}."
+
+
+def sentence(rows: Sequence[Row], quantity: str) -> str:
+    """For each of ASKED which method is fastest on how many scenes, and how much longer the paper's DIN takes."""
+    parts = []
+    scenes = by_scene(rows)
+    for level in ASKED:
+        bests = {scene: best for scene, mine in scenes.items() if (best := fastest(mine, level, quantity))}
+        wins = Counter(row["method"] for row in bests.values())
+        text = f"Within {percent(level)} fastest: " + ", ".join(f"{name} on {count}" for name, count in wins.most_common())
+        din = {s: fastest([row for row in scenes[s] if published(row)], level, quantity) for s in bests}
+        ratios = sorted(seconds(row) / seconds(bests[s]) for s, row in din.items() if row)
+        if ratios:
+            text += f"; the paper's DIN (2n system, no coarser grids) takes {ratios[0]:.2g} to {ratios[-1]:.2g} times as long"
+        lost = len(scenes) - len(bests)
+        text += f"; on {lost} of {len(scenes)} scenes no run gets there" if lost else ""
+        parts.append(f"{text}." if bests else f"Within {percent(level)}: no run.")
+    return f"{' '.join(parts)} {failures(rows)}"

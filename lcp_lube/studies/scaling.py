@@ -1,0 +1,115 @@
+"""How the cost of a whole solve grows with the grid and falls with the ranks: the runs, made on as many ranks as there are.
+
+    lcp-lube chart scaling; mpiexec -n 2 lcp-lube chart scaling; ...
+
+fills one csv; the picture is drawn anew from all of it. On more ranks than cores the seconds mean nothing and are not drawn,
+but the iteration counts do: they are those of a cluster.
+"""
+
+import os
+from collections.abc import Iterator
+from math import isqrt
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from ..base.resumable import ResumableCsv, Row
+from ..cli.main import say
+from ..scenes.scene import load_scene
+from .experiment import open_store, run
+from .scaling_picture import draw
+
+SCENES = ("problem4", "rough")
+STRONG = (250, 500, 1000)  # points a side, whatever the ranks
+QUICK = (60, 120)
+WEAK = 500  # points a side of a square that each rank has
+REPEATS = 3
+CHOICES: dict[str, Any] = {"method": "active-set", "system": "cavity", "recipe_name": "bcgs_amg", "nested": True}
+
+KEY = ("kind", "scene", "n", "ranks")
+COLUMNS = ("wall_s", "cpu_s", "runs", "levels", "finest_linear", "memory_mb", "load_average")
+
+
+def chart(quick: bool = False, results: Path = Path("lcp_lube_results")) -> int:
+    """Make the runs of this number of ranks that are not in the csv yet, then draw. Collective.
+
+    Parameters
+    ----------
+    quick : small grids, each run made once; kept apart from the full chart.
+    results : folder of scaling.csv and scaling.png (scaling_quick...).
+
+    Returns
+    -------
+    int : exit status 0; a run that fails is a point of the chart.
+
+    Raises
+    ------
+    InputError : see `open_store`.
+    """
+    stem = "scaling_quick" if quick else "scaling"
+    store = open_store(results / f"{stem}.csv", KEY, COLUMNS)
+    wanted = [
+        (kind, scene, n)
+        for kind, scene, n in cases(store.comm.size, quick)
+        if store.find(kind=kind, scene=scene, n=n, ranks=store.comm.size) is None
+    ]
+    if wanted:
+        run(load_scene("problem4", {"n": 63}), **CHOICES)  # what is compiled and loaded at first use is so before a clock runs
+    for kind, scene, n in wanted:
+        counts_only = quick or store.comm.size > (os.cpu_count() or 1)
+        fill(store, kind, scene, n, 1 if counts_only else REPEATS)
+    say("\n".join(table(store.rows)))
+    draw(store.rows, results / f"{stem}.png", store.comm)
+    say(f"{results / stem}.png, from {store.path} (remove it to run them again)")
+    return 0
+
+
+def cases(ranks: int, quick: bool) -> Iterator[tuple[str, str, int]]:
+    """Kind, scene and points a side: 'strong', the same on any number of ranks; 'weak', as many points for every rank."""
+    for scene in SCENES:
+        for n in QUICK if quick else STRONG:
+            yield "strong", scene, n
+        yield "weak", scene, isqrt(ranks * (QUICK[0] if quick else WEAK) ** 2)
+
+
+def fill(store: ResumableCsv, kind: str, scene: str, n: int, repeats: int) -> Row:
+    """Make a run and keep it. Collective."""
+    runs = [run(load_scene(scene, {"n": n}), **CHOICES) for _ in range(repeats)]
+    first = runs[0]
+    values = {
+        **first,
+        **{clock: f"{median(a_run[clock] for a_run in runs):.4f}" for clock in ("wall_s", "cpu_s")},
+        "runs": repeats,
+        "levels": " ".join(str(level["iterations"]) for level in first["levels"]),
+        "finest_linear": first["linear_iterations"],
+        "load_average": f"{os.getloadavg()[0]:.1f}",
+    }
+    row = store.add({**values, "kind": kind, "scene": scene, "n": n, "ranks": store.comm.size})
+    say(f"{kind} {scene} {n} x {n}, {store.comm.size} ranks: {row['outcome']}, {row['iterations']} steps, {row['wall_s']} s")
+    return row
+
+
+def table(rows: list[Row]) -> list[str]:
+    """The rows as lines; speed-up against one rank on the same grid (strong) and seconds against it (weak)."""
+    lines = [f"{'':<26}{'ranks':>6}{'s':>9}{'us/point':>10}{'against 1':>10}{'steps':>7}{'Krylov':>7}{'MB':>8}"]
+    for row in sorted(rows, key=lambda row: (row["kind"], row["scene"], int(row["n"]), int(row["ranks"]))):
+        one = reference(rows, row)
+        seconds = float(row["wall_s"])
+        ratio = f"{float(one['wall_s']) / seconds:.2f}" if one and can_time(row) else ""
+        lines.append(
+            f"{row['kind']:<7}{row['scene']:<10}{row['n']:>6}   {row['ranks']:>6}{seconds:>9.2f}"
+            f"{1e6 * seconds / int(row['n']) ** 2:>10.2f}{ratio:>10}{row['iterations']:>7}{row['finest_linear']:>7}"
+            f"{float(row['memory_mb'] or 0):>8.0f}"
+        )
+    return lines
+
+
+def reference(rows: list[Row], row: Row) -> Row | None:
+    """The same run on one rank: the same grid (strong), or one rank's share of points (weak)."""
+    alike = [r for r in rows if (r["kind"], r["scene"], r["ranks"]) == (row["kind"], row["scene"], "1")]
+    return next((r for r in alike if row["kind"] == "weak" or r["n"] == row["n"]), None)
+
+
+def can_time(row: Row) -> bool:
+    """Whether this machine has a core for every rank."""
+    return int(row["ranks"]) <= (os.cpu_count() or 1)
