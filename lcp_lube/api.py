@@ -1,5 +1,6 @@
 """solve(scene) -> Solution: choose method, system and recipe, run the outer loop, certify."""
 
+from inspect import signature
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -24,13 +25,13 @@ from .problems.film.lubrication import LubricationProblem
 from .problems.film.squeeze import SqueezeProblem
 from .problems.solution import Fields, Outcome, Problem, Solution
 from .registry import METHODS
-from .scenes.scene import Scene
+from .scenes.scene import Scene, as_scene
 from .solvers.newton import Monitor, Stopping
 
 
 @overflow_is_no_warning  # but an outcome
 def solve(
-    scene: Scene,
+    scene: str | Path | dict[str, Any] | Scene,
     *,
     method: str = "auto",
     system: str = "auto",
@@ -46,12 +47,14 @@ def solve(
     checkpoint: str | Path | None = None,
     every: int = 1,
     resume: str | Path | None = None,
+    **changes: Any,
 ) -> Solution:
     """Solve a scene and certify the answer. Collective.
 
     Parameters
     ----------
-    scene : what to solve; see `load_scene`.
+    scene : what to solve: a Scene, or a name, a file or a dictionary as `load_scene` takes them.
+    changes : new values of the scene's keys, ``solve("problem4", n=200)``.
     method, system : names in the registry, or 'auto'.
     recipe_name : options/NAME.opts for the inner solver; PETSc options that are set already win over it. By default see
         `auto.plan`, unless a -ksp_type or -pc_type is set.
@@ -75,6 +78,7 @@ def solve(
     ------
     InputError : an unknown name, a value out of range, an option that does not fit.
     """
+    scene = as_scene(scene, changes, signature(solve).parameters)
     if getattr(scene, "balance", None) is not None:
         raise InputError(f"scene {scene.name}: [balance] asks for a search, as 'lcp-lube solve' and solve_or_balance make it")
     begin = perf_counter()

@@ -1,12 +1,16 @@
 """Scenes: what is read, what is refused, and in which words."""
 
+import copy
+import pickle
+
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from lcp_lube import InputError, load_scene
 from lcp_lube.registry import FAMILIES, SCENE_DIR, scene_names
-from lcp_lube.scenes.scene import SliderScene, parse_changes, scene_line
+from lcp_lube.scenes.scene import SliderScene, as_scene, parse_changes, scene_line
 
 
 @pytest.mark.parametrize("name", scene_names())
@@ -178,3 +182,43 @@ def test_any_values_make_a_scene_or_one_line(changes):
         assert len(str(error).splitlines()) == 1
     else:
         assert scene.h_min > 0 and scene.shape[0] >= 1
+
+
+@pytest.mark.parametrize("name", scene_names())
+def test_a_scene_changed_is_the_scene_loaded_with_the_change(name):
+    scene, changes = load_scene(name), {"n": 11}
+    assert as_scene(scene, changes) == as_scene(name, changes) == load_scene(name, **changes)
+    assert as_scene(scene, {}) is scene
+
+
+def test_scenes_from_dictionaries_and_with_keywords(tmp_path):
+    file = tmp_path / "pad.toml"
+    file.write_text('family = "bearing"\nL_mm = 20\nU = 1\nfluid.mu = 0.02\n[[film]]\nshape = "constant"\nh_um = 20\n')
+    data = {"family": "bearing", "L_mm": 20, "U": 1, "fluid": {"mu": 0.02}, "film": [{"shape": "constant", "h_um": 20}]}
+    for scene in (load_scene(file), load_scene(data), load_scene({**data, "U": 3}, U=np.int64(1))):
+        assert (scene.L, scene.U, scene.fluid.mu, scene.film[0].h) == (0.02, 1, 0.02, 20e-6)
+    assert load_scene(data, {"film.h_um": 5, "U": 2}, U=4.0).U == 4.0
+    assert load_scene("journal", eccentricity=0.7) == load_scene("journal", {"eccentricity": 0.7})
+    assert as_scene(load_scene("journal"), {"D": 0.2}).L == load_scene("journal", D=0.2).L  # L follows anew
+    assert data == {**data, "film": [{"shape": "constant", "h_um": 20}]}
+
+
+@pytest.mark.parametrize(
+    "source, changes, message",
+    [
+        ("problem4", {"metod": "din"}, "problem4: metod is neither a key of the scene nor an argument; nearest is method"),
+        ({"family": "bearing", "U": 1}, {}, "scene: L is missing"),
+        ({"family": "bering"}, {}, "scene: family = bering: allowed are "),
+        ({"family": "slider"}, {"h_mim": 1e-6}, "scene: unknown key h_mim; nearest is h_min"),
+    ],
+)
+def test_faults_of_a_dictionary(source, changes, message):
+    with pytest.raises(InputError) as error:
+        as_scene(source, changes, also=("method", "system"))
+    assert str(error.value).startswith(message)
+
+
+def test_a_scene_says_what_was_given_and_is_pickled():
+    scene = load_scene("journal", eccentricity=0.7)
+    assert repr(scene) == "JournalScene(name='journal', nx=360, ny=79, eccentricity=0.7)"
+    assert pickle.loads(pickle.dumps(scene)) == scene == copy.deepcopy(scene)

@@ -2,6 +2,8 @@
 
 from typing import Any
 
+import numpy as np
+
 from ..errors import InputError, nearest
 from ..registry import METHODS
 from .units import stem
@@ -21,7 +23,7 @@ def changed(data: dict[str, Any], changes: dict[str, Any], prefixes: set[str], k
     ------
     InputError : a key that leads nowhere.
     """
-    out: dict[str, Any] = _copied(data)
+    out: dict[str, Any] = plain(data)
     for key, value in changes.items():
         path = key.split(".")
         if len(path) > 1 and stem(path[0]) not in known:
@@ -42,10 +44,13 @@ def changed(data: dict[str, Any], changes: dict[str, Any], prefixes: set[str], k
     return out
 
 
-def _copied(data: Any) -> Any:
+def plain(data: Any) -> Any:
+    """A copy as a scene file would give it: dictionaries, lists, and Python's own numbers in place of NumPy's."""
     if isinstance(data, dict):
-        return {key: _copied(value) for key, value in data.items()}
-    return [_copied(value) for value in data] if isinstance(data, list) else data
+        return {key: plain(value) for key, value in data.items()}
+    if isinstance(data, np.ndarray | np.generic):
+        return data.tolist()
+    return [plain(value) for value in data] if isinstance(data, list | tuple) else data
 
 
 def _table(table: dict[str, Any], word: str) -> Any:

@@ -17,8 +17,9 @@ from ..problems.film.model import Model, Side
 from ..problems.film.reynolds import Film
 from ..problems.solution import Problem
 from ..registry import FAMILIES, SCENE_DIR, scene_names
-from .changes import changed
+from .changes import changed, plain
 from .faults import first_fault, known_keys
+from .units import stem
 
 # Strict: neither true nor "1e-5" is a number.
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
@@ -36,6 +37,18 @@ class Scene(BaseModel):
     name: str = ""
     scheme: str | None = None
     _folder: Path | None = PrivateAttr(None)  # of the scene's file: other files' names are relative to it
+    _follows: frozenset[str] = PrivateAttr(frozenset())  # keys whose values follow from those that were given
+
+    def __init__(self, **data: Any):
+        super().__init__(**data)
+        given = {stem(key) for key in data}
+        fields = type(self).model_fields
+        self._follows = frozenset(name for name in self.model_fields_set if not {name, fields[name].alias} & given)
+
+    def __repr_args__(self) -> Iterable[tuple[str | None, Any]]:
+        """What was given; the rest is the family's defaults."""
+        given = self.model_fields_set - self._follows - {"family"}
+        return [(name, value) for name, value in super().__repr_args__() if name in given]
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -162,23 +175,58 @@ def scene_line(name: str) -> str:
     return (SCENE_DIR / f"{name}.toml").read_text().partition("\n")[0].lstrip("# ")
 
 
-def load_scene(source: str | Path, changes: dict[str, Any] | None = None) -> Scene:
-    """A scene from a built-in name or a .toml file, with some of its values changed.
+def load_scene(source: str | Path | dict[str, Any], changes: dict[str, Any] | None = None, /, **keys: Any) -> Scene:
+    """A scene from a built-in name, a .toml file or a dictionary of the same form, with some of its values changed.
+
+    Parameters
+    ----------
+    changes, keys : new values by key, ``load_scene("journal", eccentricity=0.7)``; with a dot into a table as --set has them,
+        ``load_scene("pocketed_pad", {"film.pocket.depth": 2e-5})``.
 
     Raises
     ------
     InputError : no such scene, an unreadable file, an unknown key, a value of the wrong type or out of range; one line
         that names the file, the key, what was found and what is allowed.
     """
-    changes = changes or {}
-    data, path, name = read_scene(source)
+    return as_scene(source, {**(changes or {}), **keys})
+
+
+def as_scene(source: "str | Path | dict[str, Any] | Scene", changes: dict[str, Any], also: Iterable[str] = ()) -> Scene:
+    """The scene that a caller means: a Scene, or what `load_scene` takes; with the changes made, checked like a file's values.
+
+    Parameters
+    ----------
+    also : names that the caller takes beside the scene's keys, of which an unknown key may be a misspelling.
+
+    Raises
+    ------
+    InputError : as `load_scene`; a change of a problem that has no scene file's keys.
+    """
+    if hasattr(source, "build") and not changes:
+        return source  # type: ignore[return-value]  # a Scene, or what stands for one
+    model: Any = None
+    if isinstance(source, Scene):
+        if source.family not in FAMILIES:
+            raise InputError(f"{source.name}: {', '.join(changes)}: a problem of one's own has no keys to change")
+        data = source.model_dump(by_alias=True, exclude_unset=True, exclude=set(source._follows))
+        folder, name, label, model = source._folder, source.name, source.name or source.family, type(source)
+    elif isinstance(source, dict):
+        data, folder, name, label = plain(source), None, "", str(source.get("name", "scene"))
+    else:
+        data, path, name = read_scene(source)
+        folder, label = path.parent, str(source)
     family = changes.get("family", data.get("family", "slider"))
-    model = family_of(source, family)
+    if model is None or "family" in changes:
+        model = family_of(label, family)
+    keys = set(known_keys(model))
+    for key in changes:
+        if key.partition(".")[0] not in keys and (near := nearest(key, also)):
+            raise InputError(f"{label}: {key} is neither a key of the scene nor an argument{near}")
     try:
-        scene: Scene = model(**{"name": name, **changed(data, changes, {name, family}, set(known_keys(model)))})
+        scene: Scene = model(**{"name": name, **changed(data, plain(changes), {name, family}, keys)})
     except ValidationError as error:
-        raise InputError(f"{source}: {first_fault(error, model)}") from None
-    scene._folder = path.parent
+        raise InputError(f"{label}: {first_fault(error, model)}") from None
+    scene._folder = folder
     return scene
 
 

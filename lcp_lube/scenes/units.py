@@ -1,5 +1,6 @@
 """Lengths in scene files: SI by itself, micrometres and millimetres by a suffix of the key (h_min_um = 15, L_mm = 100)."""
 
+from collections.abc import Iterable
 from decimal import Decimal
 from typing import Any, ClassVar
 
@@ -30,6 +31,10 @@ class Measured(BaseModel):
         super().__pydantic_init_subclass__(**kwargs)
         extras = ((name, field.json_schema_extra) for name, field in cls.model_fields.items())
         cls.lengths = frozenset(name for name, extra in extras if isinstance(extra, dict) and extra.get("unit") == "m")
+
+    def __repr_args__(self) -> Iterable[tuple[str | None, Any]]:
+        """What was given; the rest is defaults."""
+        return [(name, value) for name, value in super().__repr_args__() if name in self.model_fields_set]
 
     @model_validator(mode="before")
     @classmethod
