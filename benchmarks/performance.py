@@ -82,7 +82,7 @@ def ours(case: Case, **choices: Any) -> Values:
     """One solve of the case's scene, as a row; the fields are dropped."""
     before = peak()
     solution, wall, cpu = timed(lambda: solve(load_scene(case.scene, case.changes), **choices))
-    p = solution.p * solution.problem.p_unit
+    p = solution.fields["p"] * solution.problem.p_unit
     values = {
         "wall_s": wall,
         "cpu_s": cpu,

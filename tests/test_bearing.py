@@ -113,7 +113,7 @@ def test_pieces_side_by_side_and_in_series():
 
 def test_no_cavitation_is_one_linear_solve():
     solution = solve(load_scene("pocketed_pad", {"U": 0.02}))
-    assert solution.converged and solution.iterations == 1 and not solution.r.any()
+    assert solution.converged and solution.iterations == 1 and not solution.fields["r"].any()
     np.testing.assert_allclose(solution.problem.quantities(solution.fields)["load_above_ambient"], 1333.4520, rtol=1e-5)
     solution.destroy()
 
@@ -161,8 +161,8 @@ def test_half_the_width_with_a_line_of_symmetry(side):
 def test_void_that_enters():
     film, sides = {"shape": "constant", "h_um": 2}, {"west": {"p": 0.0, "r": 0.3}, "east": 1e5}
     solution = solve(bearing(film=film, sides=sides, U=5.0), nested=False)
-    assert solution.converged and solution.r.max() == pytest.approx(0.3)
-    west, east, *_ = solution.problem.boundary_flows(solution.p, solution.r)
+    assert solution.converged and solution.fields["r"].max() == pytest.approx(0.3)
+    west, east, *_ = solution.problem.boundary_flows(solution.fields["p"], solution.fields["r"])
     assert west == pytest.approx(0.7 * 5.0 * 2e-6, rel=1e-12) and east == pytest.approx(west, rel=1e-10)
     solution.destroy()
 

@@ -45,7 +45,7 @@ def test_holds_for_the_solution(solution):
     ],
 )
 def test_fails_for_what_is_no_solution(solution, spoil, broken):
-    p, r = spoil(solution.p.copy(), solution.r.copy())
+    p, r = spoil(solution.fields["p"].copy(), solution.fields["r"].copy())
     with np.errstate(all="ignore"):
         certificate = solution.problem.certify({"p": p, "r": r}, 1e-8)
     assert not certificate.holds and broken in certificate.failure
@@ -54,9 +54,9 @@ def test_fails_for_what_is_no_solution(solution, spoil, broken):
 @given(st.integers(0, 59), st.floats(1e-3, 1e3))
 def test_fails_for_one_wrong_point(solution, k, size):
     """A single pressure moved by a thousandth of the largest is seen."""
-    p = solution.p.copy()
+    p = solution.fields["p"].copy()
     p[k] += size * p.max()
-    assert not solution.problem.certify({"p": p, "r": solution.r}, 1e-8).holds
+    assert not solution.problem.certify({"p": p, "r": solution.fields["r"]}, 1e-8).holds
 
 
 def test_does_not_depend_on_units():

@@ -183,7 +183,7 @@ def test_every_methods_answer(name, changes, method):
     solution = solve(load_scene(name, changes), method=method, certify=True)
     assert solution.converged and solution.enclosure.certified, solution.enclosure.message
     tight = solve(load_scene(name, changes), method="active-set", nested=False, certify=True)
-    distance = np.abs(solution.p - tight.p).max() * solution.problem.p_unit
+    distance = np.abs(solution.fields["p"] - tight.fields["p"]).max() * solution.problem.p_unit
     assert distance <= solution.enclosure.bounds["band_p"] + tight.enclosure.bounds["band_p"] < 1.0
     solution.destroy()
     tight.destroy()

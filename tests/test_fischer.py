@@ -57,7 +57,7 @@ def test_table_7_residues_in_the_cavity(method):
     """DIN stays positive, at 1e-25; FBN leaves rounding of either sign, some 1e-18 (points 70 to 75, in MPa)."""
     printed = published("table7.csv")
     cavity = slice(int(printed[0]["i"]) - 1, int(printed[-1]["i"]))
-    din, fbn = run("problem1", "din").p[cavity], run("problem1", method).p[cavity]
+    din, fbn = run("problem1", "din").fields["p"][cavity], run("problem1", method).fields["p"][cavity]
     np.testing.assert_allclose(din, [float(row["p_din"]) for row in printed], rtol=0.01)
     sizes = [abs(float(row[f"p_{method.replace('-', '_')}"])) for row in printed]
     assert fbn.min() < 0 < fbn.max()
@@ -69,7 +69,7 @@ def test_loose_tolerances_leave_larger_negative_pressures(method):
     """At eps = 1e-4 some pressures are about -1e-9 MPa (text under table 7)."""
     solution = run("problem3", method, eps=1e-4)
     assert solution.converged
-    assert -1e-8 < solution.p.min() < -1e-10
+    assert -1e-8 < solution.fields["p"].min() < -1e-10
 
 
 @given(numbers, numbers)
@@ -106,15 +106,15 @@ def test_starts_outside_the_interior(method, start):
     """Not an interior method: a start at the origin, where phi has no derivative, or below zero will do."""
     solution = run("problem1", method, p0=start[0], r0=start[1])
     assert solution.converged, solution.message
-    assert solution.p.max() == pytest.approx(run("problem1", method).p.max(), rel=1e-12)
+    assert solution.fields["p"].max() == pytest.approx(run("problem1", method).fields["p"].max(), rel=1e-12)
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_inexact_steps_lead_to_the_same_answer(method):
     exact, inexact = run("problem1", method), run("problem1", method, "gmres_ilu")
     assert inexact.converged, inexact.message
-    np.testing.assert_allclose(inexact.p, exact.p, atol=1e-10)
-    np.testing.assert_allclose(inexact.r, exact.r, atol=1e-10)
+    np.testing.assert_allclose(inexact.fields["p"], exact.fields["p"], atol=1e-10)
+    np.testing.assert_allclose(inexact.fields["r"], exact.fields["r"], atol=1e-10)
     assert inexact.total("linear_iterations") > inexact.iterations
     rtols = [step.rtol for step in inexact.steps]
     assert all(1e-8 <= rtol <= 0.1 for rtol in rtols)

@@ -71,10 +71,10 @@ def test_density_alone_carries_mass():
     """Through every cross-section of a 1D film the same mass; without the law the density's factor is missing."""
     scene = load_scene("pocketed_pad", {"fluid.density": "dowson-higginson", "fluid.p_supply": 5e7, "n": 99})
     solution = solve(scene)
-    west, east, *_ = solution.problem.boundary_flows(solution.p, solution.r)
-    assert solution.converged and west == pytest.approx(east, rel=1e-9) and not solution.r.any()
+    west, east, *_ = solution.problem.boundary_flows(solution.fields["p"], solution.fields["r"])
+    assert solution.converged and west == pytest.approx(east, rel=1e-9) and not solution.fields["r"].any()
     plain = solve(load_scene("pocketed_pad", {"fluid.p_supply": 5e7, "n": 99}))
-    ratio = west / plain.problem.boundary_flows(plain.p, plain.r)[0]
+    ratio = west / plain.problem.boundary_flows(plain.fields["p"], plain.fields["r"])[0]
     assert ratio == pytest.approx(Law(0.0, True).density(np.array(5e7)), rel=2e-3)
     for one in (solution, plain):
         one.destroy()
@@ -93,8 +93,8 @@ def test_a_law_without_effect_changes_nothing():
     """Terms cost nothing where a scene does not name them; named with b ~ 0 they give the same answer."""
     plain, tiny = (solve(load_scene("pocketed_pad", {"fluid.barus": b, "n": 60})) for b in (0.0, 1e-20))
     assert "fluid_solves" not in plain.settings["details"] and tiny.settings["details"]["fluid_solves"] == 1
-    np.testing.assert_allclose(tiny.p, plain.p, rtol=1e-9)
-    problem = effective(plain.problem, Law(), plain.p * plain.problem.p_unit, plain.problem.p_sides)
+    np.testing.assert_allclose(tiny.fields["p"], plain.fields["p"], rtol=1e-9)
+    problem = effective(plain.problem, Law(), plain.fields["p"] * plain.problem.p_unit, plain.problem.p_sides)
     for name in ("k_W", "k_E", "b_C", "b_W", "c"):
         np.testing.assert_allclose(getattr(problem.scheme, name), getattr(plain.problem.scheme, name), rtol=1e-14)
     for one in (plain, tiny):
@@ -113,7 +113,7 @@ def test_from_a_neighbours_answer():
     near = load_scene("pocketed_pad_2d", {"nx": 49, "ny": 19, "U": 1.01})
     warm, cold = solve(near, start=(first.problem, first.fields)), solve(near)
     assert warm.converged
-    np.testing.assert_allclose(warm.p, cold.p, rtol=0, atol=1e-6 * cold.p.max())
+    np.testing.assert_allclose(warm.fields["p"], cold.fields["p"], rtol=0, atol=1e-6 * cold.fields["p"].max())
     for one in (first, warm, cold):
         one.destroy()
 

@@ -10,7 +10,7 @@ from lcp_lube.scenes.scene import load_scene
 def numbers(name, changes):
     solution = solve(load_scene(name, changes))
     assert solution.converged, solution.message
-    values = solution.problem.quantities(solution.fields) | {"r_max": solution.problem.reduce.max(solution.r)}
+    values = solution.problem.quantities(solution.fields) | {"r_max": solution.problem.reduce.max(solution.fields["r"])}
     solution.destroy()
     return values
 

@@ -273,14 +273,14 @@ def test_a_line_picture_shows_fields_fronts_and_the_exact_solution(line: Solutio
     upper, lower, right = draw(shown).axes
     x, p = drawn(upper, "pressure p")
     np.testing.assert_allclose(x, np.concatenate([[0.0], shown.x, [0.1]]) * 1e3)
-    np.testing.assert_allclose(p, np.concatenate([[1.0], line.p, [1.0]]))  # both ends at 1 MPa
+    np.testing.assert_allclose(p, np.concatenate([[1.0], line.fields["p"], [1.0]]))  # both ends at 1 MPa
     np.testing.assert_allclose(np.interp(x, *drawn(upper, "exact")), p, atol=0.02)
     # The void, at the faces, where the scheme knows it: that of the exact solution but for the cell that is full again.
     at, r = drawn(right, "void fraction r")
     away = np.abs(at / 1e3 - shown.quantities["reformation"]) > 2 * line.problem.grid.spacing[0]
     np.testing.assert_allclose(at[1:-1], (shown.x + 0.05 / 61) * 1e3)
     np.testing.assert_allclose(r[away], shown.exact.r(at / 1e3)[away], atol=3e-4)
-    assert np.abs(line.r - shown.exact.r(shown.x))[shown.x < 0.09].max() > 5e-3  # as at the points it is not
+    assert np.abs(line.fields["r"] - shown.exact.r(shown.x))[shown.x < 0.09].max() > 5e-3  # as at the points it is not
     texts = [text.get_text() for text in upper.texts]
     for name in ("rupture", "reformation"):
         assert f"{name}\n{1e3 * shown.quantities[name]:.4g} mm" in texts

@@ -111,8 +111,8 @@ def test_the_result_does_not_depend_on_the_preconditioner(name, scene, changes):
         pytest.skip(f"this PETSc has no {package}")
     direct, other = run(scene, "umfpack", **changes), run(scene, name, **changes)
     assert other.converged, other.message
-    np.testing.assert_allclose(other.p, direct.p, atol=1e-7 * direct.p.max())
-    np.testing.assert_allclose(other.r, direct.r, atol=1e-6)
+    np.testing.assert_allclose(other.fields["p"], direct.fields["p"], atol=1e-7 * direct.fields["p"].max())
+    np.testing.assert_allclose(other.fields["r"], direct.fields["r"], atol=1e-6)
 
 
 @pytest.mark.hypre
@@ -144,7 +144,7 @@ class TestDocumentedDifficulty:
         with recipe("umfpack"):
             system = FullSystem(problem)
             zero = np.zeros(100)
-            system.solve(solution.r, solution.p, zero, zero, 1e-8)
+            system.solve(solution.fields["r"], solution.fields["p"], zero, zero, 1e-8)
         fields = FakePC(system).fields
         A, B, R, P = gathered(fields.A), gathered(fields.B), fields.R, fields.P
         largest = np.abs(A).max()

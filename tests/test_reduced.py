@@ -115,7 +115,7 @@ def test_near_null_vector_of_a_hard_film():
     """w > 0, and S w is small against diag(S) w but for a few cells; constants leave much more."""
     problem = load_scene("textured_slider", {"K": 2}).build()
     solution = solve(load_scene("textured_slider", {"K": 2}), method="active-set", system="reduced", recipe_name=DIRECT)
-    full = solution.p > 0
+    full = solution.fields["p"] > 0
     with recipe(DIRECT):
         system = CavitySystem(problem)
         system.solve(1.0 - full, full.astype(float), problem.c, 0 * problem.c, 1e-8)

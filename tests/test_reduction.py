@@ -32,7 +32,7 @@ def both(scene):
         solution = solver(scene, method="active-set", nested=False)
         assert solution.converged, solution.message
         quantities = solution.problem.quantities(solution.fields)
-        out.append((solution.p, solution.r, quantities, solution))
+        out.append((solution.fields["p"], solution.fields["r"], quantities, solution))
         solution.destroy()
     return out
 
@@ -146,7 +146,7 @@ def test_a_set_pc_keeps_the_whole_model(petsc_options):
 def test_auto_reduces(name):
     auto, whole = (solve(load_scene(name, {"nx": 40, "ny": 31}), method=method) for method in ("auto", "active-set"))
     assert auto.converged and auto.settings["details"]["reduction"] == "mirror" and "half the width" in auto.settings["why"][0]
-    for field, other in zip((auto.p, auto.r), (whole.p, whole.r), strict=True):
+    for field, other in zip((auto.fields["p"], auto.fields["r"]), (whole.fields["p"], whole.fields["r"]), strict=True):
         np.testing.assert_allclose(field, other, rtol=0, atol=1e-6 * other.max())
     for solution in (auto, whole):
         solution.destroy()
@@ -160,7 +160,7 @@ def test_a_wrong_reduction_is_found_out(monkeypatch):
     solution, whole = solve(scene), solve(scene, method="active-set")
     assert solution.converged and "reduction" not in solution.settings["details"]
     assert solution.settings["why"][0].startswith("the whole model: the reduced one's answer (mirror) is not")
-    np.testing.assert_allclose(solution.p, whole.p, rtol=0, atol=1e-6 * whole.p.max())
+    np.testing.assert_allclose(solution.fields["p"], whole.fields["p"], rtol=0, atol=1e-6 * whole.fields["p"].max())
     for one in (solution, whole):
         one.destroy()
 
@@ -172,7 +172,7 @@ def test_nested_and_from_a_neighbours_answer():
     near = load_scene("journal", {"nx": 60, "ny": 51, "eccentricity": 0.51})
     warm, cold = solve(near, start=(first.problem, first.fields)), solve(near)
     assert warm.converged and warm.iterations <= cold.iterations
-    np.testing.assert_allclose(warm.p, cold.p, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(warm.fields["p"], cold.fields["p"], rtol=0, atol=1e-8)
     for solution in (first, warm, cold):
         solution.destroy()
 

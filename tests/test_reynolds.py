@@ -73,7 +73,7 @@ def found(film, shape=(40,), **data):
     scene = FilmScene.of(film, dimension=len(shape), **names, **data)
     solution = solve(scene, method="active-set", recipe_name="superlu", nested=False)
     assert solution.converged, solution.message
-    p, r = solution.p.reshape(shape[::-1]), solution.r.reshape(shape[::-1])
+    p, r = solution.fields["p"].reshape(shape[::-1]), solution.fields["r"].reshape(shape[::-1])
     h = solution.problem.scheme.h.reshape(shape[::-1])
     solution.destroy()
     return p, r, h
@@ -108,7 +108,7 @@ def test_flow_is_one_constant_along_a_line(film, scheme):
     """A solution's flow is the same through both ends: nothing is lost in the cavity."""
     scene = FilmScene.of(film, n=30, scheme=scheme, p_a=1e6)
     solution = solve(scene, method="active-set", recipe_name="superlu")
-    west, east, *_ = solution.problem.boundary_flows(solution.p, solution.r)
+    west, east, *_ = solution.problem.boundary_flows(solution.fields["p"], solution.fields["r"])
     assert solution.converged and west == pytest.approx(east, rel=1e-10)
     solution.destroy()
 
@@ -139,7 +139,7 @@ def test_mean_cubes_is_the_mean_of_the_nodal_cubes():
 def din(changes, name="problem3"):
     solution = solve(load_scene(name, changes), method="din", system="full", recipe_name="superlu", nested=False)
     assert solution.converged
-    fields = solution.p * solution.problem.p_unit, solution.r, solution.iterations
+    fields = solution.fields["p"] * solution.problem.p_unit, solution.fields["r"], solution.iterations
     solution.destroy()
     return fields
 
@@ -173,7 +173,7 @@ def test_lengths_scale():
 def test_problem_4_is_symmetric_in_y(method):
     solution = solve(load_scene("problem4", {"nx": 22, "ny": 13}), method=method, nested=False, stopping=Stopping(1e-10, 1e-8))
     assert solution.converged
-    for field in (solution.p, solution.r):
+    for field in (solution.fields["p"], solution.fields["r"]):
         field = field.reshape(13, 22)
         np.testing.assert_allclose(field, field[::-1], rtol=0, atol=1e-9 * field.max())
         assert np.ptp(field, axis=0).max() > 0.1 * field.max()  # it does depend on y

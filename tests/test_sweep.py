@@ -106,7 +106,7 @@ def test_a_new_line_starts_from_the_beginning_of_the_one_before():
     _, _, starts = run(axes)
     assert starts[3] is starts[1] and starts[2] is not starts[1]
     first = solve(load_scene("journal", {**JOURNAL, "width_over_diameter": 0.5, "eccentricity": 0.2}))
-    np.testing.assert_allclose(starts[3]["p"], first.p, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(starts[3]["p"], first.fields["p"], rtol=1e-6, atol=1e-9)
     first.destroy()
 
 

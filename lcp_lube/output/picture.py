@@ -92,9 +92,9 @@ def collect(solution: Solution) -> Picture | None:
     more: dict[str, Any] = {}
     if isinstance(problem, LubricationProblem):
         s = problem.scheme
-        passing = (s.couette_E.ravel() + s.b_C.ravel() * solution.r) / (problem.U * point_weights(grid))
+        passing = (s.couette_E.ravel() + s.b_C.ravel() * solution.fields["r"]) / (problem.U * point_weights(grid))
         liquid = gather(grid, passing, stride)
-        sign = gather(grid, cavity_sign(problem, solution.p, solution.r), stride)
+        sign = gather(grid, cavity_sign(problem, solution.fields["p"], solution.fields["r"]), stride)
         rows = taken(grid.shape[1], ny) if grid.dim == 2 else np.zeros(1)
         more = {
             "ahead": 0.0 if np.array_equal(s.couette_E, problem.U * s.h) else 0.5 * grid.spacing[0],

@@ -73,7 +73,7 @@ def discrete(scene: LubricationScene) -> Reference:
         band, problem = solution.enclosure, solution.problem
         try:
             if band is not None and band.certified:
-                p_max = problem.reduce.max(solution.p) * getattr(problem, "p_unit", 1.0)
+                p_max = problem.reduce.max(solution.fields["p"]) * getattr(problem, "p_unit", 1.0)
                 width = max(band.bounds["band_p"] / (p_max or 1.0), band.bounds["band_r"])
                 return Reference((solution.fields,), f"{method}, proved to {width:.0e}")
             if solution.converged:

@@ -149,7 +149,7 @@ def _pressure(solution: Solution, i: int) -> float:
     """p at x_i = i dx in the problem's unit, on every rank. Collective."""
     grid = solution.problem.grid
     here = np.arange(grid.x_start, grid.x_end) + 1 == i
-    return grid.reduce.sum(np.where(here, solution.p, 0.0))
+    return grid.reduce.sum(np.where(here, solution.fields["p"], 0.0))
 
 
 class _Layout:

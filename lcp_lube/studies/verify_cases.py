@@ -50,7 +50,7 @@ def _film_ends(solution: Solution, values: Values) -> Values:
     """Lengths over L, flow, and what the flow says of the void where it is not sampled. Collective."""
     problem: Any = solution.problem
     L = problem.grid.lengths[0]
-    west, east, *_ = problem.boundary_flows(solution.p, solution.r)
+    west, east, *_ = problem.boundary_flows(solution.fields["p"], solution.fields["r"])
     out = {"Q": west, "iterations": solution.iterations, "x_max/L": values["p_max_at"][0] / L}
     out["x_max_deg"] = 360.0 * out["x_max/L"]
     if values["rupture"] is not None:
@@ -68,17 +68,20 @@ def _pocket_start(solution: Solution, values: Values) -> Values:
     problem: Any = solution.problem
     grid = problem.grid
     here = (np.abs(grid.x[0] - 2e-3) < 0.5 * grid.spacing[0]).astype(float)
-    return {**_film_ends(solution, values), "p_at_pocket": problem.reduce.dot(solution.p, here) * problem.p_unit + problem.p_c}
+    return {
+        **_film_ends(solution, values),
+        "p_at_pocket": problem.reduce.dot(solution.fields["p"], here) * problem.p_unit + problem.p_c,
+    }
 
 
 def _void(solution: Solution, values: Values) -> Values:
     """Force of p - p_ambient by cells, number of points in the cavity, largest void fraction. Collective."""
     problem: Any = solution.problem
-    above = solution.p * problem.p_unit + problem.p_c - values["p_ambient"]
+    above = solution.fields["p"] * problem.p_unit + problem.p_c - values["p_ambient"]
     return {
         "force": problem.reduce.sum(above) * problem.grid.cell,
         "cavitated_points": values["cavitated_fraction"] * problem.grid.size,
-        "r_max": problem.reduce.max(solution.r),
+        "r_max": problem.reduce.max(solution.fields["r"]),
         "P_max": values["p_max"] / values["p_unit"],
     }
 
