@@ -17,7 +17,7 @@ from ..problems.film.model import NAMES, OPPOSITE, Model, Side
 from ..problems.film.shapes import Block, Sum
 from .film import Extent, FilmPart
 from .scene import Count, Finite, Positive, Scene
-from .units import Measured, metres
+from .units import Measured, is_quantity, measured, metres
 
 SAMPLES = 65  # points a side of the film from which the pressure unit is taken: the same on every grid
 
@@ -25,11 +25,11 @@ SAMPLES = 65  # points a side of the film from which the pressure unit is taken:
 class Fluid(Measured):
     """The lubricant; pressures are absolute, as everywhere in a bearing's file."""
 
-    mu: Positive = Field(..., description="viscosity, Pa s")
-    p_c: Finite = Field(0.0, description="cavitation pressure, Pa")
-    barus: Annotated[Finite, Field(ge=0, lt=1e-3)] = Field(0.0, description="viscosity is mu exp(barus (p - p_c)), 1/Pa")
+    mu: Positive = measured("Pa s", ..., "viscosity")
+    p_c: Finite = measured("Pa", 0.0, "cavitation pressure")
+    barus: Annotated[Finite, Field(ge=0, lt=1e-3)] = measured("1/Pa", 0.0, "viscosity is mu exp(barus (p - p_c))")
     density: Literal["constant", "dowson-higginson"] = Field("constant", description="how the density depends on the pressure")
-    p_supply: Finite | None = Field(None, description="pressure of the sides that name none, Pa; default p_c")
+    p_supply: Finite | None = measured("Pa", None, "pressure of the sides that name none; default p_c")
 
 
 class SideTable(Measured):
@@ -38,14 +38,14 @@ class SideTable(Measured):
     kind: Literal["pressure", "symmetry", "closed", "periodic"] = Field(
         "pressure", description="pressure given; symmetry or closed: nothing flows through; periodic, with the opposite side"
     )
-    p: Finite | None = Field(None, description="pressure, Pa; default fluid.p_supply")
+    p: Finite | None = measured("Pa", None, "pressure; default fluid.p_supply")
     r: Annotated[Finite, Field(ge=0, lt=1)] = Field(0.0, description="void fraction that enters (west, at p = p_c)")
 
     @model_validator(mode="before")
     @classmethod
     def _short(cls, data: Any) -> Any:
-        """A number is a pressure, a word a kind."""
-        if isinstance(data, (int, float)) and not isinstance(data, bool):
+        """A number is a pressure, with a unit or without; a word is a kind."""
+        if (isinstance(data, (int, float)) and not isinstance(data, bool)) or is_quantity(data):
             return {"p": data}
         return {"kind": data} if isinstance(data, str) else data
 
@@ -67,23 +67,23 @@ class SidesTable(Measured):
     north: SideTable = Field(SideTable(), description="y = width (2D)")
 
 
-class BearingScene(Measured, Scene):
+class BearingScene(Scene):
     """A bearing under a wall that moves in x: its film is the sum of the [[film]] shapes. SI units, pressures absolute."""
 
     family: Literal["bearing"] = "bearing"
     dimension: Literal[1, 2] = Field(1, description="1: a film h(x), per metre of width; 2: h(x, y)")
     L: Positive = metres(..., "length in the direction of motion")
     width: Positive | None = metres(None, "width in y; default L (2D)")
-    U: Positive = Field(..., description="speed of the moving wall, towards larger x, m/s")
-    p_in: Finite | None = Field(None, description="pressure of the west side, Pa: short for sides.west.p")
-    p_out: Finite | None = Field(None, description="pressure of the east side, Pa: short for sides.east.p")
+    U: Positive = measured("m/s", ..., "speed of the moving wall, towards larger x")
+    p_in: Finite | None = measured("Pa", None, "pressure of the west side; short for sides.west.p")
+    p_out: Finite | None = measured("Pa", None, "pressure of the east side; short for sides.east.p")
     fluid: Fluid = Field(..., description="the lubricant")
     film: list[FilmPart] = Field(..., min_length=1, description="shapes, which are added up")
     h_floor: Positive | None = metres(None, "smallest film: the sum is cut there; default no cut")
     sides: SidesTable = Field(SidesTable(), description="condition at each side")
     scheme: Literal["nodal", "face", "upwind"] = Field("face", description="form of the Couette flux")
     mean_cubes: bool = Field(False, description="h^3 at a face as the mean of the nodal values")
-    p_unit: Positive | None = Field(None, description="pressure unit of the equations, Pa; default from mu U L/h^2")
+    p_unit: Positive | None = measured("Pa", None, "pressure unit of the equations; default from mu U L/h^2")
     h_offset: Finite = metres(0.0, "added to the film everywhere: its level")
     balance: BalanceTable | None = Field(None, description="load to carry, and what is found for it")
     n: Count = Field(100, description="points a side")

@@ -13,6 +13,7 @@ from ..problems.film.gaps import JournalGap, Raised
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Side
 from .scene import LubricationScene, Positive
+from .units import measured, metres
 
 
 class JournalScene(LubricationScene):
@@ -28,9 +29,9 @@ class JournalScene(LubricationScene):
     eccentricity: Annotated[float, Field(ge=0, lt=1, description="relative eccentricity")] = 0.5
     width_over_diameter: Positive = Field(1.0, description="B/D (2D)")
     round: Literal["groove", "periodic"] = Field("groove", description="at phi = 0: an axial groove, or nothing (2D)")
-    D: Positive = Field(0.1, description="diameter, m")
+    D: Positive = metres(0.1, "diameter")
     psi: Annotated[float, Field(gt=0, lt=1, description="relative clearance c/(D/2)")] = 1e-3
-    omega: Positive = Field(100.0, description="angular velocity, rad/s")
+    omega: Positive = measured("rad/s", 100.0, "angular velocity")
     mu: Positive = 0.02
     L: Positive = Field(1.0, description="follows from D")
     U: Positive = Field(1.0, description="follows from D and omega")
@@ -41,7 +42,7 @@ class JournalScene(LubricationScene):
         for key in cls.derived:
             if key in data:
                 raise ValueError(f"{key} = {data[key]}: follows from D, width_over_diameter, omega, psi and mu in this scene")
-        fields = cls.model_fields
+        data, fields = cls.in_si_units(data), cls.model_fields
         D, omega, mu, psi = (data.get(key, fields[key].default) for key in ("D", "omega", "mu", "psi"))
         ratio = data.get("width_over_diameter", fields["width_over_diameter"].default)
         try:

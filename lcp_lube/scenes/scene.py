@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from petsc4py import PETSc
-from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError, model_validator
+from pydantic import Field, PrivateAttr, ValidationError, model_validator
 
 from ..drivers.balance import BalanceTable
 from ..errors import InputError, nearest
@@ -19,7 +19,7 @@ from ..problems.solution import Problem
 from ..registry import FAMILIES, SCENE_DIR, scene_names
 from .changes import changed, plain
 from .faults import first_fault, known_keys
-from .units import stem
+from .units import Measured, measured, metres, stem
 
 # Strict: neither true nor "1e-5" is a number.
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
@@ -28,10 +28,8 @@ NotNegative = Annotated[Finite, Field(ge=0)]
 Count = Annotated[int, Field(strict=True, ge=1, le=2**31 - 2)]
 
 
-class Scene(BaseModel):
+class Scene(Measured):
     """What every scene has; a family (registry.FAMILIES) adds its data and builds its problem."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     family: str = "slider"
     name: str = ""
@@ -71,18 +69,18 @@ class LubricationScene(Scene):
     """
 
     dimension: Literal[1, 2] = 1
-    L: Positive = Field(0.1, description="length in the direction of motion, m")
-    width: Positive | None = Field(None, description="width Ly, m; default L (2D)")
-    mu: Positive = Field(0.015, description="viscosity, Pa s")
-    U: Positive = Field(5.0, description="speed of the moving wall, m/s")
-    p_a: NotNegative = Field(0.0, description="pressure at x = 0, Pa above p_c")
-    p_b: NotNegative = Field(0.0, description="pressure at x = L, Pa above p_c")
-    p_side: NotNegative = Field(0.0, description="pressure at y = 0 and y = width, Pa above p_c (2D)")
-    p_c: Finite = Field(0.0, description="cavitation pressure, Pa")
+    L: Positive = metres(0.1, "length in the direction of motion")
+    width: Positive | None = metres(None, "width Ly; default L (2D)")
+    mu: Positive = measured("Pa s", 0.015, "viscosity")
+    U: Positive = measured("m/s", 5.0, "speed of the moving wall")
+    p_a: NotNegative = measured("Pa", 0.0, "pressure at x = 0, above p_c")
+    p_b: NotNegative = measured("Pa", 0.0, "pressure at x = L, above p_c")
+    p_side: NotNegative = measured("Pa", 0.0, "pressure at y = 0 and y = width (2D), above p_c")
+    p_c: Finite = measured("Pa", 0.0, "cavitation pressure")
     scheme: Literal["nodal", "face", "upwind"] = Field("face", description="form of the Couette flux")
     mean_cubes: bool = Field(False, description="h^3 at a face as the mean of the nodal values")
-    p_unit: Positive = Field(1e6, description="pressure unit of the equations, Pa")
-    h_offset: Finite = Field(0.0, description="added to the film everywhere, m: its level")
+    p_unit: Positive = measured("Pa", 1e6, "pressure unit of the equations")
+    h_offset: Finite = metres(0.0, "added to the film everywhere: its level")
     balance: BalanceTable | None = Field(None, description="load to carry, and what is found for it")
     n: Count = Field(100, description="interior points a side")
     nx: Count | None = Field(None, description="interior points in x; default n")
@@ -147,8 +145,8 @@ class SliderScene(LubricationScene):
     film: Literal["sinusoid", "parabola"] = "sinusoid"
     form: Literal["convergent-divergent", "divergent-convergent"] = "convergent-divergent"
     wave: tuple[NotNegative, NotNegative] = Field((0.0, 1.0), description="where the wave starts and ends, in parts of L")
-    h_min: Positive = Field(15e-6, description="smallest film, m")
-    h_max: Positive = Field(25e-6, description="largest film, m")
+    h_min: Positive = metres(15e-6, "smallest film")
+    h_max: Positive = metres(25e-6, "largest film")
     scheme: Literal["nodal", "face", "upwind"] = Field("nodal", description="form of the Couette flux")
 
     @model_validator(mode="after")

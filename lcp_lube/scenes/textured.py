@@ -6,6 +6,7 @@ from pydantic import Field, model_validator
 
 from ..problems.film.textures import Dimples, Rough
 from .scene import Count, LubricationScene, NotNegative, Positive, SliderScene
+from .units import metres
 
 
 class TexturedScene(LubricationScene):
@@ -17,8 +18,8 @@ class TexturedScene(LubricationScene):
     dimension: Literal[2] = 2
     L: Positive = 0.08
     K: Annotated[int, Field(ge=1, le=1000, description="cells a side")] = 4
-    h: Positive = Field(15e-6, description="film between the dimples, m")
-    depth: Positive = Field(12e-6, description="depth of the dimples, m")
+    h: Positive = metres(15e-6, "film between the dimples")
+    depth: Positive = metres(12e-6, "depth of the dimples")
     mu: Positive = 0.03
     p_a: NotNegative = 70e3
     p_b: NotNegative = 70e3
@@ -31,6 +32,7 @@ class TexturedScene(LubricationScene):
     @model_validator(mode="before")
     @classmethod
     def _reference_grid(cls, data: Any) -> Any:
+        data = cls.in_si_units(data)
         if isinstance(data, dict) and "n" not in data and isinstance(data.get("K", 4), int):
             data = {**data, "n": 30 * data.get("K", 4)}
         return data
@@ -45,9 +47,9 @@ class RoughScene(SliderScene):
 
     dimension: Literal[2] = 2
     seed: Annotated[int, Field(ge=0)] = 1
-    amplitude: NotNegative = Field(2.5e-6, description="standard deviation of the surface, m")
+    amplitude: NotNegative = metres(2.5e-6, "standard deviation of the surface")
     cells: Count = Field(40, description="meshes of the random surface along a side")
-    h_floor: Positive = Field(1e-6, description="smallest film that the surface leaves, m")
+    h_floor: Positive = metres(1e-6, "smallest film that the surface leaves")
     scheme: Literal["nodal", "face", "upwind"] = "face"
     p_a: NotNegative = 1e5
     p_b: NotNegative = 1e5
