@@ -19,6 +19,10 @@ class InputError(ValueError):
 
 
 def nearest(word: str, legal: Iterable[str], dash: str = "") -> str:
-    """'; nearest is X', or nothing when nothing is near."""
-    close = difflib.get_close_matches(word, list(legal), n=1, cutoff=0.5)
+    """'; nearest is X', or nothing when nothing is near; a difference in capitals alone is the least."""
+    names = list(legal)
+    close = [name for name in names if name.lower() == word.lower()] or difflib.get_close_matches(word, names, 1, 0.5)
+    if not close:
+        folded = {name.lower(): name for name in names}
+        close = [folded[name] for name in difflib.get_close_matches(word.lower(), folded, 1, 0.5)]
     return f"; nearest is {dash}{close[0]}" if close else ""

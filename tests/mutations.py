@@ -80,7 +80,7 @@ def furnish(folder: Path) -> None:
     (folder / "loop.toml").symlink_to(folder / "loop.toml")
     (folder / "bytes.toml").write_bytes(bytes(range(256)))
     (folder / "empty.toml").write_text("")
-    (folder / "long.toml").write_text("h_min = 1e-5\n" + "# " + "long " * 100_000)
+    (folder / "long.toml").write_text("family = 'slider'\nh_min = 1e-5\n" + "# " + "long " * 100_000)
 
 
 def _scene(rng: random.Random, folder: Path) -> Case:

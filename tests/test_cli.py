@@ -103,7 +103,7 @@ def test_bad_scene_files(refused, tmp_path, monkeypatch, scene):
     (tmp_path / "bytes.toml").write_bytes(b"\xff\xfe")
     (tmp_path / "empty.toml").write_text("")
     (tmp_path / "broken.toml").write_text("h_min = = 1\n")
-    (tmp_path / "typo.toml").write_text("h_mim = 1e-5\n")
+    (tmp_path / "typo.toml").write_text("family = 'slider'\nh_mim = 1e-5\n")
     assert refused("solve", scene).startswith(f"{scene}: ")
 
 

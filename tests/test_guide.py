@@ -98,7 +98,7 @@ def test_the_slurm_script_resumes_and_requeues(tmp_path, environment):
     home, calls = tmp_path / "home", tmp_path / "calls"
     (home / "lcp_lube" / ".venv" / "bin").mkdir(parents=True)
     (home / "lcp_lube" / ".venv" / "bin" / "activate").write_text("")
-    (tmp_path / "my_bearing.toml").write_text("n = 30\n")
+    (tmp_path / "my_bearing.toml").write_text("family = 'slider'\nn = 30\n")
     (tmp_path / "job.sh").write_text(script)
     tools = tmp_path / "tools"
     tools.mkdir()

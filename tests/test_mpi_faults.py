@@ -133,13 +133,13 @@ def test_unequal_command_lines(tmp_path):
 def test_unequal_scene_files(tmp_path):
     for k, h_min in enumerate(("1e-5", "2e-5")):
         (tmp_path / str(k)).mkdir()
-        (tmp_path / str(k) / "my.toml").write_text(f"h_min = {h_min}\nn = 30\n")
+        (tmp_path / str(k) / "my.toml").write_text(f"family = 'slider'\nh_min = {h_min}\nn = 30\n")
     status, lines = unequal(tmp_path, "solve my.toml", "solve my.toml")
     assert status == 2 and lines == ["lcp-lube: scene my or how to solve it: not the same on rank 0 and on rank 1"]
 
 
 def test_a_scene_file_that_one_rank_lacks(tmp_path):
     (tmp_path / "0").mkdir()
-    (tmp_path / "0" / "my.toml").write_text("h_min = 1e-5\nn = 30\n")
+    (tmp_path / "0" / "my.toml").write_text("family = 'slider'\nh_min = 1e-5\nn = 30\n")
     status, lines = unequal(tmp_path, "solve my.toml", "solve my.toml")
     assert status == 2 and lines == ["lcp-lube: my.toml: No such file or directory"]

@@ -161,7 +161,10 @@ def toml(value):
 def test_any_scene_loads_or_is_refused(data):
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "s.toml"
-        path.write_text("".join(f"{key} = {toml(value)}\n" for key, value in data.items()), encoding="utf-8")
+        path.write_text(
+            "family = 'slider'\n" * ("family" not in data) + "".join(f"{key} = {toml(value)}\n" for key, value in data.items()),
+            encoding="utf-8",
+        )
         try:
             scene = load_scene(path)
         except InputError as error:

@@ -37,7 +37,7 @@ def test_changes_come_last():
 
 def test_n_replaces_the_files_nx_and_ny(tmp_path):
     file = tmp_path / "flat.toml"
-    file.write_text("dimension = 2\nnx = 40\nny = 3\n")
+    file.write_text("family = 'slider'\ndimension = 2\nnx = 40\nny = 3\n")
     assert load_scene(file).shape == (40, 3)
     assert load_scene(file, {"n": 9}).shape == (9, 9)
     assert load_scene(file, {"n": 9, "ny": 2}).shape == (9, 2)
@@ -71,7 +71,14 @@ def test_only_a_1d_scene_has_an_exact_solution():
         ({"n": 10.5}, "n = 10.5: allowed is a valid integer"),
         ({"n": "many"}, "n = many: allowed is a valid integer"),
         ({"h_min": True}, "h_min = True: allowed is a valid number"),
-        ({"h_min": "15e-6"}, "h_min = 15e-6: allowed is a valid number"),
+        ({"h_min": "15e-6 mum"}, "h_min = 15e-6 mum: 'mum' is no unit; nearest is um"),
+        ({"h_min": "1 MPa"}, "h_min = 1 MPa: a length (m, mm, um, nm) is needed, not a pressure"),
+        ({"p_a": "15um"}, "p_a = 15um: a pressure (Pa, kPa, MPa, GPa, bar) is needed, not a length"),
+        ({"U": "3000 rpm"}, "U = 3000 rpm: a speed (m/s, mm/s, km/h) is needed, not an angular velocity"),
+        ({"mu": "1%"}, "mu = 1%: a viscosity (Pa s, mPa s, cP) is needed"),
+        ({"h_min_um": "15um"}, "h_min_um = 15um: a number without a unit is needed, not a length"),
+        ({"n": "1 m"}, "n = 1 m: a number without a unit is needed, not a length"),
+        ({"p_a": "1e99999 MPa"}, "p_a = inf: allowed is a finite number"),
         ({"h_min": [1e-5]}, "h_min = [1e-05]: allowed is a valid number"),
         ({"h_min": 3e-5}, "h_max = 2.5e-05: at least h_min = 3e-05 is needed"),
         ({"film": "saw"}, "film = saw: allowed is 'sinusoid' or 'parabola'"),
@@ -80,6 +87,8 @@ def test_only_a_1d_scene_has_an_exact_solution():
         ({"wave": [0.5, 0.5]}, "wave = [0.5, 0.5]: 0 <= start < end <= 1 is needed"),
         ({"wave": [0.5, 1.5]}, "wave = [0.5, 1.5]: 0 <= start < end <= 1 is needed"),
         ({"wave": [0.5]}, "wave.1"),
+        ({"u": 3.0}, "unknown key u; nearest is U"),
+        ({"H_MIN": 3.0}, "unknown key H_MIN; nearest is h_min"),
         ({"hmin": 1e-5}, "unknown key hmin; nearest is h_min"),
         ({"viscosity": 1.0}, "unknown key viscosity"),
         ({"ny": 5}, "ny = 5: the scene is one-dimensional"),
@@ -106,9 +115,10 @@ def test_refused_values(changes, message):
         (b"h_min = 1e-5\nh_min = 2e-5\n", "Cannot overwrite a value"),
         (b"\xff\xfe\x00n", "'utf-8' codec can't decode byte 0xff"),
         (b"\x00\x01\x02", "Invalid"),
-        (b"[slider]\nn = 5\n", "unknown key slider"),
-        (b"n = 1979-05-27\n", "n = 1979-05-27: allowed is a valid integer"),
-        (b"h_min = 'thin'\n", "h_min = thin: allowed is a valid number"),
+        (b"family = 'slider'\n[slider]\nn = 5\n", "unknown key slider"),
+        (b"family = 'slider'\nn = 1979-05-27\n", "n = 1979-05-27: allowed is a valid integer"),
+        (b"n = 5\n", "family is missing; allowed are slider, "),
+        (b"family = 'slider'\nh_min = 'thin'\n", "h_min = thin: allowed is a valid number"),
     ],
 )
 def test_refused_files(tmp_path, content, message):

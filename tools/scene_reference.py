@@ -25,8 +25,10 @@ A scene is a TOML file (`lcp-lube solve my.toml`), or one of the built-in names 
 writes a built-in one with every key and its meaning as a comment. `--set KEY=VALUE` changes a key, `--set TABLE.KEY=VALUE`
 one inside a table.
 
-Values are in SI units. Some keys that are lengths may carry a unit instead, {" or ".join(f"`{one}`" for one in SUFFIXES)} at
-their end (`h_min_um = 15`): the tables say which. A key that is not listed is refused, with the nearest one that is.
+Values are in SI units. A text may carry another unit of the key's dimension: `h_min = "15um"`, `p_in = "1 MPa"`,
+`mu = "40 mPa s"`, `omega = "3000 rpm"`, `eccentricity = "75%"`; with `--set` and `--vary` no quotes are needed. A length for a
+pressure is refused. Keys that are lengths may carry {" or ".join(f"`{one}`" for one in SUFFIXES)} at their end instead
+(`h_min_um = 15`). A key that is not listed is refused, with the nearest one that is.
 """
 
 

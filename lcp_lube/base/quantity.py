@@ -109,7 +109,7 @@ def in_si(text: str, units: str) -> float | None:
     if found is None:
         return None
     wanted = [_unit(unit)[1] if unit else NUMBER for unit in units.split(" or ")]
-    if found.unit and found.dimension not in wanted or text.strip().endswith("%") and NUMBER not in wanted:
+    if found.dimension not in wanted if found.unit else (text.strip().endswith("%") and NUMBER not in wanted):
         raise InputError(f"{_named(wanted)} is needed{_article(found)}")
     return found.value
 

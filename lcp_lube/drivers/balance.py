@@ -11,10 +11,11 @@ from dataclasses import dataclass
 from math import exp, inf, log, prod
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from ..errors import InputError
 from ..problems.solution import Outcome, Solution
+from ..scenes.units import Measured, measured
 from .levels import level_shapes
 from .root import Search
 
@@ -29,13 +30,11 @@ ONE_GRID = 1_000  # points up to which no coarser grid is worth its while
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 
 
-class BalanceTable(BaseModel):
+class BalanceTable(Measured):
     """[balance] of a scene file: the load to carry, and the key whose value is to be found for it."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    load: Annotated[Number, Field(gt=0)] = Field(
-        ..., description="load to carry, N (1D: N/m): a journal's bearing_load, else load_above_ambient"
+    load: Annotated[Number, Field(gt=0)] = measured(
+        "N or N/m", ..., "load to carry, in 1D per metre of width; a journal's bearing_load, else load_above_ambient"
     )
     vary: str | None = Field(None, description="key to find; default eccentricity (journals), else h_offset, the film's level")
     range: tuple[Number, Number] | None = Field(None, description="values allowed for it, in its unit")

@@ -132,6 +132,12 @@ class BearingScene(Scene):
                 sides.append(Side("periodic" if table.kind == "periodic" else "closed"))
         return tuple(sides)  # type: ignore[return-value]
 
+    def data_si(self) -> dict[str, Any]:
+        data = super().data_si()
+        if self.dimension == 1:  # which has no such sides
+            data["sides"] = {name: data["sides"][name] for name in NAMES[:2]}
+        return data
+
     @property
     def shape(self) -> tuple[int, ...]:
         nx = self.nx or self.n

@@ -35,6 +35,8 @@ def changed(data: dict[str, Any], changes: dict[str, Any], prefixes: set[str], k
             out = {name: old for name, old in out.items() if name not in ("nx", "ny") or name in changes}
         table: Any = out
         for k, word in enumerate(path[:-1]):
+            if isinstance(table, dict) and "shape" in table and word not in table and word in ("1", table["shape"]):
+                continue  # one [film] instead of [[film]]
             table = _entry(table, word, path[k + 1 :], key) if isinstance(table, list) else _table(table, word)
         if isinstance(table, list):
             table = _only(table, path[-1], key)

@@ -19,7 +19,7 @@ from ..problems.solution import Problem
 from ..registry import FAMILIES, SCENE_DIR, scene_names
 from .changes import changed, plain
 from .faults import first_fault, known_keys
-from .units import Measured, measured, metres, stem
+from .units import Measured, measured, metres, stem, units_of
 
 # Strict: neither true nor "1e-5" is a number.
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
@@ -48,6 +48,15 @@ class Scene(Measured):
         given = self.model_fields_set - self._follows - {"family"}
         return [(name, value) for name, value in super().__repr_args__() if name in given]
 
+    def data_si(self) -> dict[str, Any]:
+        """What was solved: every key that has a value, changes made, in SI units; tables as dictionaries."""
+        return self.model_dump(mode="json", by_alias=True, exclude_none=True, exclude={"name"})
+
+    def data_units(self) -> dict[str, str]:
+        """The SI unit of each key of `data_si` that has one, by its path: {'fluid.mu': 'Pa s', 'film.1.depth': 'm'}."""
+        per_width = getattr(self, "dimension", 2) == 1
+        return {key: unit.split(" or ")[-1 if per_width else 0] for key, unit in units_of(self).items()}
+
     @property
     def shape(self) -> tuple[int, ...]:
         """Numbers of interior points, (nx,) or (nx, ny)."""
@@ -73,9 +82,9 @@ class LubricationScene(Scene):
     width: Positive | None = metres(None, "width Ly; default L (2D)")
     mu: Positive = measured("Pa s", 0.015, "viscosity")
     U: Positive = measured("m/s", 5.0, "speed of the moving wall")
-    p_a: NotNegative = measured("Pa", 0.0, "pressure at x = 0, above p_c")
-    p_b: NotNegative = measured("Pa", 0.0, "pressure at x = L, above p_c")
-    p_side: NotNegative = measured("Pa", 0.0, "pressure at y = 0 and y = width (2D), above p_c")
+    p_a: NotNegative = measured("Pa", 0.0, "pressure at x = 0; above p_c")
+    p_b: NotNegative = measured("Pa", 0.0, "pressure at x = L; above p_c")
+    p_side: NotNegative = measured("Pa", 0.0, "pressure at y = 0 and y = width; above p_c (2D)")
     p_c: Finite = measured("Pa", 0.0, "cavitation pressure")
     scheme: Literal["nodal", "face", "upwind"] = Field("face", description="form of the Couette flux")
     mean_cubes: bool = Field(False, description="h^3 at a face as the mean of the nodal values")
@@ -213,7 +222,7 @@ def as_scene(source: "str | Path | dict[str, Any] | Scene", changes: dict[str, A
     else:
         data, path, name = read_scene(source)
         folder, label = path.parent, str(source)
-    family = changes.get("family", data.get("family", "slider"))
+    family = changes.get("family", data.get("family", getattr(source, "family", None)))
     if model is None or "family" in changes:
         model = family_of(label, family)
     keys = set(known_keys(model))
@@ -221,7 +230,7 @@ def as_scene(source: "str | Path | dict[str, Any] | Scene", changes: dict[str, A
         if key.partition(".")[0] not in keys and (near := nearest(key, also)):
             raise InputError(f"{label}: {key} is neither a key of the scene nor an argument{near}")
     try:
-        scene: Scene = model(**{"name": name, **changed(data, plain(changes), {name, family}, keys)})
+        scene: Scene = model(**{"name": name, **changed(data, plain(changes), {name, str(family)}, keys)})
     except ValidationError as error:
         raise InputError(f"{label}: {first_fault(error, model)}") from None
     scene._folder = folder
@@ -259,8 +268,10 @@ def family_of(source: str | Path, family: Any) -> Any:
 
     Raises
     ------
-    InputError : no such family.
+    InputError : no such family, or none at all.
     """
+    if family is None:
+        raise InputError(f"{source}: family is missing; allowed are {', '.join(FAMILIES)}")
     if family not in [*FAMILIES]:  # which may be no string at all
         raise InputError(f"{source}: family = {family}: allowed are {', '.join(FAMILIES)}{nearest(str(family), FAMILIES)}")
     return FAMILIES[family].load()
@@ -278,8 +289,15 @@ def parse_changes(assignments: Iterable[str]) -> dict[str, Any]:
         key, equals, value = (part.strip() for part in text.partition("="))
         if not (key and equals and value):
             raise InputError(f"--set {text}: KEY=VALUE is needed")
-        try:
-            changes[key] = tomllib.loads(f"value = {value}")["value"]
-        except (ValueError, RecursionError):
-            changes[key] = value
+        changes[key] = _value(value)
     return changes
+
+
+def _value(text: str) -> Any:
+    """A value as TOML; what is none, 15um say, as it stands, in a list too."""
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except (ValueError, RecursionError):
+        inner = text[1:-1]
+        listed = text.startswith("[") and text.endswith("]") and not set("[]{}\"'") & set(inner)
+        return [_value(word.strip()) for word in inner.split(",")] if listed else text

@@ -76,7 +76,8 @@ def template(source: str, folder: Path = Path()) -> str:
     head = [line.lstrip("# ") if line.startswith("#") else f"{name}: {_sentence(model)}"]
     head += textwrap.wrap(_sentence(model), WIDTH) if line.startswith("#") else []
     head += [f"Made from {name}. A line that begins with # says what a key means; '# key = value' is a key at its default."]
-    if issubclass(model, Measured):
+    if issubclass(model, Measured) and model.units:
+        head += ['Values are in SI units; a text may have others, "15um" or "1 MPa".']
         head += [f"Lengths are in metres; a key with {' or '.join(SUFFIXES)} at its end is in those."]
     return "\n".join(f"# {line}" for line in head) + "\n\n" + "\n".join(_table(model, data, "")).strip() + "\n"
 

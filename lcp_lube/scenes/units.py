@@ -57,6 +57,10 @@ class Measured(BaseModel):
 
     @model_validator(mode="before")
     @classmethod
+    def _in_si(cls, data: Any) -> Any:
+        return cls.in_si_units(data)
+
+    @classmethod
     def in_si_units(cls, data: Any) -> Any:
         """The data with every number in SI. What is no number stays as it is, for the fields to refuse.
 
@@ -82,6 +86,21 @@ class Measured(BaseModel):
         return out
 
 
+def units_of(model: Measured, prefix: str = "") -> dict[str, str]:
+    """The SI unit of every value that has one, by its path; entries of arrays of tables count from 1, as in --set."""
+    found: dict[str, str] = {}
+    for name, field in type(model).model_fields.items():
+        value, key = getattr(model, name), f"{prefix}{field.alias or name}"
+        if isinstance(value, Measured):
+            found |= units_of(value, f"{key}.")
+        elif isinstance(value, list):
+            for k, item in enumerate(value, start=1):
+                found |= units_of(item, f"{key}.{k}.") if isinstance(item, Measured) else {}
+        if value is not None and name in model.units:
+            found[key] = model.units[name]
+    return found
+
+
 def is_quantity(value: Any) -> bool:
     """Whether this is a text that begins with a number."""
     try:
@@ -94,6 +113,8 @@ def _read(value: Any, unit: str, whole: bool, key: str) -> Any:
     """The number that a text says."""
     if isinstance(value, (list, tuple)):
         return [_read(item, unit, whole, key) for item in value]
+    if whole and isinstance(value, float) and value.is_integer():
+        return int(value)  # 1e3 is a whole number
     if not isinstance(value, str):
         return value
     try:

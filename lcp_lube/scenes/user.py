@@ -63,6 +63,10 @@ class Complementarity(Scene):
         data = {"lower": parts[0], "upper": parts[1], "x0": parts[2], "n": sizes[0] if n is None else n}
         super().__init__(**{"family": "user", "name": name, "F": F, "J": J, **data})
 
+    def data_si(self) -> dict[str, Any]:
+        """Its size alone: functions and arrays are the caller's."""
+        return {"family": self.family, "n": self.n}
+
     @property
     def shape(self) -> tuple[int, ...]:
         return (self.n,)
