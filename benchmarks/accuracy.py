@@ -25,7 +25,6 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from films import FilmScene, Knots, L, Pieces, random_films  # noqa: E402
 
 from lcp_lube.api import solve  # noqa: E402
-from lcp_lube.drivers.accuracy import solve_to_accuracy  # noqa: E402
 from lcp_lube.scenes.scene import Scene, load_scene  # noqa: E402
 
 
@@ -43,7 +42,7 @@ def planes(count: int, seed: int) -> Iterator[Scene]:
 
 def value(scene: Scene, quantity: str, tol: float, finest: tuple[int, ...] | None = None) -> tuple[float, float, bool]:
     """The quantity, its estimated relative error, and whether the tolerance was reached."""
-    solution = solve_to_accuracy(scene, tol, quantity, finest=finest)
+    solution = solve(scene, accuracy=tol, quantity=quantity, finest=finest)
     found = solution.levels[-1]["value"], solution.settings["accuracy_estimate"], solution.converged
     solution.destroy()
     return found

@@ -168,9 +168,7 @@ def every_recipe(case: Case, repeats: int) -> dict[str, Values]:
         method, system, inner = variant.split("/")
         runs: list[Values] = []
         while len(runs) < (repeats if not runs or runs[0]["cpu_s"] < 1.0 else 1):
-            runs.append(
-                ours(case, method=method, system=system, recipe_name=inner, nested=False, stopping=Stopping(1e-4, 1e-4))
-            )
+            runs.append(ours(case, method=method, system=system, recipe=inner, nested=False, stopping=Stopping(1e-4, 1e-4)))
         out[variant] = {**medians(runs), "printed_s": printed(case, method, system, inner)}
     return out
 
@@ -202,7 +200,7 @@ def near_null_cycles(case: Case, repeats: int) -> dict[str, Values]:
     with options({"ksp_rtol": "1e-8"}):  # wins over the method's own tolerances
         for variant in case.variants:
             cavity.CYCLES = int(variant)
-            choices = {"method": "active-set", "system": "cavity", "recipe_name": "bcgs_amg"}
+            choices = {"method": "active-set", "system": "cavity", "recipe": "bcgs_amg"}
             out[variant] = medians([ours(case, nested=False, **choices) for _ in range(repeats)])
     cavity.CYCLES = default
     return out
@@ -225,7 +223,7 @@ def fixed_choices(case: Case, repeats: int) -> dict[str, Values]:
         for name, done in runs.items():
             method, system, inner, levels = (*name.split("/"), "", "", "")[:4] if name != "auto" else ("auto", "", "", "")
             nested = {"nested": True, "flat": False}.get(levels)
-            done.append(ours(case, method=method, system=system or "auto", recipe_name=inner or None, nested=nested))
+            done.append(ours(case, method=method, system=system or "auto", recipe=inner or None, nested=nested))
     out = {name: medians(done) for name, done in runs.items()}
     for values in out.values():
         for clock in ("wall", "cpu"):
@@ -317,7 +315,7 @@ def job(case: Case, repeats: int) -> None:
     """Run a case in this process and print its rows as JSON. What is imported or compiled at first use is so before it."""
     solve(load_scene("problem4", {"n": 24})).destroy()
     for system in ("reduced", "cavity"):
-        solve(load_scene("problem4", {"n": 24}), system=system, recipe_name="bcgs_amg").destroy()
+        solve(load_scene("problem4", {"n": 24}), system=system, recipe="bcgs_amg").destroy()
     rows = EXPERIMENTS[case.experiment](case, repeats)
     print(json.dumps({name: {key: str(value) for key, value in row.items()} for name, row in rows.items()}))
 

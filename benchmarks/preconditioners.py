@@ -50,7 +50,7 @@ def measure(problem: str, n: int, system: str, recipe: str) -> dict[str, Any]:
                 LIMIT,
                 method="din",
                 system=system,
-                recipe_name=recipe,
+                recipe=recipe,
                 stopping=Stopping(1e-4, 1e-4),
                 nested=False,
             )

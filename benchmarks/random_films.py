@@ -84,7 +84,7 @@ def main() -> None:
     args = parser.parse_args()
     other = "" if args.method == "active-set" else f"_{args.method}"
     args.output = args.output or Path(__file__).parent / "results" / f"random_films{other}.csv"
-    choices: dict[str, Any] = {"recipe_name": "umfpack", "nested": False} if args.method == "active-set" else {}
+    choices: dict[str, Any] = {"recipe": "umfpack", "nested": False} if args.method == "active-set" else {}
     steps, outcomes, helped = [], Counter[str](), 0
     with args.output.open("w", newline="") as file:
         writer = csv.writer(file)

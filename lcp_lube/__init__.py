@@ -15,14 +15,17 @@ _PUBLIC = {
     "Scene": "lcp_lube.scenes.scene",
     "load_scene": "lcp_lube.scenes.scene",
     "solve": "lcp_lube.api",
-    "solve_or_balance": "lcp_lube.drivers.neighbour",
-    "solve_to_accuracy": "lcp_lube.drivers.accuracy",
     "Solution": "lcp_lube.problems.solution",
 }
 __all__ = [*_PUBLIC, "__version__"]
 
 
+_GONE = {"solve_to_accuracy": "solve(scene, accuracy=TOL)", "solve_or_balance": "solve(scene)"}
+
+
 def __getattr__(name: str) -> Any:
+    if name in _GONE:
+        raise AttributeError(f"lcp_lube.{name} is now {_GONE[name]}")
     if name in _PUBLIC:
         return getattr(import_module(_PUBLIC[name]), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

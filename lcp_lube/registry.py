@@ -1,6 +1,5 @@
 """The one place where a name is bound to code: methods, systems, recipes. Imports no PETSc."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from importlib import import_module
 from math import inf
@@ -25,9 +24,9 @@ class Entry:
     target: str
     line: str
 
-    def load(self) -> Callable[..., Any]:
+    def load(self) -> Any:
         module, _, name = self.target.partition(":")
-        return getattr(import_module(module), name)
+        return getattr(import_module(module), name) if name else import_module(module)
 
 
 @dataclass(frozen=True)
@@ -191,6 +190,17 @@ FAMILIES: dict[str, Entry] = {
     "obstacle": Entry("lcp_lube.scenes.obstacle:ObstacleScene", "Bratu's equation between two obstacles"),
     "ehl_line": Entry("lcp_lube.scenes.ehl:EhlLineScene", "elastohydrodynamic line contact"),
     "poisson_cubic": Entry("lcp_lube.scenes.semilinear:PoissonCubicScene", "Poisson's equation with a cubic term"),
+}
+
+# A scene's way to an answer, outermost first; `drivers.compose` says what each of these modules offers.
+DRIVERS: dict[str, Entry] = {
+    "accuracy": Entry("lcp_lube.drivers.accuracy", "finer and finer grids until a quantity is as good as asked for"),
+    "balance": Entry("lcp_lube.drivers.balance", "the film that carries the load asked for"),
+    "time": Entry("lcp_lube.drivers.time", "step by step, where the film moves"),
+    "warm": Entry("lcp_lube.drivers.warm", "from a neighbour's answer, or anew where that leads nowhere"),
+    "fluid": Entry("lcp_lube.drivers.fluid", "viscosity and density that depend on the pressure"),
+    "symmetry": Entry("lcp_lube.drivers.symmetry", "no more than symmetry leaves"),
+    "direct": Entry("lcp_lube.drivers.direct", "one problem: nested grids, and methods that take over where one fails"),
 }
 
 # The maps of `chart stability`: each makes its runs and draws them.

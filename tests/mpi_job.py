@@ -83,7 +83,7 @@ def run(
         load_scene(scene, changes),
         method=method,
         system=system,
-        recipe_name=recipe,
+        recipe=recipe,
         nested=False,
         monitor=lambda k, step: left.extend(unread() if k == 1 else []),
     )

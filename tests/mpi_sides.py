@@ -6,10 +6,9 @@ from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
-from side_scenes import SCENES
+from side_scenes import SCENES, reduced_solve
 
 from lcp_lube import load_scene, solve
-from lcp_lube.drivers.symmetry import reduced_solve
 
 KEYS = ("load", "friction", "p_max", "cavitated_fraction")
 

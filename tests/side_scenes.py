@@ -1,4 +1,24 @@
-"""Scene files with sides of every kind, on points that neither 2 nor 3 ranks divide."""
+"""Scene files with sides of every kind, on points that neither 2 nor 3 ranks divide; and their reduced solve by any method."""
+
+from functools import partial
+
+from lcp_lube.drivers import compose
+from lcp_lube.drivers.ask import Ask
+from lcp_lube.drivers.symmetry import part_of, solve_part
+from lcp_lube.registry import DRIVERS
+
+
+def reduced_solve(scene, **how):
+    """What is left of a scene is solved, whatever method is named. Collective."""
+    ask = Ask(**how)
+    direct = partial(compose.solve, level=len(DRIVERS) - 1)
+    problem = scene.build(ask.comm)
+    part = part_of(scene, problem)
+    if part is None:
+        problem.destroy()
+        return direct(scene, ask)
+    return solve_part(part, problem, ask, direct)
+
 
 HEAD = """
 family = "bearing"

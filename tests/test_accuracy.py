@@ -8,7 +8,7 @@ import pytest
 from films import FilmScene, L, Pieces, random_films
 
 from lcp_lube.api import solve
-from lcp_lube.drivers.accuracy import first_shape, solve_to_accuracy
+from lcp_lube.drivers.accuracy import first_shape
 from lcp_lube.drivers.estimate import misplaced_film, relative_error
 from lcp_lube.errors import InputError
 from lcp_lube.problems.solution import Outcome
@@ -36,7 +36,7 @@ def errors(cases, quantity, tol):
     for scene, exact in cases:
         if getattr(exact, quantity) == 0:
             continue  # an empty film: no relative error
-        solution = solve_to_accuracy(scene, tol, quantity)
+        solution = solve(scene, accuracy=tol, quantity=quantity)
         problem = solution.problem
         truth = getattr(exact, quantity) + problem.p_c * (1.0 if quantity == "p_max" else problem.grid.lengths[0])
         value = problem.quantities(solution.fields)[quantity]
@@ -62,7 +62,7 @@ def test_no_grid_finer_than_needed():
     """The grid before the last one was not known to be good enough; a coarser tolerance ends sooner."""
     sizes = []
     for tol in (1e-1, 1e-2, 1e-3, 1e-4):
-        solution = solve_to_accuracy(load_scene("problem1"), tol)
+        solution = solve(load_scene("problem1"), accuracy=tol)
         solution.destroy()
         estimates = [level["estimate"] for level in solution.levels]
         assert estimates[-1] <= tol
@@ -75,7 +75,7 @@ def test_no_grid_finer_than_needed():
 @pytest.mark.parametrize("scene, tol", [("problem4", 1e-2), ("journal", 1e-2)])
 def test_plane_film(scene, tol):
     """A 2D load against that of a grid with some 250 points along x."""
-    solution = solve_to_accuracy(load_scene(scene), tol)
+    solution = solve(load_scene(scene), accuracy=tol)
     value = solution.levels[-1]["value"]
     solution.destroy()
     fine = solve(load_scene(scene, {"nx": 255, "ny": 127 if scene == "problem4" else 63}))
@@ -89,7 +89,7 @@ def test_plane_film(scene, tol):
     "scene, quantity", [("obstacle_ball", "sum_v"), ("bratu", "max_v"), ("poisson_cubic", "sum_v"), ("ehl_line", "k")]
 )
 def test_scenes_that_are_no_films(scene, quantity):
-    solution = solve_to_accuracy(load_scene(scene, {"n": 40}), 2e-2, quantity)
+    solution = solve(load_scene(scene, {"n": 40}), accuracy=2e-2, quantity=quantity)
     solution.destroy()
     assert solution.converged
     assert len({level["nx"] for level in solution.levels}) == len(solution.levels) >= 3
@@ -98,7 +98,7 @@ def test_scenes_that_are_no_films(scene, quantity):
 def test_other_methods():
     values = []
     for method in ("din", "din-pc", "active-set"):
-        solution = solve_to_accuracy(load_scene("problem3"), 1e-2, method=method)
+        solution = solve(load_scene("problem3"), accuracy=1e-2, method=method)
         solution.destroy()
         assert solution.converged
         values.append(solution.levels[-1]["value"])
@@ -148,7 +148,7 @@ def test_first_shape_keeps_two_lines_for_every_rank():
 )
 def test_bad_input(tol, quantity, words):
     with pytest.raises(InputError, match=words):
-        solve_to_accuracy(load_scene("problem1"), tol, quantity)
+        solve(load_scene("problem1"), accuracy=tol, quantity=quantity)
 
 
 def test_out_of_memorys_reach_is_refused(cli):

@@ -88,7 +88,7 @@ def test_fallback_from_a_cycling_start(monkeypatch):
 @pytest.mark.parametrize("name, n", [("problem1", 100), ("problem2", 100), ("problem1", 1000), ("problem4", 24)])
 @pytest.mark.parametrize("system", ["full", "reduced"])
 def test_predictor_corrector(name, n, system):
-    solution = run(name, {"n": n}, method="din-pc", system=system, recipe_name="umfpack")
+    solution = run(name, {"n": n}, method="din-pc", system=system, recipe="umfpack")
     assert solution.converged and solution.iterations <= 15
     solution.destroy()
 

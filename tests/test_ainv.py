@@ -131,8 +131,8 @@ def test_drop_0_takes_one_iteration(petsc_options, scene, ksp):
 
 def test_published_counts():
     """Table 4, n = 4096: 3 steps; 57 iterations with AINV are printed, 134 with Jacobi. Rounding moves a few."""
-    ainv = run("bratu", {"n": 64}, recipe_name="ainv", stopping=LOOSE)
-    jacobi = run("bratu", {"n": 64}, recipe_name="bcgs_jacobi", stopping=LOOSE)
+    ainv = run("bratu", {"n": 64}, recipe="ainv", stopping=LOOSE)
+    jacobi = run("bratu", {"n": 64}, recipe="bcgs_jacobi", stopping=LOOSE)
     assert ainv.iterations == jacobi.iterations == 3
     assert abs(ainv.total("linear_iterations") - 57) <= 6
     assert abs(jacobi.total("linear_iterations") - 134) <= 20

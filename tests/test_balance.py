@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from lcp_lube import load_scene, solve
 from lcp_lube.drivers.balance import MOST_SOLVES, carried
-from lcp_lube.drivers.neighbour import solve_near, solve_or_balance
 from lcp_lube.drivers.root import Search
 from lcp_lube.errors import InputError
 from lcp_lube.problems.solution import Outcome
@@ -20,7 +19,7 @@ from lcp_lube.studies.compare import compare
 
 def direct(name, changes):
     """The load that a film carries."""
-    solution = solve_near(load_scene(name, changes), None)
+    solution = solve(load_scene(name, changes))
     assert solution.converged
     load = carried(solution.problem.quantities(solution.fields))
     solution.destroy()
@@ -29,7 +28,7 @@ def direct(name, changes):
 
 def balance(name, changes, near=None):
     """The found settings, outcome, message and quantities of a balance."""
-    solution = solve_or_balance(lambda more: load_scene(name, {**changes, **more}), near)
+    solution = solve(load_scene(name, changes), start=near)
     values = solution.problem.quantities(solution.fields)
     found = solution.settings["balance"], solution.outcome, solution.message, values
     solution.destroy()
@@ -101,7 +100,7 @@ def test_coarse_grids_come_first():
     """On a large grid a few solves are left for the last one; without nested iteration all are there."""
     changes = {"nx": 127, "ny": 63, "balance.load": 5e3}
     nested = balance("journal", changes)[0]
-    solution = solve_or_balance(lambda more: load_scene("journal", {**changes, **more}), None, nested=False)
+    solution = solve(load_scene("journal", changes), nested=False)
     plain = solution.settings["balance"]
     solution.destroy()
     assert nested["iterations"] <= 3 < plain["iterations"] == plain["solves"] < nested["solves"]
@@ -195,9 +194,7 @@ def test_ranges_outside_the_domain():
 
 def test_a_neighbour_with_a_thicker_film():
     """Its level would close this one's film: the search begins at the scene's own."""
-    near = solve_or_balance(
-        lambda more: load_scene("problem1", {"n": 30, "h_min": 30e-6, "h_max": 60e-6, "balance.load": 8e5, **more})
-    )
+    near = solve(load_scene("problem1", {"n": 30, "h_min": 30e-6, "h_max": 60e-6, "balance.load": 8e5}))
     assert near.settings["balance"]["value"] < -15e-6
     found, outcome, _, _ = balance("problem1", {"n": 30, "balance.load": 2e5}, near)
     assert outcome is Outcome.CONVERGED and found["carried"] == pytest.approx(2e5, rel=2e-6)
@@ -205,16 +202,23 @@ def test_a_neighbour_with_a_thicker_film():
 
 
 def test_a_balance_is_never_silently_left_out():
-    """Neither by `solve`, nor by commands that make one solve a row."""
-    with pytest.raises(InputError, match=r"journal: \[balance\] asks for a search"):
-        solve(load_scene("journal", {"nx": 20, "ny": 5, "balance.load": 1e3}))
-    with pytest.raises(InputError, match="asks for a search"):
-        compare(load_scene("journal", {"nx": 20, "ny": 5, "balance.load": 1e3}), ["active-set"])
+    """Nor by commands that make one solve a row."""
+    rows = compare(load_scene("journal", {"nx": 20, "ny": 5, "balance.load": 1e3}), ["active-set", "fas"])
+    assert [row["balance"]["carried"] == pytest.approx(1e3, rel=2e-6) for row in rows] == [True, True]
 
 
-def test_not_with_accuracy_or_checkpoints(cli):
-    done = cli("solve", "journal", "--set", "balance.load=1e3", "--accuracy", 1e-2)
-    assert done.status == 2 and "--accuracy: not with [balance]" in done.lines[0]
+def test_with_accuracy_it_is_the_value_that_counts(cli):
+    """The load is given; what finer grids change is the eccentricity that carries it."""
+    done = cli("solve", "journal", "--set", "balance.load=1e3", "--accuracy", 1e-2, "--json")
+    fine = cli("solve", "journal", "--set", "balance.load=1e3", "--set", "nx=320", "--set", "ny=80", "--json")
+    assert done.status == fine.status == 0 and done.json["accuracy_quantity"] == "eccentricity"
+    assert done.json["balance"]["value"] == pytest.approx(fine.json["balance"]["value"], rel=1e-2)
+    assert done.json["accuracy_estimate"] <= 1e-2
+
+
+def test_not_with_checkpoints(cli):
+    done = cli("solve", "journal", "--set", "balance.load=1e3", "--checkpoint", "c.chk")
+    assert done.status == 2 and "--checkpoint: not for scene journal by way of balance" in done.lines[0]
 
 
 @given(st.floats(-3.9, 3.9), st.floats(0.2, 0.8), st.booleans())
@@ -247,14 +251,13 @@ def test_a_load_that_cavitation_limits():
         "dimension": 2, "L_mm": 20, "U": 2.0, "nx": 39, "ny": 15, "fluid": {"mu": 0.02, "p_supply": 1e5},
         "film": [{"shape": "constant", "h_um": 8}, {"shape": "pocket", "depth_um": 10, "x_mm": [2, 9], "y_mm": [3, 17]}],
     }  # fmt: skip
-    scene_at = lambda load: lambda more: BearingScene(**{**data, "balance": {"load": load}, **more})  # noqa: E731
     top = 0.0
     for level in np.linspace(-7e-6, 30e-6, 38):
-        solution = solve_near(BearingScene(**{**data, "h_offset": float(level)}), None)
+        solution = solve(BearingScene(**{**data, "h_offset": float(level)}))
         top = max(top, carried(solution.problem.quantities(solution.fields)))
         solution.destroy()
     for part, outcome in ((0.9, Outcome.CONVERGED), (1.1, Outcome.LOAD_NOT_CARRIED)):
-        solution = solve_or_balance(scene_at(part * top), None)
+        solution = solve(BearingScene(**{**data, "balance": {"load": part * top}}))
         assert solution.outcome is outcome, solution.message
         found = solution.settings["balance"]
         assert found["carried"] == pytest.approx(part * top if part < 1 else top, rel=2e-6 if part < 1 else 0.1)

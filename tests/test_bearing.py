@@ -37,7 +37,7 @@ def flat(**data):
 
 def found(scene, **how):
     """p (Pa above p_c) and r as arrays on the grid, and the quantities."""
-    solution = solve(scene, method="active-set", recipe_name="superlu", nested=False, **how)
+    solution = solve(scene, method="active-set", recipe="superlu", nested=False, **how)
     assert solution.converged, solution.message
     shape = scene.shape[::-1]
     p, r = (solution.fields[name].reshape(shape) for name in "pr")

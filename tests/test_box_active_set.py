@@ -38,7 +38,7 @@ def test_the_answer_is_exactly_complementary():
 
 
 def test_steps_and_cycles_stay_bounded_as_the_grid_is_refined():
-    solution = obstacle({**BOTH, "n": 255}, nested=True, recipe_name="multigrid")
+    solution = obstacle({**BOTH, "n": 255}, nested=True, recipe="multigrid")
     assert solution.converged
     assert [level["nx"] for level in solution.levels] == [31, 63, 127, 255]
     for level in solution.levels[1:]:
@@ -49,11 +49,11 @@ def test_steps_and_cycles_stay_bounded_as_the_grid_is_refined():
 @pytest.mark.parametrize("n", [64, 99, 127])
 def test_multigrid_does_what_the_direct_solver_does(n, petsc_options):
     """Also between grids that do not nest, and with fewer levels; all solve the same linear systems."""
-    reference = obstacle({**BOTH, "n": n}, recipe_name="umfpack", stopping={"eps1": 1e-12})
+    reference = obstacle({**BOTH, "n": n}, recipe="umfpack", stopping={"eps1": 1e-12})
     for levels in (None, 2):
         if levels:
             petsc_options(pc_mg_levels=levels)
-        solution = obstacle({**BOTH, "n": n}, recipe_name="multigrid", stopping={"eps1": 1e-12})
+        solution = obstacle({**BOTH, "n": n}, recipe="multigrid", stopping={"eps1": 1e-12})
         assert solution.converged and solution.settings["pc_type"] == "mg"
         np.testing.assert_allclose(solution.fields["v"], reference.fields["v"], atol=1e-12)
         solution.destroy()
@@ -62,14 +62,14 @@ def test_multigrid_does_what_the_direct_solver_does(n, petsc_options):
 
 def test_multigrid_on_the_upper_branch():
     """f' is indefinite there."""
-    solution = obstacle({"n": 64, "lambda": 6, "v0": 2}, recipe_name="multigrid")
+    solution = obstacle({"n": 64, "lambda": 6, "v0": 2}, recipe="multigrid")
     assert solution.converged
     assert solution.problem.quantities(solution.fields)["max_v"] == pytest.approx(2.2379592, abs=1e-6)
     solution.destroy()
 
 
 def test_interior_point_by_multigrid():
-    solution = obstacle({**BOTH, "n": 127}, method="interior", recipe_name="multigrid")
+    solution = obstacle({**BOTH, "n": 127}, method="interior", recipe="multigrid")
     assert solution.converged and solution.total("linear_iterations") < 10 * solution.iterations
     solution.destroy()
 
@@ -111,7 +111,7 @@ def test_newton_without_bounds_in_contact_is_newton():
 
 @pytest.mark.parametrize("recipe_name", [pytest.param("bcgs_amg", marks=pytest.mark.hypre), "bcgs_ilu", "bcgs_jacobi"])
 def test_any_inner_solver(recipe_name):
-    solution = obstacle({**BOTH, "n": 31}, recipe_name=recipe_name)
+    solution = obstacle({**BOTH, "n": 31}, recipe=recipe_name)
     assert solution.converged and solution.total("linear_iterations") > 0
     solution.destroy()
 

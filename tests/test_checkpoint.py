@@ -146,7 +146,7 @@ CASES = {
     "din-pc": ("problem4", {"n": 20}, {"method": "din-pc"}),
     "fbn-a": ("problem1", {"n": 60}, {"method": "fbn-a", "options": {"p0": 2.0}}),
     "active-set": ("problem2", {"n": 60}, {}),
-    "iterative": ("problem1", {"n": 40}, {"method": "din", "system": "full", "recipe_name": "gmres_ilu"}),
+    "iterative": ("problem1", {"n": 40}, {"method": "din", "system": "full", "recipe": "gmres_ilu"}),
     "fas": ("problem4", {"n": 40}, {"method": "fas", "stopping": {"eps1": 1e-10}}),
     "fas, obstacle": ("obstacle_bratu", {"n": 31}, {"method": "fas"}),
     "active-set, obstacle": ("obstacle_bratu", {"n": 15}, {"method": "active-set"}),

@@ -314,7 +314,7 @@ def test_json_is_what_the_library_says(cli):
     from lcp_lube.output.results import as_dict, finite
 
     data = cli("solve", "problem3", "--n", 25, "--method", "din", "--recipe", "superlu", "--json").json
-    solution = solve(load_scene("problem3", {"n": 25}), method="din", recipe_name="superlu")
+    solution = solve(load_scene("problem3", {"n": 25}), method="din", recipe="superlu")
     ours = json.loads(json.dumps(finite(as_dict(solution))))
     for key in (key for key in data if key != "time_s" and not key.startswith("memory_")):
         assert data[key] == ours[key], key

@@ -21,7 +21,7 @@ def test_rows_are_the_runs_that_solve_makes() -> None:
         ("fbn-a", "gmres_ilu"),
     ]
     assert all(row["converged"] for row in rows)
-    alone = solve(scene, method="din", recipe_name="gmres_ilu", system="full")
+    alone = solve(scene, method="din", recipe="gmres_ilu", system="full")
     data = as_dict(alone)
     alone.destroy()
     for key in ("iterations", "linear_iterations", "load", "min_p", "min_r", "residual", "complementarity"):

@@ -27,7 +27,7 @@ def run():
                 load_scene(scene, changes),
                 method="din",
                 system="full",
-                recipe_name=recipe,
+                recipe=recipe,
                 stopping=stopping,
                 options=options,
                 nested=False,

@@ -173,7 +173,7 @@ def test_options_are_checked(options, message):
         run("problem4", {"n": 9}, options=options)
 
 
-@pytest.mark.parametrize("choice", [{"system": "full"}, {"recipe_name": "mumps"}, {"nested": True}])
+@pytest.mark.parametrize("choice", [{"system": "full"}, {"recipe": "mumps"}, {"nested": True}])
 def test_what_does_not_apply_is_refused(choice):
     with pytest.raises(InputError, match="method fas"):
         run("problem4", {"n": 9}, **choice)
@@ -187,7 +187,7 @@ def test_json_and_a_start():
     assert [(level["nx"], level["ny"]) for level in data["levels"]] == [(3, 5), (6, 5), (12, 10), (25, 20), (50, 41)]
     assert data["levels"][-1]["iterations"] == data["iterations"]
     assert data["system"] is None and data["recipe"] is None
-    again = solve(scene, method="fas", start=(solution.problem, solution.fields))
+    again = solve(scene, method="fas", start=solution)
     assert again.converged and again.iterations <= 2
     for each in (solution, again):
         each.destroy()

@@ -34,7 +34,7 @@ def run(scene: str, method: str, recipe: str = "lu", eps: float = 1e-8, n: int =
         load_scene(scene, {"n": n}),
         method=method,
         system="full",
-        recipe_name=recipe,
+        recipe=recipe,
         stopping=Stopping(eps, eps),
         options=options,
     )

@@ -111,7 +111,7 @@ def test_no_pressure_carries_the_flow():
 def test_from_a_neighbours_answer():
     first = solve(load_scene("pocketed_pad_2d", {"nx": 49, "ny": 19}))
     near = load_scene("pocketed_pad_2d", {"nx": 49, "ny": 19, "U": 1.01})
-    warm, cold = solve(near, start=(first.problem, first.fields)), solve(near)
+    warm, cold = solve(near, start=first), solve(near)
     assert warm.converged
     np.testing.assert_allclose(warm.fields["p"], cold.fields["p"], rtol=0, atol=1e-6 * cold.fields["p"].max())
     for one in (first, warm, cold):

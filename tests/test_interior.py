@@ -29,7 +29,7 @@ PRINTED = [row for row in csv.DictReader(TABLE.read_text().splitlines()) if int(
 def test_table_1(row):
     """Nonlinear iterations to the digit, linear ones within 7 % (lambda = 6: the other branch, and the count by chance)."""
     n = int(row["n"]) ** 0.5
-    solution = obstacle({"n": int(n), "lambda": float(row["lambda"]), "v0": 1}, method="interior", recipe_name="bcgs_jacobi")
+    solution = obstacle({"n": int(n), "lambda": float(row["lambda"]), "v0": 1}, method="interior", recipe="bcgs_jacobi")
     assert solution.converged, solution.message
     assert solution.iterations == int(row["nonlinear_it"])
     assert solution.total("linear_iterations") == pytest.approx(int(row["linear_it"]), rel=0.07)
@@ -38,10 +38,10 @@ def test_table_1(row):
 
 
 def test_lambda_10_fails_from_the_papers_start_and_is_solved_in_contact():
-    fails = obstacle({"n": 32, "lambda": 10, "v0": 1}, method="interior", recipe_name="bcgs_jacobi")
+    fails = obstacle({"n": 32, "lambda": 10, "v0": 1}, method="interior", recipe="bcgs_jacobi")
     assert fails.outcome is Outcome.STEP_LENGTH and "v_upper" in fails.message and "v0" in fails.message
     fails.destroy()
-    solution = obstacle({"n": 64, "lambda": 10, "v0": 2}, method="interior", recipe_name="bcgs_jacobi")
+    solution = obstacle({"n": 64, "lambda": 10, "v0": 2}, method="interior", recipe="bcgs_jacobi")
     found = solution.problem.quantities(solution.fields)
     assert solution.converged and found["contact_upper"] == 1828 and found["contact_lower"] == 0
     assert found["max_v"] == pytest.approx(4, abs=1e-6)

@@ -110,11 +110,11 @@ def test_mumps_that_runs_out_of_workspace_gets_more(petsc_options, monkeypatch):
     if not PETSc.Sys.hasExternalPackage("mumps"):
         pytest.skip("this PETSc has no MUMPS")
     scene = FilmScene.of(Knots((2.5e-5, 1.5e-5, 2.5e-5)), dimension=2, nx=23, ny=17, scheme="nodal")
-    plenty = solve(scene, method="din", system="full", recipe_name="mumps", nested=False)
+    plenty = solve(scene, method="din", system="full", recipe="mumps", nested=False)
     petsc_options(mat_mumps_icntl_14=1)
     helped, enlarge = [], Krylov._enlarge_mumps
     monkeypatch.setattr(Krylov, "_enlarge_mumps", lambda self: helped.append(enlarge(self)) or helped[-1])
-    short = solve(scene, method="din", system="full", recipe_name="mumps", nested=False)
+    short = solve(scene, method="din", system="full", recipe="mumps", nested=False)
     assert plenty.converged and short.converged and short.iterations == plenty.iterations
     assert helped and all(helped)
     assert PETSc.Options().getString("mat_mumps_icntl_14") == "1"

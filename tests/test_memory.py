@@ -8,7 +8,6 @@ import pytest
 from lcp_lube.api import solve
 from lcp_lube.base.options import recipe
 from lcp_lube.drivers import memory
-from lcp_lube.drivers.plan import plan
 from lcp_lube.errors import InputError
 from lcp_lube.scenes.scene import load_scene
 
@@ -55,25 +54,24 @@ def test_too_large_is_refused_before_it_starts(cli):
     assert "grid 25000x25000: 625000000 points" in run.lines[0] and "method din on the full system" in run.lines[0]
 
 
-@pytest.mark.parametrize("name", ["problem1", "problem4", "journal", "obstacle_bratu", "bratu"])
-def test_a_large_scene_is_judged_by_its_plan(name, monkeypatch):
-    """A small grid that claims the size gets the plan and the estimate of the large one."""
-    scene, seen = load_scene(name, {"n": 30}), []
-    monkeypatch.setattr(memory, "LARGE", 1)
-    monkeypatch.setattr(memory, "check", lambda problem, plan, before: seen.append(memory.bytes_needed(problem, plan)))
-    chosen = []
-
-    def choose(problem):
-        chosen.append(plan(problem, name))
-        return chosen[-1]
-
-    problem = scene.with_shape(tuple(300 for _ in scene.shape)).build()
-    memory.look_ahead(scene.with_shape(problem.grid.shape), None, choose)
-    expected = plan(problem, name)
-    assert chosen == [expected]
-    with recipe(expected.recipe):
-        assert seen == [memory.bytes_needed(problem, expected)]
+@pytest.mark.parametrize("name", ["problem1", "problem4", "journal", "ehl_line", "obstacle_bratu", "bratu", "pocketed_pad_2d"])
+def test_what_a_scene_says_of_itself_is_true_of_its_problem(name):
+    """It is planned, and its memory estimated, before it is built."""
+    scene = load_scene(name, {"n": 30})
+    facts, problem = scene.facts(), scene.build()
+    grid = problem.grid
+    assert (facts.kind, facts.shape, facts.size, facts.dim) == (problem.kind, grid.shape, grid.size, grid.dim)
+    assert facts.dense == getattr(problem, "dense", False) and facts.whole_lines == (grid.dim == 2)
+    assert any(facts.periodic) == any(grid.periodic)
     problem.destroy()
+
+
+def test_a_large_scene_is_refused_before_it_is_built(monkeypatch):
+    scene = load_scene("problem4", {"n": 3000})
+    monkeypatch.setattr(memory, "available", lambda: 1000)
+    monkeypatch.setattr(type(scene), "build", None)
+    with pytest.raises(InputError, match="9000000 points need about"):
+        solve(scene)
 
 
 def test_the_override(monkeypatch):
@@ -87,20 +85,19 @@ def test_the_override(monkeypatch):
 
 def test_every_run_of_a_film_has_an_estimate(petsc_options):
     """Whatever the inner solver: one that was not measured counts as the most expensive of its system."""
-    problem = load_scene("problem4", {"n": 40}).build()
+    facts = load_scene("problem4", {"n": 40}).facts()
     for system in ("full", "reduced", "cavity"):
         chosen = SimpleNamespace(system=system, recipe=None, nested=False, method="din")
         with recipe("umfpack"):
-            direct = memory.bytes_needed(problem, chosen)
+            direct = memory.bytes_needed(facts, chosen)
         petsc_options(ksp_type="bcgs", pc_type="jacobi")
-        assert 0 < memory.bytes_needed(problem, chosen) <= max(direct, 1000 * 1600)
+        assert 0 < memory.bytes_needed(facts, chosen) <= max(direct, 1000 * 1600)
         petsc_options(ksp_type="preonly", pc_type="lu", pc_factor_mat_solver_type="cholmod")
-        assert memory.bytes_needed(problem, chosen) >= direct
+        assert memory.bytes_needed(facts, chosen) >= direct
         for name in ("ksp_type", "pc_type", "pc_factor_mat_solver_type"):
             from petsc4py import PETSc
 
             PETSc.Options().delValue(name)
-    problem.destroy()
 
 
 def test_limits_of_control_groups(tmp_path):

@@ -38,7 +38,7 @@ def test_an_unread_option_of_a_recipe_would_be_found(tmp_path, monkeypatch):
 
 def run(recipe_name, **changes):
     solution = solve(
-        load_scene("problem1", {"n": 12, **changes}), method="din", system="full", recipe_name=recipe_name, nested=False
+        load_scene("problem1", {"n": 12, **changes}), method="din", system="full", recipe=recipe_name, nested=False
     )
     solution.destroy()
     return solution

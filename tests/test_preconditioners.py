@@ -96,7 +96,7 @@ def run(scene: str, recipe_name: str | None, method: str = "din", eps: float = 1
         load_scene(scene, changes),
         method=method,
         system="full",
-        recipe_name=recipe_name,
+        recipe=recipe_name,
         stopping=Stopping(eps, eps, 100),
         nested=False,
     )
@@ -243,7 +243,7 @@ PYTHON = ("-ksp_type", "gmres", "-pc_type", "python", "-pc_python_type")
     ],
 )
 def test_bad_input_is_one_line_and_status_2(cli, words, expected):
-    job = cli(*FULL, *PYTHON, f"lcp_lube.linear.{words[0]}", *words[1:])
+    job = cli(*FULL, *PYTHON, f"lcp_lube.linear.pc.{words[0]}", *words[1:])
     assert job.status == 2
     assert len(job.lines) == 1 and expected in job.lines[0]
 

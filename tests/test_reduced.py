@@ -114,7 +114,7 @@ def test_all_cavitated_and_all_full():
 def test_near_null_vector_of_a_hard_film():
     """w > 0, and S w is small against diag(S) w but for a few cells; constants leave much more."""
     problem = load_scene("textured_slider", {"K": 2}).build()
-    solution = solve(load_scene("textured_slider", {"K": 2}), method="active-set", system="reduced", recipe_name=DIRECT)
+    solution = solve(load_scene("textured_slider", {"K": 2}), method="active-set", system="reduced", recipe=DIRECT)
     full = solution.fields["p"] > 0
     with recipe(DIRECT):
         system = CavitySystem(problem)
@@ -141,7 +141,7 @@ def test_near_null_vector_of_a_hard_film():
 def test_few_krylov_iterations_on_hard_films(name, changes, petsc_options):
     """At most 8 BiCGStab iterations to 1e-8 in every step, where plain multigrid takes ten times that."""
     petsc_options(ksp_rtol=1e-8)
-    choices = {"method": "active-set", "system": "cavity", "recipe_name": "bcgs_amg", "nested": False}
+    choices = {"method": "active-set", "system": "cavity", "recipe": "bcgs_amg", "nested": False}
     solution = solve(load_scene(name, changes), **choices)
     assert solution.converged
     assert max(step.linear_iterations for step in solution.steps) <= 8
@@ -152,7 +152,7 @@ def test_few_krylov_iterations_on_hard_films(name, changes, petsc_options):
 def test_din_takes_the_same_iterations_on_both_systems(problem):
     counts = []
     for system in ("full", "reduced"):
-        solution = solve(load_scene(problem), method="din", system=system, recipe_name=DIRECT)
+        solution = solve(load_scene(problem), method="din", system=system, recipe=DIRECT)
         counts.append((solution.iterations, solution.total("centrality"), solution.total("backtracking")))
         solution.destroy()
     assert counts[0] == counts[1]
@@ -161,7 +161,7 @@ def test_din_takes_the_same_iterations_on_both_systems(problem):
 def test_problem4_by_din_on_both_systems():
     loose = Stopping(1e-4, 1e-4)
     scene = load_scene("problem4", {"nx": 31, "ny": 24})
-    runs = [solve(scene, method="din", system=s, recipe_name=DIRECT, stopping=loose) for s in ("full", "reduced")]
+    runs = [solve(scene, method="din", system=s, recipe=DIRECT, stopping=loose) for s in ("full", "reduced")]
     assert runs[0].iterations == runs[1].iterations
     np.testing.assert_allclose(runs[0].p, runs[1].p, atol=1e-8)
     for run in runs:

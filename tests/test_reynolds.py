@@ -71,7 +71,7 @@ def found(film, shape=(40,), **data):
     """p and r of a scene with any film, from the method that ends at the exact discrete solution."""
     names = dict(zip(("nx", "ny"), shape, strict=False))
     scene = FilmScene.of(film, dimension=len(shape), **names, **data)
-    solution = solve(scene, method="active-set", recipe_name="superlu", nested=False)
+    solution = solve(scene, method="active-set", recipe="superlu", nested=False)
     assert solution.converged, solution.message
     p, r = solution.fields["p"].reshape(shape[::-1]), solution.fields["r"].reshape(shape[::-1])
     h = solution.problem.scheme.h.reshape(shape[::-1])
@@ -107,7 +107,7 @@ def test_a_step_makes_nodal_densities_negative_and_face_ones_not():
 def test_flow_is_one_constant_along_a_line(film, scheme):
     """A solution's flow is the same through both ends: nothing is lost in the cavity."""
     scene = FilmScene.of(film, n=30, scheme=scheme, p_a=1e6)
-    solution = solve(scene, method="active-set", recipe_name="superlu")
+    solution = solve(scene, method="active-set", recipe="superlu")
     west, east, *_ = solution.problem.boundary_flows(solution.fields["p"], solution.fields["r"])
     assert solution.converged and west == pytest.approx(east, rel=1e-10)
     solution.destroy()
@@ -137,7 +137,7 @@ def test_mean_cubes_is_the_mean_of_the_nodal_cubes():
 
 
 def din(changes, name="problem3"):
-    solution = solve(load_scene(name, changes), method="din", system="full", recipe_name="superlu", nested=False)
+    solution = solve(load_scene(name, changes), method="din", system="full", recipe="superlu", nested=False)
     assert solution.converged
     fields = solution.fields["p"] * solution.problem.p_unit, solution.fields["r"], solution.iterations
     solution.destroy()

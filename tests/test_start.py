@@ -77,7 +77,7 @@ def test_superlu_dist_has_one_thread_whatever_the_environment_says():
         "library = ctypes.CDLL(PETSc.__file__)\n"
         "threads = getattr(library, 'omp_get_max_threads', lambda: 1)\n"
         "print(threads())\n"
-        "s = solve(load_scene('problem1', {'n': 30}), method='din', system='full', recipe_name='superlu_dist')\n"
+        "s = solve(load_scene('problem1', {'n': 30}), method='din', system='full', recipe='superlu_dist')\n"
         "print(threads(), s.outcome)\n"
     )
     environment = ENVIRONMENT | {"OMP_NUM_THREADS": "3"}

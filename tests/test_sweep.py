@@ -15,7 +15,6 @@ from lcp_lube import solve
 from lcp_lube.cli.arguments import parse
 from lcp_lube.cli.sweep import Axis, parse_axis, points, sweep
 from lcp_lube.cli.sweep import run as run_command
-from lcp_lube.drivers.neighbour import solve_near
 from lcp_lube.errors import InputError
 from lcp_lube.problems.solution import Outcome
 from lcp_lube.scenes.scene import load_scene
@@ -77,7 +76,7 @@ def run(axes, warm=True, path=None, settings="", changes=JOURNAL, **choices):
 
     def solve_at(point, near):
         starts.append(near.fields if near else None)
-        return solve_near(scene_at(point), near, **choices)
+        return solve(scene_at(point), start=near, **choices)
 
     rows, columns = sweep(axes, scene_at, solve_at, path, warm, settings)
     return rows, columns, starts
@@ -138,7 +137,7 @@ def test_a_failed_point_is_a_row_and_no_start():
     def solve_at(point, near):
         nears.append(near and near.problem.film.eccentricity)
         limit = 1 if point["eccentricity"] == 0.4 else 99
-        return solve_near(scene_at(point), near, method="din", stopping={"max_it": limit})
+        return solve(scene_at(point), start=near, method="din", stopping={"max_it": limit})
 
     rows, columns = sweep([Axis("eccentricity", (0.2, 0.4, 0.6))], scene_at, solve_at)
     assert [row["outcome"] for row in rows] == ["converged", Outcome.MAX_ITERATIONS, "converged"]
@@ -156,7 +155,7 @@ def test_a_refused_point_is_a_row():
     def solve_at(point, near):
         if point["eccentricity"] > 0.3:
             raise InputError("no such film")
-        return solve_near(scene_at(point), near)
+        return solve(scene_at(point), start=near)
 
     rows, _ = sweep([Axis("eccentricity", (0.4, 0.2))], scene_at, solve_at)
     assert [row["outcome"] for row in rows] == ["refused", "converged"] and rows[0]["message"] == "no such film"

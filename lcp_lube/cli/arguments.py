@@ -121,6 +121,12 @@ def parse(own: list[str]) -> argparse.Namespace:
         "--no-memory-check", action="store_true", help="begin even if the estimate says that memory is too short"
     )
     solve.add_argument(
+        "--reduction",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="solve no more than symmetry leaves (--explain says what); default yes",
+    )
+    solve.add_argument(
         "--certify", action="store_true", help="prove how far the answer is from the exact discrete solution at most (films)"
     )
     solve.add_argument(

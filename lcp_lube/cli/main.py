@@ -11,8 +11,7 @@ from mpi4py import MPI
 
 from ..api import solve
 from ..base.options import check_unread
-from ..drivers.accuracy import solve_to_accuracy
-from ..drivers.neighbour import solve_or_balance
+from ..drivers.ask import Ask
 from ..errors import InputError, nearest
 from ..output.results import as_dict, finite, summary
 from ..problems.solution import Solution, Step
@@ -79,33 +78,35 @@ def options_of(args: argparse.Namespace, method: str, among: Sequence[str] = ())
     return options
 
 
+def ask_of(args: argparse.Namespace, monitor: Monitor | None = None) -> Ask:
+    """How to solve, of the options that `solve` and `sweep` share."""
+    return Ask(
+        method=args.method,
+        system=args.system,
+        recipe=args.recipe,
+        stopping=stopping_of(args),
+        options=options_of(args, args.method),
+        nested=args.nested,
+        monitor=monitor,
+    )
+
+
 def solution_of(args: argparse.Namespace, monitor: Monitor | None = None) -> Solution:
     """What `solve` with these arguments finds. Collective."""
     scene = scene_of(args)
-    how: dict[str, Any] = {
-        "method": args.method,
-        "system": args.system,
-        "recipe_name": args.recipe,
-        "stopping": stopping_of(args),
-        "options": options_of(args, args.method),
-        "monitor": monitor,
-        "nested": args.nested,
-        "certify": args.certify,
-        "memory_check": not args.no_memory_check,
-    }
-    if getattr(scene, "balance", None) is not None:
-        for option in ("accuracy", "checkpoint", "resume"):
-            if getattr(args, option) is not None:
-                raise InputError(f"--{option}: not with [balance], whose many solves make one answer")
-        return solve_or_balance(lambda changes: scene_of(args, changes), None, **how)
-    if args.accuracy is None:
-        if args.quantity is not None:
-            raise InputError(f"--quantity {args.quantity}: --accuracy TOL is needed too")
-        return solve(scene, **how, checkpoint=args.checkpoint, every=args.every or 1, resume=args.resume)
-    if args.checkpoint or args.resume:
-        raise InputError("--accuracy: its many grids cannot be checkpointed or resumed; give --n instead")
-    finest = scene.shape if args.n or args.nx or args.ny else None
-    return solve_to_accuracy(scene, args.accuracy, args.quantity, finest=finest, **how)
+    return solve(
+        scene,
+        ask_of(args, monitor),
+        accuracy=args.accuracy,
+        quantity=args.quantity,
+        finest=scene.shape if args.n or args.nx or args.ny else None,
+        certify=args.certify,
+        checkpoint=args.checkpoint,
+        every=args.every or 1,
+        resume=args.resume,
+        reduction=args.reduction,
+        memory_check=not args.no_memory_check,
+    )
 
 
 def run_solve(args: argparse.Namespace) -> int:

@@ -6,7 +6,7 @@ import io
 import sys
 import tomllib
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from itertools import product
 from math import isfinite, prod
@@ -17,9 +17,9 @@ import numpy as np
 from mpi4py import MPI
 from tqdm import tqdm
 
+from ..api import solve
 from ..base.options import check_unread
 from ..base.resumable import ResumableCsv
-from ..drivers.neighbour import solve_or_balance
 from ..errors import InputError
 from ..output.results import as_dict, finite
 from ..problems.solution import Outcome, Solution, Step
@@ -184,7 +184,7 @@ def _row(
         solution = solve_at(point, None if moved is None else neighbours.near(moved, scene))
     except InputError as error:
         return {"outcome": REFUSED, "converged": False, "message": str(error)}
-    row = flat(as_dict(solution)) | {"start": solution.settings.get("start")}
+    row = flat(as_dict(solution)) | {"start": solution.settings.get("start", "cold")}
     if moved is not None and solution.converged:
         neighbours.keep(moved, scene, solution)
     else:
@@ -207,25 +207,19 @@ def flat(data: dict[str, Any]) -> dict[str, Any]:
 
 def run(args: argparse.Namespace) -> int:
     """The command: exit status 0 if every point converged, else 1; raises InputError as `sweep` does. Collective."""
-    from .main import options_of, say, scene_of, stopping_of
+    from .main import ask_of, say, scene_of
 
     if args.output is not None and args.output.suffix.lower() != ".csv":
         raise InputError(f"--output {args.output}: a sweep writes a .csv")
-    choices = {
-        "method": args.method,
-        "system": args.system,
-        "recipe_name": args.recipe,
-        "stopping": stopping_of(args),
-        "options": options_of(args, args.method),
-        "nested": args.nested,
-    }
+
+    def monitor(k: int, step: Step) -> None:
+        if k == 1:
+            check_unread()
+
+    ask = ask_of(args, monitor)
 
     def solve_at(point: dict[str, Any], near: Solution | None) -> Solution:
-        def monitor(k: int, step: Step) -> None:
-            if k == 1:
-                check_unread()
-
-        return solve_or_balance(lambda changes: scene_of(args, {**point, **changes}), near, monitor=monitor, **choices)
+        return solve(scene_of(args, point), ask, start=near)
 
     rows, columns = sweep(
         [parse_axis(text) for text in args.vary],
@@ -233,7 +227,7 @@ def run(args: argparse.Namespace) -> int:
         solve_at,
         args.output,
         args.warm,
-        settings=repr(choices),
+        settings=repr(replace(ask, monitor=None)),
     )
     if args.output is None:
         text = io.StringIO()

@@ -1,6 +1,7 @@
 """Accuracy asked for: grids from coarse to fine, until the estimated relative error of a quantity is below a tolerance."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from math import ceil, inf, isfinite, prod
 from time import perf_counter
 from typing import Any
@@ -9,12 +10,13 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from ..api import solve
 from ..errors import InputError, nearest
-from ..problems.solution import Fields, Outcome, Problem, Solution
+from ..problems.solution import Outcome, Solution
 from ..registry import METHODS
-from ..scenes.scene import Scene
+from ..scenes.scene import Solvable
 from ..solvers.newton import Stopping
+from .ask import Ask
+from .compose import Inner
 from .estimate import misplaced_film, relative_error
 from .memory import DENSE, available
 from .plan import SMALL
@@ -31,41 +33,40 @@ RELATIVE_NORM = ("active-set", "fas")  # methods that measure ||F|| relative to 
 DEFAULT_QUANTITY = ("load", "sum_v", "k", "sigma")
 
 
-def solve_to_accuracy(
-    scene: Scene,
-    tol: float,
-    quantity: str | None = None,
-    *,
-    finest: tuple[int, ...] | None = None,
-    stopping: Stopping | dict[str, Any] | None = None,
-    nested: bool | None = None,
-    comm: PETSc.Comm | None = None,
-    **how: Any,
-) -> Solution:
+def applies(scene: Solvable, ask: Ask) -> bool:
+    """Whether a relative error was asked for.
+
+    Raises
+    ------
+    InputError : a tolerance out of range, a quantity without one.
+    """
+    if ask.accuracy is None:
+        if ask.quantity is not None:
+            raise InputError(f"--quantity {ask.quantity}: --accuracy TOL is needed too")
+        return False
+    if not ALLOWED[0] <= ask.accuracy <= ALLOWED[1]:
+        raise InputError(f"--accuracy {ask.accuracy:g}: allowed are relative errors from {ALLOWED[0]:g} to {ALLOWED[1]:g}")
+    return True
+
+
+def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     """Solve a scene on finer and finer grids until a quantity is good to a tolerance, and no further. Collective.
 
-    Parameters
-    ----------
-    tol : relative error allowed, 1e-10 to 0.5.
-    quantity : which number of `Problem.quantities` it is about; default 'load', of other scenes 'sum_v', 'k', 'sigma'.
-    finest : points a side that no grid may exceed; default: what memory holds.
-    stopping : tolerances of the nonlinear iteration; by default no tighter than `tol` needs.
-    nested : False: no grid starts from the answer on the one before.
-    how : method, system, recipe_name, options, monitor, certify of `solve`.
+    The tolerances of the nonlinear iteration are by default no tighter than that needs.
 
     Returns
     -------
     Solution : on the last grid. settings['accuracy_estimate'] is the estimated relative error, `levels` has every grid with its
-        value and estimate. Where grids end before the estimate is below `tol`: outcome ACCURACY.
+        value and estimate. Where grids end before the estimate is below the tolerance: outcome ACCURACY.
 
     Raises
     ------
-    InputError : no such quantity, a tolerance out of range or that no memory can hold; and what `solve` raises.
+    InputError : no such quantity, a tolerance that no memory can hold; and what the inner solves raise.
     """
-    if not ALLOWED[0] <= tol <= ALLOWED[1]:
-        raise InputError(f"--accuracy {tol:g}: allowed are relative errors from {ALLOWED[0]:g} to {ALLOWED[1]:g}")
+    tol, quantity, finest = ask.accuracy, ask.quantity, ask.finest
+    assert tol is not None
     begin = perf_counter()
-    shape = first_shape(scene.shape, (comm or PETSc.COMM_WORLD).getSize())
+    shape = first_shape(scene.shape, ask.mpi.size)
     solution: Solution | None = None
     values: list[float] = []
     misplaced: list[float] = []
@@ -74,18 +75,16 @@ def solve_to_accuracy(
     end = ""
     while not end:
         level_begin, before = perf_counter(), solution
-        solution = solve(
-            scene.with_shape(shape),
-            stopping=_stopping(stopping, tol, before),
-            start=_start(before, prod(shape)) if nested is not False else None,
-            nested=False,
-            comm=comm,
-            **how,
-        )
+        near = ask.start if before is None else _start(before, prod(shape)) if ask.nested is not False else None
+        stopping = _stopping(ask.stopping, tol, before)
+        solution = inner(scene.with_shape(shape), replace(ask, accuracy=None, stopping=stopping, start=near, nested=False))
         if before is not None:
             before.destroy()
         problem = solution.problem
         found = problem.quantities(solution.fields)
+        if balance := solution.settings.get("balance"):  # what is sought is the number; the load is given
+            found = {balance["vary"]: balance["value"], **found}
+            quantity = quantity or balance["vary"]
         quantity = quantity or next((name for name in DEFAULT_QUANTITY if name in found), "")
         values.append(_value(found, quantity, scene) if solution.converged else np.nan)
         misplaced.append(misplaced_film(problem))
@@ -151,7 +150,9 @@ def _end(estimates: Sequence[float], values: Sequence[float], tol: float, points
     return ""
 
 
-def _stopping(given: Stopping | dict[str, Any] | None, tol: float, before: Solution | None) -> Stopping | dict[str, Any] | None:
+def _stopping(
+    given: Stopping | Mapping[str, Any] | None, tol: float, before: Solution | None
+) -> Stopping | Mapping[str, Any] | None:
     """The tolerances given, filled up for a method whose ||F|| is relative to the data: no tighter than `tol` needs."""
     if isinstance(given, Stopping) or before is None or before.problem.kind != "lubrication":
         return given
@@ -160,17 +161,17 @@ def _stopping(given: Stopping | dict[str, Any] | None, tol: float, before: Solut
     return {"eps1": float(np.clip(ALGEBRAIC * tol, 1e-12, 1e-4)), "eps2": inf, **(given or {})}
 
 
-def _start(before: Solution | None, points: int) -> tuple[Problem, Fields] | None:
+def _start(before: Solution | None, points: int) -> Solution | None:
     """What the next grid starts from, where that pays: a small film is solved sooner than sweeps are compiled."""
     if before is None or before.outcome in (Outcome.NOT_FINITE, Outcome.LINEAR_SOLVER):
         return None
     if before.problem.kind == "lubrication" and points <= SMALL:
         return None
     entry = METHODS[before.settings["method"]].of(before.problem.kind)
-    return (before.problem, before.fields) if entry.nested else None
+    return before if entry.nested else None
 
 
-def _value(found: dict[str, Any], quantity: str, scene: Scene) -> float:
+def _value(found: dict[str, Any], quantity: str, scene: Solvable) -> float:
     """The quantity among those found; NaN where it has no value on this grid, a front that is not there, say."""
     numbers = [name for name, value in found.items() if isinstance(value, int | float) and not isinstance(value, bool)]
     if quantity not in found or not (found[quantity] is None or quantity in numbers):

@@ -7,44 +7,23 @@ search begins on coarse ones.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import exp, inf, log, prod
-from typing import TYPE_CHECKING, Annotated, Any
-
-from pydantic import Field, model_validator
+from typing import Any
 
 from ..errors import InputError
 from ..problems.solution import Outcome, Solution
-from ..scenes.units import Measured, measured
+from ..scenes.balance import BalanceTable
+from ..scenes.scene import Scene, Solvable, as_scene
+from .ask import Ask
+from .compose import Inner
 from .levels import level_shapes
 from .root import Search
-
-if TYPE_CHECKING:
-    from ..scenes.scene import Scene
 
 MOST_SOLVES = 30  # on a grid
 RANGE = {"eccentricity": 1e4, "h_offset": 100.0}  # unless one is given: of e/(1 - e) about 1, of the film about the scene's
 COARSE_TOL = 1e-3  # a coarse grid's load is no better
 ONE_GRID = 1_000  # points up to which no coarser grid is worth its while
-
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-
-
-class BalanceTable(Measured):
-    """[balance] of a scene file: the load to carry, and the key whose value is to be found for it."""
-
-    load: Annotated[Number, Field(gt=0)] = measured(
-        "N or N/m", ..., "load to carry, in 1D per metre of width; a journal's bearing_load, else load_above_ambient"
-    )
-    vary: str | None = Field(None, description="key to find; default eccentricity (journals), else h_offset, the film's level")
-    range: tuple[Number, Number] | None = Field(None, description="values allowed for it, in its unit")
-    tol: Annotated[Number, Field(gt=1e-12, lt=1)] = Field(1e-6, description="relative error of the load")
-
-    @model_validator(mode="after")
-    def _ordered(self) -> "BalanceTable":
-        if self.range is not None and not self.range[0] < self.range[1]:
-            raise ValueError(f"range = {list(self.range)}: smallest < largest is needed")
-        return self
 
 
 def carried(values: dict[str, Any]) -> float:
@@ -67,7 +46,7 @@ class Variable:
     slope: float
 
 
-def variable(scene: "Scene", table: BalanceTable, begin: float | None) -> Variable:
+def variable(scene: Scene, table: BalanceTable, begin: float | None) -> Variable:
     """What is to be found. Collective.
 
     Parameters
@@ -114,20 +93,15 @@ def _logit(e: float) -> float:
     return log(e / (1.0 - e))
 
 
-def balanced(
-    scene_at: Callable[[dict[str, Any]], "Scene"],
-    solve: Callable[["Scene", Solution | None], Solution],
-    near: Solution | None = None,
-    nested: bool | None = None,
-) -> Solution:
+def applies(scene: Solvable, ask: Ask) -> bool:
+    """Whether the scene has a load to carry."""
+    return getattr(scene, "balance", None) is not None
+
+
+def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     """The solution of the scene that carries the load of its [balance] table. Collective.
 
-    Parameters
-    ----------
-    scene_at : the scene with some of its values changed, by key.
-    solve : solve(scene, near) -> Solution, near being one to start from.
-    near : the solution of a neighbouring scene, perhaps a balance as well.
-    nested : False: no search on coarser grids.
+    `nested` = False: no search on coarser grids. A start that is a balance as well gives the value where the search begins.
 
     Returns
     -------
@@ -137,22 +111,25 @@ def balanced(
 
     Raises
     ------
-    InputError : what `variable` and `solve` raise.
+    InputError : what `variable` and the inner solves raise.
     """
-    scene = scene_at({})
+    assert isinstance(scene, Scene)  # as `applies` found: no other has a table
     table: BalanceTable = scene.balance  # type: ignore[attr-defined]
+    nested, near = ask.nested, ask.start
     shapes = [scene.shape]
     if prod(scene.shape) > ONE_GRID and nested is not False:
         shapes = [shape for shape in level_shapes(scene.shape) if shape == scene.shape or prod(shape) > ONE_GRID]
     known = near.settings.get("balance", {}).get("value") if near is not None else None
     unknown = variable(scene.with_shape(shapes[0]), table, known)
-    t, slope, start, solves, found = unknown.start, unknown.slope, near, 0, False
+    t, slope, solves, found = unknown.start, unknown.slope, 0, False
+    start: Any = near
     for shape in shapes:
         search = Search(unknown.low, unknown.high, slope, explore=not found)
         tol = table.tol if shape == shapes[-1] else max(table.tol, COARSE_TOL)
 
-        def solve_at(t: float, near: Solution | None, shape: tuple[int, ...] = shape) -> Solution:
-            return solve(scene_at({unknown.key: unknown.to_value(t)}).with_shape(shape), near)
+        def solve_at(t: float, near: Any, shape: tuple[int, ...] = shape) -> Solution:
+            trial = as_scene(scene, {unknown.key: unknown.to_value(t)}).with_shape(shape)
+            return inner(trial.model_copy(update={"balance": None}), replace(ask, start=near))
 
         solution, t, count, found = _on_grid(solve_at, search, t, start, table.load, tol)
         if start is not None and start is not near:
@@ -178,10 +155,10 @@ def balanced(
 
 
 def _on_grid(
-    solve_at: Callable[[float, Solution | None], Solution],
+    solve_at: Callable[[float, Any], Solution],
     search: Search,
     t: float,
-    near: Solution | None,
+    near: Any,
     load: float,
     tol: float,
 ) -> tuple[Solution, float, int, bool]:

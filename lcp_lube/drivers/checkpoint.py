@@ -20,7 +20,7 @@ from .. import __version__
 from ..errors import InputError
 from ..problems.grid import Grid
 from ..problems.solution import Fields, Outcome, Step
-from ..scenes.scene import Scene
+from ..scenes.scene import Scene, Solvable
 from ..solvers.newton import Method, Monitor, Stopping, iterate
 from . import checkpoint_file
 
@@ -105,7 +105,7 @@ class Checkpointer:
         self._saved = False
         self._signal = 0
 
-    def begin(self, scene: Scene, choices: tuple[Any, ...]) -> None:
+    def begin(self, scene: Solvable, choices: tuple[Any, ...]) -> None:
         """What is solved and how: the values of CHOICES."""
         if self.active:
             self.record = {"scene": scene_record(scene), **dict(zip(CHOICES, choices, strict=True)), "failed": []}
@@ -266,7 +266,7 @@ class Checkpoint:
         return given
 
 
-def load(path: str | Path, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> Checkpoint:
+def load(path: str | Path, scene: Solvable, comm: MPI.Comm = MPI.COMM_WORLD) -> Checkpoint:
     """Read a checkpoint of this scene. Collective.
 
     Raises
@@ -286,8 +286,9 @@ def load(path: str | Path, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> Che
     return Checkpoint(path, header, tuple(header["shape"]), [Step(*step) for step in header["steps"]], start)
 
 
-def scene_record(scene: Scene) -> dict[str, Any]:
+def scene_record(scene: Solvable) -> dict[str, Any]:
     """A scene's data as JSON holds them."""
+    assert isinstance(scene, Scene)  # `compose` lets no other be checkpointed
     return json.loads(json.dumps({"class": type(scene).__name__, **scene.model_dump(mode="json")}, default=str))
 
 

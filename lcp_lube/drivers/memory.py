@@ -9,21 +9,17 @@ A fallback that takes over with a direct solver is not in the estimate: it may n
 import os
 import resource
 import sys
-from collections.abc import Callable
-from copy import copy
 from dataclasses import dataclass
 from importlib.util import find_spec
-from math import log2, prod
+from math import log2
 from pathlib import Path
 
-import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..base.options import recipe
 from ..errors import InputError
-from ..problems.solution import Problem
-from ..scenes.scene import Scene
+from ..problems.facts import Facts
 from .plan import Plan
 
 MB = 2**20
@@ -156,14 +152,14 @@ def _restart(options: dict[str, str]) -> int:
     return int(given) if given.isdecimal() else 30
 
 
-def bytes_needed(problem: Problem, plan: Plan) -> float | None:
+def bytes_needed(facts: Facts, plan: Plan) -> float | None:
     """Bytes that a run takes for its points, all ranks together; None if nothing is known of such runs.
 
     An inner solver that was not measured counts as the most expensive one of the same system.
     """
-    points, kind = problem.grid.size, f"{problem.kind} {problem.grid.dim}D"
-    if getattr(problem, "dense", False):
-        return DENSE * points**2 * (problem.grid.comm.size if plan.recipe == "redundant_lu" else 1)
+    points, kind = facts.size, f"{facts.kind} {facts.dim}D"
+    if facts.dense:
+        return DENSE * points**2 * (facts.ranks if plan.recipe == "redundant_lu" else 1)
     options = PETSc.Options().getAll()
     if plan.system and options.get("mat_type", "") == "dense":
         return DENSE_COPY * (2 * points if plan.system == "full" else points) ** 2
@@ -179,31 +175,32 @@ def bytes_needed(problem: Problem, plan: Plan) -> float | None:
     return each * points
 
 
-def _libraries(problem: Problem, plan: Plan) -> int:
+def _libraries(facts: Facts, plan: Plan) -> int:
     """Bytes of what a rank loads in the course of such a run."""
     compiles = plan.system in ("", "cavity") or (plan.nested and plan.method in ("active-set", "monotone"))
-    if problem.kind == "lubrication" and compiles and "numba" not in sys.modules and find_spec("numba"):
+    if facts.kind == "lubrication" and compiles and "numba" not in sys.modules and find_spec("numba"):
         return LIBRARIES + COMPILER
     return LIBRARIES
 
 
-def check(problem: Problem, plan: Plan, before: int, refuse: bool = True) -> Estimate | None:
+def check(facts: Facts, plan: Plan, comm: MPI.Comm, refuse: bool = True, before: int | None = None) -> Estimate | None:
     """The run's estimate. Collective.
 
     Parameters
     ----------
     plan : how the run goes; the options of its recipe are in force.
-    before : `resident` before the problem was built.
     refuse : whether a run that cannot fit is refused.
+    before : `resident` before anything was built; default: as now.
 
     Raises
     ------
     InputError : on some machine the ranks need more than it has left.
     """
-    needed, comm = bytes_needed(problem, plan), problem.grid.comm
+    needed = bytes_needed(facts, plan)
     if needed is None:
         return None
-    fixed = _libraries(problem, plan)
+    before = resident() if before is None else before
+    fixed = _libraries(facts, plan)
     base = comm.allreduce(before + fixed)
     machine = comm.Split_type(MPI.COMM_TYPE_SHARED)
     share = (needed / comm.size + fixed) * machine.size
@@ -212,9 +209,8 @@ def check(problem: Problem, plan: Plan, before: int, refuse: bool = True) -> Est
     machine.Free()
     short, there = comm.allreduce((share > left, -left), MPI.MAX)
     if short and refuse:
-        grid = problem.grid
         raise InputError(
-            f"grid {'x'.join(map(str, grid.shape))}: {grid.size} points need about {_gb(needed)} GB with method {plan.method}"
+            f"grid {'x'.join(map(str, facts.shape))}: {facts.size} points need about {_gb(needed)} GB with method {plan.method}"
             f"{f' on the {plan.system} system' if plan.system else ''}, {_gb(-there)} GB are available; "
             f"take fewer points, another method or --no-memory-check"
         )
@@ -225,29 +221,13 @@ def _gb(size: float) -> str:
     return f"{size / 1e9:.0f}" if size >= 1e10 else f"{size / 1e9:.2g}"
 
 
-def look_ahead(scene: Scene, comm: PETSc.Comm | None, choose: Callable[[Problem], Plan]) -> None:
-    """Refuse a large scene before it is built: the estimate is that of its plan, made for a small grid that claims its size.
-
-    Parameters
-    ----------
-    choose : the plan of a problem; it must go by the grid's numbers alone. Collective.
+def look_ahead(facts: Facts, plan: Plan, comm: MPI.Comm) -> None:
+    """Refuse a large scene before it is built; of others building tells. Collective.
 
     Raises
     ------
     InputError : as `check`.
     """
-    size = prod(scene.shape)
-    if scene.family == "user" or size < LARGE or size > np.iinfo(PETSc.IntType).max // 2:  # which the grid refuses by itself
-        return
-    ranks = (comm or PETSc.COMM_WORLD).getSize()
-    small = scene.with_shape(tuple(min(n, max(50, 2 * ranks)) for n in scene.shape)).build(comm)
-    large = copy(small)
-    large.grid = grid = copy(small.grid)
-    grid.shape, grid.size = scene.shape, size
-    grid.box = (grid.box[0], grid.shape[0] if grid.box[1] == small.grid.shape[0] else grid.box[1])
-    try:
-        plan = choose(large)
+    if facts.size >= LARGE:
         with recipe(plan.recipe):
-            check(large, plan, resident())
-    finally:
-        small.destroy()
+            check(facts, plan, comm)

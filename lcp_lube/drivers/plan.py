@@ -8,8 +8,9 @@ from petsc4py import PETSc
 
 from ..base.options import set_names
 from ..errors import InputError, nearest
-from ..problems.solution import Problem
+from ..problems.facts import Facts
 from ..registry import DEFAULT_METHOD, METHODS, SMALL, SMALL_BOX
+from .ask import Ask
 
 SMALL_RING = 200_000  # the same for a film that is periodic along the flow
 DIN_ONLY = {"r0", "mu", "conditions"}  # flags that only an interior method can heed
@@ -26,36 +27,29 @@ class Plan:
     why: list[str] = field(default_factory=list)
 
 
-def plan(
-    problem: Problem,
-    scene: str,
-    method: str = "auto",
-    system: str = "auto",
-    recipe: str | None = None,
-    nested: bool | None = None,
-    options: Iterable[str] = (),
-) -> Plan:
-    """Fill in what was left to us; `options` are the names of the method options that were given.
+def plan(facts: Facts, ask: Ask, scene: str) -> Plan:
+    """Fill in what was left to us; nothing is built for it.
 
     Raises
     ------
     InputError : a name that does not exist, or does not fit the scene or the method.
     """
+    method, system, recipe, nested, options = ask.method, ask.system, ask.recipe, ask.nested, ask.options
     why = []
     if method == "auto":
-        method = DEFAULT_METHOD[problem.kind]
+        method = DEFAULT_METHOD[facts.kind]
         no_linear = system == "auto" and recipe is None and not nested and not options
-        if method == "active-set" and no_linear and _suits_multigrid(problem):
+        if method == "active-set" and no_linear and _suits_multigrid(facts):
             method = "fas"
-        reason = METHODS[method].of(problem.kind).line
-        if problem.kind == "lubrication" and DIN_ONLY & set(options):
+        reason = METHODS[method].of(facts.kind).line
+        if facts.kind == "lubrication" and DIN_ONLY & set(options):
             method, reason = "din", f"{', '.join(sorted(DIN_ONLY & set(options)))} are its options"
         why.append(f"method {method}: {reason}")
     entry = METHODS[_known(method, METHODS, "--method")]
-    if problem.kind in entry.kinds:
-        entry = entry.of(problem.kind)
+    if facts.kind in entry.kinds:
+        entry = entry.of(facts.kind)
     else:
-        fitting = [name for name, other in METHODS.items() if problem.kind in other.kinds]
+        fitting = [name for name, other in METHODS.items() if facts.kind in other.kinds]
         raise InputError(f"--method {method}: not for scene {scene}; allowed are {', '.join(fitting)}")
     if not entry.systems:
         for option, given in (("--system", None if system == "auto" else system), ("--recipe", recipe)):
@@ -64,14 +58,13 @@ def plan(
         if nested:
             raise InputError(f"--nested: method {method} has grids of its own")
         return Plan(method, "", None, False, why)
-    grid = problem.grid
-    small = SMALL_BOX if problem.kind == "box" else SMALL
-    if problem.kind == "lubrication" and grid.periodic[0]:
+    small = SMALL_BOX if facts.kind == "box" else SMALL
+    if facts.kind == "lubrication" and facts.periodic[0]:
         small = SMALL_RING  # what feeds the film is a small part of what goes round: its balance needs digits
-    large = grid.dim == 2 and grid.size > small
+    large = facts.dim == 2 and facts.size > small
     if system == "auto":
         system = entry.systems[0]
-        if large and "cavity" in entry.systems and grid.box[1] == grid.shape[0] and not any(grid.periodic):
+        if large and "cavity" in entry.systems and facts.whole_lines and not any(facts.periodic):
             system = "cavity"
             why.append(
                 "system cavity: with the cavitated cells eliminated and its near-null vector scaled out, multigrid holds"
@@ -79,41 +72,41 @@ def plan(
     _known(system, entry.systems, f"method {method}: --system")
     if nested is None:
         own_start = entry.interior and bool({"p0", "r0"} & set(options))  # one that someone chose is to be used
-        nested = entry.nested and grid.size > entry.nested_above and not own_start
+        nested = entry.nested and facts.size > entry.nested_above and not own_start
         if nested:
             why.append("nested: the front found on a coarser grid leaves a few steps on this one")
     elif nested and not entry.nested:
         raise InputError(f"--nested: method {method} does not start from a coarser grid")
     if recipe is None and not {"ksp_type", "pc_type"} & set_names():
-        recipe, reason = default_recipe(problem, system, large)
+        recipe, reason = default_recipe(facts, system, large)
         why.append(f"recipe {recipe}: {reason}")
     return Plan(method, system, recipe, nested, why)
 
 
-def _suits_multigrid(problem: Problem) -> bool:
+def _suits_multigrid(facts: Facts) -> bool:
     """Whether nonlinear multigrid is the fastest: in 2D, its loops compiled, nobody having asked for an inner solver."""
-    plane = problem.kind == "lubrication" and problem.grid.dim == 2 and not any(problem.grid.periodic)
+    plane = facts.kind == "lubrication" and facts.dim == 2 and not any(facts.periodic)
     return plane and find_spec("numba") is not None and not {"ksp_type", "pc_type"} & set_names()
 
 
-def default_recipe(problem: Problem, system: str, large: bool) -> tuple[str, str]:
+def default_recipe(facts: Facts, system: str, large: bool) -> tuple[str, str]:
     """The inner solver that this PETSc has for this system, size and number of ranks, and why."""
     has = PETSc.Sys.hasExternalPackage
-    if problem.kind in ("lubrication", "equations") and system != "full" and large:
+    if facts.kind in ("lubrication", "equations") and system != "full" and large:
         reason = "a large 2D M-matrix: multigrid costs the same per point on every grid"
         if has("hypre"):
             return "bcgs_amg", reason
         if system == "cavity":  # its scaling is what the other multigrids need
             return ("bcgs_ml" if has("ml") else "bcgs_gamg"), f"{reason}; this PETSc has no hypre, whose is the fastest"
-    if problem.kind == "box" and large:
+    if facts.kind == "box" and large:
         return "multigrid", "a large problem with coarser grids: multigrid costs the same per point on every grid"
-    ranks = problem.grid.comm.size
-    if getattr(problem, "dense", False):
+    ranks = facts.ranks
+    if facts.dense:
         return ("redundant_lu" if ranks > 1 else "dense_lu"), "a dense Jacobian: LAPACK"
-    if problem.grid.dim == 1 and system == "reduced" and ranks == 1:
+    if facts.dim == 1 and system == "reduced" and ranks == 1:
         return "banded", "tridiagonal, an M-matrix: elimination in natural order, without pivoting or fill"
     names = ("mumps", "superlu_dist") if ranks > 1 else ("superlu", "umfpack", "mumps")
-    if problem.grid.dim == 2 and ranks == 1:
+    if facts.dim == 2 and ranks == 1:
         names = ("umfpack", "superlu", "mumps")
     for name in names:
         if has(name) or (name == "umfpack" and has("suitesparse")):  # its name in older releases

@@ -12,24 +12,28 @@ on the whole problem's data like any other, and where that fails the whole probl
 needs no choice: the active-set method's first step is its one linear solve.)
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ..base.parallel import Array
+from ..problems.facts import Facts
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model, Side
-from ..problems.grid import Grid
+from ..problems.grid import Grid, places
 from ..problems.solution import Outcome, Problem, Solution
-from ..scenes.scene import Scene
+from ..scenes.scene import Solvable
+from .ask import Ask, Start
+from .compose import Inner
+from .memory import look_ahead
+from .plan import plan
 
 SAME = 1e-12  # relative difference that coordinates' rounding leaves between two values of one film
 
-SAMPLE = 5  # lines that are compared first
+SAMPLE = (65, 5)  # columns and lines that are compared first, before anything is built
 
 SENTENCES = {
     "constant": "nothing to solve: the film is the same everywhere, and the pressure at every side",
@@ -38,16 +42,59 @@ SENTENCES = {
 }
 
 
+def applies(scene: Solvable, ask: Ask) -> bool:
+    """Whether to look for symmetries: in films, where nobody named a solver, which is then meant for the whole of them."""
+    return isinstance(model_of(scene), Model) and not why_not(ask)
+
+
+def why_not(ask: Ask) -> str:
+    """What of the ask wants the whole model; empty if nothing does."""
+    if not ask.reduction:
+        return "no reduction was asked for"
+    if ask.named:
+        return "a method, a matrix or an inner solver was named: the whole scene's"
+    if ask.certify:
+        return "the band is proved for the whole problem"
+    return "checkpoints hold the whole problem" if ask.checkpoint or ask.resume else ""
+
+
+def model_of(scene: Solvable) -> Model | None:
+    """The film behind a scene, where it is one of a fluid with constant viscosity and density."""
+    model = getattr(scene, "model", None)
+    return model if isinstance(model, Model) and model.law is None else None
+
+
+def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
+    """The whole problem's solution from the least part that has it; from itself where there is none. Collective."""
+    if not promising(scene, ask):
+        return inner(scene, ask)
+    if ask.memory_check:
+        facts = scene.facts(ask.comm)
+        look_ahead(facts, plan(facts, ask, scene.name), ask.mpi)
+    problem = scene.build(ask.comm)
+    part = part_of(scene, problem)
+    if part is None:
+        problem.destroy()
+        return inner(scene, ask)
+    solution = solve_part(part, problem, ask, inner)
+    if solution.outcome is not Outcome.WRONG_SOLUTION:
+        return solution
+    solution.destroy()
+    solution = inner(scene, ask)
+    note = f"the whole model: the reduced one's answer ({part.kind}) is not the whole scene's"
+    solution.settings["why"] = [note, *solution.settings["why"]]
+    return solution
+
+
 @dataclass(frozen=True)
 class Part:
-    """What is left of a scene; to `solve` it is a scene like any other.
+    """What is left of a scene.
 
     kind : a key of SENTENCES. shape : that of the whole scene's grid, in 1D for 'line'.
     """
 
-    whole: Scene
+    whole: Solvable
     kind: str
-    family: ClassVar[str] = "user"  # no file's: what is asked of those has been asked of the whole scene
 
     @property
     def name(self) -> str:
@@ -64,24 +111,52 @@ class Part:
     def with_shape(self, shape: tuple[int, ...]) -> "Part":
         return Part(self.whole.with_shape(shape), self.kind)
 
-    def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
-        """The discrete problem of the part. Collective."""
-        model: Model = self.whole.model  # type: ignore[attr-defined]
+    def _model(self) -> tuple[Model, tuple[int, ...]]:
+        """The part's own film, and its grid."""
+        model = model_of(self.whole)
+        assert model is not None  # as `applies` found
         if self.kind == "line":
-            return replace(model, lengths=model.lengths[:1], exact=None).build(self.shape, comm)
+            return replace(model, lengths=model.lengths[:1], exact=None), self.shape
         nx, ny = self.shape
         west, east, south, _ = model.sides
         south = south if south.kind == "open" else Side("closed")
         half = (west, east, south, Side("mirror" if ny % 2 else "closed"))
         lengths = (model.lengths[0], 0.5 * model.lengths[1])
-        return replace(model, lengths=lengths, sides=half, exact=None).build((nx, (ny + 1) // 2), comm)
+        return replace(model, lengths=lengths, sides=half, exact=None), (nx, (ny + 1) // 2)
+
+    def facts(self, comm: PETSc.Comm | None = None) -> Facts:
+        model, shape = self._model()
+        return model.facts(shape, comm)
+
+    def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
+        """The discrete problem of the part. Collective."""
+        model, shape = self._model()
+        return model.build(shape, comm)
 
 
-def part_of(scene: Scene, problem: Problem) -> Part | None:
+def promising(scene: Solvable, ask: Ask) -> bool:
+    """Whether some columns and lines of the film look like one of a part: nothing is built for films that do not."""
+    model = model_of(scene)
+    assert model is not None  # as `applies` found
+    kinds = [tuple(side.kind for side in model.sides[k : k + 2]) for k in (0, 2)]
+    xs, *ys = (
+        np.unique(at[np.linspace(0, at.size - 1, min(at.size, most)).round().astype(int)])
+        for at, most in zip((places(*of) for of in zip(scene.shape, model.lengths, kinds, strict=False)), SAMPLE, strict=False)
+    )
+    y = ys[0][:, None] if ys else np.zeros((1, 1))
+    with np.errstate(all="ignore"):  # a film that is not positive is told where it is built
+        h = np.broadcast_to(model.film(xs[None, :], y), (y.size, xs.size))
+        mirrored = model.film(xs[None, :], model.lengths[-1] - y) if ys else np.inf
+        return bool(np.all(np.abs(h / h[:1] - 1.0) <= SAME) if ys else np.ptp(h) <= SAME * h.max()) or bool(
+            np.all(np.abs(mirrored / h - 1.0) <= SAME)
+        )
+
+
+def part_of(scene: Solvable, problem: Problem) -> Part | None:
     """The least part of a scene that gives its whole answer; None where that is the scene itself. Collective."""
-    if type(problem) is not LubricationProblem or not isinstance(getattr(scene, "model", None), Model):
+    model = model_of(scene)
+    if model is None or not isinstance(problem, LubricationProblem):
         return None
-    model: Model = scene.model  # type: ignore[attr-defined]
     grid = problem.grid
     west, east, *ends = model.sides
     pressures = {side.p for side in model.sides[: 2 * grid.dim] if side.kind == "open"}
@@ -97,67 +172,53 @@ def part_of(scene: Scene, problem: Problem) -> Part | None:
     return None
 
 
-def reduced_solve(scene: Scene, eps1: float = 1e-8, **how: Any) -> Solution:
-    """`api.solve` of what is left of a scene, whatever method is named. Collective."""
-    from ..api import solve
-
-    problem = scene.build(how.get("comm"))
-    part = part_of(scene, problem)
-    if part is None:
-        problem.destroy()
-        return solve(scene, **how)
-    return solve_part(part, problem, solve, eps1, **how)
-
-
-def solve_part(part: Part, problem: Problem, solve: Callable[..., Solution], eps1: float, **how: Any) -> Solution:
+def solve_part(part: Part, problem: Problem, ask: Ask, inner: Inner) -> Solution:
     """The whole problem's solution from its part's. Collective.
 
     Parameters
     ----------
-    solve : api.solve; how : its arguments. `start` is a neighbour's whole problem and fields. eps1 : tolerance of the run.
+    problem : the whole one. ask : its `start` is a neighbour's whole problem.
     """
     assert isinstance(problem, LubricationProblem)  # as `part_of` found
     details = {"reduction": part.kind}
     if part.kind == "constant":
-        p = next(side.p for side in part.whole.model.sides if side.kind == "open") / problem.p_unit  # type: ignore[attr-defined]
+        model = model_of(part.whole)
+        assert model is not None
+        p = next(side.p for side in model.sides if side.kind == "open") / problem.p_unit
         n = problem.grid.local_size
         fields = {"p": np.full(n, p), "r": np.zeros(n)}
+        eps1 = ask.stopping_for((1e-8, 1e-8)).eps1
         settings = {
             "scene": part.name,
             "method": "none",
             "scheme": part.scheme,
+            "eps1": eps1,
             "why": [SENTENCES["constant"]],
             "details": details,
         }
         certificate = problem.certify(fields, eps1)
-        outcome = Outcome.CONVERGED if certificate.holds else Outcome.WRONG_SOLUTION
-        return Solution(problem, fields, outcome, "nothing to solve", certificate, [], settings)
-    if how.get("start") is not None:
+        return Solution(problem, fields, Outcome.CONVERGED, "nothing to solve", certificate, [], settings).judged()
+    start = None
+    if ask.start is not None:
         small = part.build(problem.grid.dm.comm)
-        neighbour, found = how["start"]
-        near = problem.prolong(neighbour, found, False)
+        near = problem.prolong(ask.start.problem, ask.start.fields, False)  # type: ignore[arg-type]
         take = _Pick(problem.grid, small.grid, *_numbers(small.grid))
-        how["start"] = (small, {name: take(values) for name, values in near.items()})
-    solution = solve(part, **how)
-    if how.get("start") is not None:
-        how["start"][0].destroy()
+        start = Start(small, {name: take(values) for name, values in near.items()}, ask.start.settings)
+    solution = inner(part, replace(ask, start=start))
+    if start is not None:
+        start.problem.destroy()
     small_problem = solution.problem
     j, i = _numbers(problem.grid)
     spread = _Pick(small_problem.grid, problem.grid, *((0 * j, i) if part.kind == "line" else (_mirrored(problem.grid, j), i)))
     fields = {name: spread(values) for name, values in solution.fields.items()}
     small_problem.destroy()
-    certificate = problem.certify(fields, eps1)
-    outcome, message = solution.outcome, solution.message
-    if outcome is Outcome.CONVERGED and not certificate.holds:
-        outcome, message = Outcome.WRONG_SOLUTION, f"{message}, but the certificate fails: {certificate.failure}"
     settings = {
         **solution.settings,
         "why": [SENTENCES[part.kind], *solution.settings["why"]],
         "details": {**solution.settings["details"], **details},
     }
-    return replace(
-        solution, problem=problem, fields=fields, outcome=outcome, message=message, certificate=certificate, settings=settings
-    )
+    certificate = problem.certify(fields, solution.settings["eps1"])
+    return replace(solution, problem=problem, fields=fields, certificate=certificate, settings=settings).judged()
 
 
 def _is_constant(problem: LubricationProblem) -> bool:
@@ -181,7 +242,7 @@ def _is_symmetric(problem: LubricationProblem, faces: bool) -> bool:
     """Whether h(x, y) = h(x, width - y), at the points, and on the faces too. Collective."""
     grid = problem.grid
     mirror = 2 * grid.origin[1] + grid.lengths[1]
-    some = np.unique(np.linspace(0, grid.box[0] - 1, SAMPLE).round().astype(int))  # most films that are not tell so at once
+    some = np.unique(np.linspace(0, grid.box[0] - 1, SAMPLE[1]).round().astype(int))  # most films that are not tell so at once
     if not _all_close(problem, [(problem.scheme.h[some], problem.film(grid.x, mirror - grid.y[some]))]):
         return False
     pairs = list(zip(_films(problem), _films(problem, mirror), strict=True))

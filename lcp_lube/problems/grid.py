@@ -20,6 +20,12 @@ OFFSET = {"open": 1.0, "closed": 0.5, "mirror": 0.0, "periodic": 0.5}
 OPEN = ("open", "open")
 
 
+def places(n: int, length: float, ends: Sequence[str]) -> Array:
+    """Coordinates of the n points of a line between two ends, m."""
+    meshes = n + OFFSET[ends[0]] + OFFSET[ends[1]] - 1.0
+    return (np.arange(n) + OFFSET[ends[0]]) * (length / meshes)
+
+
 class Grid:
     """Interior points x_i = i dx, dx = L/(nx+1) (and y_j = j dy, dy = Ly/(ny+1)) of a line or a rectangle.
 

@@ -143,6 +143,13 @@ class Solution:
         """Sum of `linear_iterations`, `centrality` or `backtracking` over the steps."""
         return sum(getattr(step, name) for step in self.steps)
 
+    def judged(self) -> "Solution":
+        """This solution; one that the method takes for converged though its certificate fails is a wrong one from now on."""
+        if self.outcome is Outcome.CONVERGED and not self.certificate.holds:
+            self.outcome = Outcome.WRONG_SOLUTION
+            self.message = f"{self.message}, but the certificate fails: {self.certificate.failure}"
+        return self
+
     def destroy(self) -> None:
         """Free the PETSc objects behind the problem."""
         self.problem.destroy()

@@ -8,13 +8,14 @@ import numpy as np
 from petsc4py import PETSc
 from pydantic import Field, field_validator, model_validator
 
-from ..drivers.balance import BalanceTable
 from ..errors import InputError
+from ..problems.facts import Facts
 from ..problems.film.exact import ExactSolution, exact_solution
 from ..problems.film.fluid import Law
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import NAMES, OPPOSITE, Model, Side
 from ..problems.film.shapes import Block, Sum
+from .balance import BalanceTable
 from .film import Extent, FilmPart
 from .scene import Count, Finite, Positive, Scene
 from .units import Measured, is_quantity, measured, metres
@@ -203,5 +204,11 @@ class BearingScene(Scene):
         """
         try:
             return self.model.build(self.shape, comm)
+        except InputError as error:
+            raise InputError(f"{self.name}: {error}") from None
+
+    def facts(self, comm: PETSc.Comm | None = None) -> Facts:
+        try:
+            return self.model.facts(self.shape, comm)
         except InputError as error:
             raise InputError(f"{self.name}: {error}") from None

@@ -1,11 +1,13 @@
 """Scenes of elastohydrodynamic contact."""
 
-from typing import Annotated, Literal
+from dataclasses import replace
+from typing import Annotated, ClassVar, Literal
 
 from petsc4py import PETSc
 from pydantic import Field, model_validator
 
 from ..problems.ehl import EhlProblem
+from ..problems.facts import Facts
 from ..problems.grid import Grid
 from .scene import Finite, NotNegative, Positive, Scene
 
@@ -16,6 +18,7 @@ class EhlLineScene(Scene):
     n counts the unknowns: n - 1 pressures at start + i dx, dx = (end - start)/n, and k.
     """
 
+    problem_kind: ClassVar[str] = "mixed"
     alpha: NotNegative = Field(2.832, description="how fast viscosity grows with pressure")
     lam: Positive = Field(6.057, alias="lambda", description="speed parameter")
     x: tuple[Finite, Finite] = Field((-3.0, 2.0), description="the interval; p = 0 at its ends")
@@ -37,6 +40,9 @@ class EhlLineScene(Scene):
 
     def with_shape(self, shape: tuple[int, ...]) -> "EhlLineScene":
         return self.model_copy(update={"n": shape[0]})
+
+    def facts(self, comm: PETSc.Comm | None = None) -> Facts:
+        return replace(super().facts(comm), dense=True)
 
     def build(self, comm: PETSc.Comm | None = None) -> EhlProblem:
         """The discrete problem. Collective.

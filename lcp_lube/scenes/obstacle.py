@@ -1,6 +1,6 @@
 """Scenes of obstacle problems: -Lap v = lambda e^v on a rectangle, between two obstacles given by formulas."""
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from petsc4py import PETSc
 from pydantic import Field, PrivateAttr, field_validator, model_validator
@@ -20,6 +20,7 @@ class ObstacleScene(Scene):
     Surfaces are numbers or formulas in x and y; inf and -inf stand for no obstacle.
     """
 
+    problem_kind: ClassVar[str] = "box"
     lam: Finite = Field(6.0, alias="lambda", description="strength of the source")
     v_lower: Surface = Field(0.0, description="lower obstacle, a number or a formula in x and y")
     v_upper: Surface = Field(4.0, description="upper obstacle, a number or a formula in x and y")

@@ -3,13 +3,13 @@
 import tomllib
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal, Protocol
 
 from petsc4py import PETSc
 from pydantic import Field, PrivateAttr, ValidationError, model_validator
 
-from ..drivers.balance import BalanceTable
 from ..errors import InputError, nearest
+from ..problems.facts import Facts
 from ..problems.film.exact import ExactSolution, exact_solution
 from ..problems.film.gaps import Raised, Wave
 from ..problems.film.lubrication import LubricationProblem
@@ -17,6 +17,7 @@ from ..problems.film.model import Model, Side
 from ..problems.film.reynolds import Film
 from ..problems.solution import Problem
 from ..registry import FAMILIES, SCENE_DIR, scene_names
+from .balance import BalanceTable
 from .changes import changed, plain
 from .faults import first_fault, known_keys
 from .units import Measured, measured, metres, stem, units_of
@@ -28,9 +29,33 @@ NotNegative = Annotated[Finite, Field(ge=0)]
 Count = Annotated[int, Field(strict=True, ge=1, le=2**31 - 2)]
 
 
-class Scene(Measured):
-    """What every scene has; a family (registry.FAMILIES) adds its data and builds its problem."""
+class Solvable(Protocol):
+    """What can be solved: a scene, or what a driver makes of one (a part, a step, a fluid held)."""
 
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def scheme(self) -> str | None: ...
+
+    @property
+    def shape(self) -> tuple[int, ...]: ...
+
+    def with_shape(self, shape: tuple[int, ...]) -> "Solvable": ...
+
+    def facts(self, comm: PETSc.Comm | None = None) -> Facts: ...
+
+    def build(self, comm: PETSc.Comm | None = None) -> Problem: ...
+
+
+class Scene(Measured):
+    """What every scene has; a family (registry.FAMILIES) adds its data and builds its problem.
+
+    problem_kind : of the discrete problem. transient : it goes on in time.
+    """
+
+    problem_kind: ClassVar[str] = "lubrication"
+    transient: ClassVar[bool] = False
     family: str = "slider"
     name: str = ""
     scheme: str | None = None
@@ -56,6 +81,10 @@ class Scene(Measured):
         """The SI unit of each key of `data_si` that has one, by its path: {'fluid.mu': 'Pa s', 'film.1.depth': 'm'}."""
         per_width = getattr(self, "dimension", 2) == 1
         return {key: unit.split(" or ")[-1 if per_width else 0] for key, unit in units_of(self).items()}
+
+    def facts(self, comm: PETSc.Comm | None = None) -> Facts:
+        """The problem in numbers, before it is built."""
+        return Facts(self.problem_kind, self.shape, (comm or PETSc.COMM_WORLD).getSize())
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -137,6 +166,9 @@ class LubricationScene(Scene):
             mean_cubes=self.mean_cubes,
             exact=self.exact,
         )
+
+    def facts(self, comm: PETSc.Comm | None = None) -> Facts:
+        return self.model.facts(self.shape, comm)
 
     def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
         """The discrete problem on this scene's grid. Collective.

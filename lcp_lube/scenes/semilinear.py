@@ -1,5 +1,7 @@
 """Scenes of semilinear equations on the unit square: Bratu, and Poisson with a cubic term."""
 
+from typing import ClassVar
+
 from petsc4py import PETSc
 from pydantic import Field
 
@@ -11,6 +13,7 @@ from .scene import Count, Finite, NotNegative, Scene
 class SemilinearScene(Scene):
     """-Lap v = g(x, y, v) on the unit square, v = 0 on its boundary; a subclass has g."""
 
+    problem_kind: ClassVar[str] = "equations"
     v0: Finite = Field(0.0, description="start of v at every point")
     n: Count = Field(64, description="interior points a side")
     nx: Count | None = Field(None, description="interior points in x; default n")

@@ -1,7 +1,7 @@
 """Scene of a squeeze film: plates that approach and part, with a cavity that opens and fills again."""
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from petsc4py import PETSc
 from pydantic import Field, model_validator
@@ -14,6 +14,7 @@ from .scene import Count, NotNegative, Positive, Scene
 class SqueezeScene(Scene):
     """Parallel plates, h = h_mean + h_amplitude cos(2 pi cycles t), 0 <= x <= 1, p = p_wall at both ends; dimensionless."""
 
+    transient: ClassVar[bool] = True
     scheme: Literal["bdf2", "euler"] = Field("bdf2", description="time: two-step backward difference, or implicit Euler")
     h_mean: Positive = Field(0.375, description="mean gap")
     h_amplitude: NotNegative = Field(0.125, description="amplitude of the gap, less than the mean")

@@ -8,16 +8,18 @@ print(solve(problem).fields["v"])       # [2.00498756]
 """
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 from petsc4py import PETSc
+from pydantic import PrivateAttr
 
 from ..base.parallel import Array
 from ..errors import InputError
 from ..problems.box import BoxProblem
 from ..problems.certificate import Certificate, certificate_tol
+from ..problems.facts import Facts
 from ..problems.grid import Grid
 from ..problems.solution import Fields
 from .scene import Scene
@@ -38,12 +40,14 @@ class Complementarity(Scene):
     layout, and `n` is the whole number of unknowns. Without one every rank solves by itself.
     """
 
+    problem_kind: ClassVar[str] = "user"
     F: Callable[[Array], Any]
     J: Callable[[Array], Any]
     lower: Any
     upper: Any
     x0: Any
     n: int
+    _dense: bool | None = PrivateAttr(None)
 
     def __init__(
         self,
@@ -70,6 +74,14 @@ class Complementarity(Scene):
     @property
     def shape(self) -> tuple[int, ...]:
         return (self.n,)
+
+    def facts(self, comm: PETSc.Comm | None = None) -> Facts:
+        """Whether J is dense only J itself can tell: it is asked for at the start, once. Collective."""
+        if self._dense is None:
+            with np.errstate(all="ignore"):
+                J = self.J(self.x0)
+            self._dense = "dense" in J.getType() if isinstance(J, PETSc.Mat) else not hasattr(J, "tocsr")
+        return Facts(self.problem_kind, self.shape, (comm or PETSc.COMM_SELF).getSize(), dense=self._dense)
 
     def build(self, comm: PETSc.Comm | None = None) -> "UserProblem":
         """The problem on a line of n points. Collective.

@@ -96,7 +96,7 @@ def _run(
     scene: Scene, method: str, recipe: str | None, system: str, stopping: Any, options: Any, nested: Any
 ) -> dict[str, Any]:
     """One row. Collective."""
-    solution = solve(scene, method=method, system=system, recipe_name=recipe, stopping=stopping, options=options, nested=nested)
+    solution = solve(scene, method=method, system=system, recipe=recipe, stopping=stopping, options=options, nested=nested)
     try:
         data = as_dict(solution)
         return {**data, **exact_errors(solution.problem, data)}

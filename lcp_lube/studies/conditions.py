@@ -31,7 +31,7 @@ def cases(quick: bool) -> Iterator[Case]:
                 for subset in ("B", "FB", "FCB", "FRCB") if quick else SUBSETS:
                     key = {"start": name, "mu": mu, "problem": short(scene), "conditions": subset or "none"}
                     options = {"p0": p0, "r0": r0, "mu": mu, "conditions": subset}
-                    choices = {"method": "din", "system": "full", "recipe_name": DIRECT, "options": options}
+                    choices = {"method": "din", "system": "full", "recipe": DIRECT, "options": options}
                     yield Case(key, scene, SCENES[scene], choices)
 
 

@@ -1,6 +1,6 @@
 """What the charts share: where their runs are kept, and one run as a row."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from datetime import date
 from hashlib import sha256
 from importlib.util import find_spec
@@ -13,7 +13,7 @@ from ..base.options import LATE, set_names
 from ..base.resumable import ResumableCsv
 from ..errors import InputError
 from ..output.results import as_dict, machine, versions
-from ..problems.solution import Outcome, Solution, Step
+from ..problems.solution import Outcome, Step
 from ..scenes.scene import Scene
 from .compare import exact_errors, read_off
 from .reference import WRONG, Reference
@@ -59,7 +59,6 @@ def run(
     krylov_limit: float = float("inf"),
     reference: Reference | None = None,
     steps: list[Step] | None = None,
-    solver: Callable[..., Solution] = solve,
     **choices: Any,
 ) -> dict[str, Any]:
     """One run, however it ends: RECORD, `wall_s`, `cpu_s` (this rank's), errors and the rest of the JSON's keys. Collective.
@@ -71,7 +70,6 @@ def run(
     scene, choices : as the solver takes them.
     reference : gives `distance` and `reference`; a certified answer that is as far from it as WRONG is a wrong one.
     steps : filled with the record of every step.
-    solver : `api.solve`, or what has its arguments.
     krylov_limit : the run is left after the step in which its Krylov iterations pass this number; of its answer nothing is
         then known. Counted in iterations, not in seconds: a limit that falls on the same step on every machine.
 
@@ -88,7 +86,7 @@ def run(
 
     begin, cpu_begin = perf_counter(), process_time()
     try:
-        solution = solver(scene, monitor=monitor, **choices)
+        solution = solve(scene, monitor=monitor, **choices)
     except _Enough:
         return {
             **environment(),

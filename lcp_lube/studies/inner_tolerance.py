@@ -33,7 +33,7 @@ def cases(quick: bool) -> Iterator[Case]:
                 for recipe in recipes[:1] if quick else recipes:
                     for tol in TOLERANCES[::4] if quick else TOLERANCES:
                         key = {"scene": scene, "method": method, "inner": f"{system}, {recipe}", "tol": tol}
-                        choices = {"method": method, "system": system, "recipe_name": recipe, "options": {option: tol}}
+                        choices = {"method": method, "system": system, "recipe": recipe, "options": {option: tol}}
                         yield Case(key, scene, SCENES[scene], choices | {"nested": False})
 
 

@@ -58,7 +58,7 @@ class Case:
             w for k, v in {**self.changes, **self.late()}.items() for w in (("--n", v) if k == "n" else ("--set", f"{k}={v}"))
         ]
         method = choices.get("method", "auto")
-        for flag, name in (("--method", "method"), ("--system", "system"), ("--recipe", "recipe_name")):
+        for flag, name in (("--method", "method"), ("--system", "system"), ("--recipe", "recipe")):
             if choices.get(name):
                 words += [flag, choices[name]]
         for name, value in choices.get("options", {}).items():

@@ -7,7 +7,6 @@ which the iteration leaves (against the same grid solved to rounding).
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -16,7 +15,6 @@ from mpi4py import MPI
 
 from ..base.resumable import ResumableCsv, Row
 from ..cli.main import say
-from ..drivers.accuracy import solve_to_accuracy
 from ..errors import InputError
 from ..problems.solution import Outcome
 from ..registry import METHODS
@@ -178,7 +176,7 @@ class Bench:
         choices: dict[str, Any] = {
             "method": configuration.method,
             "system": configuration.system,
-            "recipe_name": configuration.recipe,
+            "recipe": configuration.recipe,
             "nested": configuration.nested,
             "stopping": Stopping(configuration.eps, configuration.eps),
         }
@@ -194,8 +192,7 @@ class Bench:
     def accuracy(self, store: ResumableCsv, tol: float) -> None:
         """What `auto --accuracy TOL` takes, all its grids together. Collective."""
         key = {"method": "auto --accuracy", "nested": True, "system": "auto", "recipe": "auto", "eps": tol, "n": "auto"}
-        solver = partial(solve_to_accuracy, tol=tol, quantity="load", finest=FINEST[len(self.scene.shape)])
-        self.row(store, key, self.scene, solver=solver)
+        self.row(store, key, self.scene, accuracy=tol, quantity="load", finest=FINEST[len(self.scene.shape)])
 
     def row(self, store: ResumableCsv, key: dict[str, Any], scene: Scene, **choices: Any) -> Row | None:
         """One run's row, from the csv or made now; None if it was refused. Collective."""
@@ -215,7 +212,7 @@ class Bench:
 
     def measure(self, scene: Scene, choices: dict[str, Any]) -> dict[str, Any]:
         """A run, its errors and the medians of the repeats' seconds. Collective."""
-        kind = f"{choices.get('method')} {choices.get('system')} {choices.get('recipe_name')}"
+        kind = f"{choices.get('method')} {choices.get('system')} {choices.get('recipe')}"
         if self.repeats > 1 and kind not in self._warm:  # what is compiled and loaded at first use is so before a clock runs
             self._warm.add(kind)
             small = QUICK_SIZES[len(scene.shape)][0]

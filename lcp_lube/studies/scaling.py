@@ -24,7 +24,7 @@ STRONG = (250, 500, 1000)  # points a side, whatever the ranks
 QUICK = (60, 120)
 WEAK = 500  # points a side of a square that each rank has
 REPEATS = 3
-CHOICES: dict[str, Any] = {"method": "active-set", "system": "cavity", "recipe_name": "bcgs_amg", "nested": True}
+CHOICES: dict[str, Any] = {"method": "active-set", "system": "cavity", "recipe": "bcgs_amg", "nested": True}
 
 KEY = ("kind", "scene", "n", "ranks")
 COLUMNS = ("wall_s", "cpu_s", "runs", "levels", "finest_linear", "memory_mb", "load_average")

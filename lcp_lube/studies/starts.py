@@ -82,7 +82,7 @@ def _row(store: ResumableCsv, start: dict[str, Any]) -> dict[str, str]:
         load_scene(start["scene"], {"n": start["n"]}),
         method="din",
         system="full",
-        recipe_name=start["recipe"],
+        recipe=start["recipe"],
         options={name: start[name] for name in ("mu", "conditions")} | {name: float(start[name]) for name in ("p0", "r0")},
     )
     row = store.add({**values, **key})

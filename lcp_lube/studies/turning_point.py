@@ -28,9 +28,9 @@ MEANS = (1e-3, 1.4)  # of v: near zero, and well beyond the turning point on the
 # Who is tried: the scene, its start, and what `solve` is told.
 WAYS = {
     "auto": ("bratu", 0.0, {}),
-    "newton from 0, direct": ("bratu", 0.0, {"method": "newton", "recipe_name": "umfpack"}),
-    "newton from 0, BiCGStab": ("bratu", 0.0, {"method": "newton", "recipe_name": "bcgs_ilu"}),
-    "newton from 1, direct": ("bratu", 1.0, {"method": "newton", "recipe_name": "umfpack"}),
+    "newton from 0, direct": ("bratu", 0.0, {"method": "newton", "recipe": "umfpack"}),
+    "newton from 0, BiCGStab": ("bratu", 0.0, {"method": "newton", "recipe": "bcgs_ilu"}),
+    "newton from 1, direct": ("bratu", 1.0, {"method": "newton", "recipe": "umfpack"}),
     "obstacle, auto": ("obstacle_bratu", None, {}),
     "obstacle, interior": ("obstacle_bratu", None, {"method": "interior"}),
 }

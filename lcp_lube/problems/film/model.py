@@ -9,6 +9,7 @@ from petsc4py import PETSc
 
 from ...base.parallel import Array
 from ...errors import InputError
+from ..facts import Facts
 from ..grid import Grid
 from .exact import ExactSolution
 from .fluid import Law
@@ -77,6 +78,11 @@ class Model:
         if all(pair == ("open", "open") for pair in kinds):
             return self.gap
         return _Inside(self.gap, self.lengths, [pair == ("periodic", "periodic") for pair in kinds])
+
+    def facts(self, shape: Sequence[int], comm: PETSc.Comm | None = None) -> Facts:
+        """The problem on (nx,) or (nx, ny) points, in numbers."""
+        periodic = tuple(self.sides[2 * k].kind == "periodic" for k in range(len(self.lengths)))
+        return Facts("lubrication", tuple(shape), (comm or PETSc.COMM_WORLD).getSize(), periodic)
 
     def build(self, shape: Sequence[int], comm: PETSc.Comm | None = None) -> LubricationProblem:
         """The discrete problem on (nx,) or (nx, ny) points. Collective.

@@ -1,7 +1,6 @@
-"""A scene's run: the chosen method on grids from coarse to fine, then the methods that take over where it fails."""
+"""One problem solved: the chosen method on grids from coarse to fine, then the methods that take over where it fails."""
 
-from collections.abc import Sequence
-from dataclasses import astuple
+from dataclasses import astuple, replace
 from time import perf_counter
 from typing import Any
 
@@ -9,14 +8,20 @@ import numpy as np
 
 from ..base.options import recipe
 from ..base.stages import Stages
+from ..errors import InputError
+from ..problems.box import BoxProblem
+from ..problems.facts import Facts
 from ..problems.film.lubrication import LubricationProblem
-from ..problems.solution import Fields, Outcome, Problem, Step
+from ..problems.solution import Fields, Outcome, Problem, Solution, Step
 from ..registry import METHODS
-from ..scenes.scene import Scene
+from ..scenes.scene import Solvable
 from ..solvers.enclosure import Enclosure, enclose
 from ..solvers.job import Job
-from ..solvers.newton import Method, Monitor, Stopping
-from .checkpoint import Checkpoint, Checkpointer
+from ..solvers.newton import Method, Stopping
+from . import memory
+from .ask import Ask, Start
+from .checkpoint import CHOICES, Checkpoint, Checkpointer, load
+from .compose import Inner
 from .levels import level_shapes
 from .plan import Plan, default_recipe, plan
 
@@ -24,14 +29,71 @@ from .plan import Plan, default_recipe, plan
 COARSE_EPS = {False: 1e-4, True: 1e-8}  # by MethodEntry.interior
 
 
+def applies(scene: Solvable, ask: Ask) -> bool:
+    return True
+
+
+def solve(scene: Solvable, ask: Ask, inner: Inner | None = None) -> Solution:
+    """Plan, build, solve and certify: the innermost driver. Collective.
+
+    Raises
+    ------
+    InputError : an unknown name, a value out of range, an option that does not fit, too little memory.
+    """
+    begin, held = perf_counter(), memory.resident()
+    stages = Stages()
+    facts = scene.facts(ask.comm)
+    if ask.start is not None and ask.nested is None:
+        ask = replace(ask, nested=False)
+    saved = None
+    if ask.resume is None:  # whose method is not known yet
+        chosen = plan(facts, ask, scene.name)
+    with stages("setup"):
+        if ask.memory_check and ask.resume is None:
+            memory.look_ahead(facts, chosen, ask.mpi)
+        problem = scene.build(ask.comm)
+    keeper = Checkpointer(ask.checkpoint, ask.every, problem.grid.comm)
+    if ask.resume is not None:
+        saved = load(ask.resume, scene, problem.grid.comm)
+        given = {name: getattr(ask, name) for name in CHOICES}
+        ask = replace(ask, **saved.settle(**given))
+        chosen = plan(facts, ask, scene.name)
+    entry = METHODS[chosen.method].of(facts.kind)
+    if ask.certify and not isinstance(problem, LubricationProblem):
+        raise InputError(f"--certify: scene {scene.name} is no film with cavitation, for which alone the theorem holds")
+    run = Run(scene, problem, facts, chosen, replace(ask, stopping=ask.stopping_for(entry.eps)), stages, keeper, saved)
+    keeper.begin(scene, (chosen.method, chosen.system, ask.recipe, chosen.nested, dict(ask.options)))
+    with recipe(chosen.recipe) as recipe_used:
+        estimate = memory.check(facts, chosen, problem.grid.comm, ask.memory_check, held)
+        run.grids(ask.start)
+    run.take_over()
+    outcome, message = run.outcome, run.message
+    certificate = problem.certify(run.fields, run.stopping.eps1)
+    enclosure = run.enclose(problem) if ask.certify and isinstance(problem, LubricationProblem) else None
+    if outcome is not Outcome.CONVERGED and isinstance(problem, BoxProblem):
+        outcome, message = problem.explain(outcome, message)
+    return Solution(
+        problem,
+        run.fields,
+        outcome,
+        message,
+        certificate,
+        run.steps,
+        settings=run.settings(recipe_used, estimate),
+        times={**stages.seconds, "total": perf_counter() - begin},
+        levels=run.levels if chosen.nested else run.details.get("levels", []),
+        enclosure=enclosure,
+    ).judged()
+
+
 class Run:
-    """How far a scene's solve has got: `grids`, then `take_over`. Every method is collective.
+    """How far a problem's solve has got: `grids`, then `take_over`. Every method is collective.
 
     Parameters
     ----------
-    problem : on the scene's own grid.
+    problem : on the scene's own grid; facts : of it.
     chosen : method, system, recipe and nesting.
-    options : the method's parameters by name.
+    ask : with its `stopping` settled.
     keeper : writes checkpoints, if any. saved : the one to go on from.
 
     Attributes
@@ -44,18 +106,17 @@ class Run:
 
     def __init__(
         self,
-        scene: Scene,
+        scene: Solvable,
         problem: Problem,
+        facts: Facts,
         chosen: Plan,
-        stopping: Stopping,
-        options: dict[str, Any],
-        monitor: Monitor | None,
+        ask: Ask,
         stages: Stages,
         keeper: Checkpointer,
         saved: Checkpoint | None,
     ):
-        self.scene, self.problem, self.chosen, self.stopping = scene, problem, chosen, stopping
-        self.options, self.monitor, self.stages = options, monitor, stages
+        self.scene, self.problem, self.facts, self.chosen, self.ask, self.stages = scene, problem, facts, chosen, ask, stages
+        self.stopping, self.options = ask.stopping_for((0.0, 0.0)), dict(ask.options)
         self._keeper, self._saved = keeper, saved
         self.outcome, self.message = Outcome.MAX_ITERATIONS, "no step was taken"
         self.fields: Fields = {}
@@ -66,12 +127,13 @@ class Run:
         self.ksp_type: str | None = None
         self.pc_type: str | None = None
 
-    def grids(self, start: tuple[Problem, Fields] | None = None) -> None:
-        """The chosen method on every grid; start: a problem and fields near the answer on the first one."""
+    def grids(self, start: Solution | Start | None = None) -> None:
+        """The chosen method on every grid; start: what lies near the answer on the first one."""
         entry = METHODS[self.chosen.method].of(self.problem.kind)
         finest = self.scene.shape
         shapes = level_shapes(finest, self.problem.grid.comm.size) if self.chosen.nested else [finest]
-        near, previous = start, None  # what the next grid starts from, and the problem on the grid before
+        near: tuple[Problem, Fields] | None = (start.problem, start.fields) if start is not None else None
+        previous = None  # near: what the next grid starts from, and the problem on the grid before
         if self._saved is not None:
             shapes, self.levels, near = self._saved.shapes, self._saved.record["levels"], None
         for k, shape in enumerate(shapes):
@@ -79,7 +141,7 @@ class Run:
             with self.stages("setup"):
                 level = self.problem if shape == finest else self.scene.with_shape(shape).build(self.problem.grid.dm.comm)
             with self.stages("prolongation"):
-                guess = level.prolong(*near, entry.interior) if near is not None else None
+                guess = self._guess(level, near, entry.interior)
             if previous is not None:
                 previous.destroy()
             coarse = Stopping(max(COARSE_EPS[entry.interior], self.stopping.eps1), np.inf, self.stopping.max_it)
@@ -98,10 +160,18 @@ class Run:
                 }
             )
 
+    @staticmethod
+    def _guess(level: Problem, near: tuple[Problem, Fields] | None, interior: bool) -> Fields | None:
+        """Fields to start from on this grid. Those of the very same grid are taken as they are, by a method that can."""
+        if near is None or (near[0].grid is level.grid and interior):
+            return None
+        return near[1] if near[0].grid is level.grid else level.prolong(*near, interior)
+
     def take_over(self) -> None:
         """Where the chosen method failed, those that the registry has for that, one after another."""
-        if not set(self.options) <= {"p0"}:
-            return  # who sets a method's parameters wants to see what becomes of it
+        # By default who sets a method's parameters sees what becomes of it.
+        if not (set(self.options) <= {"p0"} if self.ask.rescue is None else self.ask.rescue):
+            return
         reached, record, failures = self.fields, [], ""
         steps = self.steps
         for k, name in enumerate(METHODS[self.chosen.method].of(self.problem.kind).fallback, start=1):
@@ -122,6 +192,10 @@ class Run:
         if self.took_over:
             self.message = f"{failures}{self.took_over} took over: {self.message}"
 
+    def _plan(self, method: str, nested: bool | None = None) -> Plan:
+        """As if this method had been asked for, and nothing else."""
+        return plan(self.facts, Ask(method=method, nested=nested), self.scene.name)
+
     def _rescue_solver(self, name: str) -> tuple[str, str | None]:
         """System and recipe for a method that takes over.
 
@@ -129,10 +203,10 @@ class Run:
         method without linear systems the next one is chosen as if it had been the first.
         """
         entry = METHODS[name].of(self.problem.kind)
-        inner = default_recipe(self.problem, entry.systems[0], large=False)[0]
+        inner = default_recipe(self.facts, entry.systems[0], large=False)[0]
         if self.chosen.system or entry.interior:
             return entry.systems[0], inner
-        first = plan(self.problem, self.scene.name, name)
+        first = self._plan(name)
         return first.system, first.recipe or inner
 
     def _iterate(
@@ -146,7 +220,7 @@ class Run:
             else:
                 before = saved.restore(method, level.grid, reached) if saved is not None else []
                 self._saved = None
-                ended = self._keeper.iterate(method, level.grid, stopping, self.monitor, before, reached, **record)
+                ended = self._keeper.iterate(method, level.grid, stopping, self.ask.monitor, before, reached, **record)
                 self.outcome, self.message, self.steps = ended
             self.fields = method.fields
             if not tried:
@@ -158,15 +232,15 @@ class Run:
 
     def enclose(self, problem: LubricationProblem) -> Enclosure:
         """A band around the answer, by the inner solver that has just solved this problem, or would have."""
-        solver = self.chosen if self.chosen.system else plan(problem, self.scene.name, "active-set", nested=False)
+        solver = self.chosen if self.chosen.system else self._plan("active-set", nested=False)
         system, inner = solver.system, solver.recipe
         if self.took_over:
             system = METHODS[self.took_over].systems[0]
-            inner = default_recipe(problem, system, large=False)[0]
+            inner = default_recipe(self.facts, system, large=False)[0]
         with recipe(inner), self.stages("certify"):
             return enclose(problem, self.fields, system, Stages())
 
-    def settings(self, recipe_used: str | None, why: Sequence[str]) -> dict[str, Any]:
+    def settings(self, recipe_used: str | None, estimate: memory.Estimate | None) -> dict[str, Any]:
         """How it was solved, as the JSON prints it."""
         return {
             "scene": self.scene.name,
@@ -177,6 +251,8 @@ class Run:
             "recipe": recipe_used,
             "ksp_type": self.ksp_type,
             "pc_type": self.pc_type,
-            "why": [*self.chosen.why, *why],
+            "eps1": self.stopping.eps1,
+            "why": [*self.chosen.why, *([estimate.sentence] if estimate else [])],
+            **(estimate.settings if estimate else {}),
             "details": {key: value for key, value in self.details.items() if key != "levels"},
         }

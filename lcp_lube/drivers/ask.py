@@ -1,0 +1,102 @@
+"""What the caller of `solve` wants, beyond the scene: one value that every driver reads and hands down."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from ..base.options import set_names
+from ..errors import InputError
+from ..problems.solution import Fields, Problem, Solution
+from ..solvers.newton import Monitor, Stopping
+
+
+@dataclass(frozen=True)
+class Start:
+    """Fields near the answer, and the problem of the same kind, on any grid, that they belong to.
+
+    settings : those of the solution that they come from.
+    """
+
+    problem: Problem
+    fields: Fields
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Ask:
+    """How a scene is to be solved.
+
+    Attributes
+    ----------
+    method, system : names in the registry, or 'auto'.
+    recipe : options/NAME.opts for the inner solver; PETSc options that are set already win over it. By default see
+        `plan`, unless a -ksp_type or -pc_type is set.
+    accuracy : relative error allowed in `quantity`, 1e-10 to 0.5: grids from coarse to fine, no finer than that needs.
+    quantity : which number `accuracy` is about; default the load, of other scenes 'sum_v', 'k', 'sigma'.
+    finest : points a side that no grid of `accuracy` may exceed; default: what memory holds.
+    stopping : tolerances and iteration limit; a dictionary gives some of them, the method's own (`MethodEntry.eps`) the rest.
+    options : the method's own parameters by name (p0, r0, mu, conditions, ... of `DinOptions`).
+    nested : start from the answers on coarser grids; default: where it pays.
+    certify : also prove a band around the answer (`Solution.enclosure`), for the price of one linear solve at most.
+    checkpoint, every : write the iterate to this file after every so many steps; see `checkpoint`.
+    resume : go on from such a file, as if the run had not been stopped. What is not given anew is as it was begun with.
+    start : a neighbouring scene's `Solution`, from which this one's own start is interpolated. It takes the coarser grids'
+        place, unless `nested` asks for these; where it leads nowhere, the run begins again without it.
+    rescue : whether another method may take over where the one asked for fails; default: unless it was given options.
+    reduction : solve no more than symmetry leaves (`symmetry`).
+    memory_check : refuse a run that needs more memory than there is, by an estimate (`memory`).
+    monitor : called after every step with its number and record.
+    comm : communicator; default all ranks.
+    """
+
+    method: str = "auto"
+    system: str = "auto"
+    recipe: str | None = None
+    accuracy: float | None = None
+    quantity: str | None = None
+    finest: tuple[int, ...] | None = None
+    stopping: Stopping | Mapping[str, Any] | None = None
+    options: Mapping[str, Any] = field(default_factory=dict)
+    nested: bool | None = None
+    certify: bool = False
+    checkpoint: str | Path | None = None
+    every: int = 1
+    resume: str | Path | None = None
+    start: Solution | Start | None = None
+    rescue: bool | None = None
+    reduction: bool = True
+    memory_check: bool = True
+    monitor: Monitor | None = None
+    comm: PETSc.Comm | None = None
+
+    def __post_init__(self) -> None:
+        if self.every < 1:
+            raise InputError(f"--every {self.every}: at least 1 is needed")
+        if self.options is None:
+            object.__setattr__(self, "options", {})
+
+    @property
+    def mpi(self) -> MPI.Comm:
+        return (self.comm or PETSc.COMM_WORLD).tompi4py()
+
+    @property
+    def named(self) -> bool:
+        """Whether a method, a matrix or an inner solver was named: those of the whole scene are meant."""
+        chosen = (self.method, self.system) != ("auto", "auto") or self.recipe or self.options
+        return bool(chosen or {"ksp_type", "pc_type"} & set_names())
+
+    @property
+    def choices(self) -> tuple[Any, ...]:
+        """What must be the same on all ranks."""
+        how = (self.method, self.system, self.recipe, self.accuracy, self.quantity, self.finest, self.stopping)
+        return (*how, dict(self.options), self.nested, self.certify, self.start is None, self.reduction)
+
+    def stopping_for(self, eps: tuple[float, float]) -> Stopping:
+        """The tolerances asked for, a method's own where none are."""
+        if isinstance(self.stopping, Stopping):
+            return self.stopping
+        return Stopping(**{**dict(zip(("eps1", "eps2"), eps, strict=True)), **(self.stopping or {})})

@@ -1,0 +1,62 @@
+"""How drivers nest: each solves a scene by solving others through the next one, down to the direct solve of one problem.
+
+A driver is a module with two functions: `applies(scene, ask)`, and `solve(scene, ask, inner) -> Solution`, which calls
+`inner(scene', ask')` as often as it needs and merges what comes back. Data goes down as scene and ask, up as a solution.
+"""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Protocol
+
+from ..errors import InputError
+from ..problems.solution import Solution
+from ..registry import DRIVERS
+from ..scenes.scene import Solvable
+from .ask import Ask
+
+Inner = Callable[[Solvable, Ask], Solution]
+
+
+class Driver(Protocol):
+    """What a module among the drivers offers."""
+
+    def applies(self, scene: Solvable, ask: Ask) -> bool: ...
+
+    def solve(self, scene: Solvable, ask: Ask, inner: Inner) -> Solution: ...
+
+
+def solve(scene: Solvable, ask: Ask, level: int = 0) -> Solution:
+    """Solve through the drivers from this level on that the scene and the ask call for, outermost first. Collective."""
+    for k, name in list(enumerate(DRIVERS))[level:]:
+        driver: Driver = DRIVERS[name].load()  # type: ignore[assignment]
+        if driver.applies(scene, ask):
+            return driver.solve(scene, ask, partial(solve, level=k + 1))
+    raise AssertionError("the innermost driver applies to everything")
+
+
+# What does not compose, and why: (a driver that applies, an attribute of the ask that it cannot serve, the reason).
+CANNOT = (
+    ("accuracy", "checkpoint", "its many grids make one answer; give --n for one grid"),
+    ("accuracy", "resume", "its many grids make one answer; give --n for one grid"),
+    ("balance", "checkpoint", "its many solves make one answer; give the value that was found for one solve"),
+    ("balance", "resume", "its many solves make one answer; give the value that was found for one solve"),
+    ("time", "checkpoint", "it goes on in time, and holds its own memory of earlier steps"),
+    ("time", "resume", "it goes on in time, and holds its own memory of earlier steps"),
+    ("time", "certify", "it goes on in time, and the theorem is of one steady film"),
+    ("time", "nested", "it goes on in time, each step from the one before, on one grid"),
+    ("fluid", "checkpoint", "the density's iterations hold several answers at once"),
+    ("fluid", "resume", "the density's iterations hold several answers at once"),
+    ("fluid", "certify", "the theorem holds where viscosity and density do not depend on the pressure"),
+)
+
+
+def check(scene: Solvable, ask: Ask) -> None:
+    """Refuse what does not compose.
+
+    Raises
+    ------
+    InputError : names the option, the scene, and the reason.
+    """
+    for name, option, reason in CANNOT:
+        if getattr(ask, option) and DRIVERS[name].load().applies(scene, ask):  # type: ignore[attr-defined]
+            raise InputError(f"--{option}: not for scene {scene.name} by way of {name}: {reason}")

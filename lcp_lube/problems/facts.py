@@ -1,0 +1,38 @@
+"""What can be said of a discrete problem before it is built: enough to choose how to solve it, and whether it fits."""
+
+from dataclasses import dataclass
+from math import prod
+
+
+@dataclass(frozen=True)
+class Facts:
+    """A problem in numbers.
+
+    Attributes
+    ----------
+    kind : which methods apply (`Problem.kind`).
+    shape : numbers of points, (nx,) or (nx, ny).
+    ranks : that share them.
+    periodic : whether the domain closes in x, and in y.
+    dense : whether the Jacobian is a dense matrix.
+    """
+
+    kind: str
+    shape: tuple[int, ...]
+    ranks: int = 1
+    periodic: tuple[bool, ...] = (False, False)
+    dense: bool = False
+
+    @property
+    def dim(self) -> int:
+        return len(self.shape)
+
+    @property
+    def size(self) -> int:
+        """Number of points."""
+        return prod(self.shape)
+
+    @property
+    def whole_lines(self) -> bool:
+        """Whether every rank owns whole lines of the direction of flow (`Grid` deals them out so where there are enough)."""
+        return self.dim == 2 and self.shape[1] >= self.ranks
