@@ -14,8 +14,8 @@ from lcp_lube.base.options import recipe
 from lcp_lube.base.stages import Stages
 from lcp_lube.linear.system import make_system
 from lcp_lube.problems.film.lubrication import LubricationProblem
+from lcp_lube.problems.solution import Enclosure
 from lcp_lube.scenes.scene import load_scene
-from lcp_lube.solvers.enclosure import Enclosure
 from lcp_lube.solvers.monotone import ModelSystem
 
 REPEAT = 3

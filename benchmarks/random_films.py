@@ -20,7 +20,7 @@ petsc4py.init(sys.argv[:1])
 
 from lcp_lube.api import solve  # noqa: E402
 from lcp_lube.base.parallel import Array  # noqa: E402
-from lcp_lube.scenes.scene import LubricationScene  # noqa: E402
+from lcp_lube.scenes.published import LubricationScene  # noqa: E402
 
 KINDS = ("grid_rough", "rough", "stepped", "dimpled")
 

@@ -180,7 +180,7 @@ SYSTEMS: dict[str, Entry] = {
 
 # A scene file's `family` names the model that validates it and builds its problem.
 FAMILIES: dict[str, Entry] = {
-    "slider": Entry("lcp_lube.scenes.scene:SliderScene", "slider with one wave of the film (the published problems)"),
+    "slider": Entry("lcp_lube.scenes.published:SliderScene", "slider with one wave of the film (the published problems)"),
     "textured": Entry("lcp_lube.scenes.textured:TexturedScene", "flat slider with square dimples"),
     "journal": Entry("lcp_lube.scenes.journal:JournalScene", "journal bearing with an axial groove at the widest gap"),
     "rough": Entry("lcp_lube.scenes.textured:RoughScene", "slider with one wave and a random surface"),

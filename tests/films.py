@@ -13,7 +13,7 @@ from lcp_lube.problems.film.exact import ExactSolution, exact_solution
 from lcp_lube.problems.film.lubrication import LubricationProblem
 from lcp_lube.problems.film.reynolds import SCHEMES, box_scheme
 from lcp_lube.problems.grid import Grid
-from lcp_lube.scenes.scene import LubricationScene
+from lcp_lube.scenes.published import LubricationScene
 
 L, WIDTH, MU, U = 0.1, 0.07, 0.015, 5.0
 

@@ -238,7 +238,10 @@ PYTHON = ("-ksp_type", "gmres", "-pc_type", "python", "-pc_python_type")
 @pytest.mark.parametrize(
     "words, expected",
     [
-        (("splittings.SaddlePC", "-pc_saddle_spliting", "jacobi"), "-pc_saddle_spliting: no solver in this run reads this option"),
+        (
+            ("splittings.SaddlePC", "-pc_saddle_spliting", "jacobi"),
+            "-pc_saddle_spliting: no solver in this run reads this option",
+        ),
         (("augmentation.AugmentationPC", "-pc_augmentation_weight", "0"), "-pc_augmentation_weight 0: allowed are"),
     ],
 )

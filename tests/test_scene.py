@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from lcp_lube import InputError, load_scene
 from lcp_lube.registry import FAMILIES, SCENE_DIR, scene_names
-from lcp_lube.scenes.scene import SliderScene, as_scene, parse_changes, scene_line
+from lcp_lube.scenes.published import SliderScene
+from lcp_lube.scenes.scene import as_scene, parse_changes, scene_line
 
 
 @pytest.mark.parametrize("name", scene_names())

@@ -191,7 +191,11 @@ class Checkpointer:
             **self.record,
             "version": __version__,
             "steps": [astuple(step) for step in self.steps],
-            "scalars": {name: _plain(value) for name, value in leaves if not isinstance(value, np.ndarray)},
+            "scalars": {
+                name: value.item() if isinstance(value, np.generic) else value
+                for name, value in leaves
+                if not isinstance(value, np.ndarray)
+            },
         }
         arrays = [(name, np.asarray(value, dtype=float)) for name, value in leaves if isinstance(value, np.ndarray)]
         try:
@@ -298,7 +302,3 @@ def _other_scene(old: dict[str, Any], new: dict[str, Any]) -> str:
         return ""
     key = changed[0]
     return f"a checkpoint of another scene: its {key} is {old.get(key)}, here it is {new.get(key)}"
-
-
-def _plain(value: Any) -> Any:
-    return value.item() if isinstance(value, np.generic) else value

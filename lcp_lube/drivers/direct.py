@@ -12,10 +12,10 @@ from ..errors import InputError
 from ..problems.box import BoxProblem
 from ..problems.facts import Facts
 from ..problems.film.lubrication import LubricationProblem
-from ..problems.solution import Fields, Outcome, Problem, Solution, Step
+from ..problems.solution import Enclosure, Fields, Outcome, Problem, Solution, Step
 from ..registry import METHODS
 from ..scenes.scene import Solvable
-from ..solvers.enclosure import Enclosure, enclose
+from ..solvers.enclosure import enclose
 from ..solvers.job import Job
 from ..solvers.newton import Method, Stopping
 from . import memory

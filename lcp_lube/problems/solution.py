@@ -2,14 +2,11 @@
 
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 from ..base.parallel import Array, Reduce
 from .certificate import Certificate
 from .grid import Grid
-
-if TYPE_CHECKING:
-    from ..solvers.enclosure import Enclosure
 
 Fields = dict[str, Array]  # this rank's points of each field, by name, in the grid's order
 
@@ -95,6 +92,32 @@ class Step:
     rtol: float = 0.0
 
 
+@dataclass(frozen=True)
+class Enclosure:
+    """A band around an answer, or why there is none.
+
+    Attributes
+    ----------
+    certified : whether the band is proved.
+    message : a sentence.
+    lower, upper : fields p and r, this rank's points: lower p <= p* <= upper p and upper r <= r* <= lower r for the discrete
+        solution p*, r*; empty if not certified.
+    bounds : band_p, band_p_max (Pa), band_load (N; N/m in 1D), band_r: how far the answer's p anywhere, its p_max, its load
+        and its r anywhere are from the discrete solution's at most; empty if not certified.
+    """
+
+    certified: bool
+    message: str
+    lower: Fields = field(default_factory=dict)
+    upper: Fields = field(default_factory=dict)
+    bounds: dict[str, float] = field(default_factory=dict)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The keys of the command line's --json."""
+        bounds = {name: self.bounds.get(name) for name in ("band_p", "band_p_max", "band_load", "band_r")}
+        return {"certified": self.certified, "certified_message": self.message, **bounds}
+
+
 @dataclass
 class Solution:
     """Fields and record of one run.
@@ -121,7 +144,7 @@ class Solution:
     settings: dict[str, Any] = field(default_factory=dict)
     times: dict[str, float] = field(default_factory=dict)
     levels: list[dict[str, Any]] = field(default_factory=list)
-    enclosure: "Enclosure | None" = None
+    enclosure: Enclosure | None = None
 
     @property
     def p(self) -> Array:

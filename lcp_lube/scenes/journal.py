@@ -12,7 +12,8 @@ from ..problems.film.flows import side_flows
 from ..problems.film.gaps import JournalGap, Raised
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Side
-from .scene import LubricationScene, Positive
+from .published import LubricationScene
+from .scene import Positive
 from .units import measured, metres
 
 

@@ -5,7 +5,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from ..problems.film.textures import Dimples, Rough
-from .scene import Count, LubricationScene, NotNegative, Positive, SliderScene
+from .published import LubricationScene, SliderScene
+from .scene import Count, NotNegative, Positive
 from .units import metres
 
 

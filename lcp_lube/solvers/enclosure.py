@@ -5,9 +5,6 @@ two signs, G(z - e) <= 0 <= G(z + e), prove that the one solution lies between z
 linear solve; the proof are the signs, tested with a bound on the rounding of G itself.
 """
 
-from dataclasses import dataclass, field
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,7 +13,7 @@ from ..base.stages import Stages
 from ..linear.krylov import LinearSolverError
 from ..linear.system import make_system
 from ..problems.film.lubrication import LubricationProblem
-from ..problems.solution import Fields
+from ..problems.solution import Enclosure, Fields
 
 Mask = NDArray[np.bool_]
 UNIT = 2.0**-53  # largest relative error of one operation
@@ -25,32 +22,6 @@ RTOL = 1e-3  # of the solve for e: the signs are tested afterwards, the band nee
 RESERVE = 0.04  # of the mean |G|, added everywhere, for what that solve leaves
 REPAIRS = 40  # local corrections of a band before it is given up
 WIDEST = 0.1  # part of the largest pressure: a wider band, though proved, says that the answer is poor
-
-
-@dataclass(frozen=True)
-class Enclosure:
-    """A band around an answer, or why there is none.
-
-    Attributes
-    ----------
-    certified : whether the band is proved.
-    message : a sentence.
-    lower, upper : fields p and r, this rank's points: lower p <= p* <= upper p and upper r <= r* <= lower r for the discrete
-        solution p*, r*; empty if not certified.
-    bounds : band_p, band_p_max (Pa), band_load (N; N/m in 1D), band_r: how far the answer's p anywhere, its p_max, its load
-        and its r anywhere are from the discrete solution's at most; empty if not certified.
-    """
-
-    certified: bool
-    message: str
-    lower: Fields = field(default_factory=dict)
-    upper: Fields = field(default_factory=dict)
-    bounds: dict[str, float] = field(default_factory=dict)
-
-    def as_dict(self) -> dict[str, Any]:
-        """The keys of the command line's --json."""
-        bounds = {name: self.bounds.get(name) for name in ("band_p", "band_p_max", "band_load", "band_r")}
-        return {"certified": self.certified, "certified_message": self.message, **bounds}
 
 
 def balance(problem: LubricationProblem, p: Array, r: Array) -> tuple[Array, Array]:

@@ -10,7 +10,8 @@ from ..api import solve
 from ..base.resumable import ResumableCsv
 from ..output.results import as_dict, machine
 from ..scenes.bearing import BearingScene
-from ..scenes.scene import LubricationScene, Scene
+from ..scenes.published import LubricationScene
+from ..scenes.scene import Scene
 from ..scenes.textured import TexturedScene
 from .compare import read_off
 from .experiment import scene_key

@@ -9,7 +9,8 @@ from ..api import solve
 from ..base.parallel import Array
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Fields, Problem
-from ..scenes.scene import LubricationScene, Scene
+from ..scenes.published import LubricationScene
+from ..scenes.scene import Scene
 from ..solvers.newton import Stopping
 
 WRONG = 1e-2  # distance from which a run that believes in its answer is wrong: a per cent of p_max, or of the film's content
