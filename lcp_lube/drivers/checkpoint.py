@@ -282,11 +282,12 @@ def load(path: str | Path, scene: Solvable, comm: MPI.Comm = MPI.COMM_WORLD) -> 
         header, start = checkpoint_file.read_header(path, comm)
     except InputError as error:
         raise InputError(f"--resume {path}: {error}") from None
-    reason = _other_scene(header["scene"], scene_record(scene))
     if header["version"] != __version__:
-        reason = f"written by lcp_lube {header['version']}, this is {__version__}"
-    if reason:
-        raise InputError(f"--resume {path}: {reason}")
+        raise InputError(f"--resume {path}: written by lcp_lube {header['version']}, this is {__version__}")
+    old, new = header["scene"], scene_record(scene)
+    if changed := [key for key in {**old, **new} if key != "name" and old.get(key) != new.get(key)]:
+        differs = f"its {changed[0]} is {old.get(changed[0])}, here it is {new.get(changed[0])}"
+        raise InputError(f"--resume {path}: a checkpoint of another scene: {differs}")
     return Checkpoint(path, header, tuple(header["shape"]), [Step(*step) for step in header["steps"]], start)
 
 
@@ -294,11 +295,3 @@ def scene_record(scene: Solvable) -> dict[str, Any]:
     """A scene's data as JSON holds them."""
     assert isinstance(scene, Scene)  # `compose` lets no other be checkpointed
     return json.loads(json.dumps({"class": type(scene).__name__, **scene.model_dump(mode="json")}, default=str))
-
-
-def _other_scene(old: dict[str, Any], new: dict[str, Any]) -> str:
-    changed = [key for key in {**old, **new} if key != "name" and old.get(key) != new.get(key)]
-    if not changed:
-        return ""
-    key = changed[0]
-    return f"a checkpoint of another scene: its {key} is {old.get(key)}, here it is {new.get(key)}"
