@@ -189,7 +189,8 @@ FAMILIES: dict[str, Entry] = {
     "bratu": Entry("lcp_lube.scenes.semilinear:BratuScene", "Bratu's equation on the unit square"),
     "obstacle": Entry("lcp_lube.scenes.obstacle:ObstacleScene", "Bratu's equation between two obstacles"),
     "ehl_line": Entry("lcp_lube.scenes.ehl:EhlLineScene", "elastohydrodynamic line contact"),
-    "poisson_cubic": Entry("lcp_lube.scenes.semilinear:PoissonCubicScene", "Poisson's equation with a cubic term"),
+    "poisson_cubic": Entry("lcp_lube.scenes.semilinear:PoissonCubicScene", "equation (9) of Bergamaschi and Zilli"),
+    "manufactured_cubic": Entry("lcp_lube.scenes.semilinear:ManufacturedCubicScene", "a cubic term, the answer known"),
 }
 
 # A scene's way to an answer, outermost first; `drivers.compose` says what each of these modules offers.

@@ -92,7 +92,7 @@ def test_start_above_claims_nothing():
 )
 def test_cubic_is_exact_on_every_grid(nx, ny, lam, peak):
     """The five-point formula is exact for the known solution, so only rounding is left."""
-    solution, found = run("poisson_cubic", {"nx": nx, "ny": ny, "lambda": lam, "peak": peak})
+    solution, found = run("manufactured_cubic", {"nx": nx, "ny": ny, "lambda": lam, "peak": peak})
     assert solution.converged
     assert found["max_error"] <= 1e-11 * max(1.0, abs(peak))
 
@@ -111,9 +111,68 @@ class TestOrder:
         assert changes[-1] < self.ceiling
 
 
+def test_equation_9_as_printed():
+    """-Lap u - u^3/(1 + x^2 + y^2): 1 + x y is harmonic, also on the grid, and leaves the cubic term alone."""
+    problem = load_scene("poisson_cubic", {"nx": 7, "ny": 5, "boundary": "1 + x*y"}).build()
+    x, y = (a.ravel() for a in np.broadcast_arrays(problem.grid.x, problem.grid.y))
+    u = 1.0 + x * y
+    np.testing.assert_allclose(problem.residual(u), -problem.grid.cell * u**3 / (1.0 + x**2 + y**2), atol=1e-14)
+    slope = (problem.residual(u + 1e-6) - problem.residual(u - 1e-6)) / 2e-6
+    constant = problem.residual(u + 1.0) - problem.residual(u)  # of A alone, and of the cubic term
+    linear = constant + problem.grid.cell * ((u + 1.0) ** 3 - u**3) / (1.0 + x**2 + y**2)
+    expected = linear - problem.grid.cell * 3.0 * u**2 / (1.0 + x**2 + y**2)
+    np.testing.assert_allclose(slope, expected, atol=1e-8)
+    np.testing.assert_allclose(problem.jacobian_diagonal(u), problem.diagonal - linear + expected, atol=1e-12)
+    problem.destroy()
+
+
+@pytest.mark.parametrize("boundary", [1e-5, 1e-3, 0.1, 1.0, 2.0, "x", "1 + x + y", "sin(pi*x)"])
+def test_equation_9_is_solved_for_small_values_on_the_boundary(boundary):
+    """u >= the harmonic function with its values; of tiny values rounding is all that the cubic term can be told from."""
+    solution, found = run("poisson_cubic", {"n": 20, "boundary": boundary})
+    assert solution.converged, solution.message
+    assert found["max_v"] > 0
+
+
+def test_equation_9_on_finer_grids():
+    """Second order at the centre of the square."""
+    fields = [run("poisson_cubic", {"n": n})[0].fields["v"] for n in (7, 15, 31, 63)]
+    changes = np.abs(np.diff([v[v.size // 2] for v in fields]))
+    assert changes[:-1] / changes[1:] == pytest.approx(4.0, rel=0.1)
+
+
+def test_equation_9_has_no_solution_for_large_values():
+    """Newton climbs past every u >= 0; from below zero, and with negative values, nothing is claimed."""
+    assert run("poisson_cubic", {"n": 20, "boundary": 4.0})[0].outcome is Outcome.NO_SOLUTION
+    for changes in ({"boundary": -4.0}, {"boundary": 4.0, "v0": -1.0}, {"boundary": "4 - 9*x"}):
+        solution, _ = run("poisson_cubic", {"n": 20, **changes}, stopping=Stopping(max_it=20))
+        assert solution.outcome is not Outcome.NO_SOLUTION
+
+
+def test_the_certificate_sees_a_missing_cubic_term():
+    """The harmonic function with the same values: nearly right where they are small, refused all the same."""
+    for value in (1e-2, 0.3, 1.0):
+        problem = load_scene("poisson_cubic", {"n": 20, "boundary": value}).build()
+        constant = {"v": np.full(problem.grid.local_size, value)}
+        assert problem.certify(constant, 1e-8).measures["balance"] > 0.5
+        problem.destroy()
+
+
+@pytest.mark.parametrize(("relative", "steps"), [(0.0, 4), (1e-2, 2), (1e-4, 3)])
+def test_relative_stop(relative, steps):
+    """The run ends with the first step whose ||f|| is small enough against that of the start."""
+    solution, _ = run("bratu", {"lambda": 6.0, "n": 20}, options={"relative": relative})
+    problem = load_scene("bratu", {"lambda": 6.0, "n": 20}).build()
+    start = np.linalg.norm(problem.residual(np.zeros(400)))
+    problem.destroy()
+    reached = [step.norm / start <= relative for step in solution.steps]
+    assert not any(reached[:-1]) and reached[-1] == (relative > 0)
+    assert solution.iterations >= steps
+
+
 def test_strong_cubic_needs_damping():
     """f is not order-concave there: the decrease of ||f|| is what brings it home."""
-    solution, found = run("poisson_cubic", {"n": 31, "lambda": 1e4, "peak": 5.0})
+    solution, found = run("manufactured_cubic", {"n": 31, "lambda": 1e4, "peak": 5.0})
     assert solution.converged and solution.total("backtracking") > 0
     assert found["max_error"] < 1e-10
 
@@ -136,7 +195,7 @@ def test_balance_alone_sees_a_lost_source():
     problem.destroy()
 
 
-@pytest.mark.parametrize("options", [{"eta": 0.0}, {"eta": "x"}, {"p0": 1.0}, {"beta": 1.0}])
+@pytest.mark.parametrize("options", [{"eta": 0.0}, {"eta": "x"}, {"p0": 1.0}, {"beta": 1.0}, {"relative": -1.0}])
 def test_bad_method_options(options):
     with pytest.raises(InputError, match=r"newton\."):
         run("bratu", {"n": 4}, options=options)
@@ -167,7 +226,9 @@ def test_command_line_beyond_the_turning_point(cli, ranks):
     ("bratu", {"nx": -3}, "nx = -3"),
     ("bratu", {"lamda": 2.0}, "unknown key lamda"),
     ("bratu", {"lambda": np.inf}, "lambda = inf"),
-    ("poisson_cubic", {"lambda": -1.0}, "lambda = -1"),
+    ("manufactured_cubic", {"lambda": -1.0}, "lambda = -1"),
+    ("poisson_cubic", {"boundary": "1 +"}, "boundary"),
+    ("poisson_cubic", {"lambda": 1.0}, "unknown key lambda"),
 ])  # fmt: skip
 def test_bad_scene(name, changes, named):
     with pytest.raises(InputError, match=named):

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lcp_lube import InputError
+from lcp_lube.base import origin
 from lcp_lube.studies import tables
 from lcp_lube.studies.tables import PAPERS, find_table, matches, row_command, run_command, run_published_table
 
@@ -130,9 +131,116 @@ def test_a_table_is_resumed(small_paper: list[str], tmp_path: Path, capsys: pyte
     assert run_published_table("small", 1, results=tmp_path) == 1
     second = capsys.readouterr().out
     assert len(small_paper) == 6  # the lost row and the refused one
-    assert "2 of them already" in second
+    assert "2 of them kept from a run of this very code" in second
+    assert second.count("[stored by version ") == 2 and "[stored" not in first
     assert again.read_text().splitlines()[:3] == [line.rstrip() for line in lines[:3]]
     assert first.splitlines()[2].split()[:5] == second.splitlines()[2].split()[:5]
+
+
+def test_stale_rows_are_run_again(
+    small_paper: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Rows of other code, of no known code, and rows whose command was edited are never printed as if new."""
+    path = tmp_path / "small_table1.csv"
+    run_published_table("small", 1, results=tmp_path)
+    monkeypatch.setattr(origin, "code", lambda: "0.0.0+other")
+    run_published_table("small", 1, results=tmp_path)
+    out = capsys.readouterr().out
+    assert len(small_paper) == 8 and "3 run again that other code had made" in out and "[stored" not in out
+    with path.open() as file:
+        kept = list(csv.DictReader(file))
+    assert {row["version"] for row in kept} == {"0.0.0+other"} and len({row["digest"] for row in kept}) == 3
+    kept[0]["digest"] = kept[1]["digest"]  # a command that was edited by hand
+    kept[2]["digest"] = ""
+    with path.open("w") as file:
+        writer = csv.DictWriter(file, kept[0], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(kept)
+    run_published_table("small", 1, results=tmp_path)
+    assert len(small_paper) == 11  # two of them, and the refused one
+
+
+def test_stored_rows_are_printed_with_their_age(
+    small_paper: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """--stored runs nothing: what is there is printed as stored, also without a word of who made it; a missing row fails."""
+    run_published_table("small", 1, results=tmp_path)
+    monkeypatch.setattr(origin, "code", lambda: "0.0.0+other")
+    path = tmp_path / "small_table1.csv"
+    with path.open() as file:
+        kept = list(csv.DictReader(file))
+    with path.open("w") as file:
+        writer = csv.DictWriter(file, [name for name in kept[0] if name not in origin.COLUMNS], extrasaction="ignore")
+        writer.writeheader()
+        writer.writerow(kept[0])
+    capsys.readouterr()
+    made = len(small_paper)
+    assert run_published_table("small", 1, results=tmp_path, stored=True) == 1
+    out = capsys.readouterr().out
+    assert len(small_paper) == made
+    assert "[stored by version unknown, date unknown]" in out and out.count("not run") == 3
+
+
+def test_a_digest_knows_the_sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another digit in a source, a scene or a recipe is other code; so is another command."""
+    package = tmp_path / "package"
+    package.mkdir()
+    (tmp_path / "options").mkdir()
+    monkeypatch.setattr(origin, "PACKAGE", package)
+    seen = set()
+    for file in (package / "a.py", package / "b.toml", tmp_path / "options" / "c.opts"):
+        for text in ("1", "2"):
+            file.write_text(text)
+            seen.add(origin.code.__wrapped__())
+    assert len(seen) == 6
+    assert origin.signature(["solve a"])["digest"] != origin.signature(["solve b"])["digest"]
+
+
+QUICK = [(paper, number) for paper, (_, specs) in PAPERS.items() for number in specs]
+
+
+@pytest.mark.parametrize(("paper", "number"), QUICK, ids=[f"{paper}-{number}" for paper, number in QUICK])
+def test_quick_rows_run_from_an_empty_folder(
+    paper: str, number: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Every row of every table runs, with printed settings and with fitted ones; none is refused, none was there before."""
+    choices = [False] if PAPERS[paper][1][number].fitted is None else [False, True]
+    for fitted in choices:
+        assert run_published_table(paper, number, quick=True, results=tmp_path, fitted=fitted) == 0
+        out = capsys.readouterr().out
+        assert "refused" not in out and "[stored" not in out and " 0 of them kept" in out
+
+
+def test_fitted_settings_are_named(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="--fitted: table 4"):
+        run_published_table("bergamaschi", 4, fitted=True, results=tmp_path)
+
+
+def bergamaschi(number: int, fitted: bool, **wanted: str) -> list[dict[str, Any]]:
+    """Runs of the printed rows with these values."""
+    spec, printed = find_table("bergamaschi", number)
+    rows = [row for row in printed if all(row[name] == value for name, value in wanted.items())]
+    return [run_command(row_command(spec, row, fitted)) for row in rows]
+
+
+@pytest.mark.parametrize(("fitted", "counts"), [(False, [14, 11, 13]), (True, [13, 11, 12])])
+def test_table_1_from_both_starts(fitted: bool, counts: list[int]) -> None:
+    """v = s = z = 1 as printed, and with the slacks of v = 1, whose counts are the printed ones."""
+    runs = bergamaschi(1, fitted, n="1024", v0="1")
+    assert [run["outcome"] for run in runs] == ["converged"] * 3 + ["step_length"]  # lambda = 10: printed as failed
+    assert [run["iterations"] for run in runs[:3]] == counts
+
+
+def test_table_3_by_the_printed_rule() -> None:
+    """||f|| <= 1e-4 ||f(v0)||: 3 steps for Bratu, 4 printed; 630 CG iterations are those of the first step alone.
+
+    The other problem takes the printed 2 steps; its cubic term is then solved to 0.2 per cent, which the certificate refuses.
+    """
+    cubic, five, six = bergamaschi(3, False)
+    assert [run["iterations"] for run in (cubic, five, six)] == [2, 3, 3]
+    assert [run["outcome"] for run in (cubic, five, six)] == ["wrong_solution", "converged", "converged"]
+    assert all(abs(run["first_linear"] - 630) <= 3 for run in (cubic, five, six))
+    assert five["linear_iterations"] > 3 * 600
 
 
 def test_quick_leaves_long_rows_out(small_paper: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -211,6 +319,6 @@ def test_every_published_table_is_known() -> None:
     for paper, (_, specs) in PAPERS.items():
         for number in specs:
             spec, printed = find_table(paper, number)
-            commands = [row_command(spec, row) for row in printed]
+            commands = [row_command(spec, row, fitted) for row in printed for fitted in {False, spec.fitted is not None}]
             assert len(set(commands)) == len(commands) and not any("{" in command for command in commands)
             assert not any(math.isnan(float(row.get("n", 0))) for row in printed)

@@ -9,6 +9,7 @@ from typing import Any
 from mpi4py import MPI
 
 from ..errors import InputError
+from . import origin
 
 Row = dict[str, str]
 
@@ -26,6 +27,8 @@ class ResumableCsv:
     key : the columns that tell one row from another.
     comm : the ranks that work together; every method but `find` is collective.
     growing : columns that the file has, and those that new rows bring, are added to `columns`.
+    signed : rows carry the columns `origin.COLUMNS`: the code that made them, the date, a digest of code and key. Collective
+        callers compare `current`, and print `age` beside what they did not make.
 
     Raises
     ------
@@ -33,9 +36,18 @@ class ResumableCsv:
     """
 
     def __init__(
-        self, path: Path, columns: Sequence[str], key: Sequence[str], comm: MPI.Comm = MPI.COMM_WORLD, growing: bool = False
+        self,
+        path: Path,
+        columns: Sequence[str],
+        key: Sequence[str],
+        comm: MPI.Comm = MPI.COMM_WORLD,
+        growing: bool = False,
+        signed: bool = False,
     ):
+        columns = [*columns, *(name for name in origin.COLUMNS if name not in columns)] if signed else columns
         self.path, self.columns, self.key, self.comm, self.growing = path, list(columns), list(key), comm, growing
+        self.signed = signed
+        self._made: list[Row] = []  # by this process
         self.rows: list[Row] = self._on_rank_0(self._read)
         self._grow(name for row in self.rows[:1] for name in row)
 
@@ -44,6 +56,14 @@ class ResumableCsv:
         wanted = [str(key[name]) for name in self.key]
         return next((row for row in self.rows if [row[name] for name in self.key] == wanted), None)
 
+    def current(self, row: Row) -> bool:
+        """Whether this very code made the row (of a signed csv), by the command that its key names."""
+        return row["digest"] == origin.signature([row[name] for name in self.key])["digest"]
+
+    def age(self, row: Row) -> str:
+        """By what and when a row of a signed csv was made; empty if by this process."""
+        return "" if row in self._made else origin.told(row)
+
     def add(self, values: dict[str, Any]) -> Row:
         """Write a row, in the place of the one with the same keys if there is one; returns it as text.
 
@@ -51,6 +71,8 @@ class ResumableCsv:
         ------
         InputError : the file cannot be written.
         """
+        if self.signed:
+            values = {**values, **origin.signature([str(values[name]) for name in self.key])}
         self._grow(values)
         row = {name: "" if values.get(name) is None else str(values[name]) for name in self.columns}
         row = self.comm.bcast(row)  # seconds differ from rank to rank
@@ -59,6 +81,7 @@ class ResumableCsv:
             self.rows.append(row)
         else:
             self.rows[self.rows.index(old)] = row
+        self._made.append(row)
         self.write()
         return row
 

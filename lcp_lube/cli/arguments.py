@@ -175,6 +175,8 @@ def parse(own: list[str]) -> argparse.Namespace:
     table.add_argument("number", type=int, metavar="K")
     table.add_argument("--paper", default="mezzadri", choices=["mezzadri", "bergamaschi"])
     table.add_argument("--quick", action="store_true", help="leave the long rows out")
+    table.add_argument("--fitted", action="store_true", help="settings fitted to the paper's counts in place of printed ones")
+    table.add_argument("--stored", action="store_true", help="run nothing: print the rows of --results with their age")
     _results_option(table)
 
     chart = command("chart", "long experiments: the runs in a csv, the pictures drawn from it")

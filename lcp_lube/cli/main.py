@@ -180,7 +180,7 @@ def run_compare(args: argparse.Namespace) -> int:
 def run_table(args: argparse.Namespace) -> int:
     from ..studies.tables import run_published_table
 
-    return run_published_table(args.paper, args.number, quick=args.quick, results=args.results)
+    return run_published_table(args.paper, args.number, args.quick, args.results, fitted=args.fitted, stored=args.stored)
 
 
 def run_chart(args: argparse.Namespace) -> int:

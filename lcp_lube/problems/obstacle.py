@@ -3,22 +3,17 @@
 f(v) = A v - b - dx dy g(v), A the five-point formula times dx dy, (4, -1) where dx = dy, and b the values on the boundary.
 """
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
 
 from ..base.parallel import Array
-from ..errors import InputError
 from .box import BoxProblem
-from .film.reynolds import sides
 from .grid import Grid
-from .semilinear import Bratu, SemilinearProblem
+from .semilinear import Bratu, SemilinearProblem, Surface
 from .solution import Fields, Outcome
 from .transfer import Transfer
-
-Surface = Callable[[Array, Array], Array]
 
 # Largest lambda for which -Lap v = lambda e^v, v = 0 on the boundary of the unit square, has a solution; the five-point
 # formula's is smaller by 1.5 h^2 (6.80674, 6.80777, 6.80803 for n = 32, 64, 128).
@@ -27,18 +22,17 @@ COARSEST = 8  # points a side of multigrid's coarsest grid, at least (and as man
 
 
 class ObstacleEquations:
-    """f and f' from a semilinear equation's, with values on the boundary that need not be zero."""
+    """f and f' from a semilinear equation's."""
 
-    def __init__(self, semilinear: SemilinearProblem, boundary: Surface):
-        self.semilinear = semilinear
-        self.b = _boundary_terms(semilinear.grid, boundary)
+    def __init__(self, semilinear: SemilinearProblem):
+        self.semilinear, self.b = semilinear, semilinear.b
         self._jacobian = semilinear.A.duplicate(copy=True)
         for option in (PETSc.Mat.Option.SYMMETRIC, PETSc.Mat.Option.SYMMETRY_ETERNAL):
             self._jacobian.setOption(option, True)
         self._diagonal = self._jacobian.createVecLeft()
 
     def residual(self, v: Array) -> Array:
-        return self.semilinear.residual(v) - self.b
+        return self.semilinear.residual(v)
 
     def jacobian(self, v: Array) -> PETSc.Mat:
         self._diagonal.setArray(self.semilinear.jacobian_diagonal(v))
@@ -48,7 +42,7 @@ class ObstacleEquations:
 
     def scale(self, v: Array) -> float:
         """Mean of |A v - b| + |dx dy g(v)|: the two sides of the equation."""
-        terms = np.abs(self.semilinear.flow(v) - self.b) + np.abs(self.semilinear.supply(v))
+        terms = np.abs(self.semilinear.flow(v)) + np.abs(self.semilinear.supply(v))
         return self.semilinear.reduce.sum(terms) / self.semilinear.unknowns
 
     def destroy(self) -> None:
@@ -89,7 +83,7 @@ class ObstacleProblem(BoxProblem):
         l, u = (surface(grid.x, grid.y).ravel() for surface in (lower, upper))
         if coarse:
             l = np.minimum(l, u)
-        equations = ObstacleEquations(SemilinearProblem(grid, Bratu(lam)), boundary)
+        equations = ObstacleEquations(SemilinearProblem(grid, Bratu(lam), boundary=boundary))
         least, most = grid.reduce.min(equations.b), grid.reduce.max(equations.b)
         self.homogeneous = least == most == 0.0
         square = np.isclose(grid.lengths[0], grid.lengths[1], rtol=1e-12)
@@ -165,20 +159,3 @@ class ObstacleProblem(BoxProblem):
         if self._transfer is not None:
             self._transfer.destroy()
         super().destroy()
-
-
-def _boundary_terms(grid: Grid, boundary: Surface) -> Array:
-    """What the values on the boundary add to f: (dy/dx) v west and east, (dx/dy) v south and north.
-
-    Raises
-    ------
-    InputError : the boundary's formula has no finite value at a point next to which a grid point lies.
-    """
-    dx, dy = grid.spacing
-    b = np.zeros(grid.box)
-    for at_side, (ox, oy) in zip(sides(grid), ((-dx, 0.0), (dx, 0.0), (0.0, -dy), (0.0, dy)), strict=True):
-        weight = dy / dx if ox else dx / dy
-        b += np.where(at_side, weight * boundary(grid.x + ox, grid.y + oy), 0.0)
-    if not np.isfinite(grid.reduce.sum(b)):
-        raise InputError("boundary: no finite value at some points of the boundary")
-    return b.ravel()

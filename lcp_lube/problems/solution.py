@@ -79,7 +79,8 @@ class Outcome(StrEnum):
 class Step:
     """One step of the outer loop: the letters of the paper.
 
-    norm is ||F|| after the step, step_norm ||alpha d||; centrality and backtracking count halvings of alpha.
+    norm is ||F|| after the step, step_norm ||alpha d||; centrality and backtracking count halvings of alpha; enough: the
+    method's own stopping rule holds, whatever eps1 and eps2 say.
     """
 
     norm: float
@@ -90,6 +91,7 @@ class Step:
     backtracking: int = 0
     sigma: float = 0.0
     rtol: float = 0.0
+    enough: bool = False
 
 
 @dataclass(frozen=True)

@@ -1,17 +1,18 @@
 """Scenes of semilinear equations on the unit square: Bratu, and Poisson with a cubic term."""
 
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from petsc4py import PETSc
 from pydantic import Field
 
 from ..problems.grid import Grid
-from ..problems.semilinear import Bratu, Cubic, SemilinearProblem, Source
+from ..problems.semilinear import Bratu, ManufacturedCubic, PoissonCubic, SemilinearProblem, Source, Surface
+from .formula import Formula, FormulaText
 from .scene import Count, Finite, NotNegative, Scene
 
 
 class SemilinearScene(Scene):
-    """-Lap v = g(x, y, v) on the unit square, v = 0 on its boundary; a subclass has g."""
+    """-Lap v = g(x, y, v) on the unit square, v given on its boundary; a subclass has g."""
 
     problem_kind: ClassVar[str] = "equations"
     v0: Finite = Field(0.0, description="start of v at every point")
@@ -29,14 +30,19 @@ class SemilinearScene(Scene):
         """The right-hand side g."""
         raise NotImplementedError
 
+    @property
+    def on_boundary(self) -> Surface | None:
+        """v on the boundary; None for 0."""
+        return None
+
     def build(self, comm: PETSc.Comm | None = None) -> SemilinearProblem:
         """The discrete problem on this scene's grid. Collective.
 
         Raises
         ------
-        InputError : more ranks than the grid can be dealt to.
+        InputError : more ranks than the grid can be dealt to, or values on the boundary that are not finite.
         """
-        return SemilinearProblem(Grid(self.shape, (1.0, 1.0), comm), self.source, self.v0)
+        return SemilinearProblem(Grid(self.shape, (1.0, 1.0), comm), self.source, self.v0, self.on_boundary)
 
 
 class BratuScene(SemilinearScene):
@@ -50,11 +56,25 @@ class BratuScene(SemilinearScene):
 
 
 class PoissonCubicScene(SemilinearScene):
-    """-Lap v + lambda v^3 = s, with s such that the solution is 16 peak x (1 - x) y (1 - y)."""
+    """-Lap v - v^3/(1 + x^2 + y^2) = 0, equation (9) of Bergamaschi and Zilli, who do not print the values on the boundary."""
+
+    boundary: Annotated[float | str, FormulaText] = Field(1.0, description="v there, a number or a formula in x and y")
+
+    @property
+    def source(self) -> Source:
+        return PoissonCubic()
+
+    @property
+    def on_boundary(self) -> Surface:
+        return Formula(self.boundary)
+
+
+class ManufacturedCubicScene(SemilinearScene):
+    """-Lap v + lambda v^3 = s, with s such that the solution is 16 peak x (1 - x) y (1 - y), on every grid to rounding."""
 
     lam: NotNegative = Field(1.0, alias="lambda", description="factor of the cubic term")
     peak: Finite = Field(1.0, description="largest value of the exact solution")
 
     @property
     def source(self) -> Source:
-        return Cubic(self.lam, self.peak)
+        return ManufacturedCubic(self.lam, self.peak)

@@ -10,7 +10,8 @@ With b = -H but b2 = sigma mu e - S1 Z1 e, b3 = sigma mu e - S2 Z2 e, the Newton
 where b4 = v - l - s1 and b5 = u - v - s2. (The paper's printed dz1, dz2 are wrong, and it calls C nonsymmetric; C has
 the symmetry of f'.) Where a bound is infinite its s, z and their equations are absent.
 
-The paper leaves sigma, mu, the start and the tolerances open; the defaults here are those that reproduce its table 1.
+The paper leaves sigma, mu and the tolerances open. It prints the start v = s = z = 1 (v0 = 1, s0 = 1); the defaults here, with
+v0 = 1 and the slacks of that v, are fitted to the counts of its table 1.
 """
 
 from dataclasses import dataclass
@@ -35,12 +36,14 @@ RTOL = (1e-12, 0.5)  # of the inner solves: what PETSc's test can tell apart, an
 class InteriorOptions:
     """Parameters of the interior point method.
 
-    z0: start of z1 and z2. sigma_max: sigma = min(sigma_max, mu). forcing: inner solves to ||residual|| <= forcing mu.
+    z0: start of z1 and z2; s0: of s1 and s2, 0 for v - l and u - v. sigma_max: sigma = min(sigma_max, mu). forcing: inner
+    solves to ||residual|| <= forcing mu.
     boundary: the part of the way to the boundary s, z = 0 that a step may go. beta: of the decrease test; halvings: cuts of
     alpha before the run counts as failed. inside: the start keeps this part of the box (of 1, if wider) off the bounds.
     """
 
     z0: float = 1.0
+    s0: float = 0.0
     sigma_max: float = 0.2
     forcing: float = 0.05
     boundary: float = 0.9999
@@ -51,6 +54,8 @@ class InteriorOptions:
     def __post_init__(self) -> None:
         if not (np.isfinite(self.z0) and self.z0 > 0):
             raise InputError(f"interior.z0 = {self.z0}: a positive number is needed")
+        if not (np.isfinite(self.s0) and self.s0 >= 0):
+            raise InputError(f"interior.s0 = {self.s0}: a positive number, or 0 for the slacks of v, is needed")
         for name in ("sigma_max", "forcing", "boundary", "beta", "inside"):
             if not 0 < getattr(self, name) < 1:
                 raise InputError(f"interior.{name} = {getattr(self, name)}: allowed are numbers between 0 and 1")
@@ -74,7 +79,7 @@ class Interior:
 
     Parameters
     ----------
-    start : field v; default problem.v0. Either is moved inside the bounds; the slacks are those of v.
+    start : field v; default problem.v0. Either is moved inside the bounds; the slacks are those of v but for options.s0.
 
     Raises
     ------
@@ -91,7 +96,7 @@ class Interior:
             raise InputError("--method interior: v_lower = v_upper at some points, no inside to start in; active-set can")
         margin = options.inside * np.minimum(u - l, 1.0)
         v = np.clip(start["v"] if start else problem.v0, l + margin, u - margin)
-        s1, s2 = (np.where(has, s, 1.0) for has, s in zip(self._has, (v - l, u - v), strict=True))
+        s1, s2 = (np.where(has, options.s0 or s, 1.0) for has, s in zip(self._has, (v - l, u - v), strict=True))
         z1, z2 = (np.where(has, options.z0, 0.0) for has in self._has)
         # Without a bound, s = 1 and z = 0 stay as they are.
         self.at = Point(v, s1, s2, z1, z2)

@@ -41,7 +41,7 @@ class Method(Protocol):
 
 @dataclass(frozen=True)
 class Stopping:
-    """Stop when ||F|| <= eps1 and ||alpha d|| <= eps2; give up after max_it steps."""
+    """Stop when ||F|| <= eps1 and ||alpha d|| <= eps2, or by the method's own rule (`Step.enough`); at most max_it steps."""
 
     eps1: float = 1e-8
     eps2: float = 1e-8
@@ -93,6 +93,6 @@ def _end(k: int, step: Step, stopping: Stopping) -> tuple[Outcome, str] | None:
     """How the run ends with this step; None if it goes on."""
     if not (np.isfinite(step.norm) and np.isfinite(step.step_norm)):
         return Outcome.NOT_FINITE, f"step {k}: ||F|| = {step.norm}, ||alpha d|| = {step.step_norm}"
-    if step.norm <= stopping.eps1 and step.step_norm <= stopping.eps2:
+    if step.enough or (step.norm <= stopping.eps1 and step.step_norm <= stopping.eps2):
         return Outcome.CONVERGED, f"||F|| = {step.norm:.2e}, ||alpha d|| = {step.step_norm:.2e}"
     return None

@@ -1,7 +1,7 @@
 """Newton's method for f(v) = 0, exact or inexact: no complementarity, the same outer loop and KSP.
 
-When the source is convex (`semilinear.Source.convex`) and v0 <= 0, full steps need no damping and tell when there is no
-solution. f is then order-concave with symmetric f' whose off-diagonal entries are <= 0, and a smallest solution v*, if
+When the source is convex above v0 <= 0 (`SemilinearProblem.climbs`), full steps need no damping and tell when there is no
+solution. f is then order-concave with symmetric f' whose off-diagonal entries are <= 0, and a smallest solution v* >= v0, if
 there is one, has f'(v*) positive semidefinite. While v_k <= v*, f'(v_k) >= f'(v*) is a positive definite M-matrix, so
 
     d_k = -f'(v_k)^-1 f(v_k) >= 0,   f(v_{k+1}) <= 0   and   v_{k+1} <= v*:
@@ -32,12 +32,19 @@ LOOSEST = 0.1  # true relative residual of an inner solve that a proof may still
 
 @dataclass(frozen=True)
 class NewtonOptions:
-    """Parameters of Newton's method: eta, relative tolerance of an iterative inner solver; beta, of the decrease test."""
+    """Parameters of Newton's method.
+
+    eta: relative tolerance of an iterative inner solver; beta: of the decrease test; relative: the run ends also where
+    ||f|| <= relative ||f(v0)||, as table 3 of Bergamaschi and Zilli was stopped; 0 switches that off.
+    """
 
     eta: float = 1e-3
     beta: float = 1e-4
+    relative: float = 0.0
 
     def __post_init__(self) -> None:
+        if not 0 <= self.relative < 1:
+            raise InputError(f"newton.relative = {self.relative}: allowed are numbers from 0 to below 1")
         for name in ("eta", "beta"):
             if not 0 < getattr(self, name) < 1:
                 raise InputError(f"newton.{name} = {getattr(self, name)}: allowed are numbers between 0 and 1")
@@ -49,12 +56,12 @@ class PlainNewton:
     alpha = 1 for a convex source from below; else it is halved until ||f|| decreases as an inexact Newton step must.
     """
 
-    state: tuple[str, ...] = ("v", "f", "climbing", "norm")  # what a step starts from
+    state: tuple[str, ...] = ("v", "f", "climbing", "norm", "enough")  # what a step starts from
 
     def __init__(self, problem: SemilinearProblem, stages: Stages, options: NewtonOptions, start: Fields | None = None):
         self.problem, self.stages, self.options = problem, stages, options
         self.v = start["v"].copy() if start else np.full(problem.grid.local_size, problem.v0)
-        self.climbing = problem.source.convex and start is None and problem.v0 <= 0
+        self.climbing = start is None and problem.climbs
         grid = problem.grid
         x, y = ((points - o) / side for points, o, side in zip((grid.x, grid.y), grid.origin, grid.lengths, strict=True))
         self._bump = (np.sin(np.pi * x) * np.sin(np.pi * y)).ravel()  # A's first eigenvector
@@ -67,6 +74,7 @@ class PlainNewton:
             self._krylov = Krylov(self.mat)
         self.f = problem.residual(self.v)
         self.norm = problem.reduce.norm(self.f)
+        self.enough = options.relative * self.norm  # of ||f||
 
     @property
     def fields(self) -> Fields:
@@ -138,7 +146,8 @@ class PlainNewton:
         self.v = self.v + alpha * d
         self.f = problem.residual(self.v)
         self.norm = reduce.norm(self.f)
-        return Step(self.norm, alpha * reduce.norm(d), alpha, iterations, 0, cuts, 0.0, self.options.eta)
+        enough = self.options.relative > 0 and self.norm <= self.enough
+        return Step(self.norm, alpha * reduce.norm(d), alpha, iterations, 0, cuts, 0.0, self.options.eta, enough)
 
     def destroy(self) -> None:
         """Free the PETSc objects; a python PC must not outlive this."""

@@ -61,27 +61,45 @@ def find_table(paper: str, number: int) -> tuple[Spec, list[Row]]:
     return spec, spec.rows([dict(zip(names, row, strict=True)) for row in rows])
 
 
-def row_command(spec: Spec, printed: Row) -> str:
+def row_command(spec: Spec, printed: Row, fitted: bool = False) -> str:
     """The command line that runs a printed row; names of methods are in lower case here."""
-    return f"lcp-lube {spec.command} --system {spec.system} --no-nested".format(
+    settings = (spec.fitted or "") if fitted else spec.printed
+    return f"lcp-lube {' '.join([spec.command, settings]).strip()} --system {spec.system} --no-nested".format(
         **{**printed, "method": printed.get("method", "").lower()}
     )
 
 
-def run_published_table(paper: str, number: int, quick: bool = False, results: Path = Path("lcp_lube_results")) -> int:
+def run_published_table(
+    paper: str,
+    number: int,
+    quick: bool = False,
+    results: Path = Path("lcp_lube_results"),
+    fitted: bool = False,
+    stored: bool = False,
+) -> int:
     """Run a table and print each row beside the printed one; `=` marks a match, `!=` a difference. Collective.
 
-    The runs are kept in `results` as a csv; a run that is there already, whatever its outcome, is not made again.
+    The runs are kept in `results` as a csv. A run that is there already, whatever its outcome, is not made again if this very
+    code made it (`base.origin.code`); what other code made is run again. A row that was not made now says so and when it was.
+
+    Parameters
+    ----------
+    quick : leave the long rows out.
+    fitted : take the settings that are fitted to the paper's counts in place of those that it prints.
+    stored : run nothing: print the rows that are there, whatever code made them.
 
     Returns
     -------
-    int : exit status, 0 if every row ran; a failed run is a row, a run that its recipe or method refuses is not.
+    int : exit status, 0 if every row ran; a failed run is a row, a run that its recipe or method refuses is not. With
+    `stored`, 0 if every row was there.
 
     Raises
     ------
     InputError : no such table; a csv that cannot be read or written; PETSc options that would change the runs.
     """
     spec, rows = find_table(paper, number)
+    if fitted and spec.fitted is None:
+        raise InputError(f"--fitted: table {number} of --paper {paper} is run with one set of settings only")
     foreign = sorted(set_names() - LATE)
     if foreign:
         raise InputError(f"-{foreign[0]}: the rows of a published table bring their own inner solvers")
@@ -90,16 +108,27 @@ def run_published_table(paper: str, number: int, quick: bool = False, results: P
         results / f"{paper}_table{number}.csv",
         [*KEY, *(f"p_{i}" for i in spec.points), *RECORD],
         KEY,
+        signed=True,
     )
     layout = _Layout(rows)
     seconds = "; seconds of the processor (printed ones in brackets)" if "time_s" in layout.measured else ""
-    say(f"{paper} table {number}: {spec.title}. ours = printed where they match, ours != printed where they differ{seconds}.")
+    settings = f" Settings {'fitted, not printed' if fitted else 'as printed'}." if spec.fitted is not None else ""
+    say(
+        f"{paper} table {number}: {spec.title}.{settings} "
+        f"ours = printed where they match, ours != printed where they differ{seconds}."
+    )
     say(layout.head())
-    known = refused = 0
+    kept = stale = absent = refused = 0
     for printed in runs:
-        command = row_command(spec, printed)
+        command = row_command(spec, printed, fitted)
         record = store.find(command=command, ranks=store.comm.size)
-        known += record is not None
+        if stored and record is None:
+            absent += 1
+            say(f"{layout.name(printed)}not run")
+            continue
+        if record is not None and not stored and not store.current(record):
+            stale, record = stale + 1, None
+        kept += record is not None
         if record is None:
             values = {"command": command, "ranks": store.comm.size, **run_command(command, spec.points)}
             if values["outcome"] == "refused":
@@ -107,11 +136,14 @@ def run_published_table(paper: str, number: int, quick: bool = False, results: P
                 say(f"{layout.name(printed)}refused: {values['message']}")
                 continue
             record = store.add(values)
-        say(layout.line(printed, record))
+        age = store.age(record)
+        say(layout.line(printed, record) + (f"  [{age}]" if age else ""))
     say(layout.summary())
     left = f", {len(rows) - len(runs)} left out by --quick" if len(rows) > len(runs) else ""
-    say(f"{len(runs)} rows, {known} of them already in {store.path} (remove it to run them again){left}. {spec.note}")
-    return 1 if refused else 0
+    again = f", {stale} run again that other code had made" if stale else ""
+    how = "printed as stored" if stored else "kept from a run of this very code"
+    say(f"{len(runs)} rows, {kept} of them {how}{again}{left}; all are in {store.path}. {spec.note}")
+    return 1 if refused or absent else 0
 
 
 def run_command(command: str, points: tuple[int, ...] = ()) -> dict[str, Any]:
