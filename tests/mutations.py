@@ -16,6 +16,7 @@ SIZES = {
     "ehl_line": "--n 20",
     "bratu": "--n 8",
     "poisson_cubic": "--n 8",
+    "manufactured_cubic": "--n 8",
     "obstacle_ball": "--n 9",
     "obstacle_bratu": "--n 9",
 }

@@ -19,6 +19,7 @@ SCENES = {
     "obstacle_bratu": ({"n": 9}, ("active-set", "interior", "semismooth")),
     "bratu": ({"n": 9}, ("newton",)),
     "poisson_cubic": ({"n": 9}, ("newton",)),
+    "manufactured_cubic": ({"n": 9}, ("newton",)),
     "ehl_line": ({"n": 30}, ("interior", "semismooth")),
     "user": ({}, ("active-set", "interior", "semismooth")),
 }
