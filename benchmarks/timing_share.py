@@ -34,7 +34,7 @@ def measure(arguments: str) -> dict[str, Any]:
     petsc4py.init(["lcp-lube"])
 
     from lcp_lube.cli.arguments import parse
-    from lcp_lube.cli.main import solution_of
+    from lcp_lube.cli.asked import solution_of
     from lcp_lube.linear.krylov import Krylov
     from lcp_lube.output.results import as_dict, machine
 

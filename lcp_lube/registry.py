@@ -1,7 +1,12 @@
-"""The one place where a name is bound to code: methods, systems, recipes. Imports no PETSc."""
+"""The one place where a name is bound to code: methods, systems, scene families, film shapes, drivers, charts, recipes.
 
+Imports no PETSc. A package from outside adds lines of its own: an entry point of the group 'lcp_lube' names a function, which
+is called with this module and puts entries into the tables (docs/architecture.md shows one).
+"""
+
+import sys
 from dataclasses import dataclass, field
-from importlib import import_module
+from importlib import import_module, metadata
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -193,6 +198,22 @@ FAMILIES: dict[str, Entry] = {
     "manufactured_cubic": Entry("lcp_lube.scenes.semilinear:ManufacturedCubicScene", "a cubic term, the answer known"),
 }
 
+# What the tables [[film]] of a bearing may have as their `shape`.
+SHAPES: dict[str, Entry] = {
+    "constant": Entry("lcp_lube.scenes.film:Constant", "the same height everywhere"),
+    "linear": Entry("lcp_lube.scenes.film:Linear", "a straight line: a wedge"),
+    "wedge": Entry("lcp_lube.scenes.film:Linear", "another name of linear"),
+    "parabola": Entry("lcp_lube.scenes.film:Parabola", "h_min in the middle, h_max at both ends"),
+    "sinusoid": Entry("lcp_lube.scenes.film:Sinusoid", "full waves between h_max and h_min"),
+    "step": Entry("lcp_lube.scenes.film:Step", "one height before a place, another behind it"),
+    "pocket": Entry("lcp_lube.scenes.film:Pocket", "a rectangular recess"),
+    "dimples": Entry("lcp_lube.scenes.film:Dimples", "an array of equal recesses: square, round, domes"),
+    "journal": Entry("lcp_lube.scenes.film:JournalPart", "the gap of a journal in its bush, unwrapped"),
+    "roughness": Entry("lcp_lube.scenes.film:Roughness", "a random surface, the same for a seed on every grid"),
+    "formula": Entry("lcp_lube.scenes.film:FormulaPart", "a formula in x and y"),
+    "profile": Entry("lcp_lube.scenes.film:ProfilePart", "a measured profile from a file"),
+}
+
 # A scene's way to an answer, outermost first; `drivers.compose` says what each of these modules offers.
 DRIVERS: dict[str, Entry] = {
     "accuracy": Entry("lcp_lube.drivers.accuracy", "finer and finer grids until a quantity is as good as asked for"),
@@ -246,3 +267,7 @@ def read_recipe(name: str) -> dict[str, str]:
         if words:
             options[words[0].lstrip("-")] = words[1].strip() if len(words) > 1 else ""
     return options
+
+
+for _point in metadata.entry_points(group="lcp_lube"):
+    _point.load()(sys.modules[__name__])

@@ -45,7 +45,7 @@ def lacking(name: str) -> str:
 def attempt(name: str, max_it: int = 60) -> dict[str, Any]:
     """Outcome of a recipe's example and the options that nobody had read by its last step. Collective."""
     from lcp_lube.base.options import unread
-    from lcp_lube.cli.main import solution_of
+    from lcp_lube.cli.asked import solution_of
 
     if package := lacking(name):
         return {"lacks": package}

@@ -16,8 +16,8 @@ from lcp_lube.problems.film.model import Model, Side
 from lcp_lube.problems.film.shapes import Block, Sum
 from lcp_lube.problems.grid import Grid
 from lcp_lube.problems.transfer import Transfer
+from lcp_lube.registry import SHAPES
 from lcp_lube.scenes.bearing import BearingScene
-from lcp_lube.scenes.film import shape_names
 from lcp_lube.scenes.formula import Formula
 
 FEW = settings(max_examples=25, deadline=None)
@@ -517,7 +517,7 @@ def test_documented_scenes(tmp_path, block):
 
 def test_documented_shapes_are_all():
     text = (Path(__file__).parents[1] / "docs" / "scene_files.md").read_text()
-    for name in shape_names():
+    for name in SHAPES:
         assert f"`{name}`" in text, name
 
 

@@ -21,6 +21,7 @@ from lcp_lube import load_scene, solve
 from lcp_lube.__main__ import main
 from lcp_lube.cli import main as cli
 from lcp_lube.cli.arguments import parse, split
+from lcp_lube.cli.asked import scene_of
 from lcp_lube.errors import InputError
 from lcp_lube.registry import METHODS
 from lcp_lube.scenes.scene import parse_changes
@@ -103,7 +104,7 @@ class Judge:
         other = {"lubrication": "monotone", "box": "semismooth"}.get(kind)
         if other is None or kind not in METHODS[other].kinds:
             return None
-        solution = solve(cli.scene_of(parse(case.words)), method=other, nested=False)
+        solution = solve(scene_of(parse(case.words)), method=other, nested=False)
         try:
             return solution.problem.quantities(solution.fields) if solution.converged else None
         finally:

@@ -2,23 +2,19 @@
 
 import argparse
 import json
-import os
 import sys
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Callable
 
 from mpi4py import MPI
 
-from ..api import solve
 from ..base.options import check_unread
-from ..drivers.ask import Ask
 from ..errors import InputError, nearest
+from ..output.console import say
 from ..output.results import as_dict, finite, summary
-from ..problems.solution import Solution, Step
-from ..registry import METHODS, STABILITY, SYSTEMS, recipe_line, recipe_names
-from ..scenes.scene import Scene, load_scene, parse_changes, scene_line, scene_names
-from ..solvers.newton import Monitor
-from .arguments import method_options, scene_changes
+from ..problems.solution import Step
+from ..registry import METHODS, SHAPES, STABILITY, SYSTEMS, recipe_line, recipe_names
+from ..scenes.scene import scene_line, scene_names
+from .asked import options_of, scene_of, solution_of, stopping_of
 
 
 def run(args: argparse.Namespace) -> int:
@@ -29,84 +25,6 @@ def run(args: argparse.Namespace) -> int:
     InputError : bad input, for exit status 2.
     """
     return COMMANDS[args.command](args)
-
-
-def say(text: str) -> None:
-    """Print on rank 0.
-
-    Raises
-    ------
-    InputError : on rank 0, standard output cannot take it (a full disk).
-    """
-    if MPI.COMM_WORLD.rank == 0:
-        try:
-            print(text, flush=True)
-        except OSError as error:
-            sys.stdout = open(os.devnull, "w")  # noqa: SIM115  (else Python tries to flush it once more at its end)
-            raise InputError(f"standard output: {error.strerror}") from None
-
-
-def scene_of(args: argparse.Namespace, more: dict[str, Any] | None = None) -> Scene:
-    """The scene with the command line's changes, and more of them."""
-    changes = parse_changes(scene_changes(args)[0])
-    for key in ("n", "nx", "ny", "film"):
-        if getattr(args, key) is not None:
-            changes[key] = getattr(args, key)
-    return load_scene(args.scene, {**changes, **(more or {})})
-
-
-def stopping_of(args: argparse.Namespace) -> dict[str, Any]:
-    """The tolerances that were given, and the iteration limit."""
-    given = {name: value for name in ("eps1", "eps2") if (value := getattr(args, name)) is not None}
-    for name, value in given.items():
-        if not 0 < value < 1:
-            raise InputError(f"--{name} {value}: allowed are numbers between 0 and 1")
-    if args.max_it < 1:
-        raise InputError(f"--max-it {args.max_it}: at least 1 is needed")
-    return {**given, "max_it": args.max_it}
-
-
-def options_of(args: argparse.Namespace, method: str, among: Sequence[str] = ()) -> dict[str, Any]:
-    """The method's options from flags and from --set METHOD.OPTION=VALUE; such options of others `among` are theirs."""
-    options = method_options(args)
-    for key, value in parse_changes(scene_changes(args)[1]).items():
-        owner, _, name = key.partition(".")
-        if owner == method:
-            options[name] = value
-        elif owner not in among:
-            raise InputError(f"--set {key}: an option of method {owner}, and the method is {method}; add --method {owner}")
-    return options
-
-
-def ask_of(args: argparse.Namespace, monitor: Monitor | None = None) -> Ask:
-    """How to solve, of the options that `solve` and `sweep` share."""
-    return Ask(
-        method=args.method,
-        system=args.system,
-        recipe=args.recipe,
-        stopping=stopping_of(args),
-        options=options_of(args, args.method),
-        nested=args.nested,
-        monitor=monitor,
-    )
-
-
-def solution_of(args: argparse.Namespace, monitor: Monitor | None = None) -> Solution:
-    """What `solve` with these arguments finds. Collective."""
-    scene = scene_of(args)
-    return solve(
-        scene,
-        ask_of(args, monitor),
-        accuracy=args.accuracy,
-        quantity=args.quantity,
-        finest=scene.shape if args.n or args.nx or args.ny else None,
-        certify=args.certify,
-        checkpoint=args.checkpoint,
-        every=args.every or 1,
-        resume=args.resume,
-        reduction=args.reduction,
-        memory_check=not args.no_memory_check,
-    )
 
 
 def run_solve(args: argparse.Namespace) -> int:
@@ -228,6 +146,8 @@ def run_list(args: argparse.Namespace) -> int:
         "methods": {name: entry.line for name, entry in METHODS.items()},
         "systems": {name: entry.line for name, entry in SYSTEMS.items()},
         "recipes": {name: recipe_line(name) for name in recipe_names()},
+        "film shapes": {name: entry.line for name, entry in SHAPES.items()},
+        "maps of chart stability": {name: entry.line for name, entry in STABILITY.items()},
     }
     for title, lines in groups.items():
         say(f"{title}:")

@@ -21,9 +21,11 @@ from ..api import solve
 from ..base.options import check_unread
 from ..base.resumable import ResumableCsv
 from ..errors import InputError
+from ..output.console import say
 from ..output.results import as_dict, finite
 from ..problems.solution import Outcome, Solution, Step
 from ..scenes.scene import Scene
+from .asked import ask_of, scene_of
 
 MOST_POINTS = 100_000
 REFUSED = "refused"  # an outcome beside those of `Outcome`: bad input that only the solve could notice
@@ -207,8 +209,6 @@ def flat(data: dict[str, Any]) -> dict[str, Any]:
 
 def run(args: argparse.Namespace) -> int:
     """The command: exit status 0 if every point converged, else 1; raises InputError as `sweep` does. Collective."""
-    from .main import ask_of, say, scene_of
-
     if args.output is not None and args.output.suffix.lower() != ".csv":
         raise InputError(f"--output {args.output}: a sweep writes a .csv")
 

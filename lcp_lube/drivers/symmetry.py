@@ -43,8 +43,8 @@ SENTENCES = {
 
 
 def applies(scene: Solvable, ask: Ask) -> bool:
-    """Whether to look for symmetries: in films, where nobody named a solver, which is then meant for the whole of them."""
-    return isinstance(model_of(scene), Model) and not why_not(ask)
+    """Whether there is something that symmetries could be looked for in: a film."""
+    return model_of(scene) is not None and not isinstance(scene, Part)
 
 
 def why_not(ask: Ask) -> str:
@@ -66,8 +66,8 @@ def model_of(scene: Solvable) -> Model | None:
 
 def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     """The whole problem's solution from the least part that has it; from itself where there is none. Collective."""
-    if not promising(scene, ask):
-        return inner(scene, ask)
+    if reason := why_not(ask) or ("" if promising(scene, ask) else "neither film nor sides have a symmetry"):
+        return _whole(inner(scene, ask), reason)
     if ask.memory_check:
         facts = scene.facts(ask.comm)
         look_ahead(facts, plan(facts, ask, scene.name), ask.mpi)
@@ -75,14 +75,17 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     part = part_of(scene, problem)
     if part is None:
         problem.destroy()
-        return inner(scene, ask)
+        return _whole(inner(scene, ask), "film and sides do not share a symmetry")
     solution = solve_part(part, problem, ask, inner)
     if solution.outcome is not Outcome.WRONG_SOLUTION:
         return solution
     solution.destroy()
-    solution = inner(scene, ask)
-    note = f"the whole model: the reduced one's answer ({part.kind}) is not the whole scene's"
-    solution.settings["why"] = [note, *solution.settings["why"]]
+    return _whole(inner(scene, ask), f"the reduced one's answer ({part.kind}) is not the whole scene's")
+
+
+def _whole(solution: Solution, reason: str) -> Solution:
+    """A solution of the whole model, with the reason for that."""
+    solution.settings["why"] = [f"the whole model: {reason}", *solution.settings["why"]]
     return solution
 
 

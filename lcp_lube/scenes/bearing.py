@@ -158,7 +158,18 @@ class BearingScene(Scene):
 
     @property
     def model(self) -> Model:
-        """What is discretised."""
+        """What is discretised.
+
+        Raises
+        ------
+        InputError : sides that contradict one another, a profile that cannot be read.
+        """
+        try:
+            return self._model()
+        except InputError as error:
+            raise InputError(f"{self.name}: {error}") from None
+
+    def _model(self) -> Model:
         gap = self.gap
         return Model(
             lengths=self.side_lengths,
@@ -202,13 +213,11 @@ class BearingScene(Scene):
         ------
         InputError : more ranks than the grid can be dealt to, a film that is not positive, a profile that cannot be read.
         """
+        model = self.model
         try:
-            return self.model.build(self.shape, comm)
+            return model.build(self.shape, comm)
         except InputError as error:
             raise InputError(f"{self.name}: {error}") from None
 
     def facts(self, comm: PETSc.Comm | None = None) -> Facts:
-        try:
-            return self.model.facts(self.shape, comm)
-        except InputError as error:
-            raise InputError(f"{self.name}: {error}") from None
+        return self.model.facts(self.shape, comm)

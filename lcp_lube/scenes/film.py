@@ -1,14 +1,17 @@
 """The [[film]] tables of a bearing's scene file: named shapes that are added up, each with its parameters."""
 
 from dataclasses import dataclass
+from functools import reduce
 from math import inf
+from operator import or_
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, model_validator
 
 from ..problems.film.profile import read_profile
 from ..problems.film.shapes import Along, Block, DimpleArray, Journal, RandomSurface, Scaled, Shape
+from ..registry import SHAPES
 from .formula import Formula
 from .units import Measured, metres
 
@@ -199,17 +202,7 @@ class ProfilePart(Part):
         return read_profile(extent.folder / self.file, extent.lengths, self.interpolation, *units, self.uneven)
 
 
-PARTS = (Constant, Linear, Parabola, Sinusoid, Step, Pocket, Dimples, JournalPart, Roughness, FormulaPart, ProfilePart)
-FilmPart = Annotated[
-    Constant | Linear | Parabola | Sinusoid | Step | Pocket | Dimples | JournalPart | Roughness | FormulaPart | ProfilePart,
-    Field(discriminator="shape"),
-]
-
-
-def shape_names() -> list[str]:
-    """What `shape` may be."""
-    return [name for part in PARTS for name in _literals(part)]
-
-
-def _literals(part: Any) -> tuple[str, ...]:
-    return part.model_fields["shape"].annotation.__args__
+if TYPE_CHECKING:
+    FilmPart = Part
+else:  # whatever the registry has, lines from outside among them
+    FilmPart = Annotated[reduce(or_, (entry.load() for entry in SHAPES.values())), Field(discriminator="shape")]

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from ..base.resumable import ResumableCsv, Row
-from ..cli.main import say
 from ..errors import InputError
+from ..output.console import say
 from ..problems.solution import Step
 from ..registry import METHODS
 from ..scenes.scene import Scene, load_scene

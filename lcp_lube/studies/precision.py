@@ -14,8 +14,8 @@ from typing import Any
 from mpi4py import MPI
 
 from ..base.resumable import ResumableCsv, Row
-from ..cli.main import say
 from ..errors import InputError
+from ..output.console import say
 from ..problems.solution import Outcome
 from ..registry import METHODS
 from ..scenes.scene import Scene, load_scene

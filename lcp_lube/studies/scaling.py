@@ -14,7 +14,7 @@ from statistics import median
 from typing import Any
 
 from ..base.resumable import ResumableCsv, Row
-from ..cli.main import say
+from ..output.console import say
 from ..scenes.scene import load_scene
 from .experiment import open_store, run
 from .scaling_picture import draw

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from ..base.resumable import ResumableCsv
-from ..cli.main import say
+from ..output.console import say
 from ..problems.solution import Outcome
 from ..scenes.scene import load_scene
 from .experiment import open_store, run

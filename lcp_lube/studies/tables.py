@@ -11,8 +11,9 @@ import numpy as np
 from ..base.options import LATE, set_names
 from ..base.resumable import ResumableCsv, Row
 from ..cli.arguments import parse
-from ..cli.main import say, solution_of
+from ..cli.asked import solution_of
 from ..errors import InputError
+from ..output.console import say
 from ..output.results import as_dict, machine
 from ..problems.solution import Solution
 from ..registry import PACKAGE

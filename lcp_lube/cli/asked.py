@@ -1,0 +1,76 @@
+"""What a command line asks for: the scene, and how to solve it."""
+
+import argparse
+from collections.abc import Sequence
+from typing import Any
+
+from ..api import solve
+from ..drivers.ask import Ask
+from ..errors import InputError
+from ..problems.solution import Solution
+from ..scenes.scene import Scene, load_scene, parse_changes
+from ..solvers.newton import Monitor
+from .arguments import method_options, scene_changes
+
+
+def scene_of(args: argparse.Namespace, more: dict[str, Any] | None = None) -> Scene:
+    """The scene with the command line's changes, and more of them."""
+    changes = parse_changes(scene_changes(args)[0])
+    for key in ("n", "nx", "ny", "film"):
+        if getattr(args, key) is not None:
+            changes[key] = getattr(args, key)
+    return load_scene(args.scene, {**changes, **(more or {})})
+
+
+def stopping_of(args: argparse.Namespace) -> dict[str, Any]:
+    """The tolerances that were given, and the iteration limit."""
+    given = {name: value for name in ("eps1", "eps2") if (value := getattr(args, name)) is not None}
+    for name, value in given.items():
+        if not 0 < value < 1:
+            raise InputError(f"--{name} {value}: allowed are numbers between 0 and 1")
+    if args.max_it < 1:
+        raise InputError(f"--max-it {args.max_it}: at least 1 is needed")
+    return {**given, "max_it": args.max_it}
+
+
+def options_of(args: argparse.Namespace, method: str, among: Sequence[str] = ()) -> dict[str, Any]:
+    """The method's options from flags and from --set METHOD.OPTION=VALUE; such options of others `among` are theirs."""
+    options = method_options(args)
+    for key, value in parse_changes(scene_changes(args)[1]).items():
+        owner, _, name = key.partition(".")
+        if owner == method:
+            options[name] = value
+        elif owner not in among:
+            raise InputError(f"--set {key}: an option of method {owner}, and the method is {method}; add --method {owner}")
+    return options
+
+
+def ask_of(args: argparse.Namespace, monitor: Monitor | None = None) -> Ask:
+    """How to solve, of the options that `solve` and `sweep` share."""
+    return Ask(
+        method=args.method,
+        system=args.system,
+        recipe=args.recipe,
+        stopping=stopping_of(args),
+        options=options_of(args, args.method),
+        nested=args.nested,
+        monitor=monitor,
+    )
+
+
+def solution_of(args: argparse.Namespace, monitor: Monitor | None = None) -> Solution:
+    """What `solve` with these arguments finds. Collective."""
+    scene = scene_of(args)
+    return solve(
+        scene,
+        ask_of(args, monitor),
+        accuracy=args.accuracy,
+        quantity=args.quantity,
+        finest=scene.shape if args.n or args.nx or args.ny else None,
+        certify=args.certify,
+        checkpoint=args.checkpoint,
+        every=args.every or 1,
+        resume=args.resume,
+        reduction=args.reduction,
+        memory_check=not args.no_memory_check,
+    )

@@ -1,0 +1,43 @@
+"""One file and one line for a thing of each kind: toys from outside are found wherever names are listed and used."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+TOYS = Path(__file__).parent / "toys"
+
+
+@pytest.fixture
+def toys(cli, monkeypatch):
+    monkeypatch.setattr("conftest.ENVIRONMENT", {**__import__("conftest").ENVIRONMENT, "PYTHONPATH": path()})
+    return cli
+
+
+def path() -> str:
+    return os.pathsep.join([str(TOYS), str(TOYS.parents[1]), os.environ.get("PYTHONPATH", "")])
+
+
+def test_toys_are_listed(toys):
+    out = toys("list").out
+    for name in ("toy-method", "toy-shape", "toy-map"):
+        assert f"  {name}" in out, name
+    assert "toy-map, a toy" in toys("chart", "stability", "--help").out
+
+
+def test_toys_solve(toys, tmp_path):
+    """A family, a method and a driver; then a film shape."""
+    (tmp_path / "a.toml").write_text('family = "toy-family"\nn = 30\n')
+    done = toys("solve", "a.toml", "--method", "toy-method", "--json", "--explain")
+    assert done.status == 0 and done.json["method"] == "toy-method" and "the toy driver was here" in done.err
+    (tmp_path / "b.toml").write_text(
+        'family = "bearing"\nL_mm = 10\nU = 1\nn = 20\nfluid.mu = 0.01\nfilm = [{ shape = "toy-shape", h_um = 2 }]\n'
+    )
+    assert toys("solve", "b.toml", "--json").json["min_h"] == pytest.approx(2e-6)
+    assert toys("new", "c.toml", "--from", "a.toml").status == 0
+
+
+def test_toys_are_compared_and_charted(toys):
+    rows = toys("compare", "problem1", "--n", 30, "--methods", "toy-method,active-set", "--json").json
+    assert [row["outcome"] for row in rows] == ["converged"] * 2 and rows[0]["p_max"] == pytest.approx(rows[1]["p_max"])
+    assert "the toy's map" in toys("chart", "stability", "toy-map", "--quick").out
