@@ -218,7 +218,7 @@ def test_with_accuracy_it_is_the_value_that_counts(cli):
 
 def test_not_with_checkpoints(cli):
     done = cli("solve", "journal", "--set", "balance.load=1e3", "--checkpoint", "c.chk")
-    assert done.status == 2 and "--checkpoint: not for scene journal by way of balance" in done.lines[0]
+    assert done.status == 2 and "--checkpoint: not for scene journal (balance)" in done.lines[0]
 
 
 @given(st.floats(-3.9, 3.9), st.floats(0.2, 0.8), st.booleans())

@@ -34,8 +34,16 @@ def solve(scene: Solvable, ask: Ask, level: int = 0) -> Solution:
     raise AssertionError("the innermost driver applies to everything")
 
 
-# What does not compose, and why: (a driver that applies, an attribute of the ask that it cannot serve, the reason).
+NO_FILM = "it is no film with cavitation, for which alone the theorem holds"
+# What does not compose, and why: (a driver that applies, or a kind of problem; an attribute of the ask; the reason).
 CANNOT = (
+    ("box", "certify", NO_FILM),
+    ("equations", "certify", NO_FILM),
+    ("mixed", "certify", NO_FILM),
+    ("user", "certify", NO_FILM),
+    ("user", "checkpoint", "its functions are no data that a file could hold"),
+    ("user", "resume", "its functions are no data that a file could hold"),
+    ("user", "accuracy", "its points are its own, and no grid's that could be refined"),
     ("accuracy", "checkpoint", "its many grids make one answer; give --n for one grid"),
     ("accuracy", "resume", "its many grids make one answer; give --n for one grid"),
     ("balance", "checkpoint", "its many solves make one answer; give the value that was found for one solve"),
@@ -57,6 +65,7 @@ def check(scene: Solvable, ask: Ask) -> None:
     ------
     InputError : names the option, the scene, and the reason.
     """
+    kind = getattr(scene, "problem_kind", "")
     for name, option, reason in CANNOT:
-        if getattr(ask, option) and DRIVERS[name].load().applies(scene, ask):  # type: ignore[attr-defined]
-            raise InputError(f"--{option}: not for scene {scene.name} by way of {name}: {reason}")
+        if getattr(ask, option) and (DRIVERS[name].load().applies(scene, ask) if name in DRIVERS else name == kind):
+            raise InputError(f"--{option}: not for scene {scene.name} ({name}): {reason}")

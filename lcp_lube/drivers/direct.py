@@ -8,7 +8,6 @@ import numpy as np
 
 from ..base.options import recipe
 from ..base.stages import Stages
-from ..errors import InputError
 from ..problems.box import BoxProblem
 from ..problems.facts import Facts
 from ..problems.film.lubrication import LubricationProblem
@@ -59,8 +58,6 @@ def solve(scene: Solvable, ask: Ask, inner: Inner | None = None) -> Solution:
         ask = replace(ask, **saved.settle(**given))
         chosen = plan(facts, ask, scene.name)
     entry = METHODS[chosen.method].of(facts.kind)
-    if ask.certify and not isinstance(problem, LubricationProblem):
-        raise InputError(f"--certify: scene {scene.name} is no film with cavitation, for which alone the theorem holds")
     run = Run(scene, problem, facts, chosen, replace(ask, stopping=ask.stopping_for(entry.eps)), stages, keeper, saved)
     keeper.begin(scene, (chosen.method, chosen.system, ask.recipe, chosen.nested, dict(ask.options)))
     with recipe(chosen.recipe) as recipe_used:
@@ -165,7 +162,7 @@ class Run:
         """Fields to start from on this grid. Those of the very same grid are taken as they are, by a method that can."""
         if near is None or (near[0].grid is level.grid and interior):
             return None
-        return near[1] if near[0].grid is level.grid else level.prolong(*near, interior)
+        return near[1] if near[0].grid is level.grid else level.prolong(*near, interior) or None
 
     def take_over(self) -> None:
         """Where the chosen method failed, those that the registry has for that, one after another."""

@@ -136,8 +136,8 @@ class BoxProblem:
         return {"v": (fields["v"], ""), "f": (self.residual(fields["v"]), "")}
 
     def prolong(self, coarse: Any, fields: Fields, interior: bool) -> Fields:
-        """Without a grid behind the unknowns there is no coarser problem to start from."""
-        raise InputError("--nested: this problem has no coarser grids")
+        """A neighbour's unknowns as they are; nothing for an interior method, or of another number: no grid lies behind them."""
+        return {} if interior or coarse.grid.shape != self.grid.shape else {"v": np.clip(fields["v"], self.lower, self.upper)}
 
     def coarser(self) -> "tuple[BoxProblem, Transfer] | None":
         """The same problem on a coarser grid, and the interpolation from there; None if there is none. For multigrid.
