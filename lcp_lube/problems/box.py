@@ -136,7 +136,7 @@ class BoxProblem:
         return {"v": (fields["v"], ""), "f": (self.residual(fields["v"]), "")}
 
     def prolong(self, coarse: Any, fields: Fields, interior: bool) -> Fields:
-        """A neighbour's unknowns as they are; nothing for an interior method, or of another number: no grid lies behind them."""
+        """A neighbour's unknowns as they are; nothing for an interior method, or of another number: no grid is there."""
         return {} if interior or coarse.grid.shape != self.grid.shape else {"v": np.clip(fields["v"], self.lower, self.upper)}
 
     def coarser(self) -> "tuple[BoxProblem, Transfer] | None":
