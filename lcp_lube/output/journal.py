@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .panels import FINE, film_line, liquid_line, pressure_line
+from .liquid import liquid_line
+from .panels import pressure_line
 from .picture import Picture, largest
 from .style import BLUE, GREY, LIQUID, RED, WALL
 from .units import quantity
@@ -37,25 +38,24 @@ def journal(axes: Axes, picture: Picture, row: int | None = None) -> None:
         (ax, ay), (bx, by) = around(x, inner), around(x[::-1], outer[::-1])
         axes.fill(np.concatenate([ax, bx]), np.concatenate([ay, by]), lw=0, **look)
 
-    fine = np.linspace(start, start + L, FINE)
-    h = film_line(picture, row, fine)
+    fine = picture.fine()
+    h = picture.film(row, fine)
     to_gap = CLEARANCE / h.mean()
     x, p = pressure_line(picture, row)
     p_sides = p - problem.p_c
-    x_r, _, liquid = liquid_line(picture, row)
-    h_there = film_line(picture, row, x_r)
+    liquid = liquid_line(picture, row, fine)[2]
 
     outside = 1.0 + BUSH
     height = HIGH * np.maximum(p_sides, 0.0) / (largest(p_sides) or 1.0)
     ring(x, outside + 0.0 * x, outside + height, color=BLUE, alpha=0.3)
     axes.plot(*around(x, np.where(height > 0, outside + height, np.nan)), color=BLUE, lw=1.6)
     ring(fine, 1.0 + 0.0 * fine, outside + 0.0 * fine, color=WALL)
-    ring(x_r, 1.0 - to_gap * h_there, 1.0 - to_gap * (h_there - liquid), color=LIQUID)  # the liquid clings to the journal
+    ring(fine, 1.0 - to_gap * h, 1.0 - to_gap * (h - liquid), color=LIQUID)  # the liquid clings to the journal
     axes.plot(*around(fine, 1.0), color="black", lw=1.0)
     axes.fill(*around(fine, 1.0 - to_gap * h), facecolor="0.93", edgecolor="black", lw=1.4)
 
     for name, place in picture.fronts.items() if row is None or row == picture.middle else ():
-        gap = to_gap * film_line(picture, row, np.array([place]))[0]
+        gap = to_gap * picture.film(row, np.array([place]))[0]
         axes.plot(*around(place, np.array([1.0 - gap, outside])), color=RED)
         axes.text(*around(place, outside + 0.06), name, ha="left", va="center", fontsize=8, color=RED)
     axes.plot(*around(start, np.array([1.0, outside])), color=GREY, lw=1.0)

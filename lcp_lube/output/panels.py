@@ -1,4 +1,4 @@
-"""Panels of a picture: p, r and the film along a line, maps with the cavity's outline."""
+"""The panels of a section: p and r along a line, and the film with the liquid in it."""
 
 from __future__ import annotations
 
@@ -8,17 +8,15 @@ import numpy as np
 
 from ..base.parallel import Array
 from ..problems.film.quantities import open_pressures
-from .picture import Picture, largest, scaled
-from .style import BLUE, CAVITY, GREY, LIQUID, MAPS, NAMES, RED, WALL
+from .liquid import NOISE, liquid_line
+from .picture import Picture, largest
+from .style import BLUE, CAVITY, GREY, LIQUID, NAMES, RED, WALL
 from .units import prefix
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure, SubFigure
 
-FINE = 1201  # points of a line that is drawn from a formula
 ANGLES = range(0, 361, 60)
-MOST_SQUARE = 2.5  # longer rectangles fill their map instead of keeping their shape
 
 
 def section(upper: Axes, lower: Axes, picture: Picture, row: int | None = None, named: bool = True) -> list[Any]:
@@ -41,36 +39,42 @@ def section(upper: Axes, lower: Axes, picture: Picture, row: int | None = None, 
     ends = problem.grid.origin[0] + np.array([0.0, problem.grid.lengths[0]])
     sign = picture.sign if row is None else picture.sign[row]
     x, p = pressure_line(picture, row)
-    to_p = prefix(largest(p), "Pa")[0]
-    p, label_p = scaled(p, "Pa")
-    x_r, r, liquid = liquid_line(picture, row)
-    fine = np.linspace(ends[0], ends[1], FINE)
-    h = film_line(picture, row, fine)
+    most_p = largest(p) if largest(p) > NOISE * picture.scales["p"] else picture.scales["p"]
+    to_p, unit_p = prefix(most_p, "Pa")
+    p = to_p * p
+    fine = picture.fine()
+    x_r, r, liquid = liquid_line(picture, row, fine)
+    most_r, h = largest(r), picture.film(row, fine)
     to_h, unit_h = prefix(largest(h), "m")
 
     known = picture.fronts if row is None or row == picture.middle else {}
     spans = [upper.axvspan(scale * a, scale * b, color=CAVITY, lw=0) for a, b in cavities(picture.x, sign, ends, known)]
-    for name, place in known.items():
+    near = np.ptp([*known.values()] or [0.0]) < 0.15 * np.ptp(ends)  # so near that their names would touch
+    outwards = np.argsort(np.argsort([*known.values()]))
+    for (name, place), side in zip(known.items(), outwards, strict=True):
         upper.axvline(scale * place, color=GREY, lw=0.8, ls=(0, (1, 2)))
         if named:
-            text = f"{name}\n{picture.place(place)}"
-            upper.text(scale * place, 1.01, text, transform=upper.get_xaxis_transform(), ha="center", va="bottom", fontsize=8)
+            text, ha = f"{name}\n{picture.place(place)}", ("right", "left")[side] if near and len(known) > 1 else "center"
+            ha = "right" if place > ends[1] - 0.08 * np.ptp(ends) else ha  # clear of the right axis
+            upper.text(scale * place, 1.01, text, transform=upper.get_xaxis_transform(), ha=ha, va="bottom", fontsize=8)
 
     right = upper.twinx()
     handles = upper.plot(scale * x, p, color=BLUE, lw=2.0, label=NAMES["p"])
     handles += right.plot(scale * x_r, r, color=RED, lw=1.8, ls="-.", label=NAMES["r"])
     if (exact := picture.exact) is not None:
-        handles += upper.plot(scale * fine, to_p * (exact.p(fine) + problem.p_c), "k--", lw=0.8, label="exact")
-        right.plot(scale * fine, exact.r(fine), "k--", lw=0.8)
-    upper.set(ylim=(min(0.0, 1.05 * np.nanmin(p)), 1.08 * (largest(p) or 1.0)), xlim=scale * ends)
-    right.set_ylim(0.0, 1.08 * max(largest(r), 1e-3))
-    upper.set_ylabel(NAMES["p"] + label_p, color=BLUE)
+        exact_p, exact_r = to_p * (exact.p(fine) + problem.p_c), exact.r(fine)
+        handles += upper.plot(scale * fine, exact_p, "k--", lw=0.8, label="exact")
+        right.plot(scale * fine, exact_r, "k--", lw=0.8)
+        most_p, most_r = max(most_p, largest(exact_p) / to_p), max(most_r, largest(exact_r))
+    upper.set(ylim=(min(0.0, 1.05 * np.nanmin(p)), 1.08 * to_p * most_p), xlim=scale * ends)
+    right.set_ylim(0.0, 1.08 * max(most_r, 1e-3) if most_r > picture.noise("r") else 1.0)
+    upper.set_ylabel(f"{NAMES['p']} ({unit_p})", color=BLUE)
     right.set_ylabel(NAMES["r"], color=RED)
     for span in spans[:1]:
         span.set_label("cavity")
 
     top = 1.25 * to_h * h.max()
-    lower.fill_between(scale * x_r, 0.0, to_h * liquid, color=LIQUID, lw=0)
+    lower.fill_between(scale * fine, 0.0, to_h * liquid, color=LIQUID, lw=0)
     lower.fill_between(scale * fine, to_h * h, top, facecolor=WALL, edgecolor="0.45", hatch="////", lw=0)
     lower.plot(scale * fine, to_h * h, color="black", lw=1.4)
     lower.spines["bottom"].set_linewidth(2.0)
@@ -80,12 +84,6 @@ def section(upper: Axes, lower: Axes, picture: Picture, row: int | None = None, 
         lower.set_xticks(ANGLES)
     lower.set(ylim=(0.0, top), ylabel=f"{NAMES['h']} ({unit_h})", xlabel=label_x)
     return [*handles, *spans[:1]]
-
-
-def film_line(picture: Picture, row: int | None, x: Array) -> Array:
-    """The film in metres at x along a row."""
-    problem: Any = picture.solution.problem
-    return np.asarray(problem.film(x, np.full_like(x, 0.0 if row is None else picture.y[row])))
 
 
 def pressure_line(picture: Picture, row: int | None) -> tuple[Array, Array]:
@@ -100,21 +98,6 @@ def pressure_line(picture: Picture, row: int | None) -> tuple[Array, Array]:
     return np.concatenate([[start], picture.x, [start + L]]), np.concatenate([[first], p, [last]])
 
 
-def liquid_line(picture: Picture, row: int | None) -> tuple[Array, Array, Array]:
-    """x (m), void fraction and thickness of the liquid (m) along a row, from end to end."""
-    problem: Any = picture.solution.problem
-    start, L = problem.grid.origin[0], problem.grid.lengths[0]
-    kinds = problem.grid.ends[0]
-    x = picture.x + picture.ahead
-    liquid = picture.liquid if row is None else picture.liquid[row]
-    r = 1.0 - liquid / film_line(picture, row, x)
-    if kinds[1] == "closed" and r.size > 1:
-        r[-1] = r[-2]  # nothing passes the end
-    first = {"open": 0.0, "periodic": r[-1]}.get(kinds[0], r[0])
-    x, r = np.concatenate([[start], x, [start + L]]), np.concatenate([[first], r, r[-1:]])
-    return x, r, (1.0 - r) * film_line(picture, row, x)
-
-
 def cavities(x: Array, sign: Array, ends: Array, fronts: dict[str, float]) -> list[tuple[float, float]]:
     """Where the cavities of a line begin and end, in m: half-way between points, or at the front that is known there."""
     edges = np.concatenate([ends[:1], (x[1:] + x[:-1]) / 2, ends[1:]])
@@ -124,50 +107,3 @@ def cavities(x: Array, sign: Array, ends: Array, fronts: dict[str, float]) -> li
         if name in fronts and these.size:
             these[np.argmin(np.abs(these - fronts[name]))] = fronts[name]
     return list(zip(first, last, strict=True))
-
-
-def map_shape(picture: Picture) -> float | None:
-    """Height over width of a map that keeps its shape; None for one that fills its place."""
-    L, width = picture.solution.problem.grid.lengths
-    keeps = picture.along[0] == picture.across[0] and 1 / MOST_SQUARE < L / width < MOST_SQUARE
-    return width / L if keeps else None
-
-
-def colour_map(figure: Figure | SubFigure, axes: Axes, picture: Picture, name: str) -> None:
-    """A map of one field with its colour bar; the cells at the sides reach up to them."""
-    values, unit = picture.fields[name]
-    values, label = scaled(values, unit)
-    grid: Any = picture.solution.problem.grid
-    (scale_x, label_x), (scale_y, label_y) = picture.along, picture.across
-    dx, dy = (a[1] - a[0] if a.size > 1 else 2 * a[0] for a in (picture.x, picture.y))
-    edges = (picture.x[0] - 1.5 * dx, picture.x[-1] + 1.5 * dx, picture.y[0] - 1.5 * dy, picture.y[-1] + 1.5 * dy)
-    image = axes.imshow(
-        np.pad(values, 1, mode="edge"),
-        extent=tuple(scale * edge for scale, edge in zip((scale_x, scale_x, scale_y, scale_y), edges, strict=True)),
-        origin="lower",
-        cmap=MAPS.get(name, "viridis"),
-        interpolation="nearest",
-        aspect="equal" if map_shape(picture) else "auto",
-    )
-    figure.colorbar(image, ax=axes, location="top", pad=0.02, aspect=30, label=NAMES.get(name, name) + label)
-    x_limits, y_limits = (
-        (scale * start, scale * (start + length))
-        for scale, start, length in zip((scale_x, scale_y), grid.origin, grid.lengths, strict=True)
-    )
-    axes.set(xlabel=label_x, ylabel=label_y, xlim=x_limits, ylim=y_limits)
-    if picture.is_journal:
-        axes.set_xticks(ANGLES[::2])
-    axes.spines[:].set_visible(True)
-
-
-def outline(axes: Axes, picture: Picture, hatch: str) -> None:
-    """The cavity's edge as a white line and its inside dotted."""
-    sign = picture.sign
-    if min(sign.shape) < 2 or not sign.min() < 0 < sign.max():
-        return
-    x, y = picture.along[0] * picture.x, picture.across[0] * picture.y
-    from matplotlib import rc_context
-
-    with rc_context({"hatch.color": hatch}):
-        axes.contourf(x, y, sign, levels=[sign.min() - 1.0, 0.0], colors="none", hatches=[".."])
-    axes.contour(x, y, sign, levels=[0.0], colors="white", linewidths=1.2)

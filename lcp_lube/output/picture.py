@@ -7,14 +7,16 @@ from typing import Any
 import numpy as np
 
 from ..base.parallel import Array
+from ..problems.box import BoxProblem
 from ..problems.film.exact import ExactSolution
-from ..problems.film.flows import point_weights
 from ..problems.film.fronts import cavity_sign, middle_row
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Solution
 from .files import coordinates, gather, taken
+from .liquid import NOISE, ahead, void_at_faces
 from .units import prefix, quantity
 
+FINE = 1201  # points of a line that is drawn from a formula
 MOST_POINTS = {1: 4000, 2: 500}  # a direction; larger fields are thinned before rank 0 gathers them
 
 
@@ -22,9 +24,10 @@ MOST_POINTS = {1: 4000, 2: 500}  # a direction; larger fields are thinned before
 class Picture:
     """Fields in SI as (ny, nx) arrays, or (nx,) with an empty y, thinned if large; and what is known beside them.
 
-    Of a lubrication problem: sign, positive in the full film and negative in the cavity (`fronts.cavity_sign`); liquid, the
-    thickness (m) of the liquid that passes the face `ahead` (m) of each point, where the scheme knows it; middle, the row of
-    the middle line. Empty and 0 for other problems.
+    scales : what a field's values are large or small against; differences below `noise` of it say nothing.
+    Of a lubrication problem: sign, positive in the full film and negative in the cavity (`fronts.cavity_sign`); void, the void
+    fraction at the face `ahead` (m) of each point, where the scheme knows it; middle, the row of the middle line. Empty and 0
+    for other problems.
     """
 
     solution: Solution
@@ -32,11 +35,16 @@ class Picture:
     y: Array
     fields: dict[str, tuple[Array, str]]
     quantities: dict[str, Any]
+    scales: dict[str, float]
     sign: Array
-    liquid: Array
+    void: Array
     ahead: float = 0.0
     middle: int = 0
     exact: ExactSolution | None = None
+
+    def noise(self, name: str) -> float:
+        """Differences of a field that are not drawn, in parts of its scale: rounding, and of the void what the run left."""
+        return trace(self.solution) if name == "r" else NOISE
 
     @property
     def length_unit(self) -> str:
@@ -59,11 +67,41 @@ class Picture:
     @property
     def across(self) -> tuple[float, str]:
         """(factor, label) of the y axis."""
-        return self._axis("y", max(self.solution.problem.grid.lengths))
+        return self._axis("y", self.solution.problem.grid.lengths[1])
 
     def _axis(self, name: str, size: float) -> tuple[float, str]:
         factor, unit = prefix(size, self.length_unit)
         return factor, f"{name} ({unit})" if unit else name
+
+    def film(self, row: int | None, x: Array) -> Array:
+        """The film of a lubrication problem in metres at x along a row."""
+        problem: Any = self.solution.problem
+        return np.asarray(problem.film(x, np.full_like(x, 0.0 if row is None else self.y[row])))
+
+    def fine(self) -> Array:
+        """Places (m) along x close enough to draw the film, with two at each of its known edges."""
+        problem: Any = self.solution.problem
+        start, L = problem.grid.origin[0], problem.grid.lengths[0]
+        gap = getattr(problem.film, "gap", problem.film)
+        edges = np.array(getattr(gap, "jumps", lambda axis: ())("x"))
+        beside = np.concatenate([edges - NOISE * L, edges + NOISE * L])
+        inside = beside[(beside > start) & (beside < start + L)]
+        return np.unique(np.concatenate([np.linspace(start, start + L, FINE), inside]))
+
+    def limits(self, name: str) -> tuple[float, float]:
+        """Smallest and largest value (SI) that a bar or an axis of a field must show.
+
+        Values that differ by rounding alone span from 0 to their size, or to the scale if they are 0 by rounding too: a full
+        film has a void of 0 between 0 and 1, not a picture of its rounding.
+        """
+        values, scale = self.fields[name][0], self.scales[name]
+        values = values[np.isfinite(values)]
+        low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)
+        noise = self.noise(name)
+        if high - low > noise * max(scale, abs(low), abs(high)):
+            return (0.0 if name == "r" else low), high
+        size = 0.5 * (low + high)
+        return (min(0.0, size), max(0.0, size)) if abs(size) > noise * scale else (0.0, scale)
 
     @property
     def fronts(self) -> dict[str, float]:
@@ -88,34 +126,59 @@ def collect(solution: Solution) -> Picture | None:
     stride = (nx, ny)
     fields = {name: (gather(grid, values, stride), unit) for name, (values, unit) in problem.physical(solution.fields).items()}
     quantities = problem.quantities(solution.fields)
-    sign, liquid = np.empty(0), np.empty(0)
+    scales = {
+        name: grid.reduce.max(np.abs(np.where(np.isfinite(values), values, 0.0))) or 1.0
+        for name, (values, _) in problem.physical(solution.fields).items()
+    }
+    sign, void = np.empty(0), np.empty(0)
     more: dict[str, Any] = {}
+    if isinstance(problem, BoxProblem):
+        scales["f"] = problem.scales(solution.fields["v"])[1]
     if isinstance(problem, LubricationProblem):
-        s = problem.scheme
-        passing = (s.couette_E.ravel() + s.b_C.ravel() * solution.fields["r"]) / (problem.U * point_weights(grid))
-        liquid = gather(grid, passing, stride)
-        sign = gather(grid, cavity_sign(problem, solution.fields["p"], solution.fields["r"]), stride)
+        r = solution.fields["r"]
+        signs = cavity_sign(problem, solution.fields["p"], r)
+        least = trace(solution)
+        signs = np.where(signs < -least, signs, np.maximum(signs, least))  # a void that says nothing is none
+        sign, void = gather(grid, signs, stride), gather(grid, void_at_faces(problem, r, signs), stride)
+        scales |= {"p": _pressure_scale(problem), "r": 1.0}
         rows = taken(grid.shape[1], ny) if grid.dim == 2 else np.zeros(1)
         more = {
-            "ahead": 0.0 if np.array_equal(s.couette_E, problem.U * s.h) else 0.5 * grid.spacing[0],
+            "ahead": ahead(problem),
             "middle": int(np.argmin(np.abs(rows - middle_row(problem)))),
             "exact": problem.exact() if problem.exact is not None else None,
         }
     if grid.comm.rank > 0:
         return None
     x, *y = coordinates(grid, stride)
-    return Picture(solution, x, y[0] if y else np.empty(0), fields, quantities, sign, liquid, **more)
+    return Picture(solution, x, y[0] if y else np.empty(0), fields, quantities, scales, sign, void, **more)
+
+
+def trace(solution: Solution) -> float:
+    """The void that says nothing: rounding, or what the certificate's own tolerance allows (interior methods leave some)."""
+    return max(NOISE, solution.certificate.tol)
+
+
+def _pressure_scale(problem: LubricationProblem) -> float:
+    """What the wall's motion can raise in the thickest film, or what the sides have, Pa. Collective."""
+    h = problem.reduce.max(problem.scheme.h)
+    mu = problem.reduce.max(np.atleast_1d(problem.mu))  # that of a fluid may differ from point to point
+    viscous = 6.0 * mu * abs(problem.U) * problem.grid.lengths[0] / h**2
+    return max(viscous, *map(abs, problem.p_sides), abs(problem.p_c)) or 1.0
 
 
 def title(picture: Picture) -> str:
     """Scene, grid and the figures that an engineer asks for; a run that failed says so."""
     solution, values = picture.solution, picture.quantities
     shape = " x ".join(map(str, solution.problem.grid.shape))
-    parts = [f"{solution.settings.get('scene', '')} ({shape} points)"]
+    parts = [f"{solution.settings.get('scene', '')} ({shape} point{'s' * (shape != '1')})"]
     if not solution.converged:
         return f"{parts[0]}: NOT a solution, {solution.outcome.sentence}"
+    if (now := values.get("t_end")) is not None:
+        parts.append(f"at the end, $t$ = {now:.4g}")
     if values.get("p_max") is not None:
-        parts.append(f"$p_{{max}}$ {quantity(values['p_max'], picture.fields['p'][1])}".rstrip())
+        largest_p = quantity(values["p_max"], picture.fields["p"][1]).rstrip()
+        when = "" if now is None else f" at $t$ = {values['p_max_time']:.4g}"
+        parts.append(f"$p_{{max}}$ {'was ' * bool(when)}{largest_p}{when}")
     if picture.load is not None:
         parts.append(f"load {quantity(picture.load, 'N/m' if picture.y.size == 0 else 'N')}")
     if values.get("sommerfeld") is not None:

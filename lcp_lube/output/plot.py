@@ -11,16 +11,18 @@ from ..errors import InputError
 from ..problems.solution import Solution
 from .files import replacing
 from .journal import journal
-from .panels import colour_map, map_shape, outline, section
-from .picture import Picture, collect, scaled, title
+from .maps import FLAT, height, outline, panels, shape
+from .panels import section
+from .picture import Picture, collect, title
 from .style import BLUE, NAMES, RED, STYLE, fewer_colours, new_figure
-from .units import quantity
+from .units import prefix, quantity
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 DOTS = 130  # an inch, in a .png
+WIDE = 9.6  # inches: pictures with several maps
 
 
 def plot(solution: Solution, path: str | Path) -> None:
@@ -71,16 +73,15 @@ def _film_line(picture: Picture) -> Figure:
 
 def _film_maps(picture: Picture) -> Figure:
     """Maps of p, r and h with the cavity's outline above a section: on the middle line, or where the pressure is larger."""
-    maps = 1.1 + 2.3 * min(map_shape(picture) or 1.0, 1.0)  # inches; flat maps leave no empty space
-    figure = new_figure(9.6, maps + 3.55)
+    maps = height(picture, 3, WIDE)
+    figure = new_figure(WIDE, maps + 3.55)
     halves: Any = figure.subfigures(2, 1, height_ratios=[maps, 3.55])
     above, below = halves
     p = picture.fields["p"][0]
     row = int(np.argmax(p)) // picture.x.size
     if p[picture.middle].max() > 0.999 * p[row].max():
         row = picture.middle
-    for axes, name in zip(above.subplots(1, 3), ("p", "r", "h"), strict=True):
-        colour_map(above, axes, picture, name)
+    for name, axes in panels(above, picture, ("p", "r", "h")).items():
         axes.axhline(picture.across[0] * picture.y[row], color="black", alpha=0.4, lw=1.4)
         axes.axhline(picture.across[0] * picture.y[row], color="white", lw=0.9, ls=(0, (6, 4)))
         if name != "h":
@@ -112,16 +113,22 @@ def _lines(picture: Picture) -> Figure:
     panels = figure.subplots(len(picture.fields), 1, sharex=True, squeeze=False)[:, 0]
     scale, label_x = picture.along
     for axes, (name, (values, unit)) in zip(panels, picture.fields.items(), strict=True):
-        values, label = scaled(values, unit)
-        axes.plot(scale * picture.x, values, color=BLUE, lw=1.8)
-        axes.set_ylabel(NAMES.get(name, name) + label)
+        low, high = picture.limits(name)
+        factor, unit = prefix(max(abs(low), abs(high)), unit)
+        axes.plot(scale * picture.x, factor * values, color=BLUE, lw=1.8)
+        margin = 0.05 * (high - low)
+        axes.set(
+            ylabel=NAMES.get(name, name) + (f" ({unit})" if unit else ""),
+            ylim=(factor * (low - margin), factor * (high + margin)),
+        )
     panels[-1].set_xlabel(label_x)
     return figure
 
 
 def _maps(picture: Picture) -> Figure:
     """Any fields in 2D, side by side."""
-    figure = new_figure(4.6 * len(picture.fields), 4.8)
-    for axes, name in zip(figure.subplots(1, len(picture.fields), squeeze=False)[0], picture.fields, strict=True):
-        colour_map(figure, axes, picture, name)
+    count = len(picture.fields)
+    width = WIDE if shape(picture) < FLAT else 4.6 * count
+    figure = new_figure(width, 0.3 + height(picture, count, width))
+    panels(figure, picture, [*picture.fields])
     return figure

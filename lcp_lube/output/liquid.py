@@ -1,0 +1,69 @@
+"""How much of the gap is filled, where a picture shows it: at the faces, from what passes there, and between them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..base.parallel import Array
+from ..problems.film.flows import point_weights
+from ..problems.film.lubrication import LubricationProblem
+
+if TYPE_CHECKING:
+    from .picture import Picture
+
+NOISE = 1e-9  # of a field's scale: less is rounding and is not drawn
+
+
+def ahead(problem: LubricationProblem) -> float:
+    """How far (m) from a point to where the scheme knows the void: half a spacing, or 0 (scheme 'upwind'). Collective."""
+    s, weight = problem.scheme, point_weights(problem.grid).reshape(problem.grid.box)
+    apart = np.where(s.couette_E == 0.0, 0.0, s.couette_E / weight - problem.U * s.h)
+    return 0.5 * problem.grid.spacing[0] if problem.reduce.max(np.abs(apart)) > 0.0 else 0.0
+
+
+def void_at_faces(problem: LubricationProblem, r: Array, sign: Array) -> Array:
+    """Void fraction at the east face of each owned point. Collective.
+
+    A full cell carries couette_E, and b_C r less where there is void: their ratio is the void's share, also where the film
+    jumps inside the cell and couette_E / U is not the film at the face. Between two points of the cavity nothing but the
+    wall moves the liquid, so that its thickness is what passes over U, whatever the film does there.
+
+    Parameters
+    ----------
+    r : void fraction at the owned points. sign : `fronts.cavity_sign` there.
+    """
+    grid, s = problem.grid, problem.scheme
+    r, sign = r.reshape(grid.box), sign.reshape(grid.box)
+    moves = np.abs(s.couette_E) > 0.0  # nothing passes a closed side or a wall at rest
+    full = np.where(moves, s.couette_E, 1.0)
+    void = np.where(moves, -s.b_C * r / full, r)
+    at = ahead(problem)
+    h = np.broadcast_to(problem.film(grid.x + at, grid.y), grid.box)
+    speed = problem.U * point_weights(grid).reshape(grid.box) * h
+    layer = (s.couette_E + s.b_C * r) / np.where(moves, speed, 1.0)
+    beyond = grid.ghosted(sign.ravel())[1:-1, 2:] if at else sign
+    inside = moves & (sign < 0.0) & (beyond < 0.0)
+    return np.where(inside, 1.0 - np.minimum(layer, 1.0), void).ravel()
+
+
+def liquid_line(picture: Picture, row: int | None, x: Array) -> tuple[Array, Array, Array]:
+    """Places of the faces of a row (m), from end to end, the void fraction there, and the liquid's thickness (m) at x.
+
+    Around a point of the full film the share of the gap that is filled is taken to vary linearly from face to face, so that
+    a full film stays full across an edge; around a point of the cavity the thickness is, and the void takes what is left.
+    """
+    problem: Any = picture.solution.problem
+    grid = problem.grid
+    start, end = grid.origin[0], grid.origin[0] + grid.lengths[0]
+    r, sign = (field if row is None else field[row] for field in (picture.void, picture.sign))
+    entering = {"open": 0.0, "periodic": r[-1]}.get(grid.ends[0][0], r[0])
+    faces = np.concatenate([[start], picture.x + picture.ahead, [end]])
+    fed = grid.ends[0][1] == "open" and problem.p_sides[1] > 0.0  # the side itself is full
+    r = np.concatenate([[entering], r, 0.0 * r[-1:] if fed else r[-1:]])
+    h = picture.film(row, x)
+    share = (1.0 - np.interp(x, faces, r)) * h
+    layer = np.interp(x, faces, (1.0 - r) * picture.film(row, faces))
+    nearest = np.searchsorted(0.5 * (picture.x[1:] + picture.x[:-1]), x)
+    return faces, r, np.where(sign[nearest] < 0.0, np.minimum(layer, h), share)
