@@ -168,10 +168,23 @@ def test_breakdown_is_heard_of(petsc_options, rows):
 
 @pytest.mark.parametrize("ranks", [2, 3])
 def test_in_parallel(cli, ranks):
-    """Each rank its own block; the view, and an end without a crash."""
-    done = cli("solve", "bratu", "--nx", 41, "--ny", 22, "--recipe", "ainv", "--json", "-ksp_view", ":view.txt", ranks=ranks)
+    """The counts of one rank but for rounding, more with a block a rank; the view, and an end without a crash."""
+    words = ("solve", "bratu", "--nx", 41, "--ny", 22, "--method", "newton", "--recipe", "ainv", "--json")
+    one = cli(*words).json["linear_iterations"]
+    done = cli(*words, "-ksp_view", ":view.txt", ranks=ranks)
     assert done.status == 0, done.err
-    assert done.json["converged"] and 0 < done.json["linear_iterations"] < 120
+    assert done.json["converged"] and abs(done.json["linear_iterations"] - one) <= 3
+    block = cli(*words, "-pc_ainv_block", ranks=ranks)
+    assert block.json["converged"] and one < block.json["linear_iterations"] < 120
+
+
+def test_the_inverse_on_two_ranks(cli):
+    """Without dropping the whole inverse: one iteration a step, which no inverse of the blocks can give."""
+    words = ("solve", "bratu", "--n", 12, "--method", "newton", "--json", "-ksp_type", "gmres", "-pc_type", "python")
+    words = (*words, "-pc_python_type", "lcp_lube.linear.pc.ainv.AINV", "-pc_ainv_drop", 0)
+    whole, block = (cli(*words, *more, ranks=2).json for more in ((), ("-pc_ainv_block",)))
+    assert whole["converged"] and whole["linear_iterations"] == whole["iterations"]
+    assert block["converged"] and block["linear_iterations"] > 2 * block["iterations"]
 
 
 @pytest.mark.parametrize(("options", "named"), [

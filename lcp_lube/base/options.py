@@ -102,7 +102,7 @@ def known_names() -> list[str]:
         pc_sor_its pc_hypre_type pc_hypre_boomeramg_strong_threshold pc_hypre_boomeramg_coarsen_type
         pc_hypre_boomeramg_interp_type pc_hypre_boomeramg_relax_type_all pc_gamg_type pc_gamg_threshold pc_mg_levels
         pc_fieldsplit_type pc_fieldsplit_schur_fact_type pc_fieldsplit_schur_precondition pc_python_type pc_composite_pcs
-        ksp_python_type pc_ainv_drop pc_fsai_power cimmino_partition cimmino_blocks
+        ksp_python_type pc_ainv_drop pc_ainv_block pc_fsai_power cimmino_partition cimmino_blocks
         sub_ksp_type sub_pc_type sub_pc_factor_levels sub_pc_factor_mat_solver_type mat_type mat_view log_view
         mat_mumps_icntl_14 mat_mumps_icntl_4 options_left options_file options_view""".split()  # noqa: SIM905
     return sorted({*usual, *(key for name in recipe_names() for key in read_recipe(name))})

@@ -19,13 +19,16 @@ class AINV:
 
     W' A Z ~ D with unit upper triangular Z and W, made by biconjugation of the unit vectors (Benzi and Tuma, SIAM J. Sci.
     Comput. 19, 1998, 968-994): setting up and applying need products alone, no triangular solves. For a symmetric matrix
-    W = Z and half the work. On several ranks each has the approximate inverse of its own diagonal block (block Jacobi).
-    The matrix is first scaled to largest entries 1 in each row and column, so that one drop tolerance fits all.
+    W = Z and half the work. The matrix is first scaled to largest entries 1 in each row and column, so that one drop
+    tolerance fits all. On several ranks the factors are those of the whole matrix, as on one: the columns of Z are made one
+    after the other, so every rank gathers the matrix and makes them all; applying them is distributed.
 
     Options, each after the PC's own prefix
     ---------------------------------------
     -pc_ainv_drop : entries of Z and W smaller than this in modulus are left out as they arise; default 0.05. 0 drops
-        nothing and gives the inverse of the block, which is a full matrix.
+        nothing and gives the inverse, which is a full matrix.
+    -pc_ainv_block : each rank factorises its own diagonal block alone (block Jacobi): a set-up that scales in seconds and
+        memory, and counts that grow with the ranks; default false.
 
     Raises
     ------
@@ -34,8 +37,12 @@ class AINV:
         the dropping has destroyed it. Smaller drop tolerances help against the second.
     """
 
+    def __init__(self) -> None:
+        self._factors: tuple[PETSc.Mat, ...] = ()
+
     def setFromOptions(self, pc: PETSc.PC) -> None:
         prefix = pc.getOptionsPrefix() or ""
+        self.block = PETSc.Options(prefix).getBool("pc_ainv_block", False)
         self.drop = PETSc.Options(prefix).getReal("pc_ainv_drop", 0.05)
         if not 0 <= self.drop < 1:
             raise InputError(f"-{prefix}pc_ainv_drop {self.drop:g}: allowed are numbers from 0 to below 1")
@@ -44,25 +51,66 @@ class AINV:
         mat = pc.getOperators()[1]
         if mat.getType() not in ("seqaij", "mpiaij"):
             raise InputError(f"AINV: a matrix of type aij is needed, not {mat.getType()}")
-        pointers, columns, values = mat.getDiagonalBlock().getValuesCSR()
-        n = len(pointers) - 1
-        self._Z, self._Wt, failed = factorise(sp.csr_matrix((values, columns, pointers), shape=(n, n)), self.drop)
         comm = mat.comm.tompi4py()
+        A = _rows(mat.getDiagonalBlock()) if self.block or comm.size == 1 else _whole(mat)
+        Z, DW, failed = factorise(A, self.drop)
         failures = [(rank, column) for rank, column in enumerate(comm.allgather(failed)) if column >= 0]
         if failures:
             rank, column = failures[0]
-            where = f", rank {rank}" if comm.size > 1 else ""
+            where = f", rank {rank}" if self.block and comm.size > 1 else ""
             raise LinearSolverError(f"AINV with -pc_ainv_drop {self.drop:g}: zero or infinite pivot in column {column}{where}")
+        self._fill = (Z.nnz + DW.nnz) / max(A.shape[0], 1)
+        self._free()
+        self._factors = tuple(_distributed(factor, mat) for factor in (DW, Z))
+        self._middle = mat.createVecRight()
 
     def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        y.setArray(self._Z @ (self._Wt @ x.array_r))
+        DW, Z = self._factors
+        DW.mult(x, self._middle)
+        Z.mult(self._middle, y)
 
     def applyTranspose(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        y.setArray(self._Wt.T @ (self._Z.T @ x.array_r))
+        DW, Z = self._factors
+        Z.multTranspose(x, self._middle)
+        DW.multTranspose(self._middle, y)
 
     def view(self, pc: PETSc.PC, viewer: PETSc.Viewer) -> None:
-        fill = (self._Z.nnz + self._Wt.nnz) / max(self._Z.shape[0], 1) if hasattr(self, "_Z") else 0.0
-        viewer.printfASCII(f"  AINV: drop tolerance {self.drop:g}, {fill:.1f} entries a row in Z and W on rank 0\n")
+        fill = f", {self._fill:.1f} entries a row in Z and W on rank 0" if self._factors else ""
+        viewer.printfASCII(f"  AINV: drop tolerance {self.drop:g}{fill}\n")
+
+    def _free(self) -> None:
+        if self._factors:
+            for obj in (*self._factors, self._middle):
+                obj.destroy()
+            self._factors = ()
+
+    def destroy(self, pc: PETSc.PC) -> None:
+        self._free()
+
+
+def _rows(mat: PETSc.Mat) -> sp.csr_matrix:
+    """A sequential matrix."""
+    pointers, columns, values = mat.getValuesCSR()
+    return sp.csr_matrix((values, columns, pointers), shape=mat.getSize())
+
+
+def _whole(mat: PETSc.Mat) -> sp.csr_matrix:
+    """The whole matrix, on every rank. Collective."""
+    pointers, columns, values = mat.getValuesCSR()
+    parts = mat.comm.tompi4py().allgather((np.diff(pointers), columns, values))
+    lengths, columns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return sp.csr_matrix((values, columns, np.concatenate([[0], np.cumsum(lengths)])), shape=mat.getSize())
+
+
+def _distributed(factor: sp.csr_matrix, mat: PETSc.Mat) -> PETSc.Mat:
+    """A factor of the whole matrix or of this rank's block, its rows distributed as those of `mat`. Collective."""
+    first, end = mat.getOwnershipRange()
+    whole = factor.shape[0] == mat.getSize()[0]
+    own = (factor[first:end] if whole else factor).tocsr()
+    own.sort_indices()
+    columns = own.indices if whole else own.indices + first
+    csr = (own.indptr.astype(PETSc.IntType), columns.astype(PETSc.IntType), own.data)
+    return PETSc.Mat().createAIJ(mat.getSizes(), csr=csr, comm=mat.comm)
 
 
 def factorise(A: sp.csr_matrix, drop: float) -> tuple[sp.csr_matrix, sp.csr_matrix, int]:
