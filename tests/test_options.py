@@ -1,5 +1,6 @@
 """Recipes and PETSc options: every one read, the user's before the recipe's, misspelt ones refused."""
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -7,6 +8,7 @@ from recipes import attempt, faults, one_rank
 
 from lcp_lube import InputError, load_scene, solve
 from lcp_lube.base.options import check_unread, explain_error, known_names, recipe, set_names, unread
+from lcp_lube.drivers.plan import plan
 from lcp_lube.registry import read_recipe, recipe_line, recipe_names
 
 
@@ -135,3 +137,32 @@ def test_known_names_hold_the_recipes():
 def test_any_error_is_told_in_one_line(text):
     line = explain_error(Exception(text))
     assert line and len(line.splitlines()) == 1
+
+
+@pytest.mark.parametrize("name", ["ksp_monitor", "ksp_view", "pc_factor_shift_type", "mat_type", "mat_mumps_icntl_14"])
+def test_an_option_of_a_ksp_is_a_wish_for_one(petsc_options, name):
+    """Nonlinear multigrid, which solves no linear system, is not what 'auto' takes then."""
+    problem = load_scene("problem4", {"n": 12}).build()
+    chosen = [plan(problem, "problem4").method]
+    petsc_options(**{name: "dense" if name == "mat_type" else None})
+    chosen.append(plan(problem, "problem4").method)
+    problem.destroy()
+    assert chosen == ["fas", "active-set"]
+
+
+@pytest.mark.parametrize("system", ["full", "reduced"])
+def test_dense_matrices_by_lapack(petsc_options, system):
+    sparse = solve("problem4", n=9, system=system)
+    petsc_options(mat_type="dense")
+    dense = solve("problem4", n=9, system=system)
+    assert sparse.converged and dense.converged and dense.settings["recipe"] == "dense_lu"
+    np.testing.assert_allclose(dense.fields["p"], sparse.fields["p"], rtol=1e-10, atol=1e-12)
+    for solution in (sparse, dense):
+        solution.destroy()
+
+
+@pytest.mark.parametrize("kind, recipe_name", [("dense", "superlu"), ("sbaij", None)])
+def test_a_matrix_type_that_does_not_fit_is_named(petsc_options, kind, recipe_name):
+    petsc_options(mat_type=kind)
+    with pytest.raises(InputError, match=f"^-mat_type {kind}: PETSc: .* without this option the matrix is aij$"):
+        solve("problem1", n=20, recipe_name=recipe_name)

@@ -15,6 +15,8 @@ from ..registry import read_recipe, recipe_names
 LATE = {"log_view", "options_left", "options_view", "malloc_dump", "malloc_view", "memory_view", "objects_dump", "citations"}
 # Options that mean nothing without a value: PETSc takes its default in silence.
 VALUED = re.compile(r"(_type|_[ard]tol|divtol|_max_it|_levels|_restart|_overlap|_omega|_its|_blocks|_icntl_\d+|_pcs)$")
+# Options that only a linear solver heeds: they are a wish for one.
+LINEAR = re.compile(r"ksp_|pc_|sub_|mg_|fieldsplit_|redundant_|mat_(type|mumps_|superlu|umfpack_|solver)")
 # What PETSc says of a word that it does not know.
 KINDS = (
     (r"requested (KSP type) (\S+)", PETSc.KSP.Type),
@@ -27,6 +29,16 @@ KINDS = (
 def set_names() -> set[str]:
     """Names of all options that are set, without their dash."""
     return set(PETSc.Options().getAll())
+
+
+def names_solver() -> bool:
+    """Whether a -ksp_type or -pc_type is set: no inner solver of ours is wanted."""
+    return not {"ksp_type", "pc_type"}.isdisjoint(set_names())
+
+
+def wants_ksp() -> bool:
+    """Whether an option is set that only a KSP, its preconditioner or its matrix can heed: -ksp_monitor, -mat_type dense."""
+    return any(LINEAR.match(name) for name in set_names())
 
 
 @contextmanager
@@ -133,6 +145,9 @@ def explain_error(error: PETSc.Error) -> str:
             legal = [value for key, value in vars(enum).items() if not key.startswith("_")]
             return f"{option(word)}: no such {found[1]} in this PETSc{'' if word in legal else nearest(word, legal)}"
     words = set(re.findall(r"[a-z]{4,}", text.lower()))
+    if (kind := given.get("mat_type", "aij")) != "aij" and re.search(r"matrix type|[Mm]atrix must be", text):
+        text = text.rstrip(".")
+        return f"-mat_type {kind}: PETSc: {text}; without this option the matrix is aij"
     culprit = next(
         (
             f"-{key} {value}: "

@@ -8,7 +8,7 @@ from typing import Any
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from ..base.options import set_names
+from ..base.options import wants_ksp
 from ..errors import InputError
 from ..problems.solution import Fields, Problem, Solution
 from ..solvers.newton import Monitor, Stopping
@@ -87,7 +87,7 @@ class Ask:
     def named(self) -> bool:
         """Whether a method, a matrix or an inner solver was named: those of the whole scene are meant."""
         chosen = (self.method, self.system) != ("auto", "auto") or self.recipe or self.options
-        return bool(chosen or {"ksp_type", "pc_type"} & set_names())
+        return bool(chosen or wants_ksp())
 
     @property
     def choices(self) -> tuple[Any, ...]:

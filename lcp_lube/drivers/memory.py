@@ -161,7 +161,7 @@ def bytes_needed(facts: Facts, plan: Plan) -> float | None:
     if facts.dense:
         return DENSE * points**2 * (facts.ranks if plan.recipe == "redundant_lu" else 1)
     options = PETSc.Options().getAll()
-    if plan.system and options.get("mat_type", "") == "dense":
+    if plan.system and "dense" in options.get("mat_type", ""):
         return DENSE_COPY * (2 * points if plan.system == "full" else points) ** 2
     solver = inner_solver() if plan.system else ""
     known = {name: fit for (of, system, name), fit in MEASURED.items() if (of, system) == (kind, plan.system)}

@@ -6,7 +6,7 @@ from importlib.util import find_spec
 
 from petsc4py import PETSc
 
-from ..base.options import set_names
+from ..base.options import names_solver, wants_ksp
 from ..errors import InputError, nearest
 from ..problems.facts import Facts
 from ..registry import DEFAULT_METHOD, METHODS, SMALL, SMALL_BOX
@@ -77,7 +77,7 @@ def plan(facts: Facts, ask: Ask, scene: str) -> Plan:
             why.append("nested: the front found on a coarser grid leaves a few steps on this one")
     elif nested and not entry.nested:
         raise InputError(f"--nested: method {method} does not start from a coarser grid")
-    if recipe is None and not {"ksp_type", "pc_type"} & set_names():
+    if recipe is None and not names_solver():
         recipe, reason = default_recipe(facts, system, large)
         why.append(f"recipe {recipe}: {reason}")
     return Plan(method, system, recipe, nested, why)
@@ -86,12 +86,12 @@ def plan(facts: Facts, ask: Ask, scene: str) -> Plan:
 def _suits_multigrid(facts: Facts) -> bool:
     """Whether nonlinear multigrid is the fastest: in 2D, its loops compiled, nobody having asked for an inner solver."""
     plane = facts.kind == "lubrication" and facts.dim == 2 and not any(facts.periodic)
-    return plane and find_spec("numba") is not None and not {"ksp_type", "pc_type"} & set_names()
+    return plane and find_spec("numba") is not None and not wants_ksp()
 
 
 def default_recipe(facts: Facts, system: str, large: bool) -> tuple[str, str]:
     """The inner solver that this PETSc has for this system, size and number of ranks, and why."""
-    has = PETSc.Sys.hasExternalPackage
+    has, dense = PETSc.Sys.hasExternalPackage, "dense" in PETSc.Options().getAll().get("mat_type", "")
     if facts.kind in ("lubrication", "equations") and system != "full" and large:
         reason = "a large 2D M-matrix: multigrid costs the same per point on every grid"
         if has("hypre"):
@@ -101,7 +101,7 @@ def default_recipe(facts: Facts, system: str, large: bool) -> tuple[str, str]:
     if facts.kind == "box" and large:
         return "multigrid", "a large problem with coarser grids: multigrid costs the same per point on every grid"
     ranks = facts.ranks
-    if facts.dense:
+    if facts.dense or dense:
         return ("redundant_lu" if ranks > 1 else "dense_lu"), "a dense Jacobian: LAPACK"
     if facts.dim == 1 and system == "reduced" and ranks == 1:
         return "banded", "tridiagonal, an M-matrix: elimination in natural order, without pivoting or fill"
