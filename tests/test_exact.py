@@ -13,6 +13,8 @@ from scipy.optimize import brentq
 from lcp_lube.errors import InputError
 from lcp_lube.problems.film.exact import exact_solution
 from lcp_lube.problems.film.gaps import FORMS, SHAPES, Wave
+from lcp_lube.problems.film.profile import PiecewiseLinear
+from lcp_lube.problems.film.shapes import Sum
 
 CD, DC = FORMS
 L, MU, U = 0.1, 0.015, 5.0
@@ -347,3 +349,12 @@ def test_ends_that_rounding_sets_apart(ulps):
     one, two = (exact_solution(film, L, MU, U, 1e6, 1e6) for film in ends)
     for name in ("rupture", "reformation", "Q", "p_max", "x_max", "load"):
         assert getattr(two, name) == pytest.approx(getattr(one, name), rel=1e-12)
+
+
+def test_profiles_of_any_number_of_points():
+    """A long profile brings its own panels, more than others need."""
+    x = np.linspace(0.0, 0.05, 3001)
+    film = PiecewiseLinear(x, np.zeros(1), (1e-5 + 5e-6 * np.cos(200 * x))[None, :], "linear")
+    coarse = PiecewiseLinear(x[::3], np.zeros(1), film.z[:, ::3], "linear")
+    fine, few = (exact_solution(Sum([part]), 0.05, 0.01, 1.0, 0.0, 0.0) for part in (film, coarse))
+    assert fine.p_max == pytest.approx(few.p_max, rel=1e-3) and fine.load == pytest.approx(few.load, rel=1e-3)

@@ -210,7 +210,9 @@ def _flux(film: Film, x: Array, mu: float, U: float, p_a: float, p_b: float) -> 
 def _panels(film: Film, L: float) -> Array:
     """Return ends of panels on which 16 Gauss points integrate h^-3 to rounding, shape (n,), from 0 to L."""
     pieces = np.unique([0.0, *(s for s in film.breakpoints() if 0 < s < L), L])
-    x = np.unique(np.concatenate([np.linspace(a, b, 5) for a, b in pairwise(pieces)]))
+    few = len(pieces) <= 1000  # the pieces of a long profile are short enough by themselves
+    x = np.unique(np.concatenate([np.linspace(a, b, 5) for a, b in pairwise(pieces)])) if few else pieces
+    most = 10_000 + 4 * len(x)
 
     def weight(t: Array) -> Array:
         h = film(t)
@@ -218,7 +220,7 @@ def _panels(film: Film, L: float) -> Array:
             raise InputError(f"h = {h.min()} .. {h.max()}: the film must be positive and finite (m)")
         return (L / h) ** 3
 
-    while len(x) < 10_000:
+    while len(x) < most:
         middle = (x[:-1] + x[1:]) / 2
         whole = _gauss(weight, x[:-1], x[1:])
         halves = _gauss(weight, x[:-1], middle) + _gauss(weight, middle, x[1:])
