@@ -3,6 +3,7 @@
 import argparse
 import csv
 import io
+import re
 import sys
 import tomllib
 from collections.abc import Callable, Iterator, Sequence
@@ -19,6 +20,7 @@ from tqdm import tqdm
 
 from ..api import solve
 from ..base.options import check_unread
+from ..base.quantity import Quantity, quantity
 from ..base.resumable import ResumableCsv
 from ..errors import InputError
 from ..output.console import say
@@ -38,6 +40,11 @@ class Axis:
 
     key: str
     values: tuple[Any, ...]
+    unit: str = ""  # of all values, in SI base units, where units were given
+
+    def given(self, value: Any) -> Any:
+        """The value as the scene is to read it, which checks its unit."""
+        return f"{value!r} {self.unit}" if self.unit else value
 
 
 def parse_axis(text: str) -> Axis:
@@ -55,24 +62,36 @@ def parse_axis(text: str) -> Axis:
         raise InputError(f"--vary {text}: {forms}")
     match [part.strip() for part in values.split(":")]:
         case [listed]:
-            return Axis(key, _listed(listed))
+            return _listed(text, key, listed)
         case [start, end, count, *log] if log in ([], ["log"]):
             pass
         case _:
             raise InputError(f"--vary {text}: {forms}")
-    try:
-        a, b, n = float(start), float(end), int(count)
-    except ValueError:
-        raise InputError(f"--vary {text}: {forms}") from None
+    first, last = quantity(start), quantity(end)
+    if first is None or last is None or not re.fullmatch(r"[+-]?\d{1,9}", count):
+        raise InputError(f"--vary {text}: {forms}")
+    a, b, n, unit = first.value, last.value, int(count), _common(text, [first, last])
     if not (isfinite(a) and isfinite(b) and 1 <= n <= MOST_POINTS):
         raise InputError(f"--vary {text}: FROM and TO must be finite, N from 1 to {MOST_POINTS}")
     if log:
         if min(a, b) <= 0:
             raise InputError(f"--vary {text}: equal ratios need FROM > 0 and TO > 0")
-        return Axis(key, tuple(_rounded(number) for number in np.geomspace(a, b, n)))
+        return Axis(key, tuple(_rounded(number) for number in np.geomspace(a, b, n)), unit)
     numbers = np.linspace(a, b, n)
     whole = all(end.lstrip("+-").isdigit() for end in (start, end)) and bool(np.all(numbers == np.rint(numbers)))
-    return Axis(key, tuple(int(number) if whole else _rounded(number) for number in numbers))
+    return Axis(key, tuple(int(number) if whole else _rounded(number) for number in numbers), unit)
+
+
+def _common(text: str, found: Sequence[Quantity]) -> str:
+    """The unit of quantities that belong together; empty if they have none.
+
+    Raises
+    ------
+    InputError : they are of different dimensions.
+    """
+    if len({one.dimension for one in found if one.unit}) > 1 or len({one.unit for one in found if one.value}) > 1:
+        raise InputError(f"--vary {text}: values of one dimension are needed, all with a unit or none")
+    return next((one.text.partition(" ")[2] for one in found if one.unit), "")
 
 
 def _rounded(number: float) -> float:
@@ -80,12 +99,17 @@ def _rounded(number: float) -> float:
     return float(f"{number:.14g}")
 
 
-def _listed(values: str) -> tuple[Any, ...]:
-    """The values of A,B,C as TOML, or as bare words."""
+def _listed(text: str, key: str, values: str) -> Axis:
+    """The values of A,B,C as TOML, as quantities, or as bare words."""
     try:
-        return tuple(tomllib.loads(f"values = [{values}]")["values"])
+        return Axis(key, tuple(tomllib.loads(f"values = [{values}]")["values"]))
     except (ValueError, RecursionError):
-        return tuple(value.strip() for value in values.split(","))
+        pass
+    words = [value.strip() for value in values.split(",")]
+    found = [one for word in words if (one := quantity(word)) is not None]
+    if len(found) < len(words):
+        return Axis(key, tuple(words))
+    return Axis(key, tuple(one.value for one in found), _common(text, found))
 
 
 @dataclass
@@ -156,7 +180,8 @@ def sweep(
     if prod(len(axis.values) for axis in axes) > MOST_POINTS:
         raise InputError(f"--vary: {prod(len(axis.values) for axis in axes)} points; at most {MOST_POINTS} are allowed")
     keys = [axis.key for axis in axes]
-    plan = [(moved, point, scene_at(point)) for moved, point in points(axes)]
+    reads = {axis.key: axis.given for axis in axes}
+    plan = [(moved, point, scene_at({key: reads[key](value) for key, value in point.items()})) for moved, point in points(axes)]
     comm = MPI.COMM_WORLD
     store = ResumableCsv(path, keys, ["digest"], comm, growing=True) if path else None
     if store:
@@ -167,7 +192,9 @@ def sweep(
             digest = sha256(f"{scene.model_dump_json()} {settings}".encode()).hexdigest()[:12]
             row = store.find(digest=digest) if store else None
             if row is None:
-                row = {**point, **_row(point, scene, solve_at, neighbours, moved if warm else None), "digest": digest}
+                as_read = {key: reads[key](value) for key, value in point.items()}
+                row = {**point, **_row(as_read, scene, solve_at, neighbours, moved if warm else None)}
+                row |= {**_data(scene), "settings": settings, "digest": digest}
                 row = store.add(row) if store else row
             rows.append(row)
             bar.set_postfix_str(f"{row['outcome']}, {row.get('iterations')} iterations")
@@ -192,6 +219,21 @@ def _row(
     else:
         solution.destroy()
     return row
+
+
+def _data(scene: Scene) -> dict[str, Any]:
+    """The scene's data as columns, 'scene.h_min [m]', so that every row says what was solved."""
+    units = scene.data_units()
+
+    def columns(value: Any, path: str) -> dict[str, Any]:
+        if isinstance(value, list) and value and isinstance(value[0], dict):
+            value = dict(enumerate(value, start=1))
+        if isinstance(value, dict):
+            return {name: one for key, inner in value.items() for name, one in columns(inner, f"{path}.{key}").items()}
+        unit = units.get(path[1:])
+        return {f"scene{path} [{unit}]" if unit else f"scene{path}": value}
+
+    return columns(scene.data_si(), "")
 
 
 def flat(data: dict[str, Any]) -> dict[str, Any]:

@@ -11,6 +11,8 @@ from scipy.interpolate import CubicSpline, RectBivariateSpline, RegularGridInter
 from ...base.parallel import Array
 from ...errors import InputError
 
+SHORT = 0.05  # of the pad, at most
+SLACK = 1.01  # of the largest step: a profile may end so much before the pad
 METHODS = {"linear": 2, "cubic": 4, "nearest": 1}  # and the points that each needs along a side
 
 
@@ -80,7 +82,9 @@ def read_profile(
         j, i = np.argwhere(~np.isfinite(z))[0]
         raise InputError(f"profile {path}: h is {z[j, i]} at x = {x[i]:g}, y = {y[j]:g} m")
     for name, line, length in zip("xy", (x, y), lengths, strict=False):
-        if line.size > 1 and not (line[0] <= 1e-6 * length and line[-1] >= (1 - 1e-6) * length):
+        # Rounded coordinates, or a step rounded and added up: an end may lie a point and some digits short.
+        slack = max(1e-6, min(SLACK * float(np.max(np.diff(line))) / length, SHORT)) * length if line.size > 1 else 0.0
+        if line.size > 1 and not (line[0] <= slack and line[-1] >= length - slack):
             raise InputError(f"profile {path}: {name} from {line[0]:g} to {line[-1]:g} m; 0 to {length:g} m is needed")
         if 1 < line.size < METHODS[method]:
             raise InputError(f"profile {path}: {line.size} points in {name}; {method} interpolation needs {METHODS[method]}")
