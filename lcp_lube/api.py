@@ -10,6 +10,7 @@ from .base.parallel import overflow_is_no_warning
 from .drivers import compose
 from .drivers.ask import Ask
 from .problems.solution import Solution
+from .scenes.doubts import doubts
 from .scenes.scene import Scene, as_scene
 
 ASKED = tuple(field.name for field in fields(Ask))
@@ -41,5 +42,6 @@ def solve(scene: str | Path | dict[str, Any] | Scene, ask: Ask | None = None, **
         check_same(ask.mpi, f"scene {scene.name} or how to solve it", (scene, ask.choices))
     compose.check(scene, ask)
     solution = compose.solve(scene, ask)
+    solution.settings |= {"scene_data": scene.data_si(), "scene_units": scene.data_units(), "warnings": doubts(scene)}
     solution.times["total"] = perf_counter() - begin
     return solution

@@ -8,6 +8,7 @@ from recipes import attempt, faults, one_rank
 
 from lcp_lube import InputError, load_scene, solve
 from lcp_lube.base.options import check_unread, explain_error, known_names, recipe, set_names, unread
+from lcp_lube.drivers.ask import Ask
 from lcp_lube.drivers.plan import plan
 from lcp_lube.registry import read_recipe, recipe_line, recipe_names
 
@@ -142,11 +143,10 @@ def test_any_error_is_told_in_one_line(text):
 @pytest.mark.parametrize("name", ["ksp_monitor", "ksp_view", "pc_factor_shift_type", "mat_type", "mat_mumps_icntl_14"])
 def test_an_option_of_a_ksp_is_a_wish_for_one(petsc_options, name):
     """Nonlinear multigrid, which solves no linear system, is not what 'auto' takes then."""
-    problem = load_scene("problem4", {"n": 12}).build()
-    chosen = [plan(problem, "problem4").method]
+    facts = load_scene("problem4", {"n": 12}).facts()
+    chosen = [plan(facts, Ask(), "problem4").method]
     petsc_options(**{name: "dense" if name == "mat_type" else None})
-    chosen.append(plan(problem, "problem4").method)
-    problem.destroy()
+    chosen.append(plan(facts, Ask(), "problem4").method)
     assert chosen == ["fas", "active-set"]
 
 
@@ -165,4 +165,4 @@ def test_dense_matrices_by_lapack(petsc_options, system):
 def test_a_matrix_type_that_does_not_fit_is_named(petsc_options, kind, recipe_name):
     petsc_options(mat_type=kind)
     with pytest.raises(InputError, match=f"^-mat_type {kind}: PETSc: .* without this option the matrix is aij$"):
-        solve("problem1", n=20, recipe_name=recipe_name)
+        solve("problem1", n=20, recipe=recipe_name)

@@ -49,6 +49,9 @@ def run_solve(args: argparse.Namespace) -> int:
         if args.explain and MPI.COMM_WORLD.rank == 0:
             print("\n".join(solution.settings["why"]), file=sys.stderr, flush=True)
         data = as_dict(solution)
+        if MPI.COMM_WORLD.rank == 0:
+            for doubt in data["warnings"]:
+                print(f"lcp-lube: warning: {doubt}", file=sys.stderr, flush=True)
         say(json.dumps(finite(data)) if args.json else summary(data))
         failed = []  # a file that cannot be written costs neither the result nor the other files
         for path in args.output:

@@ -13,6 +13,7 @@ from petsc4py import PETSc
 from .. import __version__
 from ..drivers.memory import peak
 from ..problems.solution import Solution
+from ..scenes.doubts import too_high
 from .units import place, quantity
 
 
@@ -23,6 +24,7 @@ def as_dict(solution: Solution) -> dict[str, Any]:
     certificate, settings = solution.certificate, solution.settings
     last = solution.steps[-1] if solution.steps else None
     times = solution.times
+    quantities = problem.quantities(solution.fields)
     return {
         "scene": settings.get("scene"),
         "nx": grid.shape[0],
@@ -39,7 +41,7 @@ def as_dict(solution: Solution) -> dict[str, Any]:
         "linear_iterations": solution.total("linear_iterations"),
         "c1": last.norm if last else None,
         "c2": last.step_norm if last else None,
-        **problem.quantities(solution.fields),
+        **quantities,
         **certificate.extremes,
         **certificate.measures,
         "certificate_tol": certificate.tol,
@@ -48,6 +50,8 @@ def as_dict(solution: Solution) -> dict[str, Any]:
         **({"balance": settings["balance"]} if "balance" in settings else {}),
         **settings.get("details", {}),
         **({"levels": solution.levels} if solution.levels else {}),
+        "warnings": [*settings.get("warnings", []), *too_high(quantities)],
+        **{key: settings[key] for key in ("scene_data", "scene_units") if key in settings},
         "memory_mb": peak_memory(solution),
         **{key: settings.get(key) for key in ("memory_estimate_mb", "memory_base_mb")},
         "time_s": {

@@ -4,7 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from .scene import LubricationScene, Scene
+from .published import LubricationScene
+from .scene import Scene
 
 THICK = 0.01  # h/L above which Reynolds' equation is in doubt
 DENSITY = 900.0  # kg/m3, of an oil
@@ -23,13 +24,13 @@ def doubts(scene: Scene) -> list[str]:
     for k, part in enumerate(getattr(scene, "film", []) if hasattr(scene, "side_lengths") else [], start=1):
         name = f"film {k} ({part.shape})"
         found += [f"{name}: {text}" for text in _of_a_shape(part, model.lengths)]
-    found += [f"{name}" for name in _of_profiles(model)]
-    return found
+    return found + _of_profiles(model)
 
 
-def too_high(p_max: float | None) -> list[str]:
-    """A sentence on the largest pressure, Pa."""
-    if p_max is None or not p_max > STEEL:
+def too_high(quantities: dict[str, Any]) -> list[str]:
+    """A sentence on the largest pressure of a film's quantities, Pa."""
+    p_max = quantities.get("p_max")
+    if "load" not in quantities or p_max is None or not p_max > STEEL:
         return []
     return [f"p_max = {p_max:.3g} Pa: above 3 GPa no surface holds; are film, speed and viscosity meant so?"]
 
@@ -49,7 +50,7 @@ def _of_the_film(model: Any) -> list[str]:
     reynolds = DENSITY * model.U * h / model.mu
     if reynolds > TURBULENT:
         found.append(
-            f"Re = {reynolds:.3g} (median film, {DENSITY:g} kg/m3): above some {TURBULENT:g} a film is turbulent, here it is laminar"
+            f"Re = {reynolds:.3g} (median film, {DENSITY:g} kg/m3): films above some {TURBULENT:g} are turbulent, not laminar"
         )
     return found
 
