@@ -166,6 +166,12 @@ def test_breakdown_is_heard_of(petsc_options, rows):
         thing.destroy()
 
 
+def test_nothing_to_invert():
+    """A rank without unknowns, a film without full cells."""
+    Z, DW, failed = factorise(sp.csr_matrix((0, 0)), 0.05)
+    assert Z.shape == DW.shape == (0, 0) and failed == -1
+
+
 @pytest.mark.parametrize("ranks", [2, 3])
 def test_in_parallel(cli, ranks):
     """The counts of one rank but for rounding, more with a block a rank; the view, and an end without a crash."""

@@ -96,7 +96,8 @@ def test_solution_is_one():
             contact, v = solution.problem.contact, solution.fields["v"]
             p, k = contact.split(v)
             q = contact.flow(p, contact.gap(p, k))[0][:-1]
-            touching = np.flatnonzero(p[1:-1] > 0)
+            pressure, opening = solution.problem.scaled(v)
+            touching = np.flatnonzero(pressure > opening)  # p > 0 may be a trace that rounding leaves
             assert touching[0] == 0 and np.all(np.diff(touching) == 1)  # from the inlet to x_b without a hole
             end = touching[-1] + 1
             assert np.ptp(q[: end + 1]) <= 1e-9 * q[0] and np.all(np.diff(q[end:]) > 0)

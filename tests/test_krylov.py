@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from conftest import start
 from films import FilmScene, Knots, make_problem
 from petsc4py import PETSc
 
@@ -162,3 +163,41 @@ def test_one_ksp_without_prefix(system, petsc_options):
     assert krylov.ksp.getOptionsPrefix() in (None, "")
     assert (krylov.ksp_type, krylov.pc_type, krylov.direct) == ("gmres", "jacobi", False)
     krylov.destroy()
+
+
+CYCLE = """
+import gc
+gc.disable()
+from petsc4py import PETSc
+from lcp_lube.linear.krylov import Krylov
+
+class Held:
+    def setUp(self, pc):
+        cycle = [pc]
+        cycle.append(cycle)
+
+    def apply(self, pc, x, y):
+        x.copy(y)
+
+def main():
+    mat = PETSc.Mat().createAIJ((2, 2), nnz=1, comm=PETSc.COMM_SELF)
+    for k in range(2):
+        mat[k, k] = 1.0
+    mat.assemble()
+    x, b = mat.createVecs()
+    krylov = Krylov(mat)
+    pc = krylov.ksp.getPC()
+    pc.setType("python")
+    pc.setPythonContext(Held())
+    krylov.solve(b, x, 1e-8)
+    for thing in (krylov, mat, x, b):
+        thing.destroy()
+
+main()
+"""
+
+
+def test_a_cycle_that_holds_a_pc_is_no_crash(tmp_path):
+    """As numba leaves them: PETSc, freeing the PC at its own end, calls a Python that is gone."""
+    done = start(["-c", CYCLE], 1, tmp_path, timeout=60)
+    assert done.status == 0, done.err

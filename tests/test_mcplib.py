@@ -9,12 +9,13 @@ from lcp_lube.problems.solution import Solution
 
 RUNS = [(name, start) for name, case in CASES.items() for start in case().starts]
 
-# Runs that one method alone does not solve, and how it says so. The reasons stand in benchmarks/README.md.
+# Runs that one method alone does not solve, and how it says so: where rounding decides, in one of several ways. The reasons
+# stand in benchmarks/README.md.
 INTERIOR_FAILS = {
-    ("billups", "1"): "step_length",
-    ("kojshin", "1"): "step_length",
-    ("kojshin", "6"): "max_iterations",
-    ("mathiesen", "2"): "wrong_solution",
+    ("billups", "1"): {"step_length"},
+    ("kojshin", "1"): {"step_length"},
+    ("kojshin", "6"): {"max_iterations"},
+    ("mathiesen", "2"): {"wrong_solution", "step_length"},
 }
 # Singular matrices in all of them but billups and the third of kojshin, where no step decreases the residual.
 ACTIVE_SET_FAILS = {
@@ -54,7 +55,7 @@ def test_general_solver(name, start):
 def test_interior_alone(name, start):
     """The interior point method solves the others; what it does not solve it does not call solved."""
     case, solution = run(name, start, "interior", alone=True)
-    assert str(solution.outcome) == INTERIOR_FAILS.get((name, start), "converged"), solution.message
+    assert str(solution.outcome) in INTERIOR_FAILS.get((name, start), {"converged"}), solution.message
     if solution.converged:
         assert natural_residual(case, solution.fields["v"]) <= 1e-7  # ||H|| <= 1e-10 leaves products, not min(x, F), that small
         assert case.check(solution.fields["v"])
@@ -74,10 +75,10 @@ def test_active_set_alone(name, start):
 def test_semismooth_takes_over(method, name, start):
     """Where they fail the semismooth method takes over; a wrong solution is not noticed before the certificate."""
     case, solution = run(name, start, method)
-    if method == "interior" and INTERIOR_FAILS.get((name, start)) == "wrong_solution":
-        assert not solution.converged
-        return
+    failures = {*INTERIOR_FAILS} if method == "interior" else ACTIVE_SET_FAILS
     took_over = "semismooth took over" in solution.message
-    failures = INTERIOR_FAILS if method == "interior" else ACTIVE_SET_FAILS
+    if method == "interior" and str(solution.outcome) == "wrong_solution":
+        assert "wrong_solution" in INTERIOR_FAILS[name, start]  # it ran off to 1e15, and so far away the residual vanishes
+        return
     assert took_over == ((name, start) in failures)
     assert solution.converged and natural_residual(case, solution.fields["v"]) <= (1e-10 if took_over else 1e-7)

@@ -1,5 +1,7 @@
 """One KSP, configured by options alone: tolerances, counts, and failures that are heard of."""
 
+import atexit
+import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -18,6 +20,18 @@ MUMPS_LARGEST_RESERVE = 2000
 
 class LinearSolverError(ArithmeticError):
     """The inner solver broke down; the message says how."""
+
+
+@atexit.register
+def free_garbage() -> None:
+    """Free what is kept alive by reference cycles alone while Python still runs. Collective.
+
+    PETSc would free it at its own end, and calls a python PC's methods then: a crash. numba leaves such cycles when it
+    compiles inside a PC's set-up, through the frames of exceptions that it has caught.
+    """
+    gc.collect()
+    if PETSc.Sys.isInitialized() and not PETSc.Sys.isFinalized():
+        PETSc.garbage_cleanup()
 
 
 @contextmanager

@@ -8,8 +8,9 @@ import numpy as np
 
 from ..base.parallel import Array
 from ..problems.box import BoxProblem
+from ..problems.film.cavity import cavity_sign
 from ..problems.film.exact import ExactSolution
-from ..problems.film.fronts import cavity_sign, middle_row
+from ..problems.film.fronts import middle_row
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Solution
 from .files import coordinates, gather, taken
@@ -25,7 +26,7 @@ class Picture:
     """Fields in SI as (ny, nx) arrays, or (nx,) with an empty y, thinned if large; and what is known beside them.
 
     scales : what a field's values are large or small against; differences below `noise` of it say nothing.
-    Of a lubrication problem: sign, positive in the full film and negative in the cavity (`fronts.cavity_sign`); void, the void
+    Of a lubrication problem: sign, positive in the full film and negative in the cavity (`cavity.cavity_sign`); void, the void
     fraction at the face `ahead` (m) of each point, where the scheme knows it; middle, the row of the middle line. Empty and 0
     for other problems.
     """
@@ -136,7 +137,7 @@ def collect(solution: Solution) -> Picture | None:
         scales["f"] = problem.scales(solution.fields["v"])[1]
     if isinstance(problem, LubricationProblem):
         r = solution.fields["r"]
-        signs = cavity_sign(problem, solution.fields["p"], r)
+        signs = cavity_sign(problem.reduce, solution.fields["p"], r)
         least = trace(solution)
         signs = np.where(signs < -least, signs, np.maximum(signs, least))  # a void that says nothing is none
         sign, void = gather(grid, signs, stride), gather(grid, void_at_faces(problem, r, signs), stride)

@@ -159,15 +159,18 @@ class EhlProblem(BoxProblem):
         balance: |1 - (2 dx/pi) sum p|, the part of the load that p does not carry.
         """
         v = fields["v"]
-        F = self.residual(v)
-        own = slice(v.size - self.contact.has_k)
-        p_max = self.reduce.max(np.abs(v[own])) or 1.0
-        natural = np.minimum(v[own] / p_max, F[own] / (self.contact.scale(v) or 1.0))
+        natural = np.minimum(*self.scaled(v))
         defect = self.contact.load_defect(self.contact.split(v)[0])
         return Certificate(
             measures={"residual": self.reduce.max(np.abs(natural)), "balance": abs(defect)},
             tol=certificate_tol(eps1),
         )
+
+    def scaled(self, v: Array) -> tuple[Array, Array]:
+        """p_i/p_max and F_i/s at this rank's points, both about 1 at most; the larger one holds. Collective."""
+        own = slice(v.size - self.contact.has_k)
+        p_max = self.reduce.max(np.abs(v[own])) or 1.0
+        return v[own] / p_max, self.residual(v)[own] / (self.contact.scale(v) or 1.0)
 
     def quantities(self, fields: Fields) -> dict[str, Any]:
         """k, x_b, h_min, p_max, dimensionless. Collective."""
@@ -185,8 +188,8 @@ class EhlProblem(BoxProblem):
         From the last four points with p > 0 but one, by least squares: the last one has the discrete front's error. First
         order in dx.
         """
-        own = slice(self.grid.local_size - self.contact.has_k)
-        in_contact = np.flatnonzero(fields["v"][own] > self.residual(fields["v"])[own])
+        force, opening = self.scaled(fields["v"])
+        in_contact = np.flatnonzero(force > opening)
         last = self.reduce.max(self.grid.first + in_contact + 1.0)  # numbers of points, from 1
         if last < 5 or not np.all(np.isfinite(p)):
             return None

@@ -127,6 +127,8 @@ def factorise(A: sp.csr_matrix, drop: float) -> tuple[sp.csr_matrix, sp.csr_matr
     failed : column without a usable pivot, -1 if there is none; Z and DW are then empty.
     """
     n = A.shape[0]
+    if n == 0:
+        return A, A, -1
     row, column = scaling(A)
     scaled = scale(A, row, column)
     transposed = scaled.T.tocsr()

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...base.parallel import Array
 from ..grid import Grid
+from .cavity import cavity_sign
 from .reynolds import sides
 
 if TYPE_CHECKING:
@@ -63,6 +64,7 @@ def friction(problem: LubricationProblem, p_pa: Array, r: Array) -> float:
     """
     grid, s, film = problem.grid, problem.scheme, problem.film
     dx, muU, weight = grid.spacing[0], problem.mu * problem.U, point_weights(grid).reshape(grid.box)
+    full = (cavity_sign(problem.reduce, p_pa, r) >= 0).reshape(grid.box)
     p, r = p_pa.reshape(grid.box), r.reshape(grid.box)
     first, last, south, north = sides(grid)
     walls = sides(grid, ("closed",))[:2]
@@ -72,7 +74,7 @@ def friction(problem: LubricationProblem, p_pa: Array, r: Array) -> float:
     liquid = 1.0 + s.b_C * r / np.where(passes, s.couette_E, np.inf)
     shear = np.where(passes, liquid / h_east, 0.0) + np.where(first, 1.0 / h_west, 0.0)
     for wall in walls:
-        shear = shear + np.where(wall, 0.5 * np.where(p > 0, 4.0, 1.0 - r) / s.h, 0.0)
+        shear = shear + np.where(wall, 0.5 * np.where(full, 4.0, 1.0 - r) / s.h, 0.0)
     push = np.where(passes, 0.5 * h_east * (p_east - p), 0.0) + np.where(first, 0.5 * h_west * (p - problem.p_sides[0]), 0.0)
     per_row = muU * dx * shear * (1.0 + 0.5 * south + 0.5 * north) + push
     return problem.reduce.sum(per_row * weight) * (grid.spacing[1] if grid.dim == 2 else 1.0)

@@ -1,4 +1,4 @@
-"""The cavity in the discrete fields: which points it holds, and where its fronts lie."""
+"""Where the fronts of the cavity lie, from the discrete fields."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...base.parallel import Array
+from .cavity import cavity_sign
 from .flows import point_weights
 from .reynolds import Film
 
@@ -14,16 +15,10 @@ if TYPE_CHECKING:
     from .lubrication import LubricationProblem
 
 
-def cavity_sign(problem: LubricationProblem, p: Array, r: Array) -> Array:
-    """p / max|p| - r: positive in the full film, negative in the cavity; no threshold to choose. Collective."""
-    p_max = problem.reduce.max(np.abs(p))
-    return (p / p_max if p_max > 0 else p) - r
-
-
 def fronts(problem: LubricationProblem, p: Array, r: Array) -> tuple[float | None, float | None]:
     """First rupture and first reformation behind it, in metres, in 2D along `middle_row`; None where absent. Collective.
 
-    Each front is found to its cell from the sign of p/max|p| - r and placed inside it. Rupture: where U h = Q, Q being the
+    Each front is found to its cell (`cavity.cavity_sign`) and placed inside it. Rupture: where U h = Q, Q being the
     flow along the line (p = p' = 0 there; in 1D the one flow of the discrete solution, in 2D what leaves the first cell of the
     cavity), within the cell or one beside it: the discrete front may be late. Reformation: where the pressure behind it,
     extrapolated linearly, is zero.
@@ -34,7 +29,7 @@ def fronts(problem: LubricationProblem, p: Array, r: Array) -> tuple[float | Non
     here = 0 <= row < grid.box[0]
     row = row if here else 0
     y = np.full_like(x, grid.y[row, 0])
-    z = grid.ghosted(cavity_sign(problem, p, r))[row + 1]
+    z = grid.ghosted(cavity_sign(problem.reduce, p, r))[row + 1]
     opens = [kind == "open" for kind in grid.ends[0]]
     z[0] = 1.0 if grid.x_start == 0 and opens[0] else z[0]  # the inflow boundary is full
     cavity = z < 0

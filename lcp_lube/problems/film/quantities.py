@@ -8,8 +8,9 @@ import numpy as np
 from mpi4py import MPI
 
 from ...base.parallel import Array
+from .cavity import cavity_sign
 from .flows import friction, point_weights, side_flows
-from .fronts import cavity_sign, fronts
+from .fronts import fronts
 
 if TYPE_CHECKING:
     from .lubrication import LubricationProblem
@@ -33,13 +34,13 @@ def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any
     the scene's bearing_load, else load_above_ambient; None unless that is positive. power_loss : friction U, W.
     flow : out of each side, m3/s (`flows.side_flows`). side_leakage : south and north together (2D).
     min_h, min_h_at : thinnest film and where, m, sides included.
-    cavitated_fraction : share of the points; cavitated_area : theirs, m2.
+    cavitated_fraction : share of the points (`cavity.cavity_sign`); cavitated_area : theirs, m2.
     rupture, reformation : x of the first ones, m, None where absent; in 2D on the middle line (`fronts.fronts`).
     p_unit : Pa.
     """
     grid, reduce = problem.grid, problem.reduce
     p_pa = p * problem.p_unit
-    cavity = (cavity_sign(problem, p, r) < 0).astype(float)
+    cavity = (cavity_sign(reduce, p, r) < 0).astype(float)
     weight = point_weights(grid)
     load, ambient = _load(problem, p_pa), min(p for p in open_pressures(problem) if p is not None)
     flow = side_flows(problem, p, r)

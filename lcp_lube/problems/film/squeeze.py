@@ -11,6 +11,7 @@ from ...errors import InputError
 from ..certificate import Certificate
 from ..grid import Grid
 from ..solution import Fields
+from .cavity import VOID
 from .reynolds import LARGE
 from .squeeze_step import SqueezeStep
 
@@ -106,7 +107,7 @@ class SqueezeProblem:
         self._contents = [step.h * (1.0 - r), self._contents[0]]
         p_max = self.reduce.max(p)
         # An interior method leaves a trace of void in the full film.
-        r = np.where(p <= max(p_max, self.p_wall) * r, r, 0.0)
+        r = np.where((p <= max(p_max, self.p_wall) * r) & (r > VOID), r, 0.0)
         if p_max > seen.p_max:
             seen.p_max, seen.p_max_time = p_max, self.time
         self._r = r

@@ -1,0 +1,24 @@
+"""Which points are cavitated: the one definition that quantities, fronts, friction and pictures share."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...base.parallel import Array, Reduce
+
+VOID = 1e-9  # void fraction up to which a film counts as full: below what any solve resolves, and nothing that one could see
+
+
+def cavity_sign(reduce: Reduce, p: Array, r: Array) -> Array:
+    """p / max|p| - r: negative in the cavity alone, positive (or 0) in the full film. Collective.
+
+    Contact of p with its bound is what the comparison of the two says, in units in which both are at most 1; a void fraction up
+    to VOID is none, also where p is zero all over.
+
+    Parameters
+    ----------
+    p : owned points, above the cavitation pressure, in any unit. r : void fraction there.
+    """
+    p_max = reduce.max(np.abs(p))
+    z = p / p_max if p_max > 0 else p
+    return np.where(r > VOID, z - r, np.maximum(z, 0.0))
