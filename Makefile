@@ -11,7 +11,7 @@ export PRTE_MCA_rmaps_default_mapping_policy := :oversubscribe
 # The ranks are the parallelism; threads inside each would only compete.
 export OMP_NUM_THREADS := 1
 
-.PHONY: help setup demo test test-petsc-new mutations lint format charts clean
+.PHONY: help setup demo test test-rounding test-petsc-new boundscheck mutations lint format charts clean
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | expand -t 16
@@ -29,9 +29,16 @@ demo: $(READY) ## solve problem 4 and draw it: problem4.png
 test: lint ## ruff, mypy, then all tests with their coverage
 	$(BIN)/python -m pytest -q --cov=lcp_lube --cov-report=term
 
+test-rounding: $(READY) ## the tests that rounding may move, under the kernels of other processors
+	for kernel in Haswell Prescott; do OPENBLAS_CORETYPE=$$kernel NUMBA_CPU_NAME=generic $(BIN)/python -m pytest -q -m rounding || exit; done
+
 test-petsc-new: ## the tests with the newest PETSc of PyPI, without hypre; compiles it the first time
 	tools/petsc_new.sh
 	.venv-petsc-new/bin/python -m pytest -q
+
+# Machine code that was compiled without the checks must not be taken from a cache.
+boundscheck: $(READY) ## the tests with every index of the compiled loops checked
+	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(CURDIR)/.numba_boundscheck_cache $(BIN)/python -m pytest -q
 
 mutations: $(READY) ## 2,000 damaged scenes, options and files thrown at the command line
 	LCP_LUBE_MUTATIONS=2000 $(BIN)/python -m pytest -q tests/test_mutations.py --timeout 3000

@@ -71,6 +71,7 @@ def test_errors_are_those_of_the_scheme_and_of_the_iteration(quick: Path) -> Non
     assert any(float(row["krylov"]) > 0 for row in rows)
 
 
+@pytest.mark.rounding
 def test_accuracy_that_was_asked_for_is_in_the_chart(quick: Path) -> None:
     rows = chosen(read(quick / "precision_quick.csv"), method="auto --accuracy", scene="problem1")
     assert len(rows) == 2
@@ -212,6 +213,7 @@ def test_turning_point_of_bratu() -> None:
     assert curves[0].solutions(7.0) == ()
 
 
+@pytest.mark.rounding
 def test_maps_tell_who_fails_where(quick: Path) -> None:
     rows = read(quick / "stability_conditions_quick.csv")
     assert all(converged(row) for row in chosen(rows, conditions="FCB"))
@@ -224,6 +226,7 @@ def test_maps_tell_who_fails_where(quick: Path) -> None:
     assert all(turning_point.right(row) for row in beyond)
 
 
+@pytest.mark.rounding
 def test_a_rows_command_makes_the_run_again(quick: Path, cli: Any) -> None:
     for name in ("conditions", "inner_tolerance"):
         row = read(quick / f"stability_{name}_quick.csv")[-1]
@@ -232,6 +235,7 @@ def test_a_rows_command_makes_the_run_again(quick: Path, cli: Any) -> None:
         assert again["outcome"] == row["outcome"]
 
 
+@pytest.mark.rounding
 def test_condition_31_is_lost_with_loose_inner_solves(quick: Path) -> None:
     rows = chosen(read(quick / "stability_inner_tolerance_quick.csv"), method="din")
     lost = {row["tol"]: float(row["lost_at"]) for row in rows if row["inner"].startswith("full")}
@@ -280,6 +284,7 @@ def test_log_has_one_section_a_chart(tmp_path: Path) -> None:
     assert "b.png: 1 runs, 2026-01-02, a machine, PETSc 3.18.5." in written
 
 
+@pytest.mark.rounding
 def test_mu1_stalls_at_tiny_starts_and_mu2_does_not(quick: Path) -> None:
     rows = read(quick / "starts_quick.csv")
     equal = equal_starts(rows)

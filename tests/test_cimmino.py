@@ -14,6 +14,8 @@ from lcp_lube.linear.pc.cimmino import Cimmino
 from lcp_lube.scenes.scene import load_scene
 from lcp_lube.solvers.newton import Stopping
 
+pytestmark = pytest.mark.rounding
+
 PC = {"pc_type": "python", "pc_python_type": "lcp_lube.linear.pc.cimmino.Cimmino"}
 CG = {"ksp_type": "python", "ksp_python_type": "lcp_lube.linear.pc.cimmino.CimminoCG", "pc_type": "none"}
 

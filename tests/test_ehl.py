@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 from lcp_lube import InputError, load_scene, solve
 from lcp_lube.problems.ehl import EhlProblem, LineContact
 
+pytestmark = pytest.mark.rounding
+
 # n: k, p_max, h_min and x_b of an independent program.
 REFERENCE = {
     200: (1.14870584, 1.06489626, 1.75823666, 1.2023),

@@ -7,6 +7,8 @@ from mcplib_problems import CASES, Case
 from lcp_lube import Complementarity, solve
 from lcp_lube.problems.solution import Solution
 
+pytestmark = pytest.mark.rounding
+
 RUNS = [(name, start) for name, case in CASES.items() for start in case().starts]
 
 # Runs that one method alone does not solve, and how it says so: where rounding decides, in one of several ways. The reasons

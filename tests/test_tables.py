@@ -14,6 +14,8 @@ from lcp_lube.base import origin
 from lcp_lube.studies import tables
 from lcp_lube.studies.tables import PAPERS, find_table, matches, row_command, run_command, run_published_table
 
+pytestmark = pytest.mark.rounding
+
 COUNTS = {"it": "iterations", "back": "backtracking", "cent": "centrality", "linear_it": "linear_iterations"}
 
 # Rows whose counts differ from the printed ones, and ours; benchmarks/README.md says what is known of the reasons.

@@ -123,12 +123,14 @@ class BoxProblem:
         )
 
     def quantities(self, fields: Fields) -> dict[str, Any]:
-        """contact_lower, contact_upper: points where the force of the bound exceeds the distance to it, z > s. Collective."""
+        """contact_lower, contact_upper: points where the force of the bound exceeds the distance to it, z > s, each in its own
+        scale: rounding leaves traces of both. Collective."""
         v, total = fields["v"], self.reduce.sum
-        f = self.residual(v)
+        v_scale, f_scale = self.scales(v)
+        f, v, lower, upper = self.residual(v) / f_scale, v / v_scale, self.lower / v_scale, self.upper / v_scale
         return {
-            "contact_lower": int(total((f > v - self.lower).astype(float))),
-            "contact_upper": int(total((-f > self.upper - v).astype(float))),
+            "contact_lower": int(total((f > v - lower).astype(float))),
+            "contact_upper": int(total((-f > upper - v).astype(float))),
         }
 
     def physical(self, fields: Fields) -> dict[str, tuple[Array, str]]:
