@@ -58,11 +58,14 @@ def test_no_pressure_and_no_void_is_a_full_film(films, r, p):
 def test_traces_change_nothing(films, seed, size):
     """An interior method ends beside the bounds, with p > 0 in the cavity and r > 0 in the full film."""
     solution = films[1]
-    assert solution.converged and 0.3 < quantities(solution.problem, solution.p, solution.r)["cavitated_fraction"] < 1.0
+    assert (
+        solution.converged
+        and 0.3 < quantities(solution.problem, solution.fields["p"], solution.fields["r"])["cavitated_fraction"] < 1.0
+    )
     traces = size * np.random.default_rng(seed).random((2, solution.problem.size))
-    p = np.where(solution.p > 0, solution.p, traces[0] * solution.p.max())
-    r = np.where(solution.r > 0, solution.r, traces[1])
-    one, two = quantities(solution.problem, solution.p, solution.r), quantities(solution.problem, p, r)
+    p = np.where(solution.fields["p"] > 0, solution.fields["p"], traces[0] * solution.fields["p"].max())
+    r = np.where(solution.fields["r"] > 0, solution.fields["r"], traces[1])
+    one, two = quantities(solution.problem, solution.fields["p"], solution.fields["r"]), quantities(solution.problem, p, r)
     for name in ("cavitated_fraction", "cavitated_area"):
         assert one[name] == two[name]
     for name in ("friction", "load", "rupture", "reformation"):

@@ -117,6 +117,7 @@ class Krylov:
                 self.ksp.setUp()
                 self.ksp.setUpOnBlocks()
         except PETSc.Error as error:
+            self._keep()
             if self._ready or error.ierr in ZERO_PIVOT:
                 raise LinearSolverError(explain_error(error)) from None
             raise InputError(explain_error(error)) from None
@@ -148,8 +149,13 @@ class Krylov:
             with own_errors():
                 self.ksp.solve(b, x)
         except PETSc.Error as error:
+            self._keep()
             raise LinearSolverError(explain_error(error)) from None
         return self.ksp.getConvergedReason()
+
+    def _keep(self) -> None:
+        """Never free this KSP: where PETSc has left a solve by an error, its multigrid crashes on being destroyed."""
+        self.ksp.incRef()
 
     def _enlarge_mumps(self) -> bool:
         """If MUMPS ran out of the workspace it had foreseen, which pivoting can outgrow: provide four times the reserve."""

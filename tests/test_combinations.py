@@ -1,0 +1,47 @@
+"""Every recipe, method and system on every number of ranks and kind of sides: right, refused with a reason, or failed openly.
+
+A test run takes a tenth by a fresh seed, which it prints; LCP_LUBE_SEED repeats one, `make mutations` runs everything.
+"""
+
+import json
+import os
+import random
+import subprocess
+from dataclasses import asdict
+from pathlib import Path
+
+import pytest
+from combinations import Combination, everything, tenth
+from conftest import TESTS, start
+
+ALL = "LCP_LUBE_MUTATIONS" in os.environ
+SEED = int(os.environ.get("LCP_LUBE_SEED", random.SystemRandom().randrange(10**6)))
+JOBS = 40 if ALL else 1  # for a number of ranks
+
+
+def faults(cases: list[Combination], ranks: int, folder: Path) -> tuple[list[str], list[str]]:
+    """Outcomes, and what must not be: wrong answers, exceptions, a crash, a hang."""
+    (folder / "cases.json").write_text(json.dumps([asdict(case) for case in cases]))
+    end = ""
+    try:
+        job = start([str(TESTS / "combinations.py"), "cases.json", "record"], ranks, folder, timeout=100 + 2 * len(cases))
+        end = f"status {job.status}: {job.err[-500:]}" if job.status else ""
+    except subprocess.TimeoutExpired:
+        end = "hangs"
+    lines = [json.loads(line) for line in (folder / "record").read_text().splitlines()]
+    begun, outcomes = lines[::2], lines[1::2]
+    found = [f"{case}: {out}" for case, out in zip(begun, outcomes, strict=False) if out.startswith(("WRONG", "ERROR"))]
+    if end or len(outcomes) < len(cases):
+        found.append(f"{begun[-1] if begun else 'before the first'}: {end or 'no end'}")
+    return outcomes, found
+
+
+@pytest.mark.timeout(3000)
+@pytest.mark.parametrize("part", range(JOBS))
+@pytest.mark.parametrize("ranks", [1, 2, 3])
+def test_right_or_refused_or_an_open_failure(tmp_path: Path, ranks: int, part: int) -> None:
+    print(f"LCP_LUBE_SEED={SEED}")
+    cases = [case for case in (everything if ALL else tenth)(SEED) if case.ranks == ranks][part::JOBS]
+    outcomes, found = faults(cases, ranks, tmp_path)
+    assert not found, f"LCP_LUBE_SEED={SEED}: " + "\n".join(found)
+    assert outcomes.count("converged") > 0.2 * len(outcomes)
