@@ -40,8 +40,8 @@ test-petsc-new: ## the tests with the newest PETSc of PyPI, without hypre; compi
 boundscheck: $(READY) ## the tests with every index of the compiled loops checked
 	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(CURDIR)/.numba_boundscheck_cache $(BIN)/python -m pytest -q
 
-mutations: $(READY) ## 2,000 damaged scenes, options and files thrown at the command line
-	LCP_LUBE_MUTATIONS=2000 $(BIN)/python -m pytest -q tests/test_mutations.py --timeout 3000
+mutations: $(READY) ## 2,000 damaged scenes, options and files; every recipe by method, system, sides and ranks
+	LCP_LUBE_MUTATIONS=2000 $(BIN)/python -m pytest -q tests/test_mutations.py tests/test_combinations.py --timeout 3000
 
 lint: $(READY) ## ruff and mypy
 	$(BIN)/ruff check

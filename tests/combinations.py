@@ -34,7 +34,7 @@ SIDES: dict[str, dict[str, Any]] = {
 }
 FILMS = 3  # for each of the sides and shapes
 LOOSE = 1e-8  # of the largest p, and of r
-INNER = 400  # iterations: what needs more may fail
+STEPS, INNER = 60, 200  # outer and inner iterations: what needs more may fail
 
 
 @dataclass(frozen=True)
@@ -79,8 +79,8 @@ def everything(seed: int) -> list[Combination]:
     """All of them in an order of chance; shapes and films are drawn."""
     rng = random.Random(seed)
     rows = [
-        Combination(recipe, *pair, sides, ranks, rng.choice(SHAPES), rng.randrange(FILMS))
-        for recipe, pair, sides, ranks in product(recipe_names(), pairs(), SIDES, (1, 2, 3))
+        Combination(recipe, method, system, sides, ranks, rng.choice(SHAPES), rng.randrange(FILMS))
+        for recipe, (method, system), sides, ranks in product(recipe_names(), pairs(), SIDES, (1, 2, 3))
     ]
     rng.shuffle(rows)
     return rows
@@ -130,8 +130,8 @@ def attempt(case: Combination) -> str:
             load_scene(case.scene()),
             method=case.method,
             system=case.system,
-            recipe_name=case.recipe,
-            stopping={"eps1": 1e-11, "max_it": 100},
+            recipe=case.recipe,
+            stopping={"eps1": 1e-11, "max_it": STEPS},
             memory_check=False,
         )
     except InputError as refusal:

@@ -32,7 +32,7 @@ def void_at_faces(problem: LubricationProblem, r: Array, sign: Array) -> Array:
 
     Parameters
     ----------
-    r : void fraction at the owned points. sign : `fronts.cavity_sign` there.
+    r : void fraction at the owned points. sign : `cavity.cavity_sign` there.
     """
     grid, s = problem.grid, problem.scheme
     r, sign = r.reshape(grid.box), sign.reshape(grid.box)
