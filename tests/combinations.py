@@ -4,6 +4,7 @@ As a script: runs a list of them on the ranks that it is started on; before and 
 """
 
 import json
+import os
 import random
 import sys
 from dataclasses import asdict, dataclass
@@ -156,14 +157,13 @@ def main(file: Path, record: Path) -> None:
     from petsc4py import PETSc
 
     PETSc.Options().setValue("ksp_max_it", str(INNER))
-    with record.open("w") as out:
+    with (record if MPI.COMM_WORLD.rank == 0 else Path(os.devnull)).open("w") as out:
         for row in json.loads(file.read_text()):
             case = Combination(**{**row, "shape": tuple(row["shape"])})
             for say in (lambda case: asdict(case), attempt):
                 words = say(case)
-                if MPI.COMM_WORLD.rank == 0:
-                    out.write(json.dumps(words) + "\n")
-                    out.flush()
+                out.write(json.dumps(words) + "\n")
+                out.flush()
 
 
 if __name__ == "__main__":
