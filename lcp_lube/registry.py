@@ -188,6 +188,7 @@ FAMILIES: dict[str, Entry] = {
     "slider": Entry("lcp_lube.scenes.published:SliderScene", "slider with one wave of the film (the published problems)"),
     "textured": Entry("lcp_lube.scenes.textured:TexturedScene", "flat slider with square dimples"),
     "journal": Entry("lcp_lube.scenes.journal:JournalScene", "journal bearing with an axial groove at the widest gap"),
+    "grooved_journal": Entry("lcp_lube.scenes.grooved:GroovedJournalScene", "journal with axial grooves under a vertical load"),
     "rough": Entry("lcp_lube.scenes.textured:RoughScene", "slider with one wave and a random surface"),
     "bearing": Entry("lcp_lube.scenes.bearing:BearingScene", "a bearing of any kind: film shapes added up, a condition a side"),
     "squeeze": Entry("lcp_lube.scenes.squeeze:SqueezeScene", "parallel plates that approach and part, in time"),
@@ -218,9 +219,11 @@ SHAPES: dict[str, Entry] = {
 DRIVERS: dict[str, Entry] = {
     "accuracy": Entry("lcp_lube.drivers.accuracy", "finer and finer grids until a quantity is as good as asked for"),
     "balance": Entry("lcp_lube.drivers.balance", "the film that carries the load asked for"),
+    "attitude": Entry("lcp_lube.drivers.attitude", "the attitude that follows from the load's direction"),
     "time": Entry("lcp_lube.drivers.time", "step by step, where the film moves"),
     "warm": Entry("lcp_lube.drivers.warm", "from a neighbour's answer, or anew where that leads nowhere"),
     "fluid": Entry("lcp_lube.drivers.fluid", "viscosity and density that depend on the pressure"),
+    "grooves": Entry("lcp_lube.drivers.grooves", "films between axial grooves, one by one"),
     "symmetry": Entry("lcp_lube.drivers.symmetry", "no more than symmetry leaves"),
     "direct": Entry("lcp_lube.drivers.direct", "one problem: nested grids, and methods that take over where one fails"),
 }

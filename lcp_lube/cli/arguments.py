@@ -197,6 +197,15 @@ def parse(own: list[str]) -> argparse.Namespace:
     verify.add_argument("--quick", action="store_true", help="one case in a moment")
     verify.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")
 
+    coefficients = command("coefficients", "stiffness and damping of a journal's film, x along the load")
+    _scene_options(coefficients)
+    coefficients.add_argument("--method", default="auto", help="see 'lcp-lube list'; default auto")
+    coefficients.add_argument("--recipe", help="inner solver of the film: options/NAME.opts")
+    coefficients.add_argument(
+        "--frequency", default="0", metavar="F,F,...", help="of the motion, rad/s; default 0, the limit of slow motion"
+    )
+    coefficients.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")
+
     doctor = command("doctor", "what is installed, what is missing, and a short self-check on one and two ranks")
     doctor.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")
 

@@ -131,6 +131,12 @@ def run_doctor(args: argparse.Namespace) -> int:
     return run(args)
 
 
+def run_coefficients(args: argparse.Namespace) -> int:
+    from .coefficients import run
+
+    return run(args)
+
+
 def run_sweep(args: argparse.Namespace) -> int:
     from .sweep import run
 
@@ -163,6 +169,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "solve": run_solve,
     "compare": run_compare,
     "sweep": run_sweep,
+    "coefficients": run_coefficients,
     "table": run_table,
     "chart": run_chart,
     "verify": run_verify,

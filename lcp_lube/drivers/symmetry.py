@@ -25,6 +25,7 @@ from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model, Side
 from ..problems.grid import Grid, places
 from ..problems.solution import Outcome, Problem, Solution
+from ..problems.transfer import Pick, numbers
 from ..scenes.scene import Solvable
 from .ask import Ask, Start
 from .compose import Inner
@@ -205,14 +206,14 @@ def solve_part(part: Part, problem: Problem, ask: Ask, inner: Inner) -> Solution
     if ask.start is not None:
         small = part.build(problem.grid.dm.comm)
         near = problem.prolong(ask.start.problem, ask.start.fields, False)  # type: ignore[arg-type]
-        take = _Pick(problem.grid, small.grid, *_numbers(small.grid))
+        take = Pick(problem.grid, small.grid, *numbers(small.grid))
         start = Start(small, {name: take(values) for name, values in near.items()}, ask.start.settings)
     solution = inner(part, replace(ask, start=start))
     if start is not None:
         start.problem.destroy()
     small_problem = solution.problem
-    j, i = _numbers(problem.grid)
-    spread = _Pick(small_problem.grid, problem.grid, *((0 * j, i) if part.kind == "line" else (_mirrored(problem.grid, j), i)))
+    j, i = numbers(problem.grid)
+    spread = Pick(small_problem.grid, problem.grid, *((0 * j, i) if part.kind == "line" else (_mirrored(problem.grid, j), i)))
     fields = {name: spread(values) for name, values in solution.fields.items()}
     small_problem.destroy()
     settings = {
@@ -266,30 +267,5 @@ def _all_close(problem: LubricationProblem, pairs: list[tuple[Array, Any]]) -> b
     return bool(problem.reduce.max(np.array([worst])) <= SAME)
 
 
-def _numbers(grid: Grid) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Line and column numbers of the owned points; they broadcast to `grid.box`."""
-    return np.arange(grid.y_start, grid.y_end)[:, None], np.arange(grid.x_start, grid.x_end)[None, :]
-
-
 def _mirrored(grid: Grid, j: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.minimum(j, grid.shape[1] - 1 - j)
-
-
-class _Pick:
-    """Values at the points of one grid taken from numbered points of another: line j, column i. Collective."""
-
-    def __init__(self, source: Grid, target: Grid, j: NDArray[np.int64], i: NDArray[np.int64]):
-        self.source, self.target = source, target
-        natural = np.broadcast_to(j * source.shape[0] + i, target.box).ravel().astype(PETSc.IntType)
-        self._from = PETSc.IS().createGeneral(source.dm.getAO().app2petsc(natural), comm=target.dm.comm)
-        self._to = PETSc.IS().createStride(target.local_size, target.first, 1, comm=target.dm.comm)
-
-    def __call__(self, field: Array) -> Array:
-        source, target = self.source.dm.createGlobalVec(), self.target.dm.createGlobalVec()
-        source.setArray(field)
-        scatter = PETSc.Scatter().create(source, self._from, target, self._to)
-        scatter.scatter(source, target)
-        values = target.array_r.copy()
-        for obj in (scatter, source, target):
-            obj.destroy()
-        return values

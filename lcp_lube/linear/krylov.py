@@ -97,7 +97,7 @@ class Krylov:
     def pc_type(self) -> str:
         return str(self.ksp.getPC().getType())
 
-    def _set_up(self) -> None:
+    def set_up(self) -> None:
         """Hand the matrix over; bad options that only show against a matrix show here, before anything is solved."""
         try:
             operator = self.mat
@@ -133,7 +133,7 @@ class Krylov:
         """
         if not self.direct and not self._fixed_rtol:
             self.ksp.setTolerances(rtol=rtol)
-        self._set_up()
+        self.set_up()
         reason = self._run(b, x)
         while reason == PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED and self._enlarge_mumps():
             reason = self._run(b, x)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import scipy.sparse
+from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ..base.parallel import Array
@@ -81,3 +82,28 @@ def _weights(
         columns = columns % n_coarse if fine.periodic[side] else np.clip(columns, 0, n_coarse - 1)
         used = values > 0
     return scipy.sparse.csr_matrix((values[used], (rows[used], columns[used])), shape=(points.size, n_coarse))
+
+
+def numbers(grid: Grid) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Line and column numbers of the owned points; they broadcast to `grid.box`."""
+    return np.arange(grid.y_start, grid.y_end)[:, None], np.arange(grid.x_start, grid.x_end)[None, :]
+
+
+class Pick:
+    """Values at the points of one grid taken from numbered points of another: line j, column i. Collective."""
+
+    def __init__(self, source: Grid, target: Grid, j: NDArray[np.int64], i: NDArray[np.int64]):
+        self.source, self.target = source, target
+        natural = np.broadcast_to(j * source.shape[0] + i, target.box).ravel().astype(PETSc.IntType)
+        self._from = PETSc.IS().createGeneral(source.dm.getAO().app2petsc(natural), comm=target.dm.comm)
+        self._to = PETSc.IS().createStride(target.local_size, target.first, 1, comm=target.dm.comm)
+
+    def __call__(self, field: Array) -> Array:
+        source, target = self.source.dm.createGlobalVec(), self.target.dm.createGlobalVec()
+        source.setArray(field)
+        scatter = PETSc.Scatter().create(source, self._from, target, self._to)
+        scatter.scatter(source, target)
+        values = target.array_r.copy()
+        for obj in (scatter, source, target):
+            obj.destroy()
+        return values

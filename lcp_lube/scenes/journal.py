@@ -12,6 +12,7 @@ from ..problems.film.flows import side_flows
 from ..problems.film.gaps import JournalGap, Raised
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Side
+from ..problems.film.turning import Turning
 from .published import LubricationScene
 from .scene import Positive
 from .units import measured, metres
@@ -69,6 +70,12 @@ class JournalScene(LubricationScene):
         if self.round == "groove":
             return super().sides
         return Side("periodic"), Side("periodic"), Side(p=self.p_side), Side(p=self.p_side)
+
+    @property
+    def turning(self) -> Turning:
+        """Angles are counted from the widest gap."""
+        width = self.width if self.dimension == 2 and self.width else 1.0
+        return Turning(0.5 * self.D, 0.5 * self.psi * self.D, width, self.omega, 0.0)
 
     @property
     def gap(self) -> JournalGap:

@@ -1,7 +1,7 @@
 """The data of one steady film problem, whole or reduced, and the step from them to the discrete problem."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,6 +13,7 @@ from ..facts import Facts
 from ..grid import Grid
 from .exact import ExactSolution
 from .fluid import Law
+from .grooves import Groove, GroovedProblem, Pad, pads_between
 from .lubrication import LubricationProblem
 from .reynolds import Film, box_scheme
 
@@ -55,6 +56,7 @@ class Model:
     scheme: str
     mean_cubes: bool = False
     exact: Callable[[], ExactSolution | None] | None = None
+    grooves: tuple[Groove, ...] = ()  # of a film that is periodic in x
     law: Law | None = None  # a fluid that depends on the pressure; `build` makes the problem of the constant one
 
     def __post_init__(self) -> None:
@@ -67,7 +69,7 @@ class Model:
         pressures = [side.p for side in used.values() if side.kind == "open"]
         if not pressures:
             raise InputError("no side has a pressure: without one the level of p is open; give at least one side a p")
-        if self.sides[0].kind == "periodic" and not max(pressures) > 0:
+        if self.sides[0].kind == "periodic" and not max(pressures) > 0 and not self.grooves:
             raise InputError("periodic along the flow, and no side above the cavitation pressure: nothing feeds the film")
 
     @property
@@ -91,6 +93,7 @@ class Model:
         ------
         InputError : more ranks than the grid can be dealt to, a film that is not positive.
         """
+        kind = GroovedProblem if self.grooves else LubricationProblem
         west, east, south, north = self.sides
         grid = Grid(shape, self.lengths, comm, ends=((west.kind, east.kind), (south.kind, north.kind)))
         p_sides = tuple(side.p if side.kind == "open" else 0.0 for side in self.sides)
@@ -106,7 +109,7 @@ class Model:
             mean_cubes=self.mean_cubes,
             r_in=west.r,
         )
-        return LubricationProblem(
+        problem = kind(
             grid,
             scheme,
             mu=self.mu,
@@ -117,6 +120,32 @@ class Model:
             film=film,
             exact=self.exact,
         )
+        if isinstance(problem, GroovedProblem):
+            problem.grooves = self.grooves
+        return problem
+
+    def pads(self, shape: Sequence[int]) -> list[tuple[Pad, "Model"]]:
+        """The films between the grooves on a ring of nx columns, whose points they keep."""
+        dx = self.lengths[0] / shape[0]
+        films = []
+        for pad in pads_between(shape[0], self.grooves):
+            lengths = ((pad.n + 1) * dx, *self.lengths[1:])
+            sides = (Side(p=pad.west), Side(p=pad.east), *self.sides[2:])
+            # Its x = 0 is the last column of the groove before it.
+            gap = _Moved(self.gap, (pad.first - 0.5) * dx)
+            films.append((pad, replace(self, lengths=lengths, sides=sides, gap=gap, exact=None, grooves=())))
+        return films
+
+
+@dataclass(frozen=True)
+class _Moved:
+    """A film that begins elsewhere."""
+
+    gap: Film
+    start: float
+
+    def __call__(self, x: ArrayLike, y: ArrayLike | None = None, /) -> Array:
+        return self.gap(np.asarray(x, dtype=float) + self.start, np.asarray(0.0 if y is None else y))
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,55 @@
+"""The attitude at which a journal's film holds up a load of given direction: a secant iteration on the force's angle."""
+
+import math
+from dataclasses import replace
+
+from ..problems.solution import Solution
+from ..scenes.grooved import GroovedJournalScene
+from ..scenes.scene import Solvable
+from .ask import Ask
+from .compose import Inner
+
+MOST_SOLVES = 20
+TOLERANCE = 1e-9  # rad: the force across the load is then 1e-9 of it
+STEEPEST, FLATTEST = 2.0, 0.3  # slope of the force's angle over the attitude; without grooves it is 1
+
+
+def applies(scene: Solvable, ask: Ask) -> bool:
+    """Whether the attitude is left open."""
+    return isinstance(scene, GroovedJournalScene) and scene.attitude_deg is None
+
+
+def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
+    """The solution at the attitude that follows from the load's direction. Collective."""
+    assert isinstance(scene, GroovedJournalScene)
+    known = ask.start.settings.get("attitude_deg") if ask.start is not None else None
+    # A long journal's attitude without grooves (Sommerfeld, half film), as a start.
+    e = scene.eccentricity
+    attitude = math.radians(known) if known is not None else math.atan2(0.25 * math.pi * math.sqrt(1.0 - e * e), max(e, 1e-3))
+    solution: Solution | None = None
+    before: tuple[float, float] | None = None
+    slope = 1.0
+    for _ in range(MOST_SOLVES):
+        near = solution or ask.start
+        trial = scene.model_copy(update={"attitude_deg": math.degrees(attitude)})
+        new = inner(trial, replace(ask, start=near))
+        if solution is not None:
+            solution.destroy()
+        solution = new
+        if not solution.converged:
+            break
+        fx, fy = solution.problem.quantities(solution.fields)["force"]
+        off = math.atan2(-fy, -fx)
+        if before is not None and attitude != before[0]:
+            slope = min(max((off - before[1]) / (attitude - before[0]), FLATTEST), STEEPEST)
+        if abs(off) <= TOLERANCE:
+            break
+        before = (attitude, off)
+        attitude -= off / slope
+    assert solution is not None
+    solution.settings |= {"attitude_deg": math.degrees(attitude)}
+    solution.settings["why"] = [
+        f"attitude {math.degrees(attitude):.6g} degrees, at which the film's force is opposite to the load",
+        *solution.settings["why"],
+    ]
+    return solution

@@ -1,0 +1,107 @@
+"""A ring with axial grooves: the films between the grooves are solved one by one, their fields put together and certified."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from ..problems.facts import Facts
+from ..problems.film.grooves import GroovedProblem, Pad
+from ..problems.film.lubrication import LubricationProblem
+from ..problems.film.model import Model
+from ..problems.grid import Grid
+from ..problems.solution import Outcome, Solution
+from ..problems.transfer import Pick, numbers
+from ..scenes.scene import Solvable
+from .ask import Ask, Start
+from .compose import Inner
+
+
+@dataclass(frozen=True)
+class PadFilm:
+    """One of the films, on this grid."""
+
+    whole: Solvable
+    model: Model
+    shape: tuple[int, ...]
+
+    @property
+    def name(self) -> str:
+        return self.whole.name
+
+    @property
+    def scheme(self) -> str | None:
+        return self.whole.scheme
+
+    def with_shape(self, shape: tuple[int, ...]) -> "PadFilm":
+        return replace(self, shape=shape)
+
+    def facts(self, comm: PETSc.Comm | None = None) -> Facts:
+        return self.model.facts(self.shape, comm)
+
+    def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
+        return self.model.build(self.shape, comm)
+
+
+def applies(scene: Solvable, ask: Ask) -> bool:
+    """Whether the film has grooves."""
+    return bool(getattr(getattr(scene, "model", None), "grooves", ()))
+
+
+def pad_films(scene: Solvable) -> list[tuple[Pad, PadFilm]]:
+    """The films between the grooves, and where they lie."""
+    model: Model = scene.model  # type: ignore[attr-defined]
+    return [(pad, PadFilm(scene, film, (pad.n, *scene.shape[1:]))) for pad, film in model.pads(scene.shape)]
+
+
+def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
+    """The ring's solution from those of its films; the first one that fails tells how the whole ends. Collective."""
+    ring = scene.build(ask.comm)
+    assert isinstance(ring, GroovedProblem)  # as `applies` found
+    n = ring.grid.local_size
+    fields = {"p": np.zeros(n), "r": np.zeros(n)}
+    for inside, groove in zip(ring.columns, ring.grooves, strict=True):
+        fields["p"][inside] = groove.p / ring.p_unit
+    near = ask.start if ask.start is not None and ask.start.problem.grid.shape == ring.grid.shape else None
+    done: list[Solution] = []
+    times: dict[str, float] = {}
+    for pad, film in pad_films(scene):
+        start = None
+        if near is not None:
+            at = film.build(ask.comm)
+            take = pick_pad(near.problem.grid, at.grid, pad.first)
+            start = Start(at, {name: take(values) for name, values in near.fields.items()}, near.settings)
+        solution = inner(film, replace(ask, start=start))
+        if start is not None:
+            start.problem.destroy()
+        spread, within = place_pad(solution.problem.grid, ring.grid, pad)
+        for name, values in solution.fields.items():
+            fields[name] = np.where(within, spread(values), fields[name])
+        times = {name: times.get(name, 0.0) + seconds for name, seconds in solution.times.items()}
+        done.append(solution)
+    failed = next((one for one in done if not one.converged), done[0])
+    steps = [step for one in done for step in one.steps]
+    message = f"{len(done)} films between grooves; {failed.message}"
+    settings = {**failed.settings, "why": [f"{len(done)} films between grooves, solved one by one", *failed.settings["why"]]}
+    outcome: Outcome = failed.outcome
+    certificate = ring.certify(fields, failed.settings["eps1"])
+    for one in done:
+        one.destroy()
+    levels: list[dict] = []
+    changed = {"problem": ring, "fields": fields, "outcome": outcome, "message": message, "certificate": certificate}
+    return replace(failed, **changed, steps=steps, settings=settings, times=times, levels=levels).judged()  # type: ignore[arg-type]
+
+
+def pick_pad(ring: Grid, pad: Grid, first: int) -> Pick:
+    """Takes a film's values from the ring's grid."""
+    j, i = numbers(pad)
+    return Pick(ring, pad, j, (first + i) % ring.shape[0])
+
+
+def place_pad(pad: Grid, ring: Grid, where: Pad) -> tuple[Pick, NDArray[np.bool_]]:
+    """Takes the ring's values from a film's grid (any value outside the film), and which of the ring's points are inside."""
+    j, i = numbers(ring)
+    column = (i - where.first) % ring.shape[0]
+    inside = np.broadcast_to(column < where.n, ring.box).ravel()
+    return Pick(pad, ring, j, np.minimum(column, where.n - 1)), inside

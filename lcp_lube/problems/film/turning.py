@@ -1,0 +1,49 @@
+"""A journal that turns in its bush: where its film lies around it, and the force of the film on it.
+
+Angles theta are counted from the line of the load, in the sense of rotation; axes are x along the load and y a quarter of a
+turn ahead. An eccentricity (ex, ey) makes the film h = c - ex cos(theta) - ey sin(theta).
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...base.parallel import Array
+from .flows import point_weights
+from .lubrication import LubricationProblem
+
+
+@dataclass(frozen=True)
+class Turning:
+    """Radius R and clearance c, m; width B, m (1D: 1); omega, rad/s; theta at x = 0."""
+
+    R: float
+    c: float
+    B: float
+    omega: float
+    start: float
+
+    def theta(self, x: Array) -> Array:
+        """Angle of the places x (m) of the unwrapped film."""
+        return self.start + x / self.R
+
+    def force(self, problem: LubricationProblem, p: Array) -> tuple[float, float]:
+        """Force of the pressure p (owned points, p_unit above p_c) on the journal, N (1D: N/m). Collective."""
+        theta = np.broadcast_to(self.theta(problem.grid.x), problem.grid.box).ravel()
+        size = -problem.grid.cell * problem.p_unit * point_weights(problem.grid) * p
+        return problem.reduce.sum(size * np.cos(theta)), problem.reduce.sum(size * np.sin(theta))
+
+    def numbers(self, force: tuple[float, float], mu: float, eccentricity: float) -> dict[str, Any]:
+        """What a bearing's sheet lists: Sommerfeld numbers, load and attitude. eccentricity : relative."""
+        load, D = math.hypot(*force), 2.0 * self.R
+        psi = self.c / self.R
+        N = self.omega / (2.0 * math.pi)
+        return {
+            "eccentricity": eccentricity,
+            "bearing_load": load,
+            "force": list(force),
+            "sommerfeld": load * psi**2 / (self.B * D * mu * self.omega),
+            "S": mu * N * self.B * D / (load * psi**2) if load > 0 else None,
+        }

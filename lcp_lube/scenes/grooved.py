@@ -1,0 +1,126 @@
+"""Journals with axial grooves across the whole width, under a load of given direction; or without any groove."""
+
+import math
+from typing import Annotated, Any
+
+import numpy as np
+from petsc4py import PETSc
+from pydantic import Field, model_validator
+
+from ..base.parallel import Array
+from ..problems.facts import Facts
+from ..problems.film.grooves import Groove
+from ..problems.film.lubrication import LubricationProblem
+from ..problems.film.model import Model, Side
+from ..problems.film.turning import Turning
+from .scene import Count, Finite, NotNegative, Positive, Scene
+from .units import measured, metres
+
+
+class GroovedJournalScene(Scene):
+    """A journal under a vertical load, its film cut by axial grooves that hold a pressure; 2D.
+
+    Angles are counted from the line of the load, in the sense of rotation. The film is h = c (1 - eccentricity cos(theta -
+    attitude)): thinnest at the attitude angle. With attitude_deg left out the attitude is found for which the film's force
+    is opposite to the load. Without grooves the film goes round, fed by the ends, at p_end > 0.
+    """
+
+    D: Positive = metres(0.1, "diameter")
+    L_over_D: Positive = Field(0.5, description="width over diameter")
+    clearance: Positive = metres(1e-4, "radial clearance")
+    speed_rpm: Positive = Field(3000.0, description="speed of the journal, rpm")
+    mu: Positive = measured("Pa s", 0.02, "viscosity")
+    eccentricity: Annotated[float, Field(ge=0, lt=1, description="relative eccentricity")] = 0.5
+    attitude_deg: Finite | None = Field(None, description="from the load to the thinnest film, degrees; default: as it follows")
+    grooves_deg: list[Finite] = Field([90.0, 270.0], description="middles of the grooves, degrees from the load; [] for none")
+    groove_deg: Annotated[float, Field(gt=0, lt=180, description="extent of each groove, degrees")] = 20.0
+    p_groove: NotNegative = measured("Pa", 0.0, "pressure in the grooves, above p_c")
+    p_end: NotNegative = measured("Pa", 0.0, "pressure at both ends, above p_c")
+    p_c: Finite = measured("Pa", 0.0, "cavitation pressure")
+    scheme: str | None = Field("face", description="form of the Couette flux: face")
+    nx: Count = Field(360, description="points around")
+    ny: Count = Field(23, description="points across")
+
+    @model_validator(mode="after")
+    def _possible(self) -> "GroovedJournalScene":
+        if self.scheme != "face":
+            raise ValueError(f"scheme = {self.scheme}: face is allowed")
+        places = sorted(angle % 360.0 for angle in self.grooves_deg)
+        gaps = [(b - a) % 360.0 or 360.0 for a, b in zip(places, [*places[1:], *places[:1]], strict=True)]
+        if places and min(gaps) <= self.groove_deg:
+            raise ValueError(f"grooves_deg = {self.grooves_deg}: grooves of {self.groove_deg:g} degrees overlap there")
+        if not places and not self.p_end > 0:
+            raise ValueError(f"p_end = {self.p_end:g}: without grooves the ends feed the film: p_end > 0 is needed")
+        if self.nx < 12 * max(1, len(places)):
+            raise ValueError(f"nx = {self.nx}: at least {12 * max(1, len(places))} points around are needed")
+        return self
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return self.nx, self.ny
+
+    @property
+    def omega(self) -> float:
+        """Angular velocity, rad/s."""
+        return 2.0 * math.pi * self.speed_rpm / 60.0
+
+    @property
+    def turning(self) -> Turning:
+        """Place x = 0 lies half a mesh before the first groove's first edge, so that its edges are points of the grid."""
+        first = math.radians((self.grooves_deg or [180.0])[0] - 0.5 * (self.groove_deg if self.grooves_deg else 0.0))
+        start = first - math.pi / self.nx
+        return Turning(0.5 * self.D, self.clearance, self.L_over_D * self.D, self.omega, start)
+
+    def gap(self, x: Array, y: Array | None = None) -> Array:
+        """The film, m. In two squares, which keep their digits where it is thin."""
+        half = 0.5 * (self.turning.theta(np.asarray(x, dtype=float)) - math.radians(self.attitude_deg or 0.0))
+        h = self.clearance * ((1.0 - self.eccentricity) + 2.0 * self.eccentricity * np.sin(half) ** 2)
+        return np.broadcast_arrays(h, 0.0 if y is None else y)[0]
+
+    @property
+    def grooves(self) -> tuple[Groove, ...]:
+        """Their columns: edges on points of the grid, exactly where groove_deg and the middles are whole numbers of meshes."""
+        meshes = self.nx / 360.0
+        count = max(1, round(self.groove_deg * meshes) + 1)
+        middle = self.grooves_deg[0] if self.grooves_deg else 0.0
+        return tuple(Groove(round((at - middle) * meshes) % self.nx, count, self.p_groove) for at in self.grooves_deg)
+
+    @property
+    def model(self) -> Model:
+        """What is discretised."""
+        ends = Side(p=self.p_end)
+        turning = self.turning
+        return Model(
+            lengths=(math.pi * self.D, turning.B),
+            sides=(Side("periodic"), Side("periodic"), ends, ends),
+            gap=self.gap,  # type: ignore[arg-type]
+            mu=self.mu,
+            U=turning.R * turning.omega,
+            p_c=self.p_c,
+            p_unit=self.mu * self.omega * (turning.R / self.clearance) ** 2,
+            scheme="face",
+            grooves=self.grooves,
+        )
+
+    def facts(self, comm: PETSc.Comm | None = None) -> Facts:
+        return self.model.facts(self.shape, comm)
+
+    def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
+        """The discrete problem on this scene's grid. Collective.
+
+        Raises
+        ------
+        InputError : more ranks than the grid can be dealt to.
+        """
+        problem = self.model.build(self.shape, comm)
+        problem.extras = self._bearing_numbers
+        return problem
+
+    def _bearing_numbers(self, problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any]:
+        """Force on the journal along the load and a quarter of a turn ahead, load, attitude, Sommerfeld numbers. Collective."""
+        turning = self.turning
+        fx, fy = turning.force(problem, p)
+        toward_film = math.radians(self.attitude_deg or 0.0)
+        attitude = toward_film - math.atan2(-fy, -fx)  # from the direction that the film holds up
+        wrapped = math.degrees(math.remainder(attitude, 2.0 * math.pi))
+        return {**turning.numbers((fx, fy), self.mu, self.eccentricity), "attitude_deg": wrapped, "load_vector": [fx, fy]}

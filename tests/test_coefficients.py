@@ -1,0 +1,157 @@
+"""Journals with grooves, and their stiffness and damping: published rows, differences of solves, laws, ranks, bad input."""
+
+import csv
+import math
+
+import numpy as np
+import pytest
+
+from lcp_lube import InputError, load_scene, solve
+from lcp_lube.drivers.coefficients import coefficients, stability
+from lcp_lube.registry import PACKAGE
+
+TABLE = next(
+    path
+    for folder in (PACKAGE / "published", PACKAGE.parent / "benchmarks" / "published")
+    if (path := folder / "dynamics" / "lund_thomsen.csv").is_file()
+)
+ROWS = [row for row in csv.DictReader(TABLE.read_text().splitlines()) if row["bearing"].startswith("two axial grooves")]
+SMALL = {"nx": 144, "ny": 11}
+
+
+def force(scene):
+    """Of the film on the journal, x along the load's line; N."""
+    solution = solve(scene, method="active-set")
+    assert solution.converged, solution.message
+    found = solution.problem.quantities(solution.fields)["force"]
+    solution.destroy()
+    return np.array(found)
+
+
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: f"{row['L_over_D']}-{row['eps']}")
+def test_lund_and_thomsen(row):
+    """3 % of the greater of the value and 1, as the table has two digits after the point; phi to half a degree."""
+    scene = load_scene("two_groove_journal", L_over_D=float(row["L_over_D"]), eccentricity=float(row["eps"]))
+    solution = solve(scene)
+    values = solution.problem.quantities(solution.fields)
+    (found,) = coefficients(scene, solution)
+    scale = scene.clearance / values["bearing_load"]
+    assert values["S"] == pytest.approx(float(row["S"]), rel=0.02)
+    assert values["attitude_deg"] == pytest.approx(float(row["phi_deg"]), abs=0.5)
+    for name, ours in {
+        "Kxx": found.K[0, 0], "Kxy": found.K[0, 1], "Kyx": found.K[1, 0], "Kyy": found.K[1, 1],
+        "Cxx": found.C[0, 0] * scene.omega, "Cxy": found.C[0, 1] * scene.omega, "Cyy": found.C[1, 1] * scene.omega,
+    }.items():  # fmt: skip
+        assert abs(ours * scale - float(row[name])) <= 0.03 * max(abs(float(row[name])), 1.0), name
+    # Cavities end in a groove: no void is carried into a full film, and damping is symmetric.
+    assert found.C[0, 1] == pytest.approx(found.C[1, 0], rel=1e-6)
+    solution.destroy()
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"eccentricity": 0.3}, {"eccentricity": 0.8, "p_groove": 2e5, "p_end": 1e5}, {"grooves_deg": [], "p_end": 1e5}],
+    ids=["two", "fed", "ring"],
+)
+def test_stiffness_is_what_solves_differ_by(changes):
+    """Central differences of two solves, in both directions; the attitude is given, and the load not vertical."""
+    scene = load_scene("two_groove_journal", **SMALL, **{"attitude_deg": 40.0, **changes})
+    solution = solve(scene, method="active-set")
+    along = scene.turning.force(solution.problem, solution.fields["p"])
+    (found,) = coefficients(scene, solution)
+    solution.destroy()
+    beta = math.atan2(-along[1], -along[0])
+    turn = np.array([[math.cos(beta), -math.sin(beta)], [math.sin(beta), math.cos(beta)]])
+    at = scene.eccentricity * np.exp(1j * math.radians(scene.attitude_deg))
+    step = 1e-4
+    K = np.empty((2, 2))
+    for column, axis in enumerate((1.0, 1j)):
+        ends = []
+        for sign in (-1.0, 1.0):
+            e = at + sign * step * axis
+            ends.append(force(scene.model_copy(update={"eccentricity": abs(e), "attitude_deg": math.degrees(np.angle(e))})))
+        K[:, column] = -(ends[1] - ends[0]) / (2.0 * step * scene.clearance)
+    assert turn.T @ K @ turn == pytest.approx(found.K, abs=1e-6 * np.abs(K).max())
+
+
+def test_what_finite_frequency_changes():
+    """Nothing where the cavity ends in a groove; where the film forms again inside, the void that is stored counts."""
+    two = load_scene("two_groove_journal", **SMALL)
+    solution = solve(two, method="active-set")
+    slow, fast = coefficients(two, solution, [0.0, two.omega])
+    solution.destroy()
+    assert pytest.approx(slow.K, rel=1e-6) == fast.K and pytest.approx(slow.C, rel=1e-6) == fast.C
+    ring = load_scene("two_groove_journal", **SMALL, grooves_deg=[], p_end=1e5)
+    solution = solve(ring, method="active-set")
+    slow, slower, fast = coefficients(ring, solution, [0.0, 1e-4 * ring.omega, ring.omega])
+    solution.destroy()
+    assert pytest.approx(slow.K, rel=1e-3) == slower.K and pytest.approx(slow.C, rel=1e-3) == slower.C
+    assert abs(fast.K - slow.K).max() > 1e-3 * abs(slow.K).max()
+    assert abs(slow.C[0, 1] - slow.C[1, 0]) > 1e-3 * abs(slow.C).max()
+
+
+def test_the_scaling_law():
+    """Twice the viscosity: pressures, K and C double, the attitude stays; the load is vertical at the attitude found."""
+    found = []
+    for mu in (0.02, 0.04):
+        scene = load_scene("two_groove_journal", **SMALL, mu=mu)
+        solution = solve(scene)
+        (one,) = coefficients(scene, solution)
+        values = solution.problem.quantities(solution.fields)
+        assert abs(values["force"][1]) < 1e-7 * abs(values["force"][0])
+        found.append((one, values))
+        solution.destroy()
+    (a, at), (b, bt) = found
+    assert pytest.approx(2.0 * a.K, rel=1e-6) == b.K and pytest.approx(2.0 * a.C, rel=1e-6) == b.C
+    assert bt["attitude_deg"] == pytest.approx(at["attitude_deg"], abs=1e-5) and bt["S"] == pytest.approx(at["S"], rel=1e-6)
+
+
+def test_the_threshold_of_stability():
+    """Lund and Thomsen's rows give 2.35 for L/D = 0.5, S = 1.656."""
+    K, C = np.array([[1.69, 5.06], [-2.20, 1.95]]), np.array([[9.93, 2.15], [2.15, 4.80]])
+    whirl, threshold = stability(K, C)
+    assert threshold == pytest.approx(2.35, abs=0.01) and whirl == pytest.approx(0.51, abs=0.01)
+    assert stability(np.eye(2), np.eye(2)) == (None, None)
+
+
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_ranks(cli, ranks):
+    words = ("coefficients", "two_groove_journal", "--set", "nx=110", "--set", "ny=11", "--frequency", "0,100", "--json")
+    alone, together = cli(*words), cli(*words, ranks=ranks)
+    assert alone.status == together.status == 0
+    for a, b in zip(alone.json["coefficients"], together.json["coefficients"], strict=True):
+        for name in ("K", "C"):
+            assert np.array(b[name]) == pytest.approx(np.array(a[name]), abs=1e-6 * np.abs(a[name]).max())
+
+
+def test_text_and_bad_input(cli):
+    done = cli("coefficients", "journal", "--nx", 60, "--ny", 15)
+    assert done.status == 0 and "Kxy" in done.out and "whirl ratio" in done.out
+    for words, message in (
+        (("problem1",), "coefficients are of journals"),
+        (("journal", "--frequency", "-1"), "--frequency -1"),
+        (("journal", "--frequency", "a"), "numbers in rad/s"),
+        (("two_groove_journal", "--set", "groove_deg=179", "--set", "grooves_deg=[0,90]"), "overlap"),
+        (("two_groove_journal", "--set", "grooves_deg=[]"), "p_end > 0"),
+    ):
+        done = cli("coefficients", *words)
+        assert done.status == 2 and message in done.lines[0] and len(done.lines) == 1
+
+
+def test_grooves_give_what_the_ends_lose():
+    scene = load_scene("two_groove_journal", **SMALL, p_groove=2e5)
+    solution = solve(scene)
+    values = solution.problem.quantities(solution.fields)
+    # Half a spacing lies between the ends and the outermost faces; the flow out of the outermost cells is what balances.
+    _, _, south, north = solution.problem.boundary_flows(solution.fields["p"], solution.fields["r"])
+    leaving = 0.5 * solution.problem.grid.spacing[1] * (north - south)
+    assert sum(values["groove_flow"]) == pytest.approx(leaving, rel=1e-9)
+    assert solution.certificate.holds and min(values["groove_flow"]) > 0
+    solution.fields["r"][0] = 0.3  # in a groove, which is full
+    assert not solution.problem.certify(solution.fields, 1e-8).holds
+    solution.destroy()
+
+
+def test_grooves_that_are_refused():
+    with pytest.raises(InputError, match="not for scene two_groove_journal"):
+        solve("two_groove_journal", certify=True, **SMALL)
