@@ -38,8 +38,9 @@ class GroovedJournalScene(Scene):
     p_end: NotNegative = measured("Pa", 0.0, "pressure at both ends, above p_c")
     p_c: Finite = measured("Pa", 0.0, "cavitation pressure")
     scheme: str | None = Field("face", description="form of the Couette flux: face")
-    nx: Count = Field(360, description="points around")
-    ny: Count = Field(23, description="points across")
+    n: Count = Field(360, description="points around, and an odd number near a sixteenth of them across")
+    nx: Count | None = Field(None, description="points around; default n")
+    ny: Count | None = Field(None, description="points across; default as n says")
 
     @model_validator(mode="after")
     def _possible(self) -> "GroovedJournalScene":
@@ -51,13 +52,13 @@ class GroovedJournalScene(Scene):
             raise ValueError(f"grooves_deg = {self.grooves_deg}: grooves of {self.groove_deg:g} degrees overlap there")
         if not places and not self.p_end > 0:
             raise ValueError(f"p_end = {self.p_end:g}: without grooves the ends feed the film: p_end > 0 is needed")
-        if self.nx < 12 * max(1, len(places)):
-            raise ValueError(f"nx = {self.nx}: at least {12 * max(1, len(places))} points around are needed")
+        if self.shape[0] < 12 * max(1, len(places)):
+            raise ValueError(f"nx = {self.shape[0]}: at least {12 * max(1, len(places))} points around are needed")
         return self
 
     @property
     def shape(self) -> tuple[int, ...]:
-        return self.nx, self.ny
+        return self.nx or self.n, self.ny or max(3, self.n // 16 | 1)
 
     @property
     def omega(self) -> float:
@@ -68,7 +69,7 @@ class GroovedJournalScene(Scene):
     def turning(self) -> Turning:
         """Place x = 0 lies half a mesh before the first groove's first edge, so that its edges are points of the grid."""
         first = math.radians((self.grooves_deg or [180.0])[0] - 0.5 * (self.groove_deg if self.grooves_deg else 0.0))
-        start = first - math.pi / self.nx
+        start = first - math.pi / self.shape[0]
         return Turning(0.5 * self.D, self.clearance, self.L_over_D * self.D, self.omega, start)
 
     def gap(self, x: Array, y: Array | None = None) -> Array:
@@ -80,10 +81,11 @@ class GroovedJournalScene(Scene):
     @property
     def grooves(self) -> tuple[Groove, ...]:
         """Their columns: edges on points of the grid, exactly where groove_deg and the middles are whole numbers of meshes."""
-        meshes = self.nx / 360.0
+        nx = self.shape[0]
+        meshes = nx / 360.0
         count = max(1, round(self.groove_deg * meshes) + 1)
         middle = self.grooves_deg[0] if self.grooves_deg else 0.0
-        return tuple(Groove(round((at - middle) * meshes) % self.nx, count, self.p_groove) for at in self.grooves_deg)
+        return tuple(Groove(round((at - middle) * meshes) % nx, count, self.p_groove) for at in self.grooves_deg)
 
     @property
     def model(self) -> Model:
