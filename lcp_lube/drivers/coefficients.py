@@ -24,7 +24,7 @@ from ..base.parallel import Array
 from ..errors import InputError
 from ..linear.krylov import Krylov
 from ..problems.facts import Facts
-from ..problems.film.fronts import cavity_sign
+from ..problems.film.cavity import cavity_sign
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.turning import Turning
@@ -122,7 +122,7 @@ def _of_film(
 ) -> Any:
     """K + i nu C of one film (at nu = 0: K + i C), shape (frequencies, 2, 2). Collective."""
     grid, p, r = problem.grid, fields["p"], fields["r"]
-    cavity = cavity_sign(problem, p, r) < 0
+    cavity = cavity_sign(problem.reduce, p, r) < 0
     x = grid.x
     theta = np.broadcast_to(turning.theta(x + first), grid.box).ravel()
     storage = 2.0 * grid.spacing[0] * problem.scheme.h.ravel()
