@@ -5,8 +5,9 @@ the triangular solves, from PETSc's log, to n = 4000, and what keeping the Jacob
 
     python benchmarks/bergamaschi_zilli_table2.py [--quick] [--results benchmarks/results]
 
-Rows that are in the csv already are not run again. Seconds are medians of --repeat runs: of the processor for the whole, of
-the clock for its parts, whose shares are printed. Rows run in processes of their own, so that the memory is theirs.
+Rows of the shares that are in the csv already are not run again, whatever code made them, and printed with their age.
+Seconds are medians of --repeat runs: of the processor for the whole, of the clock for its parts, whose shares are printed.
+Rows run in processes of their own, so that the memory is theirs.
 """
 
 import argparse
@@ -73,7 +74,7 @@ def shares(results: Path, repeat: int, quick: bool) -> None:
     """The seconds by part, and the gain of keeping the Jacobian."""
     from lcp_lube.base.resumable import ResumableCsv
 
-    store = ResumableCsv(results / "bergamaschi_table2_shares.csv", COLUMNS, ("n", "keep"))
+    store = ResumableCsv(results / "bergamaschi_table2_shares.csv", COLUMNS, ("n", "keep"), signed=True)
     print(f"\n{'n':>5} {'keep':>4} {'it':>3} {'CPU s':>8} {'Jacobian':>9} {'factor':>7} {'solve':>6} {'rest':>6} {'MB':>6}   k")
     for n in SIZES[: 2 if quick else None]:
         for keep in KEEPS:
@@ -82,7 +83,10 @@ def shares(results: Path, repeat: int, quick: bool) -> None:
             part = [100.0 * float(row[name]) / total for name in ("jacobian_s", "factor_s", "solve_s", "rest_s")]
             share = f"{part[0]:>7.0f} % {part[1]:>5.0f} % {part[2]:>4.0f} % {part[3]:>4.0f} %"
             head = f"{n:>5} {keep:>4} {row['iterations']:>3} {float(row['cpu_s']):>8.3f}"
-            print(f"{head} {share} {float(row['memory_mb']):>6.0f}   {float(row['k']):.8f} {row['outcome']}", flush=True)
+            print(
+                f"{head} {share} {float(row['memory_mb']):>6.0f}   {float(row['k']):.8f} {row['outcome']} {store.age(row)}",
+                flush=True,
+            )
     print(
         "printed: n = 200 Jacobian 47 %, factor 22 %, solve 1 % of 1.30 s; n = 1000 30 %, 51 %, 1 % of 69.41 s (600 MHz Alpha)"
     )

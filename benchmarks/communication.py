@@ -64,12 +64,12 @@ def main() -> None:
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--results", type=Path, default=Path(__file__).parent / "results")
-    store = ResumableCsv(parser.parse_args().results / "communication.csv", [*KEY, *COLUMNS], KEY)
+    store = ResumableCsv(parser.parse_args().results / "communication.csv", [*KEY, *COLUMNS], KEY, signed=True)
     for n in SIZES:
         for ranks in RANKS:
             row = store.find(scene="problem4", n=n, ranks=ranks)
             row = row or store.add({**count(n, ranks), "scene": "problem4", "n": n, "ranks": ranks})
-            print("  ".join(f"{name} {value}" for name, value in row.items()), flush=True)
+            print("  ".join(f"{name} {row[name]}" for name in (*KEY, *COLUMNS)), store.age(row), flush=True)
 
 
 if __name__ == "__main__":

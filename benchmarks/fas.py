@@ -308,7 +308,7 @@ def main() -> None:
     for name in arguments.experiments:
         if name not in EXPERIMENTS:
             parser.error(f"{name}: allowed are {', '.join(EXPERIMENTS)}")
-    store = ResumableCsv(arguments.results / f"fas{'_quick' * arguments.quick}.csv", [*KEY, *COLUMNS], KEY)
+    store = ResumableCsv(arguments.results / f"fas{'_quick' * arguments.quick}.csv", [*KEY, *COLUMNS], KEY, signed=True)
     for experiment in arguments.experiments or EXPERIMENTS:
         for film, n, variant in cases(experiment, arguments.quick):
             key = {"experiment": experiment, "film": film, "n": n, "variant": variant}
@@ -317,7 +317,7 @@ def main() -> None:
                 values = child(experiment, (film, n, variant), 1 if arguments.quick else arguments.repeats)
                 row = store.add({**values, **key, "load": f"{os.getloadavg()[0]:.1f}", "machine": machine()})
             shown = (f"{name} {row[name]}" for name in (*KEY, *COLUMNS) if row[name] and name not in ("machine", "experiment"))
-            print(experiment, "  ".join(shown), flush=True)
+            print(experiment, "  ".join(shown), store.age(row), flush=True)
 
 
 if __name__ == "__main__":

@@ -184,7 +184,7 @@ def run(n: int, repeats: int) -> list[dict[str, Any]]:
 
 
 def main(arguments: argparse.Namespace) -> None:
-    store = ResumableCsv(RESULTS / "obstacle_peer.csv", [*COLUMNS, "repeats", "load", "machine"], ("solver", "n"))
+    store = ResumableCsv(RESULTS / "obstacle_peer.csv", [*COLUMNS, "repeats", "load", "machine"], ("solver", "n"), signed=True)
     rows = run(arguments.n, arguments.repeats)
     for row in rows:
         store.add({**row, "repeats": arguments.repeats, "load": f"{os.getloadavg()[0]:.1f}", "machine": machine()})

@@ -383,12 +383,12 @@ def main() -> None:
             parser.error(f"{name}: allowed are {', '.join(EXPERIMENTS)}")
     for name in arguments.experiments or EXPERIMENTS:
         file = ("peers" if name == "peers" else "performance") + "_quick" * arguments.quick
-        store = ResumableCsv(arguments.results / f"{file}.csv", [*KEY, *COLUMNS], KEY)
+        store = ResumableCsv(arguments.results / f"{file}.csv", [*KEY, *COLUMNS], KEY, signed=True)
         rows = []
         for case in cases(name, arguments.quick):
             rows += fill(store, case, 1 if arguments.quick else arguments.repeats)
             print(f"{name}: {case.scene} {case.n} done", file=sys.stderr, flush=True)
-        print(f"\n{name}:\n{show(rows)}", flush=True)
+        print(f"\n{name}:\n{show(rows)}\n{arguments.results / file}.csv: {store.ages()}", flush=True)
     return None
 
 

@@ -114,7 +114,7 @@ def tables(store: ResumableCsv) -> Iterable[str]:
     for ranks in RANKS:
         found = (store.find(problem=p, n=n, system="full", recipe=PARALLEL, ranks=ranks) for p, n in CASES)
         yield f"| {ranks} | " + " | ".join(map(cell, found)) + " |"
-    yield ""
+    yield f"\n{store.ages()}.\n"
 
 
 def write_readme(path: Path, lines: Iterable[str]) -> None:
@@ -130,7 +130,7 @@ def write_readme(path: Path, lines: Iterable[str]) -> None:
 
 
 def main() -> None:
-    store = ResumableCsv(HERE / "results" / "preconditioners.csv", COLUMNS, KEY)
+    store = ResumableCsv(HERE / "results" / "preconditioners.csv", COLUMNS, KEY, signed=True)
     fill(store)
     if MPI.COMM_WORLD.rank == 0:
         lines = list(tables(store))

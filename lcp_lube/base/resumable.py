@@ -2,6 +2,7 @@
 
 import csv
 import os
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -63,6 +64,11 @@ class ResumableCsv:
     def age(self, row: Row) -> str:
         """By what and when a row of a signed csv was made; empty if by this process."""
         return "" if row in self._made else origin.told(row)
+
+    def ages(self) -> str:
+        """How many rows of a signed csv were made by what and when, for scripts that print them as they are stored."""
+        counts = Counter(self.age(row) or "made now" for row in self.rows)
+        return "; ".join(f"{count} rows {age}" for age, count in counts.items()) or "no rows"
 
     def add(self, values: dict[str, Any]) -> Row:
         """Write a row, in the place of the one with the same keys if there is one; returns it as text.

@@ -1,0 +1,100 @@
+"""Parameters that no printed count depends on: largest forcing terms, the Armijo slope of inexact steps, default tolerances."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lcp_lube import load_scene, solve
+from lcp_lube.base.options import recipe
+from lcp_lube.base.parallel import Array
+from lcp_lube.base.stages import Stages
+from lcp_lube.linear.system import make_system
+from lcp_lube.problems.solution import Step
+from lcp_lube.solvers.fischer import FischerNewton, FischerOptions, derivatives
+from lcp_lube.solvers.interior import InteriorOptions
+from lcp_lube.solvers.newton import Stopping
+from lcp_lube.solvers.plain_newton import NewtonOptions
+
+
+def steps(scene: str, method: str, recipe_name: str, system: str = "full", max_it: int = 3, **options: Any) -> list[Step]:
+    """The first steps of a run."""
+    solution = solve(
+        load_scene(scene, {"n": 20}),
+        method=method,
+        system=system,
+        recipe=recipe_name,
+        stopping=Stopping(max_it=max_it),
+        options=options,
+        nested=False,
+    )
+    solution.destroy()
+    return solution.steps
+
+
+@pytest.mark.parametrize("sigma_max", [0.9, 0.3])
+def test_sigma_of_din(sigma_max: float) -> None:
+    """sigma = min(sigma_max, 0.01 ||F||), 0.9 the default: from a start of large ||F|| down to one of small ||F||."""
+    options: dict[str, Any] = {} if sigma_max == 0.9 else {"sigma_max": sigma_max}
+    record = steps("problem1", "din", "lu", max_it=60, p0=100.0, r0=1.0, **options)
+    first, *later = record
+    assert first.sigma == sigma_max  # ||F|| of the start is above 440 = 100 sqrt(20)
+    expected = [min(sigma_max, 0.01 * step.norm) for step in record[:-1]]
+    assert [step.sigma for step in later] == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("sigma_max", [0.2, 0.05])
+def test_sigma_of_the_interior_point_method(sigma_max: float) -> None:
+    """sigma = min(sigma_max, mu), mu = 2 at the start v = z = 1 with slacks 1 and 3."""
+    assert InteriorOptions().sigma_max == 0.2
+    options: dict[str, Any] = {} if sigma_max == 0.2 else {"sigma_max": sigma_max}
+    record = steps("obstacle_bratu", "interior", "umfpack", "jacobian", max_it=40, **options)
+    assert record[0].sigma == sigma_max
+    assert 0 < record[-1].sigma < 1e-3 * sigma_max
+
+
+@pytest.mark.parametrize("delta_max", [0.1, 0.02])
+@pytest.mark.parametrize("method", ["fbn-a", "fbn-i"])
+def test_delta_of_fbn(method: str, delta_max: float) -> None:
+    """Inner solves to max(tol_min, min(delta_max, 0.01 ||F~||)), delta_max = 0.1 by default."""
+    options: dict[str, Any] = {} if delta_max == 0.1 else {"delta_max": delta_max}
+    record = steps("problem1", method, "gmres_ilu", max_it=40, p0=-100.0, **options)
+    assert record[0].rtol == delta_max  # ||F~|| of the start is above 890 = 200 sqrt(20)
+    expected = [max(1e-8, min(delta_max, 0.01 * step.norm)) for step in record[:-1]]
+    assert [step.rtol for step in record[1:]] == pytest.approx(expected, rel=1e-12)
+
+
+def test_the_armijo_slope_is_that_of_an_inexact_step() -> None:
+    """F~ . F~' d by differences of ||F~||^2 / 2; -2 Phi, its value for an exact step, is far off."""
+    problem = load_scene("problem1", {"n": 20}).build()
+    with recipe("gmres_ilu"):
+        method = FischerNewton(problem, make_system("full", problem, Stages()), FischerOptions(), "armijo")
+        assert not method.system.direct
+        rng = np.random.default_rng(1)
+        method.p, method.r = rng.uniform(0.5, 2.0, 20), rng.uniform(0.1, 0.9, 20)
+        method.F1, method.F2 = problem.flow(method.p, method.r), np.hypot(method.p, method.r) - method.p - method.r
+        method.norm = float(np.hypot(np.linalg.norm(method.F1), np.linalg.norm(method.F2)))
+        dp, dr = rng.standard_normal(20), rng.standard_normal(20)
+
+        def merit(t: float) -> float:
+            p, r = method.p + t * dp, method.r + t * dr
+            F: Array = np.concatenate([problem.flow(p, r), np.hypot(p, r) - p - r])
+            return 0.5 * float(F @ F)
+
+        D_p, D_r = derivatives(method.p, method.r)
+        change = np.asarray(D_p * dp + D_r * dr, dtype=float)
+        slope = method._slope(change, dp, dr)
+        assert slope == pytest.approx((merit(1e-5) - merit(-1e-5)) / 2e-5, rel=1e-6)
+        assert abs(slope + 2.0 * merit(0.0)) > 0.1 * abs(slope)
+    method.destroy()
+    problem.destroy()
+
+
+def test_eta_of_newton() -> None:
+    """Inner solves of 'newton' to 1e-3 by default, as table 4 has them."""
+    assert NewtonOptions().eta == 1e-3
+    default = steps("bratu", "newton", "bcgs_jacobi", "jacobian")
+    assert {step.rtol for step in default} == {1e-3}
+    named, tight = (steps("bratu", "newton", "bcgs_jacobi", "jacobian", eta=eta) for eta in (1e-3, 1e-6))
+    count = [sum(step.linear_iterations for step in record) for record in (default, named, tight)]
+    assert count[0] == count[1] < count[2]
