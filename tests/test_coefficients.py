@@ -106,6 +106,39 @@ def test_the_scaling_law():
     assert bt["attitude_deg"] == pytest.approx(at["attitude_deg"], abs=1e-5) and bt["S"] == pytest.approx(at["S"], rel=1e-6)
 
 
+def test_the_elliptical_bearing():
+    """Lund and Thomsen's row with preload 0.5: S and attitude to 2 %, coefficients to 2 % of the greater of value and 1."""
+    row = next(row for row in csv.DictReader(TABLE.read_text().splitlines()) if row["bearing"].startswith("elliptical"))
+    scene = load_scene("lemon_journal")
+    solution = solve(scene)
+    values = solution.problem.quantities(solution.fields)
+    (found,) = coefficients(scene, solution)
+    scale = scene.clearance / values["bearing_load"]
+    solution.destroy()
+    assert values["S"] == pytest.approx(float(row["S"]), rel=0.02)
+    assert values["attitude_deg"] == pytest.approx(float(row["phi_deg"]), abs=0.5)
+    ours = [*found.K.ravel() * scale, *(found.C.ravel() * scale * scene.omega)[[0, 1, 3]]]
+    for name, value in zip(("Kxx", "Kxy", "Kyx", "Kyy", "Cxx", "Cxy", "Cyy"), ours, strict=True):
+        assert abs(value - float(row[name])) <= 0.02 * max(abs(float(row[name])), 1.0), name
+
+
+def test_moments_are_odd_in_the_tilt():
+    """A shaft tilted the other way is the same bearing seen from its other end; without tilt there is no moment."""
+    found = []
+    for tilt in (-4e-4, 0.0, 4e-4):
+        scene = load_scene("misaligned_journal", **SMALL, attitude_deg=45.0, tilt=tilt, tilt_across=0.5 * tilt)
+        solution = solve(scene, method="active-set")
+        found.append(solution.problem.quantities(solution.fields))
+        solution.destroy()
+    back, none, forth = found
+    size = np.abs(forth["moment"]).max()
+    assert np.add(back["moment"], forth["moment"]) == pytest.approx(0.0, abs=1e-9 * size)
+    assert none["moment"] == pytest.approx([0.0, 0.0], abs=1e-9 * size)
+    assert back["force"] == pytest.approx(forth["force"], rel=1e-9)
+    # The end that comes nearer carries more: the film pushes it back.
+    assert forth["moment"][0] < 0 < back["moment"][0]
+
+
 def test_the_threshold_of_stability():
     """Lund and Thomsen's rows give 2.35 for L/D = 0.5, S = 1.656."""
     K, C = np.array([[1.69, 5.06], [-2.20, 1.95]]), np.array([[9.93, 2.15], [2.15, 4.80]])

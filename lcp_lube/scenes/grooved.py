@@ -23,6 +23,10 @@ class GroovedJournalScene(Scene):
     Angles are counted from the line of the load, in the sense of rotation. The film is h = c (1 - eccentricity cos(theta -
     attitude)): thinnest at the attitude angle. With attitude_deg left out the attitude is found for which the film's force
     is opposite to the load. Without grooves the film goes round, fed by the ends, at p_end > 0.
+
+    preload m moves the middle of each lobe between two grooves inwards by m c: its film is less by m c cos(theta - theta_lobe).
+    tilt and tilt_across turn the shaft's axis in the plane of the load and across: the far end (y = B) comes nearer to
+    theta = 0, and to theta = 90 degrees, by tilt times B/2, the other end moves away as much.
     """
 
     D: Positive = metres(0.1, "diameter")
@@ -34,6 +38,9 @@ class GroovedJournalScene(Scene):
     attitude_deg: Finite | None = Field(None, description="from the load to the thinnest film, degrees; default: as it follows")
     grooves_deg: list[Finite] = Field([90.0, 270.0], description="middles of the grooves, degrees from the load; [] for none")
     groove_deg: Annotated[float, Field(gt=0, lt=180, description="extent of each groove, degrees")] = 20.0
+    preload: Annotated[float, Field(ge=0, lt=1, description="of the lobes between the grooves; 0: a round bush")] = 0.0
+    tilt: Finite = Field(0.0, description="slope of the shaft in the plane of the load, rad")
+    tilt_across: Finite = Field(0.0, description="slope of the shaft across the load, rad")
     p_groove: NotNegative = measured("Pa", 0.0, "pressure in the grooves, above p_c")
     p_end: NotNegative = measured("Pa", 0.0, "pressure at both ends, above p_c")
     p_c: Finite = measured("Pa", 0.0, "cavitation pressure")
@@ -50,6 +57,8 @@ class GroovedJournalScene(Scene):
         gaps = [(b - a) % 360.0 or 360.0 for a, b in zip(places, [*places[1:], *places[:1]], strict=True)]
         if places and min(gaps) <= self.groove_deg:
             raise ValueError(f"grooves_deg = {self.grooves_deg}: grooves of {self.groove_deg:g} degrees overlap there")
+        if self.preload and len(places) < 2:
+            raise ValueError(f"preload = {self.preload:g}: lobes lie between at least two grooves")
         if not places and not self.p_end > 0:
             raise ValueError(f"p_end = {self.p_end:g}: without grooves the ends feed the film: p_end > 0 is needed")
         if self.shape[0] < 12 * max(1, len(places)):
@@ -73,10 +82,24 @@ class GroovedJournalScene(Scene):
         return Turning(0.5 * self.D, self.clearance, self.L_over_D * self.D, self.omega, start)
 
     def gap(self, x: Array, y: Array | None = None) -> Array:
-        """The film, m. In two squares, which keep their digits where it is thin."""
-        half = 0.5 * (self.turning.theta(np.asarray(x, dtype=float)) - math.radians(self.attitude_deg or 0.0))
+        """The film, m. The round bush by a square, which keeps its digits where it is thin."""
+        turning = self.turning
+        theta = turning.theta(np.asarray(x, dtype=float))
+        half = 0.5 * (theta - math.radians(self.attitude_deg or 0.0))
         h = self.clearance * ((1.0 - self.eccentricity) + 2.0 * self.eccentricity * np.sin(half) ** 2)
-        return np.broadcast_arrays(h, 0.0 if y is None else y)[0]
+        if self.preload:
+            middles = np.radians(self.lobes_deg)
+            from_middle = np.remainder(theta[..., None] - middles + math.pi, 2.0 * math.pi) - math.pi
+            h = h - self.preload * self.clearance * np.cos(np.abs(from_middle).min(axis=-1))
+        if y is None or not (self.tilt or self.tilt_across):
+            return np.array(np.broadcast_arrays(h, 0.0 if y is None else y)[0])
+        return h - (np.asarray(y) - 0.5 * turning.B) * (self.tilt * np.cos(theta) + self.tilt_across * np.sin(theta))
+
+    @property
+    def lobes_deg(self) -> list[float]:
+        """Middles of the lobes between neighbouring grooves, degrees."""
+        places = sorted(angle % 360.0 for angle in self.grooves_deg)
+        return [a + 0.5 * ((b - a) % 360.0) for a, b in zip(places, [*places[1:], *places[:1]], strict=True)]
 
     @property
     def grooves(self) -> tuple[Groove, ...]:
@@ -125,4 +148,5 @@ class GroovedJournalScene(Scene):
         toward_film = math.radians(self.attitude_deg or 0.0)
         attitude = toward_film - math.atan2(-fy, -fx)  # from the direction that the film holds up
         wrapped = math.degrees(math.remainder(attitude, 2.0 * math.pi))
-        return {**turning.numbers((fx, fy), self.mu, self.eccentricity), "attitude_deg": wrapped, "load_vector": [fx, fy]}
+        numbers = turning.numbers((fx, fy), self.mu, self.eccentricity)
+        return {**numbers, "attitude_deg": wrapped, "load_vector": [fx, fy], "moment": list(turning.moment(problem, p))}
