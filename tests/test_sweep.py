@@ -209,3 +209,21 @@ def test_bad_input_is_refused_before_anything_is_solved(words, message):
     args = parse(["sweep", "journal", "--nx", "31", "--ny", "9", *words])
     with pytest.raises(InputError, match=re.escape(message)):
         run_command(args)
+
+
+def test_units_of_an_axis():
+    axis = parse_axis("h_min=10um:20um:3")
+    assert axis.values == (1e-5, 1.5e-5, 2e-5) and load_scene("problem1", {"h_min": axis.given(1.5e-5)}).h_min == 1.5e-5
+    assert parse_axis("p_a=1bar,0.5 MPa").values == (1e5, 5e5) and parse_axis("U=1,2.5").unit == ""
+
+
+def test_rows_say_what_was_solved(cli, tmp_path):
+    """Rows of different scenes in one file differ in a column, whatever was changed."""
+    for change in ("mu=10mPas", "mu=0.02"):
+        assert cli("sweep", "problem1", "--n", 20, "--set", change, "--vary", "U=1:2:2", "--output", "s.csv").status == 0
+    by_din = ("--method", "din", "--set", "din.gamma=0.3")
+    assert cli("sweep", "problem1", "--n", 20, *by_din, "--vary", "U=1:2:2", "--output", "s.csv").status == 0
+    with (tmp_path / "s.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["scene.mu [Pa s]"] for row in rows] == ["0.01", "0.01", "0.02", "0.02", "0.015", "0.015"]
+    assert [row["scene.U [m/s]"] for row in rows] == ["1.0", "2.0"] * 3 and "gamma" in rows[-1]["settings"]

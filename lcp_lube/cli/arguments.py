@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from .. import __version__
+from ..base.quantity import in_si
 from ..errors import InputError, nearest
 from ..registry import METHODS, STABILITY, scene_names
 
@@ -131,7 +132,7 @@ def parse(own: list[str]) -> argparse.Namespace:
     )
     solve.add_argument(
         "--accuracy",
-        type=float,
+        type=number,
         metavar="TOL",
         help="finer and finer grids until the load's estimated relative error is below TOL; --n, --nx, --ny: no finer ones",
     )
@@ -143,7 +144,7 @@ def parse(own: list[str]) -> argparse.Namespace:
     solve.add_argument("--monitor", action="store_true", help="a line an iteration on stderr")
 
     solve.add_argument("--checkpoint", metavar="FILE", help="save the iterate here, in one piece, so that --resume can go on")
-    solve.add_argument("--every", type=int, metavar="N", help="a checkpoint after every N steps, default 1")
+    solve.add_argument("--every", type=whole, metavar="N", help="a checkpoint after every N steps, default 1")
     solve.add_argument("--resume", metavar="FILE", help="go on from a checkpoint of this scene, on any number of ranks")
 
     compare = command("compare", "several methods and recipes on one scene, in one table")
@@ -217,6 +218,32 @@ def parse(own: list[str]) -> argparse.Namespace:
     return parser.parse_args(own)
 
 
+def number(text: str) -> float:
+    """A number, 1e-4, .75 or 1%; its unit would have nothing to be checked against."""
+    try:
+        value = in_si(text, "")
+        return float(text) if value is None else value  # nan and inf are for others to refuse
+    except InputError as error:
+        raise argparse.ArgumentTypeError(f"{text}: {error}") from None
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"invalid float value: {text!r}") from None
+
+
+def whole(text: str) -> int:
+    """A whole number, 200 or 1e3."""
+    try:
+        return int(text)
+    except ValueError:
+        pass
+    try:
+        value = in_si(text, "")
+    except InputError:
+        value = None
+    if value is None or not value.is_integer():
+        raise argparse.ArgumentTypeError(f"invalid int value: {text!r}")
+    return int(value)
+
+
 def _results_option(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--results",
@@ -230,9 +257,9 @@ def _results_option(parser: argparse.ArgumentParser) -> None:
 def _scene_options(parser: argparse.ArgumentParser) -> None:
     """What both `solve` and `compare` take."""
     parser.add_argument("scene", metavar="SCENE", help="a .toml file or a built-in name, see 'lcp-lube list'")
-    parser.add_argument("--n", type=int, help="interior points (a side, in 2D)")
-    parser.add_argument("--nx", type=int)
-    parser.add_argument("--ny", type=int)
+    parser.add_argument("--n", type=whole, help="interior points (a side, in 2D)")
+    parser.add_argument("--nx", type=whole)
+    parser.add_argument("--ny", type=whole)
     parser.add_argument("--film", help="sinusoid or parabola (published problems)")
     parser.add_argument(
         "--set",
@@ -248,11 +275,11 @@ def _scene_options(parser: argparse.ArgumentParser) -> None:
         default=None,
         help="start from the answers on coarser grids; default: where it pays",
     )
-    parser.add_argument("--eps1", type=float, help="stop when ||F|| <= eps1, default 1e-8 (fas: 1e-11, interior: 8e-8)")
-    parser.add_argument("--eps2", type=float, help="and ||alpha d|| <= eps2, default 1e-8 (fas and box scenes: no such test)")
-    parser.add_argument("--max-it", type=int, default=500, help="at most so many outer iterations, default 500")
-    parser.add_argument("--p0", type=float, help="start of p in the scene's p_unit (MPa in the published problems), 1")
-    parser.add_argument("--r0", type=float, help="start of r, 0.1")
+    parser.add_argument("--eps1", type=number, help="stop when ||F|| <= eps1, default 1e-8 (fas: 1e-11, interior: 8e-8)")
+    parser.add_argument("--eps2", type=number, help="and ||alpha d|| <= eps2, default 1e-8 (fas and box scenes: no such test)")
+    parser.add_argument("--max-it", type=whole, default=500, help="at most so many outer iterations, default 500")
+    parser.add_argument("--p0", help="start of p in the scene's p_unit (MPa in the published problems), 1; or 1bar")
+    parser.add_argument("--r0", type=number, help="start of r, 0.1")
     parser.add_argument("--mu", help="perturbation: mu1, mu2 (default) or adaptive")
     parser.add_argument("--conditions", help="step-length conditions, any of the letters FRCB; default FCB")
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..api import solve
+from ..base.quantity import in_si, quantity
 from ..drivers.ask import Ask
 from ..errors import InputError
 from ..problems.solution import Solution
@@ -36,6 +37,8 @@ def stopping_of(args: argparse.Namespace) -> dict[str, Any]:
 def options_of(args: argparse.Namespace, method: str, among: Sequence[str] = ()) -> dict[str, Any]:
     """The method's options from flags and from --set METHOD.OPTION=VALUE; such options of others `among` are theirs."""
     options = method_options(args)
+    if "p0" in options:
+        options["p0"] = _p0(args, options["p0"])
     for key, value in parse_changes(scene_changes(args)[1]).items():
         owner, _, name = key.partition(".")
         if owner == method:
@@ -43,6 +46,30 @@ def options_of(args: argparse.Namespace, method: str, among: Sequence[str] = ())
         elif owner not in among:
             raise InputError(f"--set {key}: an option of method {owner}, and the method is {method}; add --method {owner}")
     return options
+
+
+def _p0(args: argparse.Namespace, text: str) -> float:
+    """The start of p in the scene's p_unit, which a pressure with a unit is turned into.
+
+    Raises
+    ------
+    InputError : no number, or one whose unit is not a pressure's.
+    """
+    try:
+        found = quantity(text)
+        if found is None:
+            return float(text)
+        if not found.unit:
+            return found.value
+        pascals = in_si(text, "Pa")
+    except InputError as error:
+        raise InputError(f"--p0 {text}: {error}") from None
+    except ValueError:
+        raise InputError(f"--p0 {text}: a number, or a pressure with its unit, is needed") from None
+    model = getattr(scene_of(args), "model", None)
+    if model is None or pascals is None:
+        raise InputError(f"--p0 {text}: scene {args.scene} has no pressures; a number without a unit is needed")
+    return float(pascals / model.p_unit)
 
 
 def ask_of(args: argparse.Namespace, monitor: Monitor | None = None) -> Ask:

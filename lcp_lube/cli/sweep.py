@@ -71,7 +71,7 @@ def parse_axis(text: str) -> Axis:
     if first is None or last is None or not re.fullmatch(r"[+-]?\d{1,9}", count):
         raise InputError(f"--vary {text}: {forms}")
     a, b, n, unit = first.value, last.value, int(count), _common(text, [first, last])
-    if not (isfinite(a) and isfinite(b) and 1 <= n <= MOST_POINTS):
+    if not (isfinite(a) and isfinite(b) and isfinite(b - a) and 1 <= n <= MOST_POINTS):
         raise InputError(f"--vary {text}: FROM and TO must be finite, N from 1 to {MOST_POINTS}")
     if log:
         if min(a, b) <= 0:

@@ -6,7 +6,7 @@ from pydantic import Field, model_validator
 
 from ..problems.film.textures import Dimples, Rough
 from .published import LubricationScene, SliderScene
-from .scene import Count, NotNegative, Positive
+from .scene import NotNegative, Positive
 from .units import metres
 
 
@@ -49,7 +49,7 @@ class RoughScene(SliderScene):
     dimension: Literal[2] = 2
     seed: Annotated[int, Field(ge=0)] = 1
     amplitude: NotNegative = metres(2.5e-6, "standard deviation of the surface")
-    cells: Count = Field(40, description="meshes of the random surface along a side")
+    cells: Annotated[int, Field(strict=True, ge=1, le=4000)] = Field(40, description="meshes of the surface along a side")
     h_floor: Positive = metres(1e-6, "smallest film that the surface leaves")
     scheme: Literal["nodal", "face", "upwind"] = "face"
     p_a: NotNegative = 1e5

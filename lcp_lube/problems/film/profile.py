@@ -78,6 +78,10 @@ def read_profile(
             raise InputError(f"profile {path}: allowed are .csv and .npy")
     except OSError as error:
         raise InputError(f"profile {path}: {error.strerror or error}") from None
+    except ValueError as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"profile {path}: {error}") from None  # a name that no file can have
     if not np.isfinite(z).all():
         j, i = np.argwhere(~np.isfinite(z))[0]
         raise InputError(f"profile {path}: h is {z[j, i]} at x = {x[i]:g}, y = {y[j]:g} m")

@@ -164,7 +164,7 @@ def _coefficients(
             cubes_y = face_film(lambda t, s: film(s, t), y_nodes, y_faces, x[0], y_jumps, x_jumps, dx)[0].T
         else:
             cubes_y = cubes(at_y_faces, h_y)
-        k_y = k * cubes_y * dx / dy**2
+        k_y = k * cubes_y * dx / (dy * dy)
         k_S, k_N = k_y[:-1], k_y[1:]
     else:
         k_S = k_N = np.zeros(grid.box)
