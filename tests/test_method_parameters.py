@@ -11,6 +11,7 @@ from lcp_lube.base.parallel import Array
 from lcp_lube.base.stages import Stages
 from lcp_lube.linear.system import make_system
 from lcp_lube.problems.solution import Step
+from lcp_lube.solvers.din import DIN, DinOptions
 from lcp_lube.solvers.fischer import FischerNewton, FischerOptions, derivatives
 from lcp_lube.solvers.interior import InteriorOptions
 from lcp_lube.solvers.newton import Stopping
@@ -86,6 +87,32 @@ def test_the_armijo_slope_is_that_of_an_inexact_step() -> None:
         slope = method._slope(change, dp, dr)
         assert slope == pytest.approx((merit(1e-5) - merit(-1e-5)) / 2e-5, rel=1e-6)
         assert abs(slope + 2.0 * merit(0.0)) > 0.1 * abs(slope)
+    method.destroy()
+    problem.destroy()
+
+
+@pytest.mark.parametrize("inner", ["relative", "residual"])
+def test_inner_residuals_of_din(inner: str, petsc_options: Any) -> None:
+    """'residual' keeps ||F' d + F - sigma mu e|| <= delta_k ||F|| in every step; 'relative' breaks that here."""
+    petsc_options(ksp_pc_side="right")
+    problem = load_scene("problem1", {"n": 100}).build()
+    with recipe("gmres_ilu"):
+        method = DIN(problem, make_system("full", problem, Stages()), DinOptions(inner=inner, tol_min=1e-4))
+        solve_step, found = method.system.solve, []
+
+        def watched(D1: Array, D2: Array, f1: Array, f2: Array, rtol: float) -> tuple[Array, Array, int]:
+            dp, dr, iterations = solve_step(D1, D2, f1, f2, rtol)
+            first = problem.multiply(problem.A, dp) + problem.multiply(problem.B, dr) - f1
+            found.append(np.hypot(np.linalg.norm(first), np.linalg.norm(D1 * dp + D2 * dr - f2)))
+            return dp, dr, iterations
+
+        method.system.solve = watched  # type: ignore
+        allowed = []
+        for _ in range(25):
+            norm = method.norm
+            step = method.advance()
+            allowed.append(method.forcing(step.sigma) * norm)
+    assert all(a <= 1.01 * b for a, b in zip(found, allowed, strict=True)) == (inner == "residual")
     method.destroy()
     problem.destroy()
 

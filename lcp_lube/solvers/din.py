@@ -42,7 +42,9 @@ class DinOptions:
     """Parameters of DIN; the defaults are the paper's.
 
     p0 (in the problem's pressure unit) and r0 start every point. conditions is any combination of F (feasibility),
-    R (reduction), C (centrality), B (backtracking). tol_min is the floor of the inner relative tolerance.
+    R (reduction), C (centrality), B (backtracking). inner: iterative inner solves stop at the relative tolerance
+    max(tol_min, delta_k ||F||) ('relative'), or where the residual is at most delta_k ||F||, without a floor ('residual'; the
+    KSP must test the true residual for that, -ksp_pc_side right).
     """
 
     p0: float = 1.0
@@ -55,8 +57,11 @@ class DinOptions:
     theta: float = 0.5
     beta: float = 1e-4
     tol_min: float = 1e-8
+    inner: str = "relative"
 
     def __post_init__(self) -> None:
+        if self.inner not in ("relative", "residual"):
+            raise InputError(f"din.inner = {self.inner}: allowed are relative, residual")
         if self.mu not in MU_RULES:
             raise InputError(f"--mu {self.mu}: allowed are {', '.join(MU_RULES)}")
         if set(self.conditions) - set("FRCB") or len(set(self.conditions)) < len(self.conditions):
@@ -121,8 +126,10 @@ class DIN:
         sigma = min(o.sigma_max, o.sigma_factor * norm)
         mu = MU_RULES[o.mu](gap, norm, n)
         delta = 0.0 if self.system.direct else self.forcing(sigma)
-        rtol = max(o.tol_min, delta * norm)
-        dp, dr, linear_iterations = self.system.solve(r, p, -self.F1, sigma * mu - products, rtol)
+        rtol, rhs2 = max(o.tol_min, delta * norm), sigma * mu - products
+        if o.inner == "residual" and not self.system.direct:
+            rtol = float(np.clip(delta * norm / reduce.norm(self.F1, rhs2), 1e-15, 0.1))
+        dp, dr, linear_iterations = self.system.solve(r, p, -self.F1, rhs2, rtol)
 
         with self.system.stages("step length"):
             alpha, centrality, backtracking, trial = self._step_length(dp, dr, gap, sigma + delta)
