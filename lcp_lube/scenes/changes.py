@@ -15,7 +15,7 @@ def changed(data: dict[str, Any], changes: dict[str, Any], prefixes: set[str], k
     Parameters
     ----------
     changes : value by key; a dot leads into a table. In an array of tables the next word is a shape's name or a number from
-        1 on, and may be left out where the array has one entry, or one with the key.
+        1 on, and may be left out where the array has one entry, or one with the key; so may `film` itself.
     prefixes : words that may stand in front of a key without meaning anything: the scene's name and family.
     known : the scene's own keys, which win over a prefix.
 
@@ -34,6 +34,9 @@ def changed(data: dict[str, Any], changes: dict[str, Any], prefixes: set[str], k
         if path == ["n"]:  # a new number of points a side replaces the file's nx and ny too
             out = {name: old for name, old in out.items() if name not in ("nx", "ny") or name in changes}
         table: Any = out
+        if len(path) == 1 and stem(path[0]) not in known:  # a key of the one shape that has it
+            shapes = [entry for entry in out.get("film", []) if isinstance(entry, dict) and stem(path[0]) in map(stem, entry)]
+            table = shapes[0] if len(shapes) == 1 and isinstance(out.get("film"), list) else out
         for k, word in enumerate(path[:-1]):
             if isinstance(table, dict) and "shape" in table and word not in table and word in ("1", table["shape"]):
                 continue  # one [film] instead of [[film]]
