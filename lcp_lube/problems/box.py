@@ -138,8 +138,15 @@ class BoxProblem:
         return {"v": (fields["v"], ""), "f": (self.residual(fields["v"]), "")}
 
     def prolong(self, coarse: Any, fields: Fields, interior: bool) -> Fields:
-        """A neighbour's unknowns as they are; nothing for an interior method, or of another number: no grid is there."""
-        return {} if interior or coarse.grid.shape != self.grid.shape else {"v": np.clip(fields["v"], self.lower, self.upper)}
+        """A neighbour's unknowns as they are; nothing for an interior method.
+
+        Raises
+        ------
+        InputError : a neighbour of another size: there is no grid behind the unknowns.
+        """
+        if coarse.grid.shape != self.grid.shape:
+            raise InputError("--nested: this problem has no coarser grids")
+        return {} if interior else {"v": np.clip(fields["v"], self.lower, self.upper)}
 
     def coarser(self) -> "tuple[BoxProblem, Transfer] | None":
         """The same problem on a coarser grid, and the interpolation from there; None if there is none. For multigrid.
