@@ -139,10 +139,12 @@ def test_refusals():
         obstacle({"n": 8}, options={"rtol": 2.0})
     with pytest.raises(InputError, match="p0"):
         obstacle({"n": 8}, options={"p0": 2.0})
-    problem = affine(np.eye(2), np.ones(2), 0, 1)
+    problem, other = affine(np.eye(2), np.ones(2), 0, 1), affine(np.eye(3), np.ones(3), 0, 1)
     with pytest.raises(InputError, match="no coarser grids"):
-        problem.prolong(problem, {"v": problem.v0}, False)
+        problem.prolong(other, {"v": other.v0}, False)
+    assert np.array_equal(problem.prolong(problem, {"v": problem.v0}, False)["v"], problem.v0)
     problem.destroy()
+    other.destroy()
 
 
 @pytest.mark.parametrize("ranks, n, how", [(3, 50, []), (2, 101, ["--nested", "--recipe", "multigrid"])])
