@@ -117,7 +117,7 @@ def self_check(comm: MPI.Comm) -> list[dict[str, Any]]:
         try:
             scene = load_scene(name, changes)
             solution = solve(scene, comm=PETSc.Comm(comm))
-            check["load"] = solution.problem.quantities(solution.fields)["load"]
+            check["load"] = solution.problem.quantities(solution.fields)["pressure_integral"]
             check["passed"], check["message"] = solution.converged, solution.message
             if exact := getattr(scene, "exact", lambda: None)():
                 check["error"] = abs(check["load"] / exact.load - 1)

@@ -31,7 +31,7 @@ from .asked import ask_of, scene_of
 
 MOST_POINTS = 100_000
 REFUSED = "refused"  # an outcome beside those of `Outcome`: bad input that only the solve could notice
-PARTS = {"p_max_at": ("p_max_x", "p_max_y"), "min_h_at": ("min_h_x", "min_h_y"), "load_vector": ("load_towards", "load_across")}
+PARTS = {"p_max_at": ("p_max_x", "p_max_y"), "min_h_at": ("min_h_x", "min_h_y"), "force": ("force_x", "force_y"), "moment": ("moment_x", "moment_y")}
 
 
 @dataclass(frozen=True)
@@ -240,7 +240,7 @@ def flat(data: dict[str, Any]) -> dict[str, Any]:
     """The JSON's keys as columns: places by coordinate, flows by side, the total of the seconds."""
     row: dict[str, Any] = {}
     for key, value in finite(data).items():
-        if key in PARTS:
+        if key in PARTS and not isinstance(value, float):  # in 1D a moment is one number
             row |= dict(zip(PARTS[key], [*(value or []), None][: len(value or []) or 2], strict=False))
         elif key in ("flow", "balance") and isinstance(value, dict):
             row |= {f"{key}_{name}": part for name, part in value.items()}

@@ -28,7 +28,7 @@ ONE_GRID = 1_000  # points up to which no coarser grid is worth its while
 
 def carried(values: dict[str, Any]) -> float:
     """The load that a balance is about, of `Problem.quantities`: N (1D: N/m)."""
-    return float(values.get("bearing_load", values["load_above_ambient"]))
+    return float(values["load"])
 
 
 @dataclass(frozen=True)

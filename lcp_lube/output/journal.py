@@ -21,17 +21,16 @@ CLEARANCE, HIGH, BUSH = 0.22, 0.55, 0.10  # mean gap, largest pressure and wall 
 def journal(axes: Axes, picture: Picture, row: int | None = None) -> None:
     """Draw the cross-section through a row, the load downwards, the gap far too wide.
 
-    The angle phi runs from the widest film in the sense of rotation. The film presses the journal against the load, so the
+    The angle phi runs from x = 0 in the sense of rotation. The film presses the journal against the load, so the
     narrowest film lies at the attitude angle behind the load's direction, counted in the sense of rotation.
     """
     problem: Any = picture.solution.problem
     start, L = problem.grid.origin[0], problem.grid.lengths[0]
-    towards, across = picture.quantities["load_vector"]
-    attitude = float(np.arctan2(across, towards))
-    widest = 0.5 * np.pi + attitude
+    force, attitude = picture.quantities["force"], picture.quantities["attitude_deg"]
+    beginning = problem.shaft.start - 0.5 * np.pi - float(np.arctan2(-force[1], -force[0]))  # of x, the load pointing downwards
 
     def around(x: Any, radius: Any) -> tuple[Any, Any]:
-        theta = widest + 2.0 * np.pi * (x - start) / L
+        theta = beginning + 2.0 * np.pi * (x - start) / L
         return radius * np.cos(theta), radius * np.sin(theta)
 
     def ring(x: Any, inner: Any, outer: Any, **look: Any) -> None:
@@ -60,7 +59,7 @@ def journal(axes: Axes, picture: Picture, row: int | None = None) -> None:
         axes.text(*around(place, outside + 0.06), name, ha="left", va="center", fontsize=8, color=RED)
     axes.plot(*around(start, np.array([1.0, outside])), color=GREY, lw=1.0)
     axes.text(*around(start, outside + 0.1), "0°", ha="center", va="center", fontsize=8, color=GREY)
-    narrowest = widest + np.pi
+    narrowest = -0.5 * np.pi + np.radians(attitude or 0.0)
     centre = 0.5 * to_gap * np.ptp(h) * unit(narrowest)
     axes.plot(*np.transpose([0.0 * centre, 0.85 * unit(narrowest)]), color=GREY, lw=0.8, ls=(0, (6, 3)))
     load = {"arrowstyle": "-|>", "lw": 1.6, "color": "black"}
@@ -71,7 +70,7 @@ def journal(axes: Axes, picture: Picture, row: int | None = None) -> None:
     axes.plot(*np.transpose([0.5 * unit(angle) for angle in turn]), color="black", lw=1.0)
     axes.annotate("", 0.5 * unit(turn[-1]), 0.5 * unit(turn[-3]), arrowprops={**load, "lw": 1.0})
     axes.text(0.0, 0.55, "$\\omega$", ha="center", va="bottom")
-    axes.set_title(f"attitude angle {np.degrees(attitude):.1f}°; gap not to scale", loc="center")
+    axes.set_title("gap not to scale" if attitude is None else f"attitude angle {attitude:.1f}°; gap not to scale", loc="center")
     axes.set_aspect("equal")
     axes.axis("off")
 

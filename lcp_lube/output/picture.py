@@ -55,14 +55,14 @@ class Picture:
     @property
     def is_journal(self) -> bool:
         """A load with a direction is known."""
-        return bool(np.all(np.isfinite(self.quantities.get("load_vector", np.nan))))
+        return bool(np.all(np.isfinite(self.quantities.get("force", np.nan))))
 
     @property
     def along(self) -> tuple[float, str]:
-        """(factor, label) of the x axis: of a journal the angle from the widest film, else x in a unit that suits it."""
+        """(factor, label) of the x axis: of a film round a shaft the angle from x = 0, else x in a unit that suits it."""
         grid = self.solution.problem.grid
         if self.is_journal:
-            return 360.0 / grid.lengths[0], "angle from the widest film (°)"
+            return 360.0 / grid.lengths[0], "angle from x = 0 (°)"
         return self._axis("x", max(abs(grid.origin[0]), *grid.lengths))
 
     @property
@@ -115,8 +115,8 @@ class Picture:
 
     @property
     def load(self) -> float | None:
-        """What the bearing carries: a journal's load, else the integral of the absolute pressure."""
-        return self.quantities.get("bearing_load", self.quantities.get("load"))
+        """What the bearing carries."""
+        return self.quantities.get("load")
 
 
 def collect(solution: Solution) -> Picture | None:

@@ -13,7 +13,7 @@ class BalanceTable(Measured):
     """[balance] of a scene file: the load to carry, and the key whose value is to be found for it."""
 
     load: Annotated[Number, Field(gt=0)] = measured(
-        "N or N/m", ..., "load to carry, in 1D per metre of width; a journal's bearing_load, else load_above_ambient"
+        "N or N/m", ..., "load to carry, in 1D per metre of width: `load` of the results"
     )
     vary: str | None = Field(None, description="key to find; default eccentricity (journals), else h_offset, the film's level")
     range: tuple[Number, Number] | None = Field(None, description="values allowed for it, in its unit")

@@ -1,5 +1,6 @@
 """Bearings of any kind: a film made of named shapes, a fluid, and a condition for each side."""
 
+import cmath
 import math
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -12,11 +13,12 @@ from ..errors import InputError
 from ..problems.facts import Facts
 from ..problems.film.exact import ExactSolution, exact_solution
 from ..problems.film.fluid import Law
+from ..problems.film.forces import Shaft
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import NAMES, OPPOSITE, Model, Side
 from ..problems.film.shapes import Block, Sum
 from .balance import BalanceTable
-from .film import Extent, FilmPart
+from .film import Extent, FilmPart, JournalPart
 from .scene import Count, Finite, Positive, Scene
 from .units import Measured, is_quantity, measured, metres
 
@@ -182,8 +184,18 @@ class BearingScene(Scene):
             scheme=self.scheme,
             mean_cubes=self.mean_cubes,
             exact=self.exact,
+            shaft=self._shaft,
             law=self._law,
         )
+
+    @property
+    def _shaft(self) -> Shaft | None:
+        """What the film is wrapped round: it has a journal among its shapes, whose eccentricities add up as vectors."""
+        journals = [table for table in self.film if isinstance(table, JournalPart)]
+        if not journals:
+            return None
+        offset = sum(table.c * table.eccentricity * cmath.exp(2j * math.pi * table.widest / self.L) for table in journals)
+        return Shaft(self.L / (2.0 * math.pi), cmath.phase(offset) if offset else None)
 
     @property
     def _law(self) -> Law | None:

@@ -1,17 +1,16 @@
 """Journal bearings, unwrapped from one axial groove at the widest gap to the same groove again."""
 
 import math
+from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Literal
 
-import numpy as np
 from pydantic import Field, model_validator
 
-from ..base.parallel import Array
 from ..problems.film.exact import ExactSolution, exact_solution
-from ..problems.film.flows import side_flows
+from ..problems.film.forces import Shaft
 from ..problems.film.gaps import JournalGap, Raised
 from ..problems.film.lubrication import LubricationProblem
-from ..problems.film.model import Side
+from ..problems.film.model import Model, Side
 from ..problems.film.turning import Turning
 from .published import LubricationScene
 from .scene import Positive
@@ -91,27 +90,14 @@ class JournalScene(LubricationScene):
         problem.extras = self._bearing_numbers
         return problem
 
-    def _bearing_numbers(self, problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any]:
-        """Sommerfeld number W psi^2/(B D mu omega), attitude angle, load, side leakage as Q/((D/2)^3 psi omega). Collective.
+    @property
+    def model(self) -> Model:
+        return replace(super().model, shaft=Shaft(0.5 * self.D, 0.0 if self.eccentricity else None))
 
-        bearing_load is in N (1D: N/m), load_vector its parts towards the narrowest gap and across, in the sense of rotation.
-        """
-        grid = problem.grid
-        phi = 2.0 * np.pi * np.broadcast_to(grid.x, grid.box).ravel() / self.L
-        width = self.width if grid.dim == 2 and self.width else 1.0
-        groove = 0.5 * (self.p_a + self.p_b) * (grid.shape[1] if grid.dim == 2 else 1)
-        # Towards the narrowest gap, and across: the film's force on the journal, trapezoidal along x.
-        towards = grid.cell * (-problem.reduce.dot(p, np.cos(phi)) * problem.p_unit - groove)
-        across = grid.cell * problem.reduce.dot(p, np.sin(phi)) * problem.p_unit
-        load = math.hypot(towards, across)
-        numbers: dict[str, Any] = {
-            "sommerfeld": load * self.psi**2 / (width * self.D * self.mu * self.omega),
-            "attitude_deg": math.degrees(math.atan2(across, towards)),
-            "bearing_load": load,
-            "load_vector": [towards, across],
-        }
-        if grid.dim == 2:
-            flow = side_flows(problem, p, r)
-            leakage = flow["south"] + flow["north"]
-            numbers["side_leakage_number"] = leakage / ((0.5 * self.D) ** 3 * self.psi * self.omega)
+    def _bearing_numbers(self, values: dict[str, Any]) -> dict[str, Any]:
+        """Sommerfeld number W psi^2/(B D mu omega), and in 2D the side leakage as Q/((D/2)^3 psi omega)."""
+        width = self.width if self.dimension == 2 and self.width else 1.0
+        numbers = {"sommerfeld": values["load"] * self.psi**2 / (width * self.D * self.mu * self.omega)}
+        if self.dimension == 2:
+            numbers["side_leakage_number"] = values["side_leakage"] / ((0.5 * self.D) ** 3 * self.psi * self.omega)
         return numbers

@@ -1,7 +1,6 @@
 """Several methods and recipes on one scene, side by side."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from math import prod
 from typing import Any
 
 from ..api import solve
@@ -105,12 +104,12 @@ def _run(
 
 
 def read_off(problem: Problem, data: dict[str, Any]) -> dict[str, float | None]:
-    """What errors are told of: load and p_max above the cavitation pressure (N or N/m, Pa), rupture (m; 2D: middle line)."""
+    """What errors are told of: integral of the pressure and p_max above the cavitation pressure (N or N/m, Pa), rupture (m; 2D: middle line)."""
     if "load" not in data:
         return {}
     p_c = getattr(problem, "p_c", 0.0)
     return {
-        "load": data["load"] - p_c * prod(problem.grid.lengths),
+        "load": data["pressure_integral"],
         "p_max": data["p_max"] - p_c,
         "rupture": data["rupture"],
     }

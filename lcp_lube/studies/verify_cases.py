@@ -108,7 +108,7 @@ def _slider(number: int, x_r: float, x_f: float | None, Q: float, p_max: float, 
         **({} if x_f is None else {"reformation": Reference(x_f, 2e-6, 1.5)}),
         "Q": Reference(Q, 2e-6, 1.5),
         "p_max": Reference(p_max, 2e-6, 1.5),
-        "load": Reference(load, 2e-6, 1.5),
+        "pressure_integral": Reference(load, 2e-6, 1.5),
     }
     return Case(f"problem {number}", f"problem{number}", QUADRATURE, references, derive=_film_ends, note=NOISE)
 
@@ -166,7 +166,7 @@ CASES: tuple[Case, ...] = (
             "reformation": Reference(3.6112626558e-3, 1e-7, 1.5),
             "void_behind_rupture": Reference(0.4872906839, 1e-7, 1.8),
             "p_max": Reference(9_808_818.754, 1e-8, 1.8),
-            "load_above_ambient": Reference(34_165.70098, 1e-5, 1.5),
+            "load": Reference(34_165.70098, 1e-5, 1.5),
         },
         {"U": 1.0},
         PAD,
@@ -180,7 +180,7 @@ CASES: tuple[Case, ...] = (
         {
             "p_at_pocket": Reference(40_621.8837, 1e-8, 1.8),
             "p_max": Reference(451_923.9105, 1e-8, 1.8),
-            "load_above_ambient": Reference(1333.4520, 1e-6, 1.8),
+            "load": Reference(1333.4520, 1e-6, 1.8),
             "iterations": Reference(1, 1e-9, None, "no cavitation: one linear solve must do"),
         },
         {"U": 0.02},
@@ -195,7 +195,7 @@ CASES: tuple[Case, ...] = (
             "rupture/L": Reference(0.67893443, 1e-6, 1.5),
             "p_max": Reference(3_591_787.27, 1e-5, 1.5),
             "x_max/L": Reference(0.32106557, 2e-3, None, "found to a point of the grid"),
-            "load": Reference(101_349.500, 1e-5, 1.5),
+            "pressure_integral": Reference(101_349.500, 1e-5, 1.5),
         },
         derive=_film_ends,
         note=NOISE,

@@ -105,6 +105,8 @@ def _scaled(
         p_sides=p_sides,
         p_c=problem.p_c,
         film=problem.film,
+        shaft=problem.shaft,
+        r_in=problem.r_in,
     )
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...base.parallel import Array
+from ..grid import Grid
 from .cavity import cavity_sign
 from .flows import point_weights
 from .reynolds import Film
@@ -15,23 +16,24 @@ if TYPE_CHECKING:
     from .lubrication import LubricationProblem
 
 
-def fronts(problem: LubricationProblem, p: Array, r: Array) -> tuple[float | None, float | None]:
-    """First rupture and first reformation behind it, in metres, in 2D along `middle_row`; None where absent. Collective.
+def fronts(problem: LubricationProblem, p: Array, r: Array) -> tuple[list[float], list[float]]:
+    """x of all ruptures and of all reformations, m, in ascending order, in 2D along `middle_row`. Collective.
 
     Each front is found to its cell (`cavity.cavity_sign`) and placed inside it. Rupture: where U h = Q, Q being the
     flow along the line (p = p' = 0 there; in 1D the one flow of the discrete solution, in 2D what leaves the first cell of the
     cavity), within the cell or one beside it: the discrete front may be late. Reformation: where the pressure behind it,
-    extrapolated linearly, is zero.
+    extrapolated linearly, is zero. A cavity that begins with the void that enters at the west has no rupture.
     """
     grid, film, scheme = problem.grid, problem.film, problem.scheme
-    dx, L = grid.spacing[0], grid.lengths[0]
+    dx, start, L = grid.spacing[0], grid.origin[0], grid.lengths[0]
     x, row = grid.x[0], middle_row(problem) - grid.y_start
     here = 0 <= row < grid.box[0]
     row = row if here else 0
     y = np.full_like(x, grid.y[row, 0])
     z = grid.ghosted(cavity_sign(problem.reduce, p, r))[row + 1]
     opens = [kind == "open" for kind in grid.ends[0]]
-    z[0] = 1.0 if grid.x_start == 0 and opens[0] else z[0]  # the inflow boundary is full
+    if grid.x_start == 0 and opens[0]:
+        z[0] = -1.0 if problem.r_in > 0 else 1.0
     cavity = z < 0
     if grid.dim == 1 and opens[0]:
         Q = np.full_like(x, problem.boundary_flows(p, r)[0])
@@ -39,23 +41,35 @@ def fronts(problem: LubricationProblem, p: Array, r: Array) -> tuple[float | Non
         leaves = scheme.couette_E + scheme.b_C * r.reshape(grid.box)
         Q = leaves[row] / point_weights(grid).reshape(grid.box)[row]
     front = cavity[1:-1] & ~cavity[:-2] & here
-    ruptures = _rises_through(film, Q[front] / problem.U, x[front] - 2.0 * dx, x[front] + dx, y[front])
-    rupture = problem.reduce.min(ruptures)
-    if not np.isfinite(rupture):
-        return None, None
+    before = x[front] - 2.0 * dx
+    before = before if grid.periodic[0] else np.maximum(before, start)
+    ruptures = _rises_through(film, Q[front] / problem.U, before, x[front] + dx, y[front])
     p_line = grid.ghosted(p)[row + 1]
-    if grid.x_end == grid.shape[0] and opens[1]:
+    last = grid.x_end == grid.shape[0] and opens[1]
+    if last:
         p_line[-1] = problem.p_sides[1] / problem.p_unit
     rise = p_line[2:] - p_line[1:-1]
     back = np.where(rise > 0, np.clip(p_line[1:-1] / np.where(rise > 0, rise, 1.0), 0.0, 1.0), 0.5)
-    behind = x + np.where((x <= rupture) & grid.periodic[0], L, 0.0)  # round the end
-    full_again = ~cavity[1:-1] & cavity[:-2] & (behind > rupture) & here
-    reformation = problem.reduce.min(np.where(full_again, behind - back * dx, np.inf))
-    if np.isfinite(reformation) and reformation >= grid.origin[0] + L and grid.periodic[0]:
-        reformation -= L
-    if not np.isfinite(reformation) and problem.p_sides[1] > 0:
-        reformation = grid.origin[0] + L - 0.5 * dx  # in the last cell, before a boundary above the cavitation pressure
-    return rupture, reformation if np.isfinite(reformation) else None
+    full_again = ~cavity[1:-1] & cavity[:-2] & here
+    reformations = (x - back * dx)[full_again]
+    if last and here and cavity[-2] and problem.p_sides[1] > 0:
+        reformations = np.append(reformations, start + L - 0.5 * dx)  # before a side above the cavitation pressure
+    parts = grid.comm.allgather((ruptures.tolist(), reformations.tolist()))
+    found = ([place for part in parts for place in part[k]] for k in (0, 1))
+    if grid.periodic[0]:
+        found = ([start + (place - start) % L for place in places] for places in found)
+    first, second = (sorted(places) for places in found)
+    return first, second
+
+
+def first_cavity(grid: Grid, ruptures: list[float], reformations: list[float]) -> tuple[float | None, float | None]:
+    """The first rupture, and the first reformation behind it; without a rupture the first reformation. None where absent."""
+    if not ruptures:
+        return None, min(reformations, default=None)
+    rupture = ruptures[0]
+    if grid.periodic[0]:
+        return rupture, min(reformations, key=lambda x: (x - rupture) % grid.lengths[0], default=None)
+    return rupture, min((x for x in reformations if x > rupture), default=None)
 
 
 def _rises_through(film: Film, level: Array, a: Array, b: Array, y: Array) -> Array:

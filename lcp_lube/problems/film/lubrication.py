@@ -15,6 +15,7 @@ from ..grid import Grid
 from ..solution import Fields
 from ..transfer import Transfer
 from .exact import ExactSolution
+from .forces import Shaft
 from .quantities import quantities
 from .reynolds import BoxScheme, assemble, side_points, term_squares
 
@@ -37,6 +38,8 @@ class LubricationProblem:
     p_c : cavitation pressure in Pa, added to the pressures that are reported.
     film : h(x, y) in metres.
     exact : gives the exact 1D solution, where one is known.
+    shaft : what the film is wrapped round; None for a flat one.
+    r_in : void fraction that enters at the west.
     """
 
     kind = "lubrication"
@@ -53,11 +56,13 @@ class LubricationProblem:
         p_c: float,
         film: Callable[[Array, Array], Array],
         exact: Callable[[], ExactSolution | None] | None = None,
+        shaft: Shaft | None = None,
+        r_in: float = 0.0,
     ):
         self.grid, self.scheme, self.film = grid, scheme, film
         self.mu, self.U, self.p_unit, self.p_sides, self.p_c = mu, U, p_unit, p_sides, p_c
-        self.exact = exact
-        self.extras: Callable[[LubricationProblem, Array, Array], dict[str, Any]] | None = None
+        self.exact, self.shaft, self.r_in = exact, shaft, r_in
+        self.extras: Callable[[dict[str, Any]], dict[str, Any]] | None = None
         self.reduce = grid.reduce
         self.c = scheme.c.ravel()
 

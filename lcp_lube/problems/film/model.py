@@ -13,6 +13,7 @@ from ..facts import Facts
 from ..grid import Grid
 from .exact import ExactSolution
 from .fluid import Law
+from .forces import Shaft
 from .grooves import Groove, GroovedProblem, Pad, pads_between
 from .lubrication import LubricationProblem
 from .reynolds import Film, box_scheme
@@ -57,6 +58,7 @@ class Model:
     mean_cubes: bool = False
     exact: Callable[[], ExactSolution | None] | None = None
     grooves: tuple[Groove, ...] = ()  # of a film that is periodic in x
+    shaft: Shaft | None = None  # of a film that is wrapped round one
     law: Law | None = None  # a fluid that depends on the pressure; `build` makes the problem of the constant one
 
     def __post_init__(self) -> None:
@@ -119,6 +121,8 @@ class Model:
             p_c=self.p_c,
             film=film,
             exact=self.exact,
+            shaft=self.shaft,
+            r_in=west.r,
         )
         if isinstance(problem, GroovedProblem):
             problem.grooves = self.grooves

@@ -10,7 +10,8 @@ from mpi4py import MPI
 from ...base.parallel import Array
 from .cavity import cavity_sign
 from .flows import friction, point_weights, side_flows
-from .fronts import fronts
+from .forces import ambient, corner_flows, forces, open_pressures
+from .fronts import first_cavity, fronts
 
 if TYPE_CHECKING:
     from .lubrication import LubricationProblem
@@ -28,71 +29,49 @@ def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any
     Returns
     -------
     p_max : largest pressure, absolute, Pa; p_max_at : its [x] or [x, y], m (of a side: its middle).
-    load : integral of the absolute pressure, N. load_above_ambient : that of p - p_ambient, p_ambient (Pa, absolute) being the
-    smallest pressure at a side.
-    friction : drag on the moving wall, N (`flows.friction`). friction_coefficient : friction over the load carried, which is
-    the scene's bearing_load, else load_above_ambient; None unless that is positive. power_loss : friction U, W.
-    flow : out of each side, m3/s (`flows.side_flows`). side_leakage : south and north together (2D).
+    load, force, moment, attitude_deg : what the film carries (`forces.forces`), above p_ambient (Pa, absolute), the smallest
+    pressure at a side. pressure_integral : of p - p_c, N.
+    friction : drag on the moving wall, N (`flows.friction`). friction_coefficient : friction over load; None unless that is
+    positive. power_loss : friction U, W.
+    flow : out of each side, m3/s (`flows.side_flows`). side_leakage : south and north together (2D). flow_growth : of each when
+    the spacings are halved, None if they converge (`forces.corner_flows`; 2D).
     min_h, min_h_at : thinnest film and where, m, sides included.
     cavitated_fraction : share of the points (`cavity.cavity_sign`); cavitated_area : theirs, m2.
-    rupture, reformation : x of the first ones, m, None where absent; in 2D on the middle line (`fronts.fronts`).
+    ruptures, reformations : x of all of them, m; in 2D on the middle line (`fronts.fronts`). rupture : the first one, None
+    where absent. reformation : the first one behind it, or behind the void that enters.
     p_unit : Pa.
     """
     grid, reduce = problem.grid, problem.reduce
     p_pa = p * problem.p_unit
     cavity = (cavity_sign(reduce, p, r) < 0).astype(float)
     weight = point_weights(grid)
-    load, ambient = _load(problem, p_pa), min(p for p in open_pressures(problem) if p is not None)
     flow = side_flows(problem, p, r)
     p_max, p_max_at = _largest_pressure(problem, p_pa)
     min_h, min_h_at = _thinnest(problem)
-    rupture, reformation = fronts(problem, p, r)
+    ruptures, reformations = fronts(problem, p, r)
+    rupture, reformation = first_cavity(grid, ruptures, reformations)
     out: dict[str, Any] = {
         "p_max": p_max + problem.p_c,
         "p_max_at": p_max_at,
-        "load": load + problem.p_c * _area(problem),
-        "p_ambient": ambient + problem.p_c,
-        "load_above_ambient": load - ambient * _area(problem),
+        **forces(problem, p_pa),
+        "p_ambient": ambient(problem) + problem.p_c,
         "friction": friction(problem, p_pa, r),
         "p_unit": problem.p_unit,
         "cavitated_fraction": reduce.sum(cavity) / grid.size,
         "cavitated_area": reduce.sum(cavity * weight) * grid.cell,
         "rupture": rupture,
         "reformation": reformation,
+        "ruptures": ruptures,
+        "reformations": reformations,
         "min_h": min_h,
         "min_h_at": min_h_at,
         "flow": flow,
     }
     if grid.dim == 2:
-        out["side_leakage"] = flow["south"] + flow["north"]
-    out |= problem.extras(problem, p, r) if problem.extras else {}
-    carried = out.get("bearing_load", out["load_above_ambient"])
-    out["friction_coefficient"] = out["friction"] / carried if carried > 0 else None
+        out |= {"side_leakage": flow["south"] + flow["north"], "flow_growth": corner_flows(problem)}
+    out["friction_coefficient"] = out["friction"] / out["load"] if out["load"] > 0 else None
     out["power_loss"] = out["friction"] * problem.U
-    return out
-
-
-def _area(problem: LubricationProblem) -> float:
-    return float(np.prod(problem.grid.lengths))
-
-
-def open_pressures(problem: LubricationProblem) -> list[float | None]:
-    """Pressures above p_c at west, east (south, north) in Pa; None where the side has none, being closed or periodic."""
-    kinds = [kind for pair in problem.grid.ends for kind in pair]
-    return [p if kind == "open" else None for p, kind in zip(problem.p_sides, kinds, strict=False)]
-
-
-def _load(problem: LubricationProblem, p_pa: Array) -> float:
-    """Integral of p - p_c: trapezoidal to the open sides, a corner having the mean of its two; cells end at the others."""
-    grid = problem.grid
-    along = [n - 0.5 * pair.count("mirror") for n, pair in zip(grid.shape, grid.ends, strict=True)]
-    total = problem.reduce.sum(p_pa * point_weights(grid))
-    pressures = open_pressures(problem)
-    for k, p_side in enumerate(pressures):
-        if p_side is not None:
-            corners = sum(other is not None for other in pressures[2 - k // 2 * 2 :][:2])
-            total += 0.5 * p_side * (along[1 - k // 2] if grid.dim == 2 else 1.0) + 0.125 * p_side * corners
-    return grid.cell * total
+    return out | (problem.extras(out) if problem.extras else {})
 
 
 def _largest_pressure(problem: LubricationProblem, p_pa: Array) -> tuple[float, list[float] | None]:

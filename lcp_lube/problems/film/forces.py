@@ -1,0 +1,135 @@
+"""What the pressure of a film carries: the load of a flat film, the force of one that is wrapped round a shaft, the moments."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...base.parallel import Array
+from .flows import point_weights
+from .reynolds import sides
+
+if TYPE_CHECKING:
+    from .lubrication import LubricationProblem
+
+
+@dataclass(frozen=True)
+class Shaft:
+    """What a film is wrapped round: at x lies the angle phi = start + x/radius; y along the axis.
+
+    radius : m. widest : phi of the widest gap that the shaft's eccentricity makes, rad; None for a concentric one.
+    """
+
+    radius: float
+    widest: float | None
+    start: float = 0.0
+
+
+def open_pressures(problem: LubricationProblem) -> list[float | None]:
+    """Pressures above p_c at west, east (south, north) in Pa; None where the side has none, being closed or periodic."""
+    kinds = [kind for pair in problem.grid.ends for kind in pair]
+    return [p if kind == "open" else None for p, kind in zip(problem.p_sides, kinds, strict=False)]
+
+
+def ambient(problem: LubricationProblem) -> float:
+    """The smallest pressure at a side, Pa above p_c."""
+    return min(p for p in open_pressures(problem) if p is not None)
+
+
+def forces(problem: LubricationProblem, p_pa: Array) -> dict[str, Any]:
+    """Load, force and moment, N and N m (1D: N/m and N): the keys of `docs/numbers.md`. Collective.
+
+    A flat film: `load`, the integral of p - p_ambient, and `moment` about the middle of the film, [about x, about y], of that
+    pressure on the wall (the force points to +z). One round a shaft: `force` of the film on the shaft, minus the
+    integral of (p - p_ambient) (cos phi, sin phi), `load` its magnitude, `attitude_deg` the angle from the load that it holds up,
+    its opposite, to the narrowest gap, positive in the sense of rotation, `moment` about the shaft's middle in the same two
+    directions (2D), 0 where the shaft lies straight between alike ends.
+
+    Parameters
+    ----------
+    p_pa : owned points, Pa above p_c.
+    """
+    grid, shaft, reference = problem.grid, problem.shaft, ambient(problem)
+    middle = [start + 0.5 * length for start, length in zip(grid.origin, grid.lengths, strict=False)]
+
+    def integral(weight: Callable[[Array, Array], Array], above: float = reference) -> float:
+        return _integral(problem, p_pa, above, weight)
+
+    out: dict[str, Any] = {"pressure_integral": integral(lambda x, y: np.ones(1), 0.0)}
+    if shaft is None:
+        out["load"] = integral(lambda x, y: np.ones(1))
+        about_y = -integral(lambda x, y: x - middle[0])
+        out["moment"] = [integral(lambda x, y: y - middle[1]), about_y] if grid.dim == 2 else about_y
+        return out
+
+    def phi(x: Array) -> Array:
+        return shaft.start + (x - grid.origin[0]) / shaft.radius
+
+    force = [-integral(lambda x, y: np.cos(phi(x))), -integral(lambda x, y: np.sin(phi(x)))]
+    out |= {"load": float(np.hypot(*force)), "force": force, "attitude_deg": None}
+    if shaft.widest is not None and out["load"] != 0:
+        behind = np.exp(1j * shaft.widest) / complex(*force)  # of the opposites of both
+        out["attitude_deg"] = float(np.degrees(np.angle(behind if problem.U >= 0 else np.conj(behind))))
+    if grid.dim == 2:
+        out["moment"] = [
+            integral(lambda x, y: (y - middle[1]) * np.sin(phi(x))),
+            -integral(lambda x, y: (y - middle[1]) * np.cos(phi(x))),
+        ]
+    return out
+
+
+def _integral(problem: LubricationProblem, p_pa: Array, above: float, weight: Callable[[Array, Array], Array]) -> float:
+    """Integral of (p - above) weight(x, y): trapezoidal to the open sides, a corner having the mean of its two; cells end at
+    the others. Collective."""
+    grid = problem.grid
+    inside = (p_pa - above) * np.broadcast_to(weight(grid.x, grid.y), grid.box).ravel()
+    total = problem.reduce.sum(inside * point_weights(grid))
+    pressures = open_pressures(problem)
+    coordinates = [  # of all points, on every rank
+        a + (np.arange(n) + offset) * step
+        for a, n, offset, step in zip(grid.origin, grid.shape, grid.offset, grid.spacing, strict=False)
+    ]
+    for k, p_side in enumerate(pressures):
+        if p_side is None:
+            continue
+        axis, across = k // 2, 1 - k // 2
+        at = grid.origin[axis] + (k % 2) * grid.lengths[axis]
+        if grid.dim == 1:
+            total += 0.5 * (p_side - above) * weight(np.array([at]), np.zeros(1))[0]
+            continue
+        along = coordinates[across]
+        share = np.full(along.size, 0.5)
+        if "mirror" in grid.ends[across]:
+            share[-1] = 0.25
+        ends = [grid.origin[across] + j * grid.lengths[across] for j in (0, 1) if pressures[2 * across + j] is not None]
+        places, shares = np.concatenate([along, ends]), np.concatenate([share, np.full(len(ends), 0.125)])
+        x, y = (np.full_like(places, at), places) if axis == 0 else (places, np.full_like(places, at))
+        total += (p_side - above) * float(np.sum(shares * weight(x, y)))
+    return float(grid.cell * total)
+
+
+def corner_flows(problem: LubricationProblem) -> dict[str, float] | None:
+    """By how much the flow out of each side grows when the spacings are halved, m3/s; None if it does not. Collective.
+
+    At a corner of two sides whose pressures differ by dp, the flow from the one to the other is without bound: a distance r
+    from the corner h^3/(12 mu) 2 dp/(pi r) passes, so that every halving adds h^3/(12 mu) (2 dp/pi) log 2.
+    """
+    grid, s, pressures = problem.grid, problem.scheme, open_pressures(problem)
+    if grid.dim == 1:
+        return None
+    at = sides(grid)
+    names = ("west", "east", "south", "north")
+    growth = dict.fromkeys(names, 0.0)
+    for i in (0, 1):
+        for j in (2, 3):
+            p_i, p_j = pressures[i], pressures[j]
+            if p_i is None or p_j is None or p_i == p_j:
+                continue
+            k = (s.k_W, s.k_E)[i] * (0.5 * grid.spacing[0] / problem.p_unit)  # h^3/(12 mu)
+            passing = problem.reduce.sum(np.where(at[i] & at[j], k, 0.0)) * 2.0 * np.log(2.0) / np.pi * (p_i - p_j)
+            growth[names[j]] += passing
+            growth[names[i]] -= passing
+    return growth if any(growth.values()) else None
