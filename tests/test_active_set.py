@@ -11,6 +11,7 @@ from petsc4py import PETSc
 from lcp_lube.api import solve
 from lcp_lube.drivers.levels import level_shapes
 from lcp_lube.errors import InputError
+from lcp_lube.output.results import as_dict, summary
 from lcp_lube.problems.solution import Outcome
 from lcp_lube.scenes.scene import load_scene
 from lcp_lube.solvers.newton import Stopping
@@ -71,9 +72,15 @@ def test_fallback_takes_over_and_says_so():
     solution = run("problem3", {"n": 60}, method="active-set", options={"p0": 1.0})
     assert solution.converged and "took over" not in solution.message
     solution.destroy()
-    given_up = run("problem3", {"n": 60}, method="active-set", options={"give_up": 1})
-    assert given_up.outcome is Outcome.STEP_LENGTH  # a user's own limit is kept
-    given_up.destroy()
+    rescued = run("problem3", {"n": 60}, method="active-set", options={"give_up": 1})  # an option is no wish to fail
+    assert rescued.converged and rescued.settings["took_over"] == "din-pc"
+    assert (
+        summary(as_dict(rescued)).splitlines()[0].startswith("problem3 (n = 60, scheme nodal) by active-set (it failed: din-pc")
+    )
+    given_up = run("problem3", {"n": 60}, method="active-set", options={"give_up": 1}, rescue=False)
+    assert given_up.outcome is Outcome.STEP_LENGTH and given_up.settings["took_over"] is None
+    for solution in (rescued, given_up):
+        solution.destroy()
 
 
 def test_fallback_from_a_cycling_start(monkeypatch):

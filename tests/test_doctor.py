@@ -42,7 +42,7 @@ def test_a_wrong_answer_fails_the_check(monkeypatch):
     monkeypatch.setattr(
         LubricationProblem,
         "quantities",
-        lambda self, fields: {**honest(self, fields), "load": 1.01 * honest(self, fields)["load"]},
+        lambda self, fields: {**honest(self, fields), "pressure_integral": 1.01 * honest(self, fields)["pressure_integral"]},
     )
     problem1, _ = doctor.self_check(MPI.COMM_SELF)
     assert not problem1["passed"] and "load off by 1.0e-02" in problem1["message"]

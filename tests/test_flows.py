@@ -102,23 +102,23 @@ def test_flows_of_a_plain_film():
 def test_side_leakage_and_friction_of_a_journal_converge():
     """Steps of refinement shrink faster than twofold (the front's place in its cell disturbs them); both ends leak the same."""
     values = [found(load_scene("journal", {"nx": 32 * k - 1, "ny": 8 * k - 1})) for k in (1, 2, 4, 8)]
-    for key, least in (("side_leakage", 2.2), ("friction", 2.5), ("bearing_load", 2.5)):
+    for key, least in (("side_leakage", 2.2), ("friction", 2.5), ("load", 2.5)):
         steps = np.abs(np.diff([v[key] for v in values]))
         assert steps[0] / steps[2] > least**2, (key, steps)
     last = values[-1]
     assert last["flow"]["south"] == pytest.approx(last["flow"]["north"], rel=1e-6)
-    assert np.hypot(*last["load_vector"]) == pytest.approx(last["bearing_load"], rel=1e-13)
-    assert last["friction_coefficient"] == last["friction"] / last["bearing_load"]
+    assert np.hypot(*last["force"]) == pytest.approx(last["load"], rel=1e-13)
+    assert last["friction_coefficient"] == last["friction"] / last["load"]
 
 
-def test_load_above_ambient_and_friction_coefficient():
+def test_load_and_friction_coefficient():
     """Raising every pressure by the same amount changes neither; a load that points the other way has no coefficient."""
     low, high = (found(load_scene("problem1", {"n": 60, "p_c": p_c})) for p_c in (0.0, 3e5))
-    for key in ("load_above_ambient", "friction_coefficient", "power_loss"):
+    for key in ("load", "friction_coefficient", "power_loss"):
         assert high[key] == pytest.approx(low[key], rel=1e-12)
     assert (low["p_ambient"], high["p_ambient"]) == (0.0, 3e5)
     textured = found(load_scene("textured_slider", {"K": 1}))
-    assert textured["load_above_ambient"] < 0 and textured["friction_coefficient"] is None
+    assert textured["load"] < 0 and textured["friction_coefficient"] is None
 
 
 @pytest.mark.parametrize("nx, ny", [(4, 6), (5, 1), (1, 3)])
@@ -151,7 +151,7 @@ def test_fronts_on_the_middle_line_of_a_wide_bearing_are_those_of_the_long_one()
     assert wide["cavitated_area"] == pytest.approx(wide["cavitated_fraction"] * np.pi * 0.1 * 3.0, rel=0.06)
 
 
-PER_WIDTH = ("load", "friction", "load_above_ambient", "power_loss", "cavitated_area")
+PER_WIDTH = ("load", "friction", "pressure_integral", "power_loss", "cavitated_area")
 
 
 def on_sides(shape, film, sides, width=WIDTH):
@@ -197,8 +197,8 @@ def test_periodic_along_the_flow():
     h = 2e-5
     values = on_sides((12, 5), Knots((h,)), (Side("periodic"), Side("periodic"), Side(p=1e6), Side(p=1e6)))
     assert values["friction"] == pytest.approx(MU * U / h * L * WIDTH, rel=1e-12)
-    assert values["load"] == pytest.approx(1e6 * L * WIDTH, rel=1e-12)
-    assert values["load_above_ambient"] == pytest.approx(0.0, abs=1e-6) and values["p_ambient"] == 1e6
+    assert values["pressure_integral"] == pytest.approx(1e6 * L * WIDTH, rel=1e-12)
+    assert values["load"] == pytest.approx(0.0, abs=1e-6) and values["p_ambient"] == 1e6
     assert values["flow"] == pytest.approx(dict.fromkeys(SIDES, 0.0), abs=1e-15)
 
 
@@ -220,7 +220,7 @@ def test_closed_at_the_end():
 def test_three_ranks_find_the_same_places_and_flows(cli):
     """With fewer lines than ranks, so that lines are dealt out too."""
     one, three = (cli("solve", "journal", "--nx", 31, "--ny", 2, "--json", ranks=ranks).json for ranks in (1, 3))
-    for key in ("p_max_at", "min_h_at", "load_vector"):
+    for key in ("p_max_at", "min_h_at", "force"):
         assert three[key] == pytest.approx(one[key], rel=1e-6)
     for key in ("rupture", "friction", "side_leakage", "cavitated_area", "power_loss", "min_h"):
         assert three[key] == pytest.approx(one[key], rel=1e-6)

@@ -90,7 +90,7 @@ def test_rows_equal_single_solves_and_warm_starts_save_steps():
     assert columns[:2] == ["width_over_diameter", "eccentricity"]
     for a, b in zip(warm, cold, strict=True):
         assert a["outcome"] == b["outcome"] == "converged"
-        for key in ("p_max", "load", "friction", "sommerfeld", "flow_south", "p_max_x", "load_across"):
+        for key in ("p_max", "load", "friction", "sommerfeld", "flow_south", "p_max_x", "force_y"):
             assert a[key] == pytest.approx(b[key], rel=1e-9)
     single = solve(load_scene("journal", {**JOURNAL, "eccentricity": 0.6}))
     assert warm[6]["load"] == pytest.approx(single.problem.quantities(single.fields)["load"], rel=1e-7)
@@ -167,7 +167,7 @@ def test_a_sweep_of_loads(cli):
     """Each row is a balance, which begins at its neighbour's eccentricity."""
     done = cli("sweep", "journal", "--nx", 31, "--ny", 9, "--vary", "balance.load=1e3,2e3,4e3")
     rows = table(done.out)
-    assert done.status == 0 and [float(row["bearing_load"]) for row in rows] == pytest.approx([1e3, 2e3, 4e3], rel=2e-6)
+    assert done.status == 0 and [float(row["load"]) for row in rows] == pytest.approx([1e3, 2e3, 4e3], rel=2e-6)
     values = [float(row["balance_value"]) for row in rows]
     assert values == sorted(values) and int(rows[2]["balance_solves"]) <= 5
 

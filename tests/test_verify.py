@@ -50,8 +50,8 @@ def test_orders_of_exact_cases(verdicts):
 
 def wrong_quick_case():
     (case,) = quick_cases()
-    load = case.references["load"]
-    return replace(case, references={**case.references, "load": replace(load, value=load.value * (1 + 1e-4))})
+    load = case.references["pressure_integral"]
+    return replace(case, references={**case.references, "pressure_integral": replace(load, value=load.value * (1 + 1e-4))})
 
 
 def test_wrong_reference_fails(monkeypatch, capsys):
@@ -63,7 +63,7 @@ def test_wrong_reference_fails(monkeypatch, capsys):
     assert verify.run(argparse.Namespace(quick=False, json=True)) == 1
     data = json.loads(capsys.readouterr().out)
     assert not data["passed"]
-    assert [row["quantity"] for row in data["cases"][0]["rows"] if not row["passed"]] == ["load"]
+    assert [row["quantity"] for row in data["cases"][0]["rows"] if not row["passed"]] == ["pressure_integral"]
 
 
 @pytest.mark.parametrize("coefficient", ["k_E", "couette_E", "b_C"])
@@ -103,7 +103,7 @@ def test_command_line(cli, ranks):
     assert run.status == 0, run.err
     (case,) = run.json["cases"]
     assert run.json["passed"] and case["passed"]
-    load = next(row for row in case["rows"] if row["quantity"] == "load")
+    load = next(row for row in case["rows"] if row["quantity"] == "pressure_integral")
     assert len(load["errors"]) == len(load["grids"]) == 3
     assert load["errors"][-1] == pytest.approx(abs(load["ours"] / load["reference"] - 1))
     assert load["source"]

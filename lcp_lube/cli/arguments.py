@@ -275,6 +275,9 @@ def _scene_options(parser: argparse.ArgumentParser) -> None:
         default=None,
         help="start from the answers on coarser grids; default: where it pays",
     )
+    parser.add_argument(
+        "--no-rescue", action="store_true", help="if the method fails, say so; by default another takes over, and is named"
+    )
     parser.add_argument("--eps1", type=number, help="stop when ||F|| <= eps1, default 1e-8 (fas: 1e-11, interior: 8e-8)")
     parser.add_argument("--eps2", type=number, help="and ||alpha d|| <= eps2, default 1e-8 (fas and box scenes: no such test)")
     parser.add_argument("--max-it", type=whole, default=500, help="at most so many outer iterations, default 500")

@@ -92,6 +92,7 @@ def run_compare(args: argparse.Namespace) -> int:
         stopping=stopping_of(args),
         options=lambda method: options_of(args, method, args.methods.split(",")),
         nested=args.nested,
+        rescue=not args.no_rescue,
     )
     check_unread()
     say(json.dumps(finite(rows)) if args.json else table(rows))

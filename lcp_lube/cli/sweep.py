@@ -31,7 +31,8 @@ from .asked import ask_of, scene_of
 
 MOST_POINTS = 100_000
 REFUSED = "refused"  # an outcome beside those of `Outcome`: bad input that only the solve could notice
-PARTS = {"p_max_at": ("p_max_x", "p_max_y"), "min_h_at": ("min_h_x", "min_h_y"), "force": ("force_x", "force_y"), "moment": ("moment_x", "moment_y")}
+PLACES = {"p_max_at": "p_max", "min_h_at": "min_h", "force": "force", "moment": "moment"}
+PARTS = {key: (f"{name}_x", f"{name}_y") for key, name in PLACES.items()}
 
 
 @dataclass(frozen=True)

@@ -123,13 +123,17 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     unknown = variable(scene.with_shape(shapes[0]), table, known)
     t, slope, solves, found = unknown.start, unknown.slope, 0, False
     start: Any = near
+    times: dict[str, float] = {}
     for shape in shapes:
         search = Search(unknown.low, unknown.high, slope, explore=not found)
         tol = table.tol if shape == shapes[-1] else max(table.tol, COARSE_TOL)
 
         def solve_at(t: float, near: Any, shape: tuple[int, ...] = shape) -> Solution:
             trial = as_scene(scene, {unknown.key: unknown.to_value(t)}).with_shape(shape)
-            return inner(trial.model_copy(update={"balance": None}), replace(ask, start=near))
+            solution = inner(trial.model_copy(update={"balance": None}), replace(ask, start=near))
+            for name, seconds in solution.times.items():
+                times[name] = times.get(name, 0.0) + seconds
+            return solution
 
         solution, t, count, found = _on_grid(solve_at, search, t, start, table.load, tol)
         if start is not None and start is not near:
@@ -140,6 +144,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     if solution.converged and not found:
         solution.outcome = Outcome.LOAD_NOT_CARRIED
         solution.message = f"{table.load:g} asked for; the nearest of {count} tried: {answer}"
+    solution.times = times
     solution.settings |= {
         "balance": {
             "vary": unknown.key,

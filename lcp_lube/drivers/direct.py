@@ -166,8 +166,7 @@ class Run:
 
     def take_over(self) -> None:
         """Where the chosen method failed, those that the registry has for that, one after another."""
-        # By default who sets a method's parameters sees what becomes of it.
-        if not (set(self.options) <= {"p0"} if self.ask.rescue is None else self.ask.rescue):
+        if not self.ask.rescue:
             return
         reached, record, failures = self.fields, [], ""
         steps = self.steps

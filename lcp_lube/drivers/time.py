@@ -69,7 +69,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     chosen = plan(scene.facts(ask.comm), ask, scene.name)
     if chosen.method == "active-set":  # the step before has the front to within a cell or two
         ask = replace(ask, options={"sweeps": 0, **ask.options})
-    ask = replace(ask, method=chosen.method, start=None, rescue=ask.rescue is not False)
+    ask = replace(ask, method=chosen.method, start=None)
     problem: SqueezeProblem = scene.build(ask.comm)  # type: ignore[assignment]
     record: list[Step] = []
     certificates: list[Certificate] = []

@@ -15,12 +15,15 @@ def applies(scene: Solvable, ask: Ask) -> bool:
 def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     """Settings['start'] of the solution is 'warm' or 'cold'. Collective."""
     assert ask.start is not None
+    times: dict[str, float] = {}
     if ask.start.problem.grid.dim == len(scene.shape):
         solution = inner(scene, ask)
         solution.settings["start"] = "warm"
         if solution.converged:
             return solution
+        times = solution.times
         solution.destroy()
     solution = inner(scene, replace(ask, start=None))
     solution.settings["start"] = "cold"
+    solution.times = {name: times.get(name, 0.0) + solution.times.get(name, 0.0) for name in {**times, **solution.times}}
     return solution

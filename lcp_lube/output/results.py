@@ -23,7 +23,6 @@ def as_dict(solution: Solution) -> dict[str, Any]:
     problem, grid = solution.problem, solution.problem.grid
     certificate, settings = solution.certificate, solution.settings
     last = solution.steps[-1] if solution.steps else None
-    times = solution.times
     quantities = problem.quantities(solution.fields)
     return {
         "scene": settings.get("scene"),
@@ -31,7 +30,7 @@ def as_dict(solution: Solution) -> dict[str, Any]:
         "ny": grid.shape[1] if grid.dim == 2 else None,
         "unknowns": problem.unknowns,
         "ranks": grid.comm.size,
-        **{key: settings.get(key) for key in ("method", "system", "scheme", "recipe", "ksp_type", "pc_type")},
+        **{key: settings.get(key) for key in ("method", "took_over", "system", "scheme", "recipe", "ksp_type", "pc_type")},
         "outcome": str(solution.outcome),
         "converged": solution.converged,
         "message": solution.message,
@@ -54,16 +53,25 @@ def as_dict(solution: Solution) -> dict[str, Any]:
         **{key: settings[key] for key in ("scene_data", "scene_units") if key in settings},
         "memory_mb": peak_memory(solution),
         **{key: settings.get(key) for key in ("memory_estimate_mb", "memory_base_mb")},
-        "time_s": {
-            "total": times.get("total"),
-            "setup": times.get("setup"),
-            "assembly": times.get("assembly", 0.0) + times.get("Jacobian", 0.0),
-            "linear": times.get("KSP", 0.0),
-            "step_length": times.get("step length", 0.0),
-            **({"certify": times["certify"]} if "certify" in times else {}),
-        },
+        "time_s": seconds(solution.times),
         "versions": versions(),
     }
+
+
+def seconds(times: dict[str, float]) -> dict[str, float]:
+    """`Solution.times` as the JSON has them: parts that add up to the total, `other` being what has no name of its own.
+
+    `cycles`: of nonlinear multigrid, which solves no linear systems; `certify`: of the band that was asked for.
+    """
+    parts: dict[str, float] = {
+        "setup": times.get("setup", 0.0),
+        "assembly": times.get("assembly", 0.0) + times.get("Jacobian", 0.0),
+        "linear": times.get("KSP", 0.0),
+        "step_length": times.get("step length", 0.0),
+        **{name: times[name] for name in ("cycles", "certify") if name in times},
+    }
+    total = times.get("total", sum(parts.values()))
+    return {"total": total, **parts, "other": max(total - sum(parts.values()), 0.0)}
 
 
 def peak_memory(solution: Solution) -> float:
@@ -110,31 +118,44 @@ QUANTITIES = (
 )
 MEASURES = ("residual", "natural_residual", "complementarity", "mass_defect", "balance", "min_p", "min_r")
 UNITS = {"min_p": " Pa"}
+MOST_FRONTS = 4  # that are told one by one
 
 
 def _bearing_lines(data: dict[str, Any], one_d: bool) -> list[str]:
     """What the summary tells of a bearing beyond pressure and load: a journal's numbers, fronts, places, losses, flows."""
     per, flow_unit = ("/m", "m2/s") if one_d else ("", "m3/s")
     lines = []
-    if data.get("sommerfeld") is not None:
-        lines.append(
-            f"bearing load {quantity(data['bearing_load'], 'N' + per, 6)}, attitude angle {data['attitude_deg']:.5g} deg, "
-            f"Sommerfeld number {data['sommerfeld']:.6g}"
-        )
+    if data.get("force"):
+        told = [f"force on the bush ({', '.join(quantity(part, 'N' + per, 6) for part in data['force'])})"]
+        if data["attitude_deg"] is not None:
+            told.append(f"attitude angle {data['attitude_deg']:.5g} deg")
+        if data.get("sommerfeld") is not None:
+            told.append(f"Sommerfeld number {data['sommerfeld']:.6g}")
+        lines.append(", ".join(told))
     if data.get("balance"):
         found = data["balance"]
         carried = quantity(found["carried"], "N" + per, 6)
         lines.append(f"balance: {found['vary']} = {found['value']:.8g} carries {carried}, found in {found['solves']} solves")
-    if data.get("rupture") is not None:
-        behind = f", reformation {1e3 * data['reformation']:.5g} mm" if data["reformation"] is not None else ""
-        lines.append(f"rupture {1e3 * data['rupture']:.5g} mm{behind}{'' if one_d else ' (on the middle line)'}")
+    if places := ", ".join(filter(None, (_fronts(name, data) for name in ("rupture", "reformation")))):
+        lines.append(places + ("" if one_d else " (on the middle line)"))
     thinnest = f"thinnest film {quantity(data['min_h'], 'm')} at {place(data['min_h_at']) or '-'}"
     lines.append(f"p_max at {place(data['p_max_at']) or '-'}; {thinnest}")
     coefficient = data["friction_coefficient"]
     losses = "" if coefficient is None else f"friction coefficient {coefficient:.4g}, "
     flows = ", ".join(f"{side} {value:.4g}" for side, value in data["flow"].items())
     lines.append(f"{losses}power loss {quantity(data['power_loss'], 'W' + per)}; flow out: {flows} {flow_unit}")
+    if data.get("flow_growth"):
+        growth = ", ".join(f"{side} {value:+.2g}" for side, value in data["flow_growth"].items() if value)
+        lines.append(f"these flows have no limit: sides of unequal pressure meet; each halving of the spacings adds {growth}")
     return lines
+
+
+def _fronts(name: str, data: dict[str, Any]) -> str:
+    """'rupture 2 mm', 'ruptures 2, 7 mm', or the first one and how many there are; empty without one."""
+    places = [f"{1e3 * x:.5g}" for x in data[f"{name}s"]]
+    if len(places) > MOST_FRONTS:
+        return f"{len(places)} {name}s from {places[0]} to {places[-1]} mm"
+    return f"{name}{'s' * (len(places) > 1)} {', '.join(places)} mm" if places else ""
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -146,6 +167,7 @@ def summary(data: dict[str, Any]) -> str:
     inner = f", {data['linear_iterations']} Krylov" if data["linear_iterations"] else ""
     recipe = data["recipe"] or f"{data['ksp_type']} + {data['pc_type']}"
     system = f" on the {data['system']} system, {recipe}" if data["system"] else ""
+    taken = f" (it failed: {data['took_over']} took over)" if data["took_over"] else ""
     scheme = f", scheme {data['scheme']}" if data["scheme"] else ""
     measures = ", ".join(
         f"{name.replace('_', ' ')} {data[name]:.1e}{UNITS.get(name, '')}"
@@ -160,7 +182,7 @@ def summary(data: dict[str, Any]) -> str:
     else:
         quantities = ", ".join(f"{name} {data[name]:.8g}" for name in QUANTITIES if data.get(name) is not None)
     lines = [
-        f"{data['scene']} ({size}{scheme}) by {data['method']}{system}, {data['ranks']} rank{'s' * (data['ranks'] > 1)}",
+        f"{data['scene']} ({size}{scheme}) by {data['method']}{taken}{system}, {data['ranks']} rank{'s' * (data['ranks'] > 1)}",
         f"{data['outcome']}: {data['iterations']} iterations{inner}, {data['centrality']} centrality and "
         f"{data['backtracking']} backtracking cuts, {data['time_s']['total']:.2f} s; {data['message']}",
         quantities,

@@ -12,6 +12,7 @@ from ..base.parallel import Array
 from ..base.stages import Stages
 from ..linear.krylov import LinearSolverError
 from ..linear.system import make_system
+from ..problems.film.forces import ambient
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Enclosure, Fields
 
@@ -192,7 +193,8 @@ def _bounds(problem: LubricationProblem, fields: Fields, lower: Fields, upper: F
     off_r = np.maximum(lower["r"] - r, r - upper["r"])
     p_max, low, high = (reduce.max(a) for a in (p, lower["p"], upper["p"]))
     largest = max(abs(p_max), high, *(side / unit for side in problem.p_sides)) + abs(problem.p_c) / unit
-    load_rounding = (problem.size + 16) * UNIT * reduce.sum(np.abs(p) + off_p)  # a sum of n numbers, in any order
+    above = ambient(problem) / unit
+    load_rounding = (problem.size + 32) * UNIT * reduce.sum(np.abs(p) + off_p + above)  # a sum of n numbers, in any order
     return {
         "band_p": (reduce.max(off_p) + 8 * UNIT * largest) * unit,
         "band_p_max": (max(high - p_max, p_max - low) + 8 * UNIT * largest) * unit,

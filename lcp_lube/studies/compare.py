@@ -14,6 +14,7 @@ from ..solvers.newton import Stopping
 # Key of a row, heading, format; times have keys of their own, see `table`.
 COLUMNS = (
     ("method", "method", "s"),
+    ("took_over", "took over", "s"),
     ("system", "system", "s"),
     ("recipe", "recipe", "s"),
     ("outcome", "outcome", "s"),
@@ -38,6 +39,7 @@ def compare(
     stopping: Stopping | dict[str, Any] | None = None,
     options: Callable[[str], dict[str, Any]] = lambda method: {},
     nested: bool | None = None,
+    rescue: bool = True,
 ) -> list[dict[str, Any]]:
     """Solve a scene by every method with every recipe; a combination that fails is a row as well. Collective.
 
@@ -45,7 +47,7 @@ def compare(
     ----------
     methods : names in the registry, or 'auto'.
     recipes : names of files in options/; None is the default one.
-    system, stopping, nested : as `api.solve` takes them.
+    system, stopping, nested, rescue : as `api.solve` takes them.
     options : a method's own parameters, by its name.
 
     Returns
@@ -68,7 +70,7 @@ def compare(
     for method in methods:
         for recipe in recipes:
             try:
-                rows.append(_run(scene, method, recipe, system, stopping, options(method), nested))
+                rows.append(_run(scene, method, recipe, system, stopping, options(method), nested, rescue))
             except InputError as error:
                 rows.append(
                     {
@@ -92,10 +94,11 @@ def _check(option: str, name: str, known: Iterable[str]) -> None:
 
 
 def _run(
-    scene: Scene, method: str, recipe: str | None, system: str, stopping: Any, options: Any, nested: Any
+    scene: Scene, method: str, recipe: str | None, system: str, stopping: Any, options: Any, nested: Any, rescue: bool
 ) -> dict[str, Any]:
     """One row. Collective."""
-    solution = solve(scene, method=method, system=system, recipe=recipe, stopping=stopping, options=options, nested=nested)
+    how: dict[str, Any] = {"stopping": stopping, "options": options, "nested": nested, "rescue": rescue}
+    solution = solve(scene, method=method, system=system, recipe=recipe, **how)
     try:
         data = as_dict(solution)
         return {**data, **exact_errors(solution.problem, data)}
@@ -104,7 +107,7 @@ def _run(
 
 
 def read_off(problem: Problem, data: dict[str, Any]) -> dict[str, float | None]:
-    """What errors are told of: integral of the pressure and p_max above the cavitation pressure (N or N/m, Pa), rupture (m; 2D: middle line)."""
+    """What errors are told of: `load`, integral of p - p_c (N or N/m), p_max above p_c (Pa), rupture (m; 2D: middle line)."""
     if "load" not in data:
         return {}
     p_c = getattr(problem, "p_c", 0.0)

@@ -63,7 +63,8 @@ def run(
 ) -> dict[str, Any]:
     """One run, however it ends: RECORD, `wall_s`, `cpu_s` (this rank's), errors and the rest of the JSON's keys. Collective.
 
-    Further keys: `read_off` (`compare.read_off`), `points`, `krylov`: Krylov iterations on all grids.
+    Further keys: `read_off` (`compare.read_off`), `points`, `krylov`: Krylov iterations on all grids. `iterations` are those of
+    all grids too.
 
     Parameters
     ----------
@@ -114,6 +115,7 @@ def run(
                 why = f"{far:.1e} from the reference" if far is not None else "although there is no solution"
                 outcome |= {"outcome": Outcome.WRONG_SOLUTION, "message": f"{solution.message}, {why}"}
         more = {
+            "iterations": len(steps),
             "read_off": read_off(solution.problem, data),
             "points": solution.problem.grid.size,
             "krylov": sum(step.linear_iterations for step in steps),
