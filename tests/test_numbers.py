@@ -4,10 +4,8 @@ import re
 from pathlib import Path
 
 import pytest
-from lcp_lube.drivers.neighbour import solve_or_balance
 
 from lcp_lube import load_scene, solve
-from lcp_lube.drivers.accuracy import solve_to_accuracy
 from lcp_lube.output.results import as_dict
 from lcp_lube.registry import scene_names
 
