@@ -237,7 +237,7 @@ STABILITY: dict[str, Entry] = {
     "inner_tolerance": Entry(
         "lcp_lube.studies.inner_tolerance:chart", "loose inner solves by recipe, and what (31) says of them"
     ),
-    "roughness": Entry("lcp_lube.studies.roughness:chart", "standard deviation of a random surface by grid, every method"),
+    "roughness": Entry("lcp_lube.studies.roughness:chart", "amplitude of a random surface by grid, every method"),
     "turning_point": Entry("lcp_lube.studies.turning_point:chart", "lambda around the turning point of Bratu's equation"),
 }
 

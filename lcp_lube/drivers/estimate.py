@@ -6,7 +6,8 @@ come with any factor and sign, and one small difference proves nothing; and a ju
 cell, so that differences can vanish on several grids while the error does not. So the estimate is the greater of
 
 - Richardson's, SAFETY times the largest of the last differences, each carried to the newest grid at second order, over
-  2^q - 1 with the order q seen over all of them, between 1 and 2;
+  2^q - 1 with the order q seen over all of them, between 1 and 2; where the film has edges inside cells, whose error is of
+  first order and has any sign, at first order, and q = 1;
 - the film's: the share of Int h^-3 that the jumps of the film inside a cell misplace on this grid, times how strongly the
   quantity was seen to answer to it.
 
@@ -50,8 +51,10 @@ def relative_error(values: Sequence[float], misplaced: Sequence[float]) -> float
         return inf
     age = np.arange(len(steps))[::-1]
     logs = np.log2(steps + np.finfo(float).tiny)
-    order = float(np.clip((logs[0] - logs[-1]) / age[0], 1.0, 2.0))
-    richardson = SAFETY * np.max(steps / 4.0**age) / (2.0**order - 1.0) / abs(values[-1])
+    edges = misplaced[-1] > 0
+    order = 1.0 if edges else float(np.clip((logs[0] - logs[-1]) / age[0], 1.0, 2.0))
+    fall = 2.0 if edges else 4.0
+    richardson = SAFETY * np.max(steps / fall**age) / (2.0**order - 1.0) / abs(values[-1])
     if not misplaced[-1]:
         return float(richardson)
     shares = (np.array(misplaced[:-1]) + misplaced[1:])[-len(steps) :]

@@ -44,11 +44,15 @@ class TexturedScene(LubricationScene):
 
 
 class RoughScene(SliderScene):
-    """Problem 1's wave over a square, with a random surface of given standard deviation, by default 0.1 MPa all round."""
+    """Problem 1's wave over a square, with a random surface, by default 0.1 MPa all round.
+
+    The surface is a smooth spline through random numbers of standard deviation `amplitude`; its own is 0.479 of that, before
+    the cut at h_floor. (A bearing's shape `roughness` takes the surface's own, sigma.)
+    """
 
     dimension: Literal[2] = 2
     seed: Annotated[int, Field(ge=0)] = 1
-    amplitude: NotNegative = metres(2.5e-6, "standard deviation of the surface")
+    amplitude: NotNegative = metres(2.5e-6, "standard deviation of the random numbers; the surface's is 0.479 of it")
     cells: Annotated[int, Field(strict=True, ge=1, le=4000)] = Field(40, description="meshes of the surface along a side")
     h_floor: Positive = metres(1e-6, "smallest film that the surface leaves")
     scheme: Literal["nodal", "face", "upwind"] = "face"

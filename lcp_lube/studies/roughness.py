@@ -1,15 +1,23 @@
-"""Stability against roughness: standard deviation of a random surface on coarse to fine grids, several surfaces a cell."""
+"""Stability against roughness: height of a random surface on coarse to fine grids, several surfaces a cell."""
 
 from collections.abc import Iterator, Sequence
 
 from ..base.resumable import Row
 from .outcome_map import Axis, Case, OutcomeMap, Panels, methods, tallies
 
-AMPLITUDES = (0, 1, 2, 4, 6, 10, 20)  # um, on a film of 15 to 25 um; 1 um is left everywhere
+AMPLITUDES = (
+    0,
+    1,
+    2,
+    4,
+    6,
+    10,
+    20,
+)  # um, of the random numbers: the surface's is 0.479 of it; on a film of 15 to 25 um; 1 um is left everywhere
 SIZES = (16, 32, 64)
 SEEDS = (1, 2, 3)
 
-X, Y = Axis("n", "points a side", "n"), Axis("um", "standard deviation in um", "deviation in um")
+X, Y = Axis("n", "points a side", "n"), Axis("um", "amplitude in um (standard deviation: 0.479 of it)", "amplitude in um")
 
 
 def cases(quick: bool) -> Iterator[Case]:

@@ -39,8 +39,8 @@ class Dimples:
 class Rough:
     """A wave with a random surface on it: cubic B-spline through normal numbers on a lattice, cut at h_floor.
 
-    The surface depends on the seed, not on the grid: amplitude is the standard deviation of the lattice's numbers in m,
-    `cells` how many of its meshes lie along a side.
+    The surface depends on the seed, not on the grid: amplitude is the standard deviation of the lattice's numbers in m (the
+    surface's own is `shapes.MEAN_SQUARE` = 0.479 of it), `cells` how many of its meshes lie along a side.
     """
 
     wave: Wave
