@@ -42,17 +42,17 @@ def solve(scene: str | Path | dict[str, Any] | Scene, ask: Ask | None = None, **
         check_same(ask.mpi, f"scene {scene.name} or how to solve it", (scene, ask.choices))
     compose.check(scene, ask)
     solution = compose.solve(scene, ask)
-    solution.settings |= {"scene_data": scene.data_si(), "scene_units": scene.data_units(), "warnings": doubts(scene)}
+    last = _solved(scene, solution)
+    data = last.data_si()
+    if "nx" in data:
+        data.pop("n", None)  # which these have replaced
+    solution.settings |= {"scene_data": data, "scene_units": last.data_units(), "warnings": doubts(scene)}
     solution.times["total"] = perf_counter() - begin
-    solution.settings["scene_data"] = _solved(scene, solution)
     return solution
 
 
-def _solved(scene: Scene, solution: Solution) -> dict[str, Any]:
-    """The data of what was solved: with the value that a balance found, on the last grid."""
+def _solved(scene: Scene, solution: Solution) -> Scene:
+    """The scene as it was solved: on the last grid, with the value that a balance found."""
     found, shape = solution.settings.get("balance"), solution.problem.grid.shape
     last = as_scene(scene, {found["vary"]: found["value"]}) if found else scene
-    data = (last.with_shape(shape) if shape != scene.shape else last).data_si()
-    if "nx" in data:
-        data.pop("n", None)  # which these have replaced
-    return data
+    return last.with_shape(shape) if shape != scene.shape else last

@@ -14,7 +14,7 @@ from ..output.results import as_dict, finite
 from ..scenes.scene import Scene
 from .asked import ask_of, scene_of
 
-KEYS = ("S", "sommerfeld", "eccentricity", "attitude_deg", "bearing_load")
+KEYS = ("S", "sommerfeld", "eccentricity", "attitude_deg", "load")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -48,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
 def report(found: list[Coefficients], scene: Scene, data: dict[str, Any]) -> dict[str, Any]:
     """The coefficients as the JSON has them, and what a rigid rotor on them does (at the first frequency)."""
     turning = scene.turning  # type: ignore[attr-defined]
-    W = data["bearing_load"]
+    W = data["load"]
     scale = turning.c / W if W > 0 else math.nan  # nothing to measure by where nothing is carried
     scaled = [(one.K * scale, one.C * scale * turning.omega) for one in found]
     rows = [
@@ -74,7 +74,7 @@ def text(record: dict[str, Any]) -> str:
         return f"{record['scene']}: {record['outcome']}: {record['message']}"
     lines = [
         f"{record['scene']} ({record['nx']} x {record['ny']}): eccentricity {record['eccentricity']:.6g}, attitude "
-        f"{record['attitude_deg']:.5g} deg, load {record['bearing_load']:.6g} N, S {record['S']:.5g}",
+        f"{record['attitude_deg']:.5g} deg, load {record['load']:.6g} N, S {record['S']:.5g}",
         "x along the load, y a quarter of a turn ahead; in brackets K c/W and C c omega/W",
     ]
     for one in record["coefficients"]:
@@ -85,9 +85,7 @@ def text(record: dict[str, Any]) -> str:
                 cells = "  ".join(f"{name}{'xy'[i]}{'xy'[j]} {row[j]:12.5g} [{plain[j]:9.5f}]" for j in (0, 1))
                 lines.append(f"  {cells}  {unit}")
     if record["threshold"] is None:
-        lines.append(
-            "no threshold of stability" if record["bearing_load"] > 0 else "nothing is carried: no numbers in brackets"
-        )
+        lines.append("no threshold of stability" if record["load"] > 0 else "nothing is carried: no numbers in brackets")
     else:
         lines.append(
             f"rigid rotor: whirl ratio {record['whirl_ratio']:.4g}, unstable beyond omega sqrt(c/g) = {record['threshold']:.4g}"

@@ -126,7 +126,7 @@ def _bearing_lines(data: dict[str, Any], one_d: bool) -> list[str]:
     per, flow_unit = ("/m", "m2/s") if one_d else ("", "m3/s")
     lines = []
     if data.get("force"):
-        told = [f"force on the bush ({', '.join(quantity(part, 'N' + per, 6) for part in data['force'])})"]
+        told = [f"force on the shaft ({', '.join(quantity(part, 'N' + per, 6) for part in data['force'])})"]
         if data["attitude_deg"] is not None:
             told.append(f"attitude angle {data['attitude_deg']:.5g} deg")
         if data.get("sommerfeld") is not None:

@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from ..base.parallel import Array
 from ..problems.facts import Facts
+from ..problems.film.forces import Shaft
 from ..problems.film.grooves import Groove
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model, Side
@@ -124,6 +125,9 @@ class GroovedJournalScene(Scene):
             p_c=self.p_c,
             p_unit=self.mu * self.omega * (turning.R / self.clearance) ** 2,
             scheme="face",
+            shaft=Shaft(
+                turning.R, math.radians(self.attitude_deg or 0.0) + math.pi if self.eccentricity else None, turning.start
+            ),
             grooves=self.grooves,
         )
 
@@ -141,12 +145,5 @@ class GroovedJournalScene(Scene):
         problem.extras = self._bearing_numbers
         return problem
 
-    def _bearing_numbers(self, problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any]:
-        """Force on the journal along the load and a quarter of a turn ahead, load, attitude, Sommerfeld numbers. Collective."""
-        turning = self.turning
-        fx, fy = turning.force(problem, p)
-        toward_film = math.radians(self.attitude_deg or 0.0)
-        attitude = toward_film - math.atan2(-fy, -fx)  # from the direction that the film holds up
-        wrapped = math.degrees(math.remainder(attitude, 2.0 * math.pi))
-        numbers = turning.numbers((fx, fy), self.mu, self.eccentricity)
-        return {**numbers, "attitude_deg": wrapped, "load_vector": [fx, fy], "moment": list(turning.moment(problem, p))}
+    def _bearing_numbers(self, values: dict[str, Any]) -> dict[str, Any]:
+        return self.turning.numbers(values["load"], self.mu, self.eccentricity)

@@ -45,9 +45,9 @@ def forces(problem: LubricationProblem, p_pa: Array) -> dict[str, Any]:
 
     A flat film: `load`, the integral of p - p_ambient, and `moment` about the middle of the film, [about x, about y], of that
     pressure on the wall (the force points to +z). One round a shaft: `force` of the film on the shaft, minus the
-    integral of (p - p_ambient) (cos phi, sin phi), `load` its magnitude, `attitude_deg` the angle from the load that it holds up,
-    its opposite, to the narrowest gap, positive in the sense of rotation, `moment` about the shaft's middle in the same two
-    directions (2D), 0 where the shaft lies straight between alike ends.
+    integral of (p - p_ambient) (cos phi, sin phi), `load` its magnitude, `attitude_deg` the angle from the load, which is
+    its opposite, to the narrowest gap, positive in the sense of rotation, `moment` of the force about the middle of the width:
+    its two parts times the distance along the axis (2D), 0 where the shaft lies straight between alike ends.
 
     Parameters
     ----------
@@ -76,8 +76,8 @@ def forces(problem: LubricationProblem, p_pa: Array) -> dict[str, Any]:
         out["attitude_deg"] = float(np.degrees(np.angle(behind if problem.U >= 0 else np.conj(behind))))
     if grid.dim == 2:
         out["moment"] = [
-            integral(lambda x, y: (y - middle[1]) * np.sin(phi(x))),
             -integral(lambda x, y: (y - middle[1]) * np.cos(phi(x))),
+            -integral(lambda x, y: (y - middle[1]) * np.sin(phi(x))),
         ]
     return out
 

@@ -35,26 +35,13 @@ class Turning:
         size = -problem.grid.cell * problem.p_unit * point_weights(problem.grid) * p
         return problem.reduce.sum(size * np.cos(theta)), problem.reduce.sum(size * np.sin(theta))
 
-    def moment(self, problem: LubricationProblem, p: Array) -> tuple[float, float]:
-        """Moment of that force about the middle of the width, N m: its parts along x and y times the distance along the axis.
-
-        Positive where the force grows towards y = B. Collective.
-        """
-        grid = problem.grid
-        theta = np.broadcast_to(self.theta(grid.x), grid.box).ravel()
-        arm = np.broadcast_to(grid.y - 0.5 * self.B, grid.box).ravel()
-        size = -grid.cell * problem.p_unit * point_weights(grid) * p * arm
-        return problem.reduce.sum(size * np.cos(theta)), problem.reduce.sum(size * np.sin(theta))
-
-    def numbers(self, force: tuple[float, float], mu: float, eccentricity: float) -> dict[str, Any]:
-        """What a bearing's sheet lists: Sommerfeld numbers, load and attitude. eccentricity : relative."""
-        load, D = math.hypot(*force), 2.0 * self.R
+    def numbers(self, load: float, mu: float, eccentricity: float) -> dict[str, Any]:
+        """What a bearing's sheet lists: Sommerfeld numbers. eccentricity : relative."""
+        D = 2.0 * self.R
         psi = self.c / self.R
         N = self.omega / (2.0 * math.pi)
         return {
             "eccentricity": eccentricity,
-            "bearing_load": load,
-            "force": list(force),
             "sommerfeld": load * psi**2 / (self.B * D * mu * self.omega),
             "S": mu * N * self.B * D / (load * psi**2) if load > 0 else None,
         }
