@@ -31,7 +31,7 @@ def exact_scenes():
 
 
 def errors(cases, quantity, tol):
-    """Estimated and true relative errors, and whether edges lie inside cells, shape (cases, 3); all runs reach the tolerance."""
+    """Estimated and true relative errors, and whether edges lie inside cells, shape (cases, 3); all runs reach `tol`."""
     out = []
     for scene, exact in cases:
         if getattr(exact, {"pressure_integral": "load"}.get(quantity, quantity)) == 0:
