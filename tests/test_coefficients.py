@@ -113,7 +113,7 @@ def test_the_elliptical_bearing():
     solution = solve(scene)
     values = solution.problem.quantities(solution.fields)
     (found,) = coefficients(scene, solution)
-    scale = scene.clearance / values["bearing_load"]
+    scale = scene.clearance / values["load"]
     solution.destroy()
     assert values["S"] == pytest.approx(float(row["S"]), rel=0.02)
     assert values["attitude_deg"] == pytest.approx(float(row["phi_deg"]), abs=0.5)
