@@ -63,7 +63,6 @@ def test_only_a_1d_scene_has_an_exact_solution():
         ({"mu": 0}, "mu = 0: allowed is greater than 0"),
         ({"mu": float("nan")}, "mu = nan: allowed is a finite number"),
         ({"U": float("inf")}, "U = inf: allowed is a finite number"),
-        ({"U": -5.0}, "U = -5.0: allowed is greater than 0"),
         ({"p_a": -1.0}, "p_a = -1.0: allowed is greater than or equal to 0"),
         ({"p_c": float("nan")}, "p_c = nan: allowed is a finite number"),
         ({"n": 0}, "n = 0: allowed is greater than or equal to 1"),

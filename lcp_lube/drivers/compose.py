@@ -55,6 +55,8 @@ CANNOT = (
     ("grooves", "checkpoint", "its films are solved one by one"),
     ("grooves", "resume", "its films are solved one by one"),
     ("grooves", "certify", "a band would be proved for each film between grooves alone"),
+    ("turned", "checkpoint", "U < 0 is solved as its mirror image; give that, with -U"),
+    ("turned", "resume", "U < 0 is solved as its mirror image; give that, with -U"),
     ("fluid", "checkpoint", "the density's iterations hold several answers at once"),
     ("fluid", "resume", "the density's iterations hold several answers at once"),
     ("fluid", "certify", "the theorem holds where viscosity and density do not depend on the pressure"),

@@ -12,6 +12,7 @@ on the whole problem's data like any other, and where that fails the whole probl
 needs no choice: the active-set method's first step is its one linear solve.)
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -227,12 +228,16 @@ def solve_part(part: Part, problem: Problem, ask: Ask, inner: Inner) -> Solution
 
 def _is_constant(problem: LubricationProblem) -> bool:
     """Whether all points and faces have one film thickness. Collective."""
+    if _edges(problem, "x") or _edges(problem, "y"):
+        return False  # between points, where no one looks
     h, largest = problem.scheme.h, problem.reduce.max(problem.scheme.h)
     return _all_close(problem, [(h, largest)]) and _all_close(problem, [(faces, largest) for faces in _films(problem)])
 
 
 def _all_lines_are_one(problem: LubricationProblem) -> bool:
     """Whether the film does not depend on y. Collective."""
+    if _edges(problem, "y"):
+        return False
     grid, film = problem.grid, problem.film
     x_nodes, x_faces = grid.nodes_and_faces(0)
     first = np.array([[grid.origin[1]]])
@@ -246,11 +251,19 @@ def _is_symmetric(problem: LubricationProblem, faces: bool) -> bool:
     """Whether h(x, y) = h(x, width - y), at the points, and on the faces too. Collective."""
     grid = problem.grid
     mirror = 2 * grid.origin[1] + grid.lengths[1]
+    edges = np.unique(_edges(problem, "y"))
+    if not np.allclose(edges, np.sort(mirror - edges), rtol=0.0, atol=SAME * grid.lengths[1]):
+        return False
     some = np.unique(np.linspace(0, grid.box[0] - 1, SAMPLE[1]).round().astype(int))  # most films that are not tell so at once
     if not _all_close(problem, [(problem.scheme.h[some], problem.film(grid.x, mirror - grid.y[some]))]):
         return False
     pairs = list(zip(_films(problem), _films(problem, mirror), strict=True))
     return _all_close(problem, pairs if faces else pairs[:1])
+
+
+def _edges(problem: LubricationProblem, axis: str) -> Sequence[float]:
+    """Where the film jumps, inside a cell perhaps."""
+    return getattr(problem.film, "jumps", lambda axis: ())(axis)
 
 
 def _films(problem: LubricationProblem, mirror: float | None = None) -> list[Array]:

@@ -104,6 +104,10 @@ class CavitySystem:
         with self.stages("Jacobian"):
             return dp, self._void(full, f1 - self.problem.multiply(self.problem.A, dp)), iterations
 
+    def resolve(self, f1: Array, f2: Array, rtol: float) -> tuple[Array, Array, int]:
+        """The same for another right-hand side and the cells of the last `solve`, whose set-up is kept. Collective."""
+        return self.solve((~self._full).astype(float), self._full.astype(float), f1, f2, rtol)
+
     def _assemble(self, full: NDArray[np.bool_], target: NDArray[np.int64]) -> PETSc.Mat:
         """S for these full cells. Collective."""
         with self.stages("Jacobian"):

@@ -25,7 +25,8 @@ class ReducedSystem:
     """The step of any method through a KSP on J(theta), with its columns scaled to the diagonal of A.
 
     Column scaling balances full-film columns (conductances h^3/dx) and cavitated ones (U h): after it the diagonal is A's
-    for every theta, and in the full film the matrix is A. The sparsity is A's and never changes.
+    for every theta, and in the full film the matrix is A. For a direct solver the diagonal is 1: no off-diagonal entry is
+    larger then, and what it takes for a zero pivot, by a number, is one. The sparsity is A's and never changes.
     """
 
     def __init__(self, problem: LubricationProblem, stages: Stages | None = None):
@@ -64,7 +65,9 @@ class ReducedSystem:
 
     def assemble(self, theta: Array) -> Array:
         """Refresh the matrix for theta; returns the column scaling, y = scaling * (the KSP's solution). Collective."""
-        scaling = self._diagonal_A / (theta * self._diagonal_A + (1.0 - theta) * self._diagonal_B)
+        scaling = 1.0 / (theta * self._diagonal_A + (1.0 - theta) * self._diagonal_B)
+        if not self.direct:
+            scaling *= self._diagonal_A
         full = self.problem.grid.ghosted(theta * scaling).ravel()
         cavity = self.problem.grid.ghosted((1.0 - theta) * scaling).ravel()
         values = self._a * full[self._neighbour] - self._b_entries * cavity[self._neighbour]

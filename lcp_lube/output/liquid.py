@@ -19,12 +19,12 @@ NOISE = 1e-9  # of a field's scale: less is rounding and is not drawn
 def ahead(problem: LubricationProblem) -> float:
     """How far (m) from a point to where the scheme knows the void: half a spacing, or 0 (scheme 'upwind'). Collective."""
     s, weight = problem.scheme, point_weights(problem.grid).reshape(problem.grid.box)
-    apart = np.where(s.couette_E == 0.0, 0.0, s.couette_E / weight - problem.U * s.h)
-    return 0.5 * problem.grid.spacing[0] if problem.reduce.max(np.abs(apart)) > 0.0 else 0.0
+    apart = np.where(s.couette_E == 0.0, 0.0, s.couette_E / weight - problem.U / s.flow_unit * s.h)
+    return float(np.sign(problem.U)) * 0.5 * problem.grid.spacing[0] if problem.reduce.max(np.abs(apart)) > 0.0 else 0.0
 
 
 def void_at_faces(problem: LubricationProblem, r: Array, sign: Array) -> Array:
-    """Void fraction at the east face of each owned point. Collective.
+    """Void fraction at the face downstream of each owned point. Collective.
 
     A full cell carries couette_E, and b_C r less where there is void: their ratio is the void's share, also where the film
     jumps inside the cell and couette_E / U is not the film at the face. Between two points of the cavity nothing but the
@@ -41,9 +41,10 @@ def void_at_faces(problem: LubricationProblem, r: Array, sign: Array) -> Array:
     void = np.where(moves, -s.b_C * r / full, r)
     at = ahead(problem)
     h = np.broadcast_to(problem.film(grid.x + at, grid.y), grid.box)
-    speed = problem.U * point_weights(grid).reshape(grid.box) * h
+    speed = problem.U / s.flow_unit * point_weights(grid).reshape(grid.box) * h
     layer = (s.couette_E + s.b_C * r) / np.where(moves, speed, 1.0)
-    beyond = grid.ghosted(sign.ravel())[1:-1, 2:] if at else sign
+    framed = grid.ghosted(sign.ravel())[1:-1]
+    beyond = (framed[:, 2:] if at > 0 else framed[:, :-2]) if at else sign
     inside = moves & (sign < 0.0) & (beyond < 0.0)
     return np.where(inside, 1.0 - np.minimum(layer, 1.0), void).ravel()
 

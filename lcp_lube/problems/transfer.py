@@ -107,3 +107,7 @@ class Pick:
         for obj in (scatter, source, target):
             obj.destroy()
         return values
+
+    def destroy(self) -> None:
+        for obj in (self._from, self._to):
+            obj.destroy()

@@ -11,12 +11,13 @@ from pydantic import Field, field_validator, model_validator
 
 from ..errors import InputError
 from ..problems.facts import Facts
-from ..problems.film.exact import ExactSolution, exact_solution
+from ..problems.film.exact import ExactSolution
 from ..problems.film.fluid import Law
 from ..problems.film.forces import Shaft
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import NAMES, OPPOSITE, Model, Side
 from ..problems.film.shapes import Block, Sum
+from ..problems.film.turned import exact_either_way
 from .balance import BalanceTable
 from .film import Extent, FilmPart, JournalPart
 from .scene import Count, Finite, Positive, Scene
@@ -77,7 +78,7 @@ class BearingScene(Scene):
     dimension: Literal[1, 2] = Field(1, description="1: a film h(x), per metre of width; 2: h(x, y)")
     L: Positive = metres(..., "length in the direction of motion")
     width: Positive | None = metres(None, "width in y; default L (2D)")
-    U: Positive = measured("m/s", ..., "speed of the moving wall, towards larger x")
+    U: Finite = measured("m/s", ..., "speed of the moving wall, towards larger x; negative: to smaller x; 0: at rest")
     p_in: Finite | None = measured("Pa", None, "pressure of the west side; short for sides.west.p")
     p_out: Finite | None = measured("Pa", None, "pressure of the east side; short for sides.east.p")
     fluid: Fluid = Field(..., description="the lubricant")
@@ -203,20 +204,24 @@ class BearingScene(Scene):
         return None if law == Law() else law
 
     def _pressure_unit(self, gap: Sum) -> float:
-        """The power of ten next to mu U L/h^2 with the thinnest film: p and r are then of like size."""
+        """The power of ten next to mu U L/h^2 with the thinnest film, or to the largest pressure at a side, if that is more.
+
+        p and r are then of like size, or p is what a film at rest has.
+        """
         places = [(np.arange(SAMPLES) + 0.5) / SAMPLES * length for length in self.side_lengths]
         h = gap(places[0][None, :], places[1][:, None] if self.dimension == 2 else None)
         positive = h[np.isfinite(h) & (h > 0)]
         if not positive.size:
             return 1e6  # the discretisation says where the film is not positive
-        unit = self.fluid.mu * self.U * self.L / float(positive.min()) ** 2
+        drag = self.fluid.mu * abs(self.U) * self.L / float(positive.min()) ** 2
+        unit = max(drag, *(side.p for side in self._sides()))
         return 10.0 ** round(math.log10(unit)) if 1e-90 < unit < 1e90 else 1e6
 
     def exact(self) -> ExactSolution | None:
         gap, (west, east, *_) = self.gap, self._sides()
         if self.dimension == 2 or {west.kind, east.kind} != {"open"} or west.r or not gap.smooth_between or self._law:
             return None
-        return exact_solution(gap, self.L, self.fluid.mu, self.U, west.p, east.p)
+        return exact_either_way(gap, self.L, self.fluid.mu, self.U, west.p, east.p)
 
     def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
         """The discrete problem on this scene's grid. Collective.

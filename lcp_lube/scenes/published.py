@@ -6,11 +6,12 @@ from petsc4py import PETSc
 from pydantic import Field, model_validator
 
 from ..problems.facts import Facts
-from ..problems.film.exact import ExactSolution, exact_solution
+from ..problems.film.exact import ExactSolution
 from ..problems.film.gaps import Raised, Wave
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model, Side
 from ..problems.film.reynolds import Film
+from ..problems.film.turned import exact_either_way
 from .balance import BalanceTable
 from .scene import Count, Finite, NotNegative, Positive, Scene
 from .units import measured, metres
@@ -26,7 +27,7 @@ class LubricationScene(Scene):
     L: Positive = metres(0.1, "length in the direction of motion")
     width: Positive | None = metres(None, "width Ly; default L (2D)")
     mu: Positive = measured("Pa s", 0.015, "viscosity")
-    U: Positive = measured("m/s", 5.0, "speed of the moving wall")
+    U: Finite = measured("m/s", 5.0, "speed of the moving wall; negative: to smaller x; 0: at rest")
     p_a: NotNegative = measured("Pa", 0.0, "pressure at x = 0; above p_c")
     p_b: NotNegative = measured("Pa", 0.0, "pressure at x = L; above p_c")
     p_side: NotNegative = measured("Pa", 0.0, "pressure at y = 0 and y = width; above p_c (2D)")
@@ -122,4 +123,4 @@ class SliderScene(LubricationScene):
     def exact(self) -> ExactSolution | None:
         if self.dimension == 2:
             return None
-        return exact_solution(Raised(self.gap, self.h_offset), self.L, self.mu, self.U, self.p_a, self.p_b)
+        return exact_either_way(Raised(self.gap, self.h_offset), self.L, self.mu, self.U, self.p_a, self.p_b)

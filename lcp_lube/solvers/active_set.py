@@ -17,6 +17,7 @@ converge from any start, as G is an M-function, so the method cannot cycle for e
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.parallel import Array
 from ..errors import InputError
@@ -31,6 +32,7 @@ from .steplength import StepLengthError
 
 EPS = float(np.finfo(float).eps)
 RESCUE_SWEEPS, MOST_SWEEPS = 16, 2**14  # once stalled: at first, and at most
+REFINEMENTS, REFINED = 8, 1e-12  # solves that a direct solver adds to the last step, until z moves by less of itself
 
 
 @dataclass(frozen=True)
@@ -103,10 +105,11 @@ class ActiveSet:
         """||G|| / ||c||; where rounding in G's sums alone exceeds eps1, on very fine grids, relative to that."""
         reduce, c = self.problem.reduce, self.problem.c
         rounding = 16 * EPS * reduce.norm(self.diagonal * np.abs(z) + np.abs(c))
-        return reduce.norm(G) / (max(reduce.norm(c), rounding / self.eps1) or 1.0)
+        driven = reduce.norm(c) or reduce.norm(self.diagonal)  # nothing drives the film: p is measured by its unit
+        return reduce.norm(G) / max(driven, rounding / self.eps1)
 
     def _residual(self, z: Array) -> Array:
-        return self.problem.flow(np.maximum(z, 0.0), self.s * np.maximum(-z, 0.0))
+        return self.problem.balance(np.maximum(z, 0.0), self.s * np.maximum(-z, 0.0))
 
     def _relax(self, sweeps: int, always: bool = False) -> None:
         """Sweeps from z, kept if ||G|| falls by them, or always."""
@@ -132,7 +135,7 @@ class ActiveSet:
         if self._taken == self.options.give_up:
             raise StepLengthError(f"||G|| is at {self.norm:.1e} of ||c|| after {self._taken} steps: they seem to cycle")
         self._taken += 1
-        full = self.z >= 0
+        full = self._branch()
         cavity = (~full).astype(float)
         # Early steps need signs, not digits; the last one is to bring ||G|| below eps1, and no further.
         rtol = max(self.options.rtol, min(1e-2, max(0.1 * self.norm, 0.4 * self.eps1 / self.norm if self.norm else 1.0)))
@@ -144,6 +147,8 @@ class ActiveSet:
             self.norm = self._norm(self.z, self.G)
             changed = self.problem.reduce.sum((full != (self.z >= 0)).astype(float))
             step_norm = self.problem.reduce.norm(d) if changed else 0.0
+        if not changed and self.system.direct:
+            self._refine(cavity)
         with self.system.stages("relaxation"):
             if self._stalled >= self.options.patience:
                 self._relax(self._rescue, always=True)
@@ -153,6 +158,31 @@ class ActiveSet:
         self._stalled = 0 if self.norm <= 0.9 * self._best else self._stalled + 1
         self._best = min(self._best, self.norm)
         return Step(self.norm, step_norm, 1.0, linear_iterations, rtol=rtol)
+
+    def _branch(self) -> NDArray[np.bool_]:
+        """Where the film counts as full: by the sign of z; a ring that is empty all round, which no solution is and whose
+        matrix is singular, is full where it is least empty."""
+        full, grid = self.z >= 0, self.problem.grid
+        if grid.periodic[0] and grid.box[1] == grid.shape[0]:
+            z = self.z.reshape(grid.box)
+            empty = np.flatnonzero(~full.reshape(grid.box).any(axis=1))
+            full.reshape(grid.box)[empty, np.argmax(z[empty], axis=1)] = True
+        return full
+
+    def _refine(self, cavity: Array) -> None:
+        """Solve again with the same factors for what is left of G: their rounding is that of A's diagonal, G's is not."""
+        reduce, none, last = self.problem.reduce, np.zeros_like(self.G), np.inf
+        for _ in range(REFINEMENTS):
+            dp, dr, _ = self.system.resolve(-self.G, none, self.options.rtol)
+            d = np.where(cavity > 0, -dr / self.s, dp)
+            size = reduce.max(np.abs(d)) / (reduce.max(np.abs(self.z)) or 1.0)
+            if not size < 0.5 * last:  # rounding, or NaN
+                break
+            self.z = self.z + d
+            self.G, last = self._residual(self.z), size
+            if size <= REFINED:
+                break
+        self.norm = self._norm(self.z, self.G)
 
 
 def build(job: Job) -> ActiveSet:

@@ -109,7 +109,7 @@ def exact_solution(film: Film, L: float, mu: float, U: float, p_a: float, p_b: f
     L : float
         Length (m).
     mu, U : float
-        Viscosity (Pa s) and speed of the wall (m/s), both positive.
+        Viscosity (Pa s), positive, and speed of the wall (m/s), not negative; at U = 0 nothing ruptures.
     p_a, p_b : float
         Pressures at x = 0 and x = L above the cavitation pressure (Pa), not negative.
 
@@ -127,9 +127,11 @@ def exact_solution(film: Film, L: float, mu: float, U: float, p_a: float, p_b: f
     Theory in the head of this file. Rounding leaves an error of some 1e-14 of 6 mu U L/h_min^2 in p, so a film ratio
     of 1 + 1e-6 leaves fewer digits than one of 2.
     """
-    for name, value in {"L": L, "mu": mu, "U": U}.items():
+    for name, value in {"L": L, "mu": mu}.items():
         if not 0 < value < math.inf:
             raise InputError(f"{name} = {value}: must be positive and finite")
+    if not 0 <= U < math.inf:
+        raise InputError(f"U = {U}: must be positive and finite, or 0; `turned.exact_either_way` takes the other sign")
     for name, value in {"p_a": p_a, "p_b": p_b}.items():
         if not 0 <= value < math.inf:
             raise InputError(f"{name} = {value}: must be finite and not negative (Pa above the cavitation pressure)")

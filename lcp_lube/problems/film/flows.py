@@ -31,13 +31,16 @@ def side_flows(problem: LubricationProblem, p: Array, r: Array) -> dict[str, flo
     not change on the way. Along a side y = const of constant pressure, the strip between the outer faces and the side carries
     Couette flow alone, U h (1 - r)/2 of the line of points beside it; what it loses between west and east leaves by the side.
     """
+    if (moving := getattr(problem, "moving", None)) is not None:  # a TurnedProblem
+        flow = side_flows(moving, *problem.there({"p": p, "r": r}).values())  # type: ignore[attr-defined]
+        return {**flow, "west": flow["east"], "east": flow["west"]}
     grid, s = problem.grid, problem.scheme
     west, east, south, north = problem.boundary_flows(p, r)
     if grid.dim == 1:
         return {"west": -0.5 * west, "east": 0.5 * east}
     at_west, at_east, *at_ends = sides(grid)
     leaving = s.couette_E + s.b_C * r.reshape(grid.box)
-    total = problem.reduce.sum
+    total = lambda flows: s.flow_unit * problem.reduce.sum(flows)  # noqa: E731
     strips = [  # enters at the west, leaves at the east
         (0.5 * total(np.where(at_west & end, s.couette_W, 0.0)), 0.5 * total(np.where(at_east & end, leaving, 0.0)))
         for end in at_ends
@@ -71,7 +74,7 @@ def friction(problem: LubricationProblem, p_pa: Array, r: Array) -> float:
     p_east = np.where(last, problem.p_sides[1], grid.ghosted(p_pa)[1:-1, 2:])
     h_west, h_east = (np.broadcast_to(film(grid.x + step, grid.y), grid.box) for step in (-dx / 2, dx / 2))
     passes = ~np.broadcast_to(walls[1], grid.box)  # the east face
-    liquid = 1.0 + s.b_C * r / np.where(passes, s.couette_E, np.inf)
+    liquid = 1.0 + s.b_C * r / np.where(passes & (s.couette_E != 0.0), s.couette_E, np.inf)
     shear = np.where(passes, liquid / h_east, 0.0) + np.where(first, 1.0 / h_west, 0.0)
     for wall in walls:
         shear = shear + np.where(wall, 0.5 * np.where(full, 4.0, 1.0 - r) / s.h, 0.0)

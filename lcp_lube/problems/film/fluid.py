@@ -95,7 +95,7 @@ def _scaled(
         c = c + np.where(at_side, conductance * (p_side / problem.p_unit), 0.0)
     names = dict(zip(("k_W", "k_E", "k_S", "k_N"), k, strict=True))
     b = {"b_C": s.b_C * density[1], "b_W": s.b_W * density[0]}
-    scheme = replace(s, **names, **b, couette_W=couette_W, couette_E=couette_E, c=c)
+    scheme = replace(s, **names, **b, couette_W=couette_W, couette_E=couette_E, c=c)  # type: ignore[arg-type]
     return LubricationProblem(
         grid,
         scheme,

@@ -24,6 +24,8 @@ def fronts(problem: LubricationProblem, p: Array, r: Array) -> tuple[list[float]
     cavity), within the cell or one beside it: the discrete front may be late. Reformation: where the pressure behind it,
     extrapolated linearly, is zero. A cavity that begins with the void that enters at the west has no rupture.
     """
+    if not problem.U:
+        return None, None  # at rest a film does not cavitate
     grid, film, scheme = problem.grid, problem.film, problem.scheme
     dx, start, L = grid.spacing[0], grid.origin[0], grid.lengths[0]
     x, row = grid.x[0], middle_row(problem) - grid.y_start
@@ -39,7 +41,7 @@ def fronts(problem: LubricationProblem, p: Array, r: Array) -> tuple[list[float]
         Q = np.full_like(x, problem.boundary_flows(p, r)[0])
     else:
         leaves = scheme.couette_E + scheme.b_C * r.reshape(grid.box)
-        Q = leaves[row] / point_weights(grid).reshape(grid.box)[row]
+        Q = scheme.flow_unit * leaves[row] / point_weights(grid).reshape(grid.box)[row]
     front = cavity[1:-1] & ~cavity[:-2] & here
     before = x[front] - 2.0 * dx
     before = before if grid.periodic[0] else np.maximum(before, start)

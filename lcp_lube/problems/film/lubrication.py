@@ -17,9 +17,11 @@ from ..transfer import Transfer
 from .exact import ExactSolution
 from .forces import Shaft
 from .quantities import quantities
-from .reynolds import BoxScheme, assemble, side_points, term_squares
+from .reynolds import BoxScheme, assemble, side_points, sides, term_squares
 
-IDLE = 1e-8  # share of the Couette flow below which a flow is none
+UNIT = 2.0**-53  # largest relative error of one operation
+IDLE = 1e-8  # share of what the pressures alone would drive through the sides, below which a flow is none
+UNEVEN = 1e-4  # part of the flow that the rounding of pressures inside may make of a mass defect, at most
 
 
 class LubricationProblem:
@@ -100,34 +102,69 @@ class LubricationProblem:
         y.resetArray()
         return out
 
-    def term_norms(self, p: Array, r: Array) -> tuple[float, float, float]:
-        """||A p||, ||B r|| and ||A p + B r - c||: by the matrices where they stand already, else by the stencil. Collective."""
-        if "A" in self.__dict__ or find_spec("numba") is None:
+    def term_norms(self, p: Array, r: Array) -> tuple[float, float, float, float]:
+        """||A p||, ||B r||, ||A p + B r - c|| and ||diag(A) p||, rows of A p as the sums of their face flows. Collective."""
+        if find_spec("numba") is None:
             Ap, Br = self.multiply(self.A, p), self.multiply(self.B, r)
-            return self.reduce.norm(Ap), self.reduce.norm(Br), self.reduce.norm(Ap + Br - self.c)
+            s = self.scheme
+            terms = (Ap, Br, self.balance(p, r), (s.k_W + s.k_E + s.k_S + s.k_N).ravel() * p)
+            return tuple(map(self.reduce.norm, terms))  # type: ignore[return-value]
         s, framed = self.scheme, (self.grid.ghosted(field, outside=0.0) for field in (p, r))
         squares = compiled(term_squares)(*framed, s.k_W, s.k_E, s.k_S, s.k_N, s.b_C, s.b_W, s.c)
         norms = np.sqrt([self.reduce.sum(np.array([square])) for square in squares])
-        return float(norms[0]), float(norms[1]), float(norms[2])
+        return tuple(map(float, norms))  # type: ignore[return-value]
 
     def flow(self, p: Array, r: Array) -> Array:
         """F1 = A p + B r - c, the flow balance of every point in m2/s. Collective."""
         return self.multiply(self.A, p) + self.multiply(self.B, r) - self.c
 
+    def balance(self, p: Array, r: Array) -> Array:
+        """F1 as the difference of the flows through each point's faces. Collective.
+
+        What leaves a cell enters the next one to the last bit, which A p + B r - c cannot say: where conductances differ by
+        1e9 and more the rounding of A's diagonal is a leak, and where little flows through a ring the rounding of c is one.
+        """
+        s, box, at_sides = self.scheme, self.grid.box, sides(self.grid)
+        frame_p, frame_r = (self.grid.ghosted(a, outside=0.0) for a in (p, r))
+        p, r = p.reshape(box), r.reshape(box)
+        around = [frame_p[1:-1, :-2], frame_p[1:-1, 2:], frame_p[:-2, 1:-1], frame_p[2:, 1:-1]]
+        p_W, p_E, p_S, p_N = (
+            np.where(at_side, p_side / self.p_unit, beside) if p_side else beside
+            for at_side, p_side, beside in zip(at_sides, self.p_sides, around, strict=True)
+        )
+        pressed = s.k_E * (p - p_E) - s.k_W * (p_W - p)
+        if self.grid.dim == 2:
+            pressed += s.k_N * (p - p_N) - s.k_S * (p_S - p)
+        # The difference first: it may be small, and the pressures too, where the flows themselves are large.
+        dragged = (s.couette_E + s.b_C * r) - (s.couette_W - s.b_W * frame_r[1:-1, :-2])
+        return (pressed + dragged - self._sources).ravel()
+
+    @cached_property
+    def _sources(self) -> Array:
+        """What c has beyond the flows of the wall and of the pressures at the sides: nothing in a steady film."""
+        s = self.scheme
+        c = s.couette_W - s.couette_E
+        for k, at_side, p_side in zip((s.k_W, s.k_E, s.k_S, s.k_N), sides(self.grid), self.p_sides, strict=True):
+            c += np.where(at_side, k * (p_side / self.p_unit), 0.0)
+        return s.c - c
+
     def certify(self, fields: Fields, eps1: float) -> Certificate:
         """Certificate of the fields p and r for a run whose tolerance was eps1. Collective.
 
-        residual: ||A p + B r - c|| / (||A p|| + ||B r|| + ||c||);
+        residual: ||A p + B r - c||, beyond what one rounding of p makes of it, over ||A p|| + ||B r|| + ||c||;
         complementarity: max_i |min(p_i / max|p|, r_i)|, which bounds negative p, negative r and products alike;
-        mass_defect: |flow in - flow out| / flow in, over the open sides.
+        mass_defect: |flow in - flow out| / flow, over the open sides (`mass_defect`).
         """
         red, p, r = self.reduce, fields["p"], fields["r"]
-        pressure, void, residual = self.term_norms(p, r)
-        scale = pressure + void + red.norm(self.c)
-        p_max = red.max(np.abs(p))
+        pressure, void, residual, diagonal = self.term_norms(p, r)
+        rounding = 2 * UNIT * diagonal  # of p itself: in a deep pocket this is more than all that flows
+        scale, p_max = pressure + void + red.norm(self.c), red.max(np.abs(p))
+        if not red.norm(self.c):  # nothing drives the film, p = 0: what is left of it is measured by its unit
+            s = self.scheme
+            scale, p_max = scale + red.norm((s.k_W + s.k_E + s.k_S + s.k_N).ravel()), max(p_max, 1.0)
         return Certificate(
             measures={
-                "residual": residual / scale if scale != 0 else 0.0,  # NaN stays NaN
+                "residual": np.maximum(residual - rounding, 0.0) / scale if scale != 0 else 0.0,  # NaN stays NaN
                 "complementarity": red.max(np.abs(np.minimum(p / p_max if p_max > 0 else p, r))),
                 "mass_defect": self.mass_defect(p, r),
             },
@@ -136,13 +173,29 @@ class LubricationProblem:
         )
 
     def mass_defect(self, p: Array, r: Array) -> float:
-        """|flow in - flow out| / flow in, over the open sides. Collective."""
-        west, east, south, north = self.boundary_flows(p, r)
+        """|flow in - flow out| over the open sides, beyond what rounding makes of it, in parts of the flow. Collective.
+
+        The flow is the largest of what comes in, of what the wall drags through every cross-section of the film, also if
+        nothing comes in, and of IDLE times what the pressures would drive through the sides' cells alone: below this the
+        flows are differences of pressures that are equal to as many digits as a solve has. Rounding is that of the sums here,
+        and of p inside, where the conductances may be 1e9 times the sides' (up to UNEVEN parts of the flow).
+        """
+        s, reduce = self.scheme, self.reduce
+        flows = west, east, south, north = self.boundary_flows(p, r)
+        net = abs(west - east + south - north)
         inflow = max(west, 0.0) + max(-east, 0.0) + max(south, 0.0) + max(-north, 0.0)
-        # Nothing may flow through at all: what rounding leaves is measured by what the wall drags along.
-        dragged = self.reduce.max(np.abs(self.scheme.b_C)) * (self.grid.shape[1] if self.grid.dim == 2 else 1)
-        inflow = max(inflow, IDLE * dragged)
-        return abs(west - east + south - north) / inflow if inflow != 0 else 0.0
+        dragged = s.flow_unit * (reduce.min(-s.b_C) if self.U else 0.0) * (self.grid.shape[1] if self.grid.dim == 2 else 1)
+        at = np.abs(p).reshape(self.grid.box)
+        if not reduce.norm(self.c):
+            at = at + 1.0  # nothing drives the film: p_unit measures what is left
+        pressed = 0.0
+        for k, points, side in zip((s.k_W, s.k_E, s.k_S, s.k_N), side_points(self.grid), self.p_sides, strict=True):
+            pressed += s.flow_unit * reduce.sum(k[points] * (at[points] + side / self.p_unit))
+        flow = max(inflow, dragged, IDLE * pressed)
+        inside = UNIT * s.flow_unit * reduce.sum((s.k_W + s.k_E + s.k_S + s.k_N) * at)
+        rounding = 8 * UNIT * (pressed + sum(map(abs, flows))) + min(inside, UNEVEN * flow)
+        excess = net - rounding  # NaN stays NaN
+        return 0.0 if excess <= 0 else excess / flow if flow != 0 else np.inf
 
     def boundary_flows(self, p: Array, r: Array) -> tuple[float, float, float, float]:
         """Scaled flow through the west, east, south and north side, positive towards larger x or y.
@@ -154,7 +207,11 @@ class LubricationProblem:
         p, r = p.reshape(box), r.reshape(box)
         p_W, p_E, p_S, p_N = (side / self.p_unit for side in self.p_sides)
         west, east, south, north = side_points(self.grid)
-        total = self.reduce.sum
+        unit = s.flow_unit
+
+        def total(flows: Array) -> float:
+            return unit * self.reduce.sum(flows)
+
         return (
             total(s.couette_W[west] + s.k_W[west] * (p_W - p[west])),
             total(s.couette_E[east] + s.b_C[east] * r[east] + s.k_E[east] * (p[east] - p_E)),

@@ -17,6 +17,7 @@ from .forces import Shaft
 from .grooves import Groove, GroovedProblem, Pad, pads_between
 from .lubrication import LubricationProblem
 from .reynolds import Film, box_scheme
+from .turned import MirroredFilm, TurnedProblem
 
 NAMES = ("west", "east", "south", "north")
 OPPOSITE = dict(zip(NAMES, ("east", "west", "north", "south"), strict=True))
@@ -39,6 +40,9 @@ class Side:
 @dataclass(frozen=True)
 class Model:
     """A film over [0, L] or [0, L] x [0, Ly] in SI units; the letters are those of `LubricationProblem`.
+
+    U : of either sign, or 0, when the film is a hydrostatic one: p solves the linear complementarity problem p >= 0,
+    A p - c >= 0, and as no side is below the cavitation pressure there is no void, r = 0.
 
     sides : west, east, south, north (the last two in 2D).
 
@@ -66,12 +70,15 @@ class Model:
         for name, side in used.items():
             if side.kind == "periodic" and used[OPPOSITE[name]].kind != "periodic":
                 raise InputError(f"sides.{name} is periodic, sides.{OPPOSITE[name]} is not: both of them or none")
-            if side.r and (name != "west" or side.p):
-                raise InputError(f"sides.{name}.r = {side.r:g}: void enters by the west side alone, and there at p = p_c")
+            inlet = "west" if self.U >= 0 else "east"
+            if side.r and (name != inlet or side.p):
+                raise InputError(f"sides.{name}.r = {side.r:g}: void enters by the {inlet} side alone, and there at p = p_c")
         pressures = [side.p for side in used.values() if side.kind == "open"]
         if not pressures:
             raise InputError("no side has a pressure: without one the level of p is open; give at least one side a p")
-        if self.sides[0].kind == "periodic" and not max(pressures) > 0 and not self.grooves:
+        if self.U < 0 and self.grooves:
+            raise InputError(f"U = {self.U:g}: a film with axial grooves moves to larger x; turn it round")
+        if self.U and self.sides[0].kind == "periodic" and not max(pressures) > 0 and not self.grooves:
             raise InputError("periodic along the flow, and no side above the cavitation pressure: nothing feeds the film")
 
     @property
@@ -88,6 +95,13 @@ class Model:
         periodic = tuple(self.sides[2 * k].kind == "periodic" for k in range(len(self.lengths)))
         return Facts("lubrication", tuple(shape), (comm or PETSc.COMM_WORLD).getSize(), periodic)
 
+    @property
+    def mirrored(self) -> "Model":
+        """The mirror image in x, whose wall moves the other way."""
+        west, east, *ends = self.sides
+        gap = MirroredFilm(self.gap, self.lengths[0])
+        return replace(self, gap=gap, U=-self.U, sides=(east, west, *ends), exact=None)  # type: ignore[arg-type]
+
     def build(self, shape: Sequence[int], comm: PETSc.Comm | None = None) -> LubricationProblem:
         """The discrete problem on (nx,) or (nx, ny) points. Collective.
 
@@ -96,6 +110,8 @@ class Model:
         InputError : more ranks than the grid can be dealt to, a film that is not positive.
         """
         kind = GroovedProblem if self.grooves else LubricationProblem
+        if self.U < 0:
+            return TurnedProblem(self.mirrored.build(shape, comm), self.exact)
         west, east, south, north = self.sides
         grid = Grid(shape, self.lengths, comm, ends=((west.kind, east.kind), (south.kind, north.kind)))
         p_sides = tuple(side.p if side.kind == "open" else 0.0 for side in self.sides)
@@ -165,6 +181,9 @@ class _Inside:
         for side, (length, periodic) in enumerate(zip(self.lengths, self.periodic, strict=True)):
             places[side] = places[side] % length if periodic else np.clip(places[side], 0.0, length)
         return self.gap(*places)
+
+    def jumps(self, axis: str) -> tuple[float, ...]:
+        return getattr(self.gap, "jumps", lambda axis: ())(axis)
 
     def breakpoints(self) -> tuple[float, ...]:
         return self.gap.breakpoints()  # type: ignore[attr-defined]

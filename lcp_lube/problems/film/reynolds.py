@@ -1,7 +1,7 @@
 """Box scheme of the steady Reynolds equation with cavitation: film -> coefficients of A p + B r = c."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import scipy.sparse
@@ -16,6 +16,7 @@ from .edges import face_film
 
 SCHEMES = ("nodal", "face", "upwind")
 Film = Callable[[Array, Array], Array]
+USUAL = 1e6  # the largest coefficient lies between this and its inverse: absolute tolerances then mean something
 LARGE = 1e100  # coefficients whose squares still have a norm
 
 
@@ -41,6 +42,12 @@ class BoxScheme:
     couette_W: Array  # U h at the west and east face of a cell without void: the flux balance that c holds
     couette_E: Array
     h: Array  # film at the points, m
+    flow_unit: float = 1.0  # of all of them but h, m2/s: a power of 2
+
+    @property
+    def arrays(self) -> list[str]:
+        """Names of the coefficients and of h."""
+        return [field.name for field in fields(self) if field.name != "flow_unit"]
 
     def pressure_entries(self) -> list[tuple[int, int, Array]]:
         """Row entries of A as (dj, di, value)."""
@@ -72,7 +79,8 @@ def box_scheme(
     Parameters
     ----------
     film : h(x, y) in metres for arrays of coordinates in metres that broadcast.
-    mu, U : viscosity in Pa s, speed of the moving wall in m/s (U > 0: the flow goes to larger x).
+    mu, U : viscosity in Pa s, speed of the moving wall in m/s (the flow goes to larger x; `Model` mirrors films for U < 0).
+        U = 0: void travels nowhere, and its columns are those of some speed: the answer has r = 0 for any.
     scheme : form of the Couette flux. 'nodal' (paper, eq. 7): U (h_face - (h r)_upwind); 'face': U h_face (1 - r_upwind);
         'upwind': U (h (1 - r))_upwind.
     p_sides : Dirichlet pressures above the cavitation pressure at west, east, south, north in Pa (south, north: 2D only);
@@ -100,7 +108,10 @@ def box_scheme(
             f"film {reduce.min(box.h):g} to {reduce.max(box.h):g} m, mu = {mu:g} Pa s, U = {U:g} m/s, p_unit = {p_unit:g} Pa: "
             f"flow balance with coefficients {smallest:g} to {largest:g}, allowed are {1 / LARGE:g} to {LARGE:g} (SI units?)"
         )
-    return box
+    if 1 / USUAL < largest < USUAL:
+        return box
+    unit = 2.0 ** np.round(np.log2(largest))
+    return replace(box, **{name: getattr(box, name) / unit for name in box.arrays if name != "h"}, flow_unit=float(unit))
 
 
 def check_film(grid: Grid, film: Film) -> None:
@@ -171,18 +182,23 @@ def _coefficients(
 
     first = (np.arange(grid.x_start, grid.x_end) == 0)[None, :]
     h_W = h_x[:, :-2]
+    if U == 0.0:
+        # No void is carried, and there is none: any speed keeps B regular.
+        U_r, r_in = grid.reduce.max(k_x) / grid.reduce.max(h), 0.0
+    else:
+        U_r = U
     if scheme == "upwind":
         couette_W, couette_E = U * h_W, U * h
     else:
         couette_W, couette_E = U * h_face[:, :-1], U * h_face[:, 1:]
     if scheme == "face":
-        b_C, b_W = -couette_E, couette_W
+        b_C, b_W = -U_r * h_face[:, 1:], U_r * h_face[:, :-1]
     else:
-        b_C, b_W = -U * h, U * h_W
+        b_C, b_W = -U_r * h, U_r * h_W
     open_west, *_ = sides(grid)
     if r_in:
         couette_W = couette_W - np.where(open_west, b_W * r_in, 0.0)
-    if not grid.periodic[0]:
+    if not grid.periodic[0] or U == 0.0:
         b_W = np.where(first, 0.0, b_W)  # what enters is in c
     if any(end != "open" for pair in grid.ends for end in pair):
         # Column sums stay >= 0, those of A and B are 0 in the cells away from open sides. b_C stays at a closed east side: in
@@ -258,10 +274,13 @@ def assemble(grid: Grid, entries: list[tuple[int, int, Array]]) -> PETSc.Mat:
 
 def term_squares(
     p: Array, r: Array, k_W: Array, k_E: Array, k_S: Array, k_N: Array, b_C: Array, b_W: Array, c: Array
-) -> tuple[float, float, float]:
-    """Sums of the squares of A p, B r and A p + B r - c over this rank's points, for `compiled`; p and r have a frame."""
+) -> tuple[float, float, float, float]:
+    """Sums of the squares of A p, B r, A p + B r - c and diag(A) p over this rank's points, for `compiled`.
+
+    p and r have a frame of neighbours.
+    """
     ny, nx = c.shape
-    pressure, void, balance = 0.0, 0.0, 0.0
+    pressure, void, balance, diagonal = 0.0, 0.0, 0.0, 0.0
     for j in range(ny):
         for i in range(nx):
             here = p[j + 1, i + 1]
@@ -271,4 +290,5 @@ def term_squares(
             pressure += a * a
             void += b * b
             balance += (a + b - c[j, i]) ** 2
-    return pressure, void, balance
+            diagonal += ((k_W[j, i] + k_E[j, i] + k_S[j, i] + k_N[j, i]) * here) ** 2
+    return pressure, void, balance, diagonal

@@ -1,0 +1,68 @@
+"""Films under a wall that moves to smaller x: the mirror image is solved, and its answer turned back."""
+
+from dataclasses import dataclass, replace
+
+from petsc4py import PETSc
+
+from ..problems.facts import Facts
+from ..problems.film.lubrication import LubricationProblem
+from ..problems.film.model import Model
+from ..problems.film.turned import TurnedProblem
+from ..problems.solution import Solution
+from ..scenes.scene import Solvable
+from .ask import Ask, Start
+from .compose import Inner
+
+
+@dataclass(frozen=True)
+class Mirrored:
+    """The mirror image of a scene."""
+
+    whole: Solvable
+
+    @property
+    def name(self) -> str:
+        return self.whole.name
+
+    @property
+    def scheme(self) -> str | None:
+        return self.whole.scheme
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return self.whole.shape
+
+    @property
+    def model(self) -> Model:
+        return self.whole.model.mirrored  # type: ignore[attr-defined]
+
+    def with_shape(self, shape: tuple[int, ...]) -> "Mirrored":
+        return Mirrored(self.whole.with_shape(shape))
+
+    def facts(self, comm: PETSc.Comm | None = None) -> Facts:
+        return self.model.facts(self.shape, comm)
+
+    def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
+        return self.model.build(self.shape, comm)
+
+
+def applies(scene: Solvable, ask: Ask) -> bool:
+    """Whether the scene is a film whose wall moves to smaller x."""
+    model = getattr(scene, "model", None)
+    return isinstance(model, Model) and model.U < 0
+
+
+def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
+    """The mirror image's solution, turned back. Collective."""
+    if ask.start is not None and isinstance(near := ask.start.problem, TurnedProblem):
+        ask = replace(ask, start=Start(near.moving, near.there(ask.start.fields), ask.start.settings))
+    solution = inner(Mirrored(scene), ask)
+    assert isinstance(solution.problem, LubricationProblem)  # as `applies` found
+    problem = TurnedProblem(solution.problem, scene.model.exact)  # type: ignore[attr-defined]
+    problem.extras = getattr(scene, "extras", None)
+    band = solution.enclosure
+    if band is not None:
+        band = replace(band, lower=problem.here(band.lower), upper=problem.here(band.upper))
+    why = ["the wall moves to smaller x: the mirror image is solved, and turned back", *solution.settings["why"]]
+    settings = {**solution.settings, "why": why}
+    return replace(solution, problem=problem, fields=problem.here(solution.fields), settings=settings, enclosure=band)

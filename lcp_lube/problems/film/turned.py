@@ -1,0 +1,154 @@
+"""A film under a wall that moves to smaller x: the mirror image is solved, in which the wall moves to larger x.
+
+Methods, matrices and the void's way know one direction only. What is told of the answer, fields and numbers, is turned back:
+x counts as in the scene, flows are those through the scene's own sides, and fronts stay what they are in the sense of motion,
+rupture being where the moving fluid leaves the full film.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...base.parallel import Array
+from ..certificate import Certificate
+from ..grid import Grid
+from ..solution import Fields
+from ..transfer import Pick
+from .exact import ExactSolution, exact_solution
+from .lubrication import LubricationProblem
+
+PLACES = ("rupture", "reformation")
+
+
+@dataclass(frozen=True)
+class MirroredFilm:
+    """h(L - x, y) of a film h over [0, L]."""
+
+    film: Any
+    L: float
+
+    def __call__(self, x: ArrayLike, y: ArrayLike | None = None, /) -> Array:
+        return self.film(self.L - np.asarray(x, dtype=float), y)
+
+    def breakpoints(self) -> tuple[float, ...]:
+        return tuple(sorted(self.L - x for x in self.film.breakpoints()))
+
+    def __getattr__(self, name: str) -> Any:
+        if name != "jumps":  # a film without them has no such attribute
+            raise AttributeError(name)
+        jumps = self.film.jumps
+        return lambda axis: tuple(sorted(self.L - x for x in jumps(axis))) if axis == "x" else jumps(axis)
+
+
+class TurnedProblem(LubricationProblem):
+    """The film as it stands, for what is told of its answer; `moving` is the mirror image, which is solved.
+
+    Parameters
+    ----------
+    moving : the discrete mirror image, |U| its speed. exact : the exact 1D solution of the film as it stands, where known.
+    """
+
+    def __init__(self, moving: LubricationProblem, exact: Callable[[], ExactSolution | None] | None = None):
+        self.moving = moving
+        grid = moving.grid
+        ends = tuple((pair[::-1] if k == 0 else pair) for k, pair in enumerate(grid.ends))
+        own = Grid(grid.shape, grid.lengths, grid.dm.comm, ends=ends)  # type: ignore[arg-type]
+        columns = np.arange(own.x_start, own.x_end)[None, :]
+        lines = np.arange(own.y_start, own.y_end)[:, None]
+        there, back = grid.shape[0] - 1 - columns, grid.shape[0] - 1 - np.arange(grid.x_start, grid.x_end)[None, :]
+        self._here = Pick(grid, own, lines, there)
+        self._there = Pick(own, grid, np.arange(grid.y_start, grid.y_end)[:, None], back)
+        s = moving.scheme
+        turned = {name: self._here(getattr(s, name).ravel()).reshape(own.box) for name in s.arrays}
+        turned |= {"k_W": turned["k_E"], "k_E": turned["k_W"], "b_C": -turned["b_C"], "b_W": -turned["b_W"]}
+        # couette_E: of the face downstream, as in the mirror image.
+        turned |= {"couette_W": -turned["couette_W"], "couette_E": -turned["couette_E"]}
+        west, east, *ends_y = moving.p_sides
+        film = moving.film.film if isinstance(moving.film, MirroredFilm) else MirroredFilm(moving.film, grid.lengths[0])
+        super().__init__(
+            own,
+            replace(s, **turned),  # type: ignore[arg-type]
+            mu=moving.mu,
+            U=-moving.U,
+            p_unit=moving.p_unit,
+            p_sides=(east, west, *ends_y),  # type: ignore[arg-type]
+            p_c=moving.p_c,
+            film=film,
+            exact=exact,
+        )
+
+    def here(self, fields: Fields) -> Fields:
+        """Fields of the mirror image as fields of the film as it stands. Collective."""
+        return {name: self._here(values) for name, values in fields.items()}
+
+    def there(self, fields: Fields) -> Fields:
+        """The other way round. Collective."""
+        return {name: self._there(values) for name, values in fields.items()}
+
+    def flow(self, p: Array, r: Array) -> Array:
+        return self._here(self.moving.flow(self._there(p), self._there(r)))
+
+    def balance(self, p: Array, r: Array) -> Array:
+        return self._here(self.moving.balance(self._there(p), self._there(r)))
+
+    def certify(self, fields: Fields, eps1: float) -> Certificate:
+        return self.moving.certify(self.there(fields), eps1)
+
+    def boundary_flows(self, p: Array, r: Array) -> tuple[float, float, float, float]:
+        west, east, south, north = self.moving.boundary_flows(self._there(p), self._there(r))
+        return -east, -west, south, north
+
+    def quantities(self, fields: Fields) -> dict[str, Any]:
+        """Those of the mirror image, their places and directions turned back. Collective."""
+        out, L = self.moving.quantities(self.there(fields)), self.grid.lengths[0]
+        for name in ("p_max_at", "min_h_at"):
+            out[name] = [L - out[name][0], *out[name][1:]] if out[name] is not None else None
+        for name in PLACES:
+            out[name] = L - out[name] if out[name] is not None else None
+        out["flow"] = {**out["flow"], "west": out["flow"]["east"], "east": out["flow"]["west"]}
+        out["friction"] = -out["friction"]
+        if self.extras:
+            out |= self.extras(self, fields["p"], fields["r"])
+            carried = out.get("bearing_load", out["load_above_ambient"])
+            out["friction_coefficient"] = -out["friction"] / carried if carried > 0 else None
+        return out
+
+    def destroy(self) -> None:
+        """Free the PETSc objects of both."""
+        self._here.destroy()
+        self._there.destroy()
+        super().destroy()
+        self.moving.destroy()
+
+
+@dataclass(frozen=True)
+class TurnedExact(ExactSolution):
+    """The exact solution of a film from that of its mirror image."""
+
+    _moving: Any = None
+
+    @classmethod
+    def of(cls, moving: ExactSolution, L: float) -> "TurnedExact":
+        def place(x: float | None) -> float | None:
+            return None if x is None else L - x
+
+        data = {name: getattr(moving, name) for name in ("p_max", "load", "_mu", "_x", "_p")}
+        fronts = {name: place(getattr(moving, name)) for name in PLACES}
+        more = {"_film": MirroredFilm(moving._film, L), "_U": -moving._U, "_moving": moving}
+        return cls(**data, **fronts, Q=-moving.Q, x_max=L - moving.x_max, **more)  # type: ignore[arg-type]
+
+    def p(self, x: ArrayLike) -> Array:
+        return self._moving.p(self._x[-1] - np.asarray(x, dtype=float))
+
+    def r(self, x: ArrayLike) -> Array:
+        return self._moving.r(self._x[-1] - np.asarray(x, dtype=float))
+
+
+def exact_either_way(film: Any, L: float, mu: float, U: float, p_a: float, p_b: float) -> ExactSolution:
+    """`exact_solution` for any U: where it is negative, by the mirror image."""
+    if not U < 0:
+        return exact_solution(film, L, mu, U, p_a, p_b)
+    return TurnedExact.of(exact_solution(MirroredFilm(film, L), L, mu, -U, p_b, p_a), L)
