@@ -156,6 +156,7 @@ class Dense:
 
     def __init__(self, scene: Any):
         faces, self.n, dead = discretise(scene)
+        self.ring = scene.shape[0] if scene.model.sides[0].kind == "periodic" else 0
         self.i, self.j = np.array(faces.i), np.array(faces.j)
         self.k, self.u, self.b_i, self.b_j, self.p_i, self.p_j, self.r_i, self.r_j = (
             np.array(getattr(faces, name), dtype=LONG) for name in COLUMNS[2:]
@@ -172,10 +173,12 @@ class Dense:
         self.virtual = np.where(dead | (self.b == 0.0), 1.0, 0.0)  # of any size: void there is none
         self.b = np.where(self.virtual > 0, self.a, self.b)
         self.A, self.B = self._matrices()
-        h = scene.model.gap(np.linspace(0, scene.L, 200)[None, :], np.linspace(0, scene.side_lengths[-1], 200)[:, None])
-        # What one rounding of r does to p, the flow of one cell pressed through the thinnest: no double r knows more of it.
-        thin = max(float(h.min()), 1e-290)
-        self.rounding = 2.0**-53 * 6 * scene.fluid.mu * abs(scene.U) * scene.L / thin**2 * (float(h.max()) / thin)
+        # What one rounding of r does to p: the flow of one cell pressed to an open side, through the thinnest film. No p that
+        # comes with an r in double precision knows more.
+        along = (self.b_i != 0) | (self.b_j != 0)
+        way = along if {side.kind for side in scene.model.sides[:2]} & {"open"} and np.any(along) else ~along
+        weakest = float(np.min(self.k[way if np.any(way) else along | ~along]))
+        self.rounding = 8 * 2.0**-53 * self.n * float(np.max(np.abs(self.b_i) + np.abs(self.b_j))) / weakest
 
     def _matrices(self) -> tuple[np.ndarray, np.ndarray]:
         A, B = np.zeros((self.n + 1, self.n + 1)), np.zeros((self.n + 1, self.n + 1))
@@ -202,6 +205,10 @@ class Dense:
 
     def step(self, y: np.ndarray) -> np.ndarray:
         full = y >= 0
+        if self.ring:  # one that is empty all round has no steady flow
+            lines, values = full.reshape(-1, self.ring), y.reshape(-1, self.ring)
+            empty = np.flatnonzero(~lines.any(axis=1))
+            lines[empty, np.argmax(values[empty], axis=1)] = True
         J = np.where(full[None, :], self.A / self.a, -self.B / self.b)
         factors, z = lu_factor(J, check_finite=False), np.zeros(self.n, dtype=LONG)
         for _ in range(20):  # refinement: the equations of this sign pattern, their flows in extended precision

@@ -175,12 +175,15 @@ def test_auto_chooses_and_says_why():
 
 
 def test_auto_in_the_plane(monkeypatch):
-    """Nonlinear multigrid where its loops are compiled, the active set where they are not."""
+    """Nonlinear multigrid where its loops are compiled and the grid is not small, else the active set."""
     pytest.importorskip("numba")
-    sweeps = run("problem4", {"n": 20})
+    few = run("problem4", {"n": 20})
+    assert few.settings["method"] == "active-set" and few.converged
+    few.destroy()
+    sweeps = run("problem4", {"n": 80})
     assert sweeps.settings["method"] == "fas" and sweeps.converged and sweeps.total("linear_iterations") == 0
     monkeypatch.setattr("lcp_lube.drivers.plan.find_spec", lambda name: None)
-    steps = run("problem4", {"n": 20})
+    steps = run("problem4", {"n": 80})
     assert steps.settings["method"] == "active-set" and steps.converged
     np.testing.assert_allclose(sweeps.fields["p"], steps.fields["p"], atol=1e-6)
     sweeps.destroy()

@@ -2,7 +2,8 @@
 
 In the order in which they are looked for:
 
-constant : the film is everywhere the same, and so is the pressure at every open side: that is the answer.
+constant : the pressure is the same at every open side, and the film is everywhere the same, or the wall at rest: that pressure
+    is the answer.
 line : film and sides do not depend on y (both sides along the flow closed or periodic): one line is solved in 1D.
 mirror : the film is symmetric about the middle of the width, and the sides south and north are alike: half the width is solved,
     with a closed side in the middle. For an odd number of lines the middle one lies on that side and has half cells.
@@ -38,7 +39,7 @@ SAME = 1e-12  # relative difference that coordinates' rounding leaves between tw
 SAMPLE = (65, 5)  # columns and lines that are compared first, before anything is built
 
 SENTENCES = {
-    "constant": "nothing to solve: the film is the same everywhere, and the pressure at every side",
+    "constant": "nothing to solve: the pressure is the same at every side, and nothing else moves the fluid",
     "line": "solved in 1D: neither the film nor the sides depend on y",
     "mirror": "half the width is solved: the film and the sides are symmetric about its middle",
 }
@@ -143,6 +144,8 @@ def promising(scene: Solvable, ask: Ask) -> bool:
     """Whether some columns and lines of the film look like one of a part: nothing is built for films that do not."""
     model = model_of(scene)
     assert model is not None  # as `applies` found
+    if _at_rest(model):
+        return True
     kinds = [tuple(side.kind for side in model.sides[k : k + 2]) for k in (0, 2)]
     xs, *ys = (
         np.unique(at[np.linspace(0, at.size - 1, min(at.size, most)).round().astype(int)])
@@ -157,6 +160,11 @@ def promising(scene: Solvable, ask: Ask) -> bool:
         )
 
 
+def _at_rest(model: Model) -> bool:
+    """Whether neither the wall nor a difference of pressures moves the fluid."""
+    return not model.U and len({side.p for side in model.sides[: 2 * len(model.lengths)] if side.kind == "open"}) == 1
+
+
 def part_of(scene: Solvable, problem: Problem) -> Part | None:
     """The least part of a scene that gives its whole answer; None where that is the scene itself. Collective."""
     model = model_of(scene)
@@ -165,6 +173,8 @@ def part_of(scene: Solvable, problem: Problem) -> Part | None:
     grid = problem.grid
     west, east, *ends = model.sides
     pressures = {side.p for side in model.sides[: 2 * grid.dim] if side.kind == "open"}
+    if _at_rest(model):
+        return Part(scene, "constant")
     if len(pressures) == 1 and not west.r and "closed" not in (west.kind, east.kind) and _is_constant(problem):
         return Part(scene, "constant")
     if grid.dim == 1:

@@ -32,6 +32,7 @@ from .steplength import StepLengthError
 
 EPS = float(np.finfo(float).eps)
 RESCUE_SWEEPS, MOST_SWEEPS = 16, 2**14  # once stalled: at first, and at most
+LEAST = 1e-15  # p_unit: a largest pressure below this is rounding
 REFINEMENTS, REFINED = 8, 1e-12  # solves that a direct solver adds to the last step, until z moves by less of itself
 
 
@@ -146,9 +147,11 @@ class ActiveSet:
             self.G = self._residual(self.z)
             self.norm = self._norm(self.z, self.G)
             changed = self.problem.reduce.sum((full != (self.z >= 0)).astype(float))
-            step_norm = self.problem.reduce.norm(d) if changed else 0.0
         if not changed and self.system.direct:
-            self._refine(cavity)
+            changed = self._refine(full)
+        # In parts of the largest pressure, if that is far below p_unit: eps2 is no step then.
+        p_max = float(np.clip(self.problem.reduce.max(self.z), LEAST, 1.0))
+        step_norm = self.problem.reduce.norm(d) / p_max if changed else 0.0
         with self.system.stages("relaxation"):
             if self._stalled >= self.options.patience:
                 self._relax(self._rescue, always=True)
@@ -169,13 +172,17 @@ class ActiveSet:
             full.reshape(grid.box)[empty, np.argmax(z[empty], axis=1)] = True
         return full
 
-    def _refine(self, cavity: Array) -> None:
-        """Solve again with the same factors for what is left of G: their rounding is that of A's diagonal, G's is not."""
+    def _refine(self, full: NDArray[np.bool_]) -> float:
+        """Solve again with the same factors for what is left of G: their rounding is that of A's diagonal, G's is not.
+
+        Returns how many signs that changes: of pressures that are next to nothing beside what the wall could make.
+        """
         reduce, none, last = self.problem.reduce, np.zeros_like(self.G), np.inf
         for _ in range(REFINEMENTS):
             dp, dr, _ = self.system.resolve(-self.G, none, self.options.rtol)
-            d = np.where(cavity > 0, -dr / self.s, dp)
-            size = reduce.max(np.abs(d)) / (reduce.max(np.abs(self.z)) or 1.0)
+            d = np.where(full, dp, -dr / self.s)
+            parts = [(np.where(some, np.abs(d), 0.0), np.where(some, np.abs(self.z), 0.0)) for some in (full, ~full)]
+            size = max(reduce.max(moved) / (reduce.max(whole) or 1.0) for moved, whole in parts)
             if not size < 0.5 * last:  # rounding, or NaN
                 break
             self.z = self.z + d
@@ -183,6 +190,7 @@ class ActiveSet:
             if size <= REFINED:
                 break
         self.norm = self._norm(self.z, self.G)
+        return reduce.sum((full != (self.z >= 0)).astype(float))
 
 
 def build(job: Job) -> ActiveSet:

@@ -140,7 +140,8 @@ class _Band:
         near = about[1:-1, 1:-1] + about[1:-1, :-2] + about[1:-1, 2:]
         if problem.grid.dim == 2:
             near = near + about[:-2, 1:-1] + about[2:, 1:-1]
-        self.slack = 4 * rounding + 8 * UNIT * near.ravel()
+        # c is a difference of the wall's flows, rounded; methods take the difference at the faces (`problem.balance`).
+        self.slack = 4 * rounding + 8 * UNIT * (near - scheme.b_C).ravel()
 
     def pair(self, z: Array) -> tuple[Array, Array]:
         """p and r, complementary to the last bit: what is tested is this pair, s has no part in the proof."""

@@ -151,13 +151,14 @@ class LubricationProblem:
     def certify(self, fields: Fields, eps1: float) -> Certificate:
         """Certificate of the fields p and r for a run whose tolerance was eps1. Collective.
 
-        residual: ||A p + B r - c||, beyond what one rounding of p makes of it, over ||A p|| + ||B r|| + ||c||;
+        residual: ||A p + B r - c||, beyond what rounding of p and c makes of it, over ||A p|| + ||B r|| + ||c||;
         complementarity: max_i |min(p_i / max|p|, r_i)|, which bounds negative p, negative r and products alike;
         mass_defect: |flow in - flow out| / flow, over the open sides (`mass_defect`).
         """
         red, p, r = self.reduce, fields["p"], fields["r"]
         pressure, void, residual, diagonal = self.term_norms(p, r)
-        rounding = 2 * UNIT * diagonal  # of p itself: in a deep pocket this is more than all that flows
+        # Of p itself, which in a deep pocket is more than all that flows, and of c as a difference of the wall's flows.
+        rounding = 2 * UNIT * (diagonal + red.norm(self.scheme.b_C.ravel()))
         scale, p_max = pressure + void + red.norm(self.c), red.max(np.abs(p))
         if not red.norm(self.c):  # nothing drives the film, p = 0: what is left of it is measured by its unit
             s = self.scheme
@@ -186,12 +187,12 @@ class LubricationProblem:
         inflow = max(west, 0.0) + max(-east, 0.0) + max(south, 0.0) + max(-north, 0.0)
         dragged = s.flow_unit * (reduce.min(-s.b_C) if self.U else 0.0) * (self.grid.shape[1] if self.grid.dim == 2 else 1)
         at = np.abs(p).reshape(self.grid.box)
-        if not reduce.norm(self.c):
-            at = at + 1.0  # nothing drives the film: p_unit measures what is left
+        driven = reduce.norm(self.c) > 0  # or else p = 0, and p_unit measures what is left of it
+        at = at if driven else at + 1.0
         pressed = 0.0
         for k, points, side in zip((s.k_W, s.k_E, s.k_S, s.k_N), side_points(self.grid), self.p_sides, strict=True):
             pressed += s.flow_unit * reduce.sum(k[points] * (at[points] + side / self.p_unit))
-        flow = max(inflow, dragged, IDLE * pressed)
+        flow = max(inflow, dragged, IDLE * pressed if driven else pressed)
         inside = UNIT * s.flow_unit * reduce.sum((s.k_W + s.k_E + s.k_S + s.k_N) * at)
         rounding = 8 * UNIT * (pressed + sum(map(abs, flows))) + min(inside, UNEVEN * flow)
         excess = net - rounding  # NaN stays NaN
