@@ -2,7 +2,7 @@
 
 Every film is a row of a csv; what is there already is not run again, so that a run may be stopped and taken up.
 
-    python benchmarks/wild_films.py [--films 20000] [--seed 0] [--minutes 5] [--output results/wild_films.csv]
+    python benchmarks/unknown_films.py [--films 20000] [--seed 0] [--minutes 5] [--output results/unknown_films.csv]
 """
 
 import argparse
@@ -15,7 +15,7 @@ from time import monotonic
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
-from wild_films import BEYOND, WRONG, judge  # noqa: E402
+from wild_films import BEYOND, WRONG, judge
 
 COLUMNS = ["seed", "what", "method", "error", "ratio", "message"]
 
@@ -25,7 +25,7 @@ def main() -> None:
     parser.add_argument("--films", type=int, default=20_000)
     parser.add_argument("--seed", type=int, default=0, help="of the first film")
     parser.add_argument("--minutes", type=float, default=float("inf"), help="stop after so many")
-    parser.add_argument("--output", type=Path, default=Path(__file__).parent / "results" / "wild_films.csv")
+    parser.add_argument("--output", type=Path, default=Path(__file__).parent / "results" / "unknown_films.csv")
     args = parser.parse_args()
     rows = list(csv.DictReader(args.output.open(newline=""))) if args.output.exists() else []
     done, begin = {int(row["seed"]) for row in rows}, monotonic()
