@@ -40,7 +40,13 @@ def main() -> None:
                 break
             v = judge(seed, Path(folder))
             told = "" if v.what == "converged" and v.good else v.message
-            row = {"seed": seed, "what": v.what, "method": v.method, "error": f"{v.error:.1e}", "ratio": f"{v.ratio:.1e}"}
+            row: dict[str, str] = {
+                "seed": str(seed),
+                "what": v.what,
+                "method": v.method,
+                "error": f"{v.error:.1e}",
+                "ratio": f"{v.ratio:.1e}",
+            }
             writer.writerow({**row, "message": told})
             file.flush()
             rows.append({**row, "message": told})
