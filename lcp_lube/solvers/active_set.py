@@ -150,7 +150,7 @@ class ActiveSet:
         if not changed and self.system.direct:
             changed = self._refine(full)
         # In parts of the largest pressure, if that is far below p_unit: eps2 is no step then.
-        p_max = float(np.clip(self.problem.reduce.max(self.z), LEAST, 1.0))
+        p_max = float(np.clip(self.problem.reduce.max(self.z), LEAST, 1.0)) if self.norm > 8 * EPS else 1.0
         step_norm = self.problem.reduce.norm(d) / p_max if changed else 0.0
         with self.system.stages("relaxation"):
             if self._stalled >= self.options.patience:

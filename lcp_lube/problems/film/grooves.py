@@ -65,7 +65,8 @@ class GroovedProblem(LubricationProblem):
         """Volume flow that each groove gives to the film, m3/s (1D: m2/s). Collective."""
         balance = self.flow(p, r)
         dy = self.grid.spacing[1] if self.grid.dim == 2 else 1.0
-        return [0.5 * dy * self.reduce.sum(np.where(inside, balance, 0.0)) for inside in self.columns]
+        unit = 0.5 * dy * self.scheme.flow_unit
+        return [unit * self.reduce.sum(np.where(inside, balance, 0.0)) for inside in self.columns]
 
     def certify(self, fields: Fields, eps1: float) -> Certificate:
         """As for any film, over the points outside the grooves; inside, that they hold their pressure. Collective."""
