@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import hypot
+from math import hypot, inf
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -71,7 +71,7 @@ def forces(problem: LubricationProblem, p_pa: Array) -> dict[str, Any]:
 
     force = [-integral(lambda x, y: np.cos(phi(x))), -integral(lambda x, y: np.sin(phi(x)))]
     out |= {"load": hypot(*force), "force": force, "attitude_deg": None}
-    if shaft.widest is not None and out["load"] != 0:
+    if shaft.widest is not None and 0 < out["load"] < inf:
         behind = np.exp(1j * shaft.widest) / complex(*force)  # of the opposites of both
         out["attitude_deg"] = float(np.degrees(np.angle(behind if problem.U >= 0 else np.conj(behind))))
     if grid.dim == 2:
