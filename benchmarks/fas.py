@@ -151,7 +151,7 @@ def factors(film: str, n: int, variant: str, repeats: int) -> Values:
         name, changes = FILMS[film]
         solution = solve(load_scene(name, {**changes, "nx": n, "ny": n}), method="fas")
         own, steps = solution.settings["details"]["cycles"] + 1, solution.iterations
-        values["took_over"] = f"{solution.settings['took_over']} {steps - own} steps: {solution.outcome}"
+        values["took_over"] = f"{solution.settings['method']} {steps - own} steps: {solution.outcome}"
         solution.destroy()
     return values
 

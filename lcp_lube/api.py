@@ -9,6 +9,7 @@ from .base.alarm import check_same
 from .base.parallel import overflow_is_no_warning
 from .drivers import compose
 from .drivers.ask import Ask
+from .drivers.memory import peak
 from .problems.solution import Solution
 from .scenes.doubts import doubts
 from .scenes.scene import Scene, as_scene
@@ -29,7 +30,7 @@ def solve(scene: str | Path | dict[str, Any] | Scene, ask: Ask | None = None, **
 
     Returns
     -------
-    Solution : call its `destroy` when done with it.
+    Solution : everything about it; in a with statement, or until its `destroy` is called, it can be solved on from.
 
     Raises
     ------
@@ -47,6 +48,8 @@ def solve(scene: str | Path | dict[str, Any] | Scene, ask: Ask | None = None, **
     if "nx" in data:
         data.pop("n", None)  # which these have replaced
     solution.settings |= {"scene_data": data, "scene_units": last.data_units(), "warnings": doubts(scene)}
+    solution.settings["memory_mb"] = solution.problem.grid.comm.allreduce(peak() / 2**20)
+    solution.numbers  # noqa: B018  (all that needs every rank is taken now: later look-ups are each rank's own)
     solution.times["total"] = perf_counter() - begin
     return solution
 

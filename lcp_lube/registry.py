@@ -229,6 +229,15 @@ DRIVERS: dict[str, Entry] = {
     "direct": Entry("lcp_lube.drivers.direct", "one problem: nested grids, and methods that take over where one fails"),
 }
 
+# What a Solution shows of itself; each takes the solution, `summary` its record.
+OUTPUT: dict[str, Entry] = {
+    "record": Entry("lcp_lube.output.results:as_dict", "the dictionary that --json prints"),
+    "summary": Entry("lcp_lube.output.results:summary", "a few lines for people"),
+    "plot": Entry("lcp_lube.output.plot:plot", "pictures"),
+    "save": Entry("lcp_lube.output.files:save", "fields in files"),
+    "xarray": Entry("lcp_lube.output.dataset:to_xarray", "fields as an xarray.Dataset"),
+}
+
 # The maps of `chart stability`: each makes its runs and draws them.
 STABILITY: dict[str, Entry] = {
     "starts": Entry("lcp_lube.studies.starts:chart", "starting vectors p0, r0 from 1e-15 to 1e3 by rule for mu (DIN)"),

@@ -117,7 +117,7 @@ def test_hard_films_are_handed_over_within_few_cycles(changes):
     solution, other = run("textured_slider", changes), solve(load_scene("textured_slider", changes), method="active-set")
     assert solution.converged and other.converged
     if solution.settings["took_over"]:
-        assert solution.settings["took_over"] == "active-set" and solution.settings["details"]["cycles"] <= 5
+        assert solution.settings["method"] == "active-set" and solution.settings["details"]["cycles"] <= 5
         assert "stalled" in solution.message
     agree(solution, other, 1e-5)
     solution.destroy()

@@ -112,7 +112,7 @@ def test_last_resort_of_auto(film, monkeypatch):
     monkeypatch.setattr(Fas, "advance", fail)
     solution = solve(load_scene(*HARD[film]))
     assert solution.converged, solution.message
-    assert solution.settings["took_over"] == "monotone"
+    assert solution.settings["method"] == "monotone"
     assert solution.message.count("made to fail") >= 2
     solution.destroy()
 

@@ -37,6 +37,13 @@ class Reduce:
     def __init__(self, comm: MPI.Comm):
         self.comm = comm
 
+    def __deepcopy__(self, memo: dict[int, Any]) -> "Reduce":
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled on one rank it is one rank's, else that of all."""
+        return _over, (self.comm.size == 1,)
+
     def sum(self, a: Array) -> float:
         return self.comm.allreduce(float(np.sum(a)))
 
@@ -61,3 +68,7 @@ class Reduce:
             return value
         bad = self.comm.allreduce(bool(np.isnan(value)), MPI.LOR)
         return float("nan") if bad else self.comm.allreduce(value, op)
+
+
+def _over(one: bool) -> Reduce:
+    return Reduce(MPI.COMM_SELF if one else MPI.COMM_WORLD)

@@ -156,7 +156,7 @@ def _stopping(
     """The tolerances given, filled up for a method whose ||F|| is relative to the data: no tighter than `tol` needs."""
     if isinstance(given, Stopping) or before is None or before.problem.kind != "lubrication":
         return given
-    if before.settings["method"] not in RELATIVE_NORM or any(before.problem.grid.periodic):
+    if before.asked not in RELATIVE_NORM or any(before.problem.grid.periodic):
         return given  # what feeds a ring is a small part of what goes round: its balance needs digits
     return {"eps1": float(np.clip(ALGEBRAIC * tol, 1e-12, 1e-4)), "eps2": inf, **(given or {})}
 
@@ -167,7 +167,7 @@ def _start(before: Solution | None, points: int) -> Solution | None:
         return None
     if before.problem.kind == "lubrication" and points <= SMALL:
         return None
-    entry = METHODS[before.settings["method"]].of(before.problem.kind)
+    entry = METHODS[before.asked].of(before.problem.kind)
     return before if entry.nested else None
 
 
@@ -197,7 +197,7 @@ def _no_room(solution: Solution, shape: tuple[int, ...], finest: tuple[int, ...]
     share = machine.size / comm.size  # of the points, on this machine
     machine.Free()
     left, share = comm.allreduce(available(), MPI.MIN), comm.allreduce(share, MPI.MAX)
-    each = BYTES_FAS if solution.settings["method"] == "fas" else BYTES[len(shape)]
+    each = BYTES_FAS if solution.asked == "fas" else BYTES[len(shape)]
     dense = bool(getattr(problem, "dense", False))
 
     def needed(points: float) -> float:

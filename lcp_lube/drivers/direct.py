@@ -60,7 +60,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner | None = None) -> Solution:
     entry = METHODS[chosen.method].of(facts.kind)
     run = Run(scene, problem, facts, chosen, replace(ask, stopping=ask.stopping_for(entry.eps)), stages, keeper, saved)
     keeper.begin(scene, (chosen.method, chosen.system, ask.recipe, chosen.nested, dict(ask.options)))
-    with recipe(chosen.recipe) as recipe_used:
+    with recipe(chosen.recipe) as run.recipe:
         estimate = memory.check(facts, chosen, problem.grid.comm, ask.memory_check, held)
         run.grids(ask.start)
     run.take_over()
@@ -76,7 +76,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner | None = None) -> Solution:
         message,
         certificate,
         run.steps,
-        settings=run.settings(recipe_used, estimate),
+        settings=run.settings(estimate),
         times={**stages.seconds, "total": perf_counter() - begin},
         levels=run.levels if chosen.nested else run.details.get("levels", []),
         enclosure=enclosure,
@@ -96,9 +96,8 @@ class Run:
     Attributes
     ----------
     outcome, message, fields, steps : of the last method, on the finest grid; steps of those before it come first.
-    took_over : the method that took the chosen one's place, if any.
+    method, system, recipe, ksp_type, pc_type : of the last method, the chosen one or the one that took over from it.
     levels : a record of every grid, coarse to fine. details : what the method tells of itself beyond its steps.
-    ksp_type, pc_type : of the chosen method's inner solver.
     """
 
     def __init__(
@@ -120,7 +119,8 @@ class Run:
         self.steps: list[Step] = []
         self.levels: list[dict[str, Any]] = []
         self.details: dict[str, Any] = {}
-        self.took_over: str | None = None
+        self.method, self.system = chosen.method, chosen.system
+        self.recipe: str | None = None
         self.ksp_type: str | None = None
         self.pc_type: str | None = None
 
@@ -174,19 +174,19 @@ class Run:
             if self.outcome is Outcome.CONVERGED:
                 break
             record.append((self.outcome, self.message, [astuple(step) for step in self.steps]))
-            failures += f"{self.took_over or self.chosen.method} failed ({self.message}); "
+            failures += f"{self.method} failed ({self.message}); "
             entry = METHODS[name].of(self.problem.kind)
             system, inner = self._rescue_solver(name)
-            with recipe(inner):
+            with recipe(inner) as self.recipe:
                 # An interior method begins anew; another may take up what was reached, if it is not zero everywhere.
                 anything = self.problem.reduce.max(np.concatenate([np.abs(values) for values in reached.values()]))
                 start = None if entry.interior or anything == 0.0 else reached
                 method = entry.load()(Job(self.problem, self.stages, system, {}, self.stopping, start))
                 self._iterate(method, self.problem, self.stopping, k, reached, failed=record)
-            self.took_over, steps = name, steps + self.steps
+            self.method, self.system, steps = name, system, steps + self.steps
         self.steps = steps
-        if self.took_over:
-            self.message = f"{failures}{self.took_over} took over: {self.message}"
+        if failures:
+            self.message = f"{failures}{self.method} took over: {self.message}"
 
     def _plan(self, method: str, nested: bool | None = None) -> Plan:
         """As if this method had been asked for, and nothing else."""
@@ -221,8 +221,8 @@ class Run:
             self.fields = method.fields
             if not tried:
                 self.details = getattr(method, "details", {})
-                if krylov := method.krylov:
-                    self.ksp_type, self.pc_type = krylov.ksp_type, krylov.pc_type
+            krylov = method.krylov
+            self.ksp_type, self.pc_type = (krylov.ksp_type, krylov.pc_type) if krylov else (None, None)
         finally:
             method.destroy()
 
@@ -230,21 +230,21 @@ class Run:
         """A band around the answer, by the inner solver that has just solved this problem, or would have."""
         solver = self.chosen if self.chosen.system else self._plan("active-set", nested=False)
         system, inner = solver.system, solver.recipe
-        if self.took_over:
-            system = METHODS[self.took_over].systems[0]
+        if self.method != self.chosen.method:
+            system = METHODS[self.method].systems[0]
             inner = default_recipe(self.facts, system, large=False)[0]
         with recipe(inner), self.stages("certify"):
             return enclose(problem, self.fields, system, Stages())
 
-    def settings(self, recipe_used: str | None, estimate: memory.Estimate | None) -> dict[str, Any]:
+    def settings(self, estimate: memory.Estimate | None) -> dict[str, Any]:
         """How it was solved, as the JSON prints it."""
         return {
             "scene": self.scene.name,
-            "method": self.chosen.method,
-            "took_over": self.took_over,
-            "system": self.chosen.system or None,
+            "method": self.method,
+            "took_over": self.chosen.method if self.method != self.chosen.method else None,
+            "system": self.system or None,
             "scheme": self.scene.scheme,
-            "recipe": recipe_used,
+            "recipe": self.recipe,
             "ksp_type": self.ksp_type,
             "pc_type": self.pc_type,
             "eps1": self.stopping.eps1,

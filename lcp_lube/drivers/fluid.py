@@ -94,7 +94,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     solution = inner(Frozen(scene, law), ask)
     eps1 = solution.settings["eps1"]
     first, steps, p, solves = solution, list(solution.steps), _pressure(solution, law), 1
-    times, took_over = dict(solution.times), solution.settings.get("took_over")
+    times, rescued = dict(solution.times), solution if solution.took_over else None
     density, change = np.ones_like(p), 0.0
     while law.dowson_higginson and solution.converged:
         new = law.density(p)
@@ -106,7 +106,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         last.destroy()
         p, solves = _pressure(solution, law), solves + 1
         steps += solution.steps
-        took_over = solution.settings.get("took_over") or took_over
+        rescued = solution if solution.took_over else rescued
         times = {name: times.get(name, 0.0) + seconds for name, seconds in solution.times.items()}
     outcome, message = solution.outcome, solution.message
     reduce = solution.problem.reduce
@@ -125,7 +125,9 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         certificate = problem.certify(fields, eps1)
     solution.destroy()
     why = f"fluid: {solves} solve{'s' * (solves > 1)} of a constant fluid's kind, viscosity by a change of unknown"
-    settings = {**first.settings, "took_over": took_over, "why": [why, *first.settings["why"]]}
+    settings = {**first.settings, "why": [why, *first.settings["why"]]}
+    if rescued is not None:
+        settings |= {"method": rescued.method, "took_over": rescued.took_over}
     settings["details"] = {**first.settings["details"], "fluid_solves": solves}
     done = {"problem": problem, "fields": fields, "outcome": outcome, "message": message, "certificate": certificate}
     return replace(first, **done, steps=steps, settings=settings, times=times).judged()  # type: ignore[arg-type]

@@ -74,7 +74,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     record: list[Step] = []
     certificates: list[Certificate] = []
     times: dict[str, float] = {}
-    took_over: str | None = None
+    rescuer: str | None = None
     outcome = Outcome.CONVERGED
     while problem.steps > len(certificates) and outcome is Outcome.CONVERGED:
         step = problem.next_step()
@@ -82,7 +82,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         outcome, message = solution.outcome, solution.message
         if not certificates:
             settings: dict[str, Any] = solution.settings
-        took_over = solution.settings["took_over"] or took_over
+        rescuer = solution.method if solution.took_over else rescuer
         certificates.append(solution.certificate)
         record += solution.steps
         times = {name: times.get(name, 0.0) + seconds for name, seconds in solution.times.items()}
@@ -103,7 +103,13 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         message=message,
         certificate=Certificate(worst, certificates[0].tol, lowest),
         steps=record,
-        settings={**settings, "took_over": took_over, "start": "cold", "why": chosen.why},
+        settings={
+            **settings,
+            "method": rescuer or chosen.method,
+            "took_over": chosen.method if rescuer else None,
+            "start": "cold",
+            "why": chosen.why,
+        },
         times=times,
         levels=[],
     )

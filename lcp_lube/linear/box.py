@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ..base.options import explain_error
+from ..base.owned import Owned
 from ..base.parallel import Array
 from ..base.stages import Stages
 from ..errors import InputError
@@ -77,8 +78,9 @@ class NewtonMatrix:
 
     def __init__(self, problem: BoxProblem):
         self.problem = problem
-        self.mat = problem.jacobian(problem.v0).duplicate(copy=True)
-        self.x, self.b = self.mat.createVecs()
+        self._own = Owned(self, problem.grid.dm.comm)
+        self.mat = self._own(problem.jacobian(problem.v0).duplicate(copy=True))
+        self.x, self.b = map(self._own, self.mat.createVecs())
 
     def linearise(self, v: Array) -> Array:
         """Take f' at v for `update`; returns its diagonal. Collective."""
@@ -112,8 +114,7 @@ class NewtonMatrix:
         self.b.setArray(rhs)
 
     def destroy(self) -> None:
-        for obj in (self.mat, self.x, self.b):
-            obj.destroy()
+        self._own.free()
 
 
 class Multigrid:

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from ..base.owned import Owned
 from ..base.parallel import Array
 from ..base.stages import Stages
 from ..problems.film.lubrication import LubricationProblem
@@ -51,13 +52,14 @@ class FullSystem:
                     values[k] = values[k] * self._scale[rows[k] - 2 * grid.first]
             pointers, sorted_columns, order = csr(np.concatenate(rows), np.concatenate(columns), 2 * grid.first, 2 * nl)
             size = (2 * nl, 2 * grid.size)
-            self.mat = PETSc.Mat().createAIJ(
-                (size, size), csr=(pointers, sorted_columns, np.concatenate(values)[order]), comm=comm
-            )
-            self.fields = {name: PETSc.IS().createGeneral(own, comm=comm) for name, own in (("p", own_p), ("r", own_r))}
+            self._own = Owned(self, comm)
+            csr_arrays = (pointers, sorted_columns, np.concatenate(values)[order])
+            self.mat = self._own(PETSc.Mat().createAIJ((size, size), csr=csr_arrays, comm=comm))
+            parts = {"p": own_p, "r": own_r}
+            self.fields = {name: self._own(PETSc.IS().createGeneral(part, comm=comm)) for name, part in parts.items()}
             self.mat.setAttr("fields", self.fields)
             self.mat.setAttr("problem", problem)
-            self._x, self._b = self.mat.createVecs()
+            self._x, self._b = map(self._own, self.mat.createVecs())
             self.krylov = Krylov(self.mat, self.fields)
 
     @property
@@ -102,8 +104,7 @@ class FullSystem:
     def destroy(self) -> None:
         """Free the PETSc objects; a python PC must not outlive this."""
         self.krylov.destroy()
-        for obj in (self.mat, self._x, self._b, *self.fields.values()):
-            obj.destroy()
+        self._own.free()
 
 
 def _number(points: NDArray, field: int, starts: NDArray) -> NDArray:

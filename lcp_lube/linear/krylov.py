@@ -9,6 +9,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..base.options import explain_error, set_names
+from ..base.owned import Owned
 from ..base.threads import one_thread_for_superlu_dist
 from ..errors import InputError
 
@@ -72,7 +73,10 @@ class Krylov:
         if "pc_factor_in_place" in given:
             raise InputError("-pc_factor_in_place: the matrix is written anew in every step, factors cannot take its place")
         one_thread_for_superlu_dist()
-        self.ksp = PETSc.KSP().create(mat.comm)
+        self._own = Owned(self, mat.comm)
+        if self._converted is not None:
+            self._own(self._converted)
+        self.ksp = self._own(PETSc.KSP().create(mat.comm))
         self.ksp.setTolerances(max_it=MAX_INNER_ITERATIONS)
         self._ready = False
         self.fields = fields or {}
@@ -181,9 +185,7 @@ class Krylov:
         return True
 
     def destroy(self) -> None:
-        self.ksp.destroy()
-        if self._converted is not None:
-            self._converted.destroy()
+        self._own.free()
 
 
 def reason_name(reason: int) -> str:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from ..base.owned import Owned
 from ..base.parallel import Array
 from ..base.stages import Stages
 from ..problems.film.lubrication import LubricationProblem
@@ -40,10 +41,11 @@ class ReducedSystem:
             self._a, self._b_entries, self._neighbour = a[order], b[order], neighbour[order]
             size = (grid.local_size, grid.size)
             csr_arrays = (self._pointers, self._columns, self._a)
-            self.mat = PETSc.Mat().createAIJ((size, size), csr=csr_arrays, comm=grid.dm.comm)
+            self._own = Owned(self, grid.dm.comm)
+            self.mat = self._own(PETSc.Mat().createAIJ((size, size), csr=csr_arrays, comm=grid.dm.comm))
             self._diagonal_A = (scheme.k_W + scheme.k_E + scheme.k_S + scheme.k_N).ravel()
             self._diagonal_B = -scheme.b_C.ravel()
-            self._x, self._b = self.mat.createVecs()
+            self._x, self._b = map(self._own, self.mat.createVecs())
             self.krylov = Krylov(self.mat)
 
     @property
@@ -103,5 +105,4 @@ class ReducedSystem:
     def destroy(self) -> None:
         """Free the PETSc objects."""
         self.krylov.destroy()
-        for obj in (self.mat, self._x, self._b):
-            obj.destroy()
+        self._own.free()

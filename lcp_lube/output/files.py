@@ -1,5 +1,6 @@
 """Fields in files: NumPy (.npz), ParaView (.vts, .vtr), HDF5 (.h5). SI units throughout."""
 
+import ctypes
 import json
 import os
 import tempfile
@@ -15,11 +16,13 @@ from petsc4py import PETSc
 
 from ..base.parallel import Array
 from ..errors import InputError, nearest
+from ..problems.frame import Frame
 from ..problems.grid import Grid
 from ..problems.solution import Solution
 from .results import as_dict, finite
 
 FIELD_FILES = (".npz", ".vts", ".vtr", ".h5")
+PETSC_STRING = 13  # of PETSc's PetscDataType
 PICTURES = (".png", ".pdf", ".svg")
 
 
@@ -41,8 +44,8 @@ def check_target(path: str | Path, plot: bool = False, comm: MPI.Comm = MPI.COMM
         raise InputError(f"{'--plot' if plot else '--output'} {path}: {fault}")
 
 
-def save(solution: Solution, path: str | Path) -> None:
-    """Write the fields of `Problem.physical` at the interior points; boundary values are data of the scene. Collective.
+def save(solution: Solution, path: str | Path, boundary: bool = False) -> None:
+    """Write the fields of `Problem.physical` at the interior points, or with those of the sides. Collective.
 
     All in SI: for a lubrication problem p in Pa (absolute), r (void fraction), h in m; coordinates x, y in m. Arrays have
     shape (ny, nx), or (nx,) in 1D, in the natural order, whatever the number of ranks.
@@ -50,26 +53,32 @@ def save(solution: Solution, path: str | Path) -> None:
     - .npz: the fields, x of shape (nx,), y of shape (ny,) in 2D, and two JSON strings: `units` by field, and `result`, the
       object that --json prints. Rank 0 gathers it all: take .h5 or .vts where that is too much for it.
     - .vts, .vtr: ParaView's structured and rectilinear grid by PETSc's viewer; rank 0 writes, one rank's part at a time.
-    - .h5: the fields, x and y as datasets by PETSc's viewer, all ranks writing; `Vec.load` with the field's name reads one
-      back on any number of ranks. petsc4py writes no attributes, so the units are those above.
+    - .h5: the fields, x and y as datasets by PETSc's viewer, all ranks writing, each with an attribute `units`; `Vec.load`
+      with the field's name reads one back on any number of ranks.
+
+    Parameters
+    ----------
+    boundary : with the points of the sides: nx + 2 in x, ny + 2 in y (`Solution.field`).
 
     Raises
     ------
-    InputError : the file cannot be written; then nothing is left behind.
+    InputError : the file cannot be written; then nothing is left behind. No sides.
     """
     path, grid = Path(path), solution.problem.grid
     suffix = path.suffix.lower()
     if wrong := _wrong_extension(suffix, plot=False):
         raise InputError(f"{path}: {wrong}")
-    fields = solution.problem.physical(solution.fields)
+    points = Frame(grid) if boundary else grid
+    units = solution.units
+    fields = {name: solution.field(name, boundary) for name in solution.problem.physical(solution.fields)}
     with replacing(path, grid.comm) as temporary:
         if suffix == ".npz":
-            _save_npz(solution, fields, temporary)
+            _save_npz(solution, points, fields, units, temporary)
         else:
-            _save_by_viewer(grid, {name: values for name, (values, _) in fields.items()}, temporary)
+            _save_by_viewer(points, fields, units, temporary)
 
 
-def gather(grid: Grid, values: Array, stride: tuple[int, int] = (1, 1)) -> Array:
+def gather(grid: Grid | Frame, values: Array, stride: tuple[int, int] = (1, 1)) -> Array:
     """A field on rank 0, or every stride-th point of it in x and in y; empty on the other ranks. Collective.
 
     Parameters
@@ -102,12 +111,9 @@ def taken(n: int, step: int) -> np.ndarray:
     return np.arange((n - 1) % step // 2, n, step)
 
 
-def coordinates(grid: Grid, stride: tuple[int, int] = (1, 1)) -> tuple[Array, ...]:
+def coordinates(grid: Grid | Frame, stride: tuple[int, int] = (1, 1)) -> tuple[Array, ...]:
     """Coordinates x, and y in 2D, of the points that `gather` returns, in metres; on every rank."""
-    return tuple(
-        start + (taken(n, step) + offset) * spacing
-        for start, n, step, offset, spacing in zip(grid.origin, grid.shape, stride, grid.offset, grid.spacing, strict=False)
-    )
+    return tuple(line[taken(line.size, step)] for line, step in zip(grid.lines, stride, strict=False))
 
 
 @contextmanager
@@ -137,12 +143,10 @@ def replacing(path: Path, comm: MPI.Comm) -> Iterator[str]:
         raise InputError(f"{path}: could not be written: {reason}")
 
 
-def _save_npz(solution: Solution, fields: dict[str, tuple[Array, str]], target: str) -> None:
-    grid = solution.problem.grid
-    arrays = {name: gather(grid, values) for name, (values, _) in fields.items()}
+def _save_npz(solution: Solution, grid: Grid | Frame, fields: dict[str, Array], units: dict[str, str], target: str) -> None:
+    arrays = {name: gather(grid, values) for name, values in fields.items()}
     arrays |= dict(zip("xy", coordinates(grid), strict=False))
-    units = {name: unit for name, (_, unit) in fields.items()}
-    units |= dict.fromkeys("xy"[: grid.dim], "m" if any(units.values()) else "")  # dimensionless problems have no metres
+    units = {name: units[name] for name in arrays}
     result = json.dumps(finite(as_dict(solution)))
     if grid.comm.rank > 0:
         return
@@ -153,9 +157,10 @@ def _save_npz(solution: Solution, fields: dict[str, tuple[Array, str]], target: 
                 np.lib.format.write_array(entry, np.asarray(values), allow_pickle=False)
 
 
-def _save_by_viewer(grid: Grid, fields: dict[str, Array], target: str) -> None:
+def _save_by_viewer(grid: Grid | Frame, fields: dict[str, Array], units: dict[str, str], target: str) -> None:
     """VTK or HDF5, by the extension. PETSc writes all that was viewed when the viewer is destroyed."""
-    dm, comm = grid.dm.duplicate(), grid.dm.comm  # a copy: coordinates would stay in the grid's own
+    dm = grid.dm.duplicate() if isinstance(grid, Grid) else grid.dm()  # a copy: coordinates would stay in the grid's own
+    comm = dm.comm
     viewer = PETSc.Viewer()
     try:
         if target.endswith(".h5"):
@@ -163,7 +168,7 @@ def _save_by_viewer(grid: Grid, fields: dict[str, Array], target: str) -> None:
             for name, x in zip("xy", coordinates(grid), strict=False):
                 vec = PETSc.Vec().createMPI(x.size, comm=comm)
                 vec.setArray(x[slice(*vec.owner_range)])
-                _view(vec, name, viewer)
+                _view(vec, name, viewer, units[name])
         else:
             viewer.createVTK(target, "w", comm)
             vec = dm.getCoordinateDM().createGlobalVec()
@@ -172,8 +177,8 @@ def _save_by_viewer(grid: Grid, fields: dict[str, Array], target: str) -> None:
             vec.destroy()
         for name, values in fields.items():
             vec = dm.createGlobalVec()
-            vec.setArray(values)
-            _view(vec, name, viewer)
+            vec.setArray(values.ravel())
+            _view(vec, name, viewer, units[name])
         viewer.destroy()
     except PETSc.Error:
         if viewer:
@@ -183,9 +188,16 @@ def _save_by_viewer(grid: Grid, fields: dict[str, Array], target: str) -> None:
         dm.destroy()
 
 
-def _view(vec: PETSc.Vec, name: str, viewer: PETSc.Viewer) -> None:
+def _view(vec: PETSc.Vec, name: str, viewer: PETSc.Viewer, unit: str) -> None:
     vec.setName(name)
     vec.view(viewer)
+    if viewer.getType() == PETSc.Viewer.Type.HDF5:
+        # petsc4py has no call for attributes, PETSc has.
+        library = ctypes.CDLL(PETSc.__file__)
+        write = library.PetscViewerHDF5WriteObjectAttribute
+        write.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int, ctypes.c_char_p]
+        if error := write(viewer.handle, vec.handle, b"units", PETSC_STRING, unit.encode()):
+            raise PETSc.Error(error)
     vec.destroy()  # a VTK viewer keeps a reference until it writes
 
 

@@ -11,7 +11,6 @@ import petsc4py
 from petsc4py import PETSc
 
 from .. import __version__
-from ..drivers.memory import peak
 from ..problems.solution import Solution
 from ..scenes.doubts import too_high
 from .units import place, quantity
@@ -19,11 +18,11 @@ from .units import place, quantity
 
 @np.errstate(over="ignore", invalid="ignore")
 def as_dict(solution: Solution) -> dict[str, Any]:
-    """The keys of the command line's --json, in their order. Collective; the same on every rank."""
+    """The keys of the command line's --json, in their order; the same on every rank."""
     problem, grid = solution.problem, solution.problem.grid
     certificate, settings = solution.certificate, solution.settings
     last = solution.steps[-1] if solution.steps else None
-    quantities = problem.quantities(solution.fields)
+    quantities = solution.numbers
     return {
         "scene": settings.get("scene"),
         "nx": grid.shape[0],
@@ -51,8 +50,7 @@ def as_dict(solution: Solution) -> dict[str, Any]:
         **({"levels": solution.levels} if solution.levels else {}),
         "warnings": [*settings.get("warnings", []), *too_high(quantities)],
         **{key: settings[key] for key in ("scene_data", "scene_units") if key in settings},
-        "memory_mb": peak_memory(solution),
-        **{key: settings.get(key) for key in ("memory_estimate_mb", "memory_base_mb")},
+        **{key: settings.get(key) for key in ("memory_mb", "memory_estimate_mb", "memory_base_mb")},
         "time_s": seconds(solution.times),
         "versions": versions(),
     }
@@ -72,11 +70,6 @@ def seconds(times: dict[str, float]) -> dict[str, float]:
     }
     total = times.get("total", sum(parts.values()))
     return {"total": total, **parts, "other": max(total - sum(parts.values()), 0.0)}
-
-
-def peak_memory(solution: Solution) -> float:
-    """Largest resident memory so far in MB, summed over the ranks. Collective."""
-    return solution.problem.grid.comm.allreduce(peak() / 2**20)
 
 
 def versions() -> dict[str, str]:
@@ -167,8 +160,8 @@ def summary(data: dict[str, Any]) -> str:
     inner = f", {data['linear_iterations']} Krylov" if data["linear_iterations"] else ""
     recipe = data["recipe"] or f"{data['ksp_type']} + {data['pc_type']}"
     system = f" on the {data['system']} system, {recipe}" if data["system"] else ""
-    taken = f" (it failed: {data['took_over']} took over)" if data["took_over"] else ""
     scheme = f", scheme {data['scheme']}" if data["scheme"] else ""
+    first = f", which took over from {data['took_over']}," if data["took_over"] else ""
     measures = ", ".join(
         f"{name.replace('_', ' ')} {data[name]:.1e}{UNITS.get(name, '')}"
         for name in MEASURES
@@ -182,7 +175,7 @@ def summary(data: dict[str, Any]) -> str:
     else:
         quantities = ", ".join(f"{name} {data[name]:.8g}" for name in QUANTITIES if data.get(name) is not None)
     lines = [
-        f"{data['scene']} ({size}{scheme}) by {data['method']}{taken}{system}, {data['ranks']} rank{'s' * (data['ranks'] > 1)}",
+        f"{data['scene']} ({size}{scheme}) by {data['method']}{first}{system}, {data['ranks']} rank{'s' * (data['ranks'] > 1)}",
         f"{data['outcome']}: {data['iterations']} iterations{inner}, {data['centrality']} centrality and "
         f"{data['backtracking']} backtracking cuts, {data['time_s']['total']:.2f} s; {data['message']}",
         quantities,

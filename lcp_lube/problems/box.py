@@ -6,7 +6,7 @@ With slacks and multipliers, f(v) = z1 - z2, s1 = v - l, s2 = u - v, all >= 0, s
 all of them, these are the equations f(v) = 0.
 """
 
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from petsc4py import PETSc
@@ -53,6 +53,7 @@ class BoxProblem:
     """
 
     kind = "box"
+    units: ClassVar[dict[str, str]] = {}
 
     def __init__(self, grid: Grid, equations: Equations, lower: Array, upper: Array, v0: Array):
         self.grid, self.equations, self.lower, self.upper = grid, equations, lower, upper
@@ -136,6 +137,10 @@ class BoxProblem:
     def physical(self, fields: Fields) -> dict[str, tuple[Array, str]]:
         """v and f(v), the force of the bounds; they have no unit."""
         return {"v": (fields["v"], ""), "f": (self.residual(fields["v"]), "")}
+
+    def at_sides(self, name: str, x: Array, y: Array) -> Array | None:
+        """None: the unknowns are no points between sides."""
+        return None
 
     def prolong(self, coarse: Any, fields: Fields, interior: bool) -> Fields:
         """A neighbour's unknowns as they are; nothing for an interior method.

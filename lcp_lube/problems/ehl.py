@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
+from ..base.owned import Owned
 from ..base.parallel import Array
 from .box import BoxProblem
 from .certificate import Certificate, certificate_tol
@@ -49,7 +50,8 @@ class LineContact:
         self._differences = (self._kernel[:-2] - self._kernel[2:])[::-1].copy()
         self._rows = np.arange(count - self.has_k)
         size = (count, n)
-        self.mat = PETSc.Mat().createDense((size, size), comm=grid.dm.comm)
+        self._own = Owned(self, grid.dm.comm)
+        self.mat = self._own(PETSc.Mat().createDense((size, size), comm=grid.dm.comm))
         self.mat.setUp()
 
     def split(self, v: Array) -> tuple[Array, float]:
@@ -129,7 +131,7 @@ class LineContact:
         return self.scale_of_rows * self.lam * self.grid.reduce.max(np.abs(np.diff(self.gap(p, k))))
 
     def destroy(self) -> None:
-        self.mat.destroy()
+        self._own.free()
 
 
 class EhlProblem(BoxProblem):
@@ -146,11 +148,16 @@ class EhlProblem(BoxProblem):
 
     def __init__(self, grid: Grid, alpha: float, lam: float, k0: float, scale: float = 1.0):
         self.contact = LineContact(grid, alpha, lam, scale)
+        self._k0 = k0
         lower, upper = np.zeros(grid.local_size), np.full(grid.local_size, np.inf)
         v0 = np.maximum(1.0 - grid.x[0] ** 2 / 4.0, 0.0)
         if self.contact.has_k:
             lower[-1], v0[-1] = -np.inf, k0
         super().__init__(grid, self.contact, lower, upper, v0)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        contact = self.contact
+        return EhlProblem, (self.grid, contact.alpha, contact.lam, self._k0, contact.scale_of_rows)
 
     def certify(self, fields: Fields, eps1: float) -> Certificate:
         """Certificate of p and k, from the data alone. Collective.

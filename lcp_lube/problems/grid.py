@@ -3,11 +3,13 @@
 import math
 import os
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from ..base.owned import Owned, collect
 from ..base.parallel import Array, Reduce
 from ..errors import InputError
 
@@ -58,7 +60,7 @@ class Grid:
         self.shape = tuple(int(n) for n in shape)
         self.lengths = tuple(float(length) for length in lengths)
         self.dim = len(self.shape)
-        self.ends = ends[: self.dim]
+        self._ends, self.ends = ends, ends[: self.dim]
         self.periodic = tuple("periodic" in pair for pair in self.ends)
         if any(periodic and n < 3 for periodic, n in zip(self.periodic, self.shape, strict=True)):
             raise InputError(f"grid {'x'.join(map(str, shape))}: at least 3 points between periodic sides are needed")
@@ -70,11 +72,13 @@ class Grid:
         self.size = math.prod(self.shape)
         comm = comm or PETSc.COMM_WORLD
         self._check_size(comm)
+        collect(comm)  # what earlier solves have left behind
+        self._own = Owned(self, comm)
         # Lines of the flow direction stay whole where there are enough of them: what the void does is told along them.
         whole_lines = self.dim == 2 and self.shape[1] >= comm.size
         proc_sizes = (1, comm.size) if whole_lines else None
         try:
-            self.dm = PETSc.DMDA().create(
+            dm = PETSc.DMDA().create(
                 dim=self.dim,
                 sizes=self.shape,
                 proc_sizes=proc_sizes,
@@ -88,6 +92,7 @@ class Grid:
             raise InputError(
                 f"grid {'x'.join(map(str, self.shape))}: too few points for {comm.size} ranks; use fewer ranks or a finer grid"
             ) from None
+        self.dm = self._own(dm)
         self.comm = self.dm.comm.tompi4py()
         self.reduce = Reduce(self.comm)
         ranges = self.dm.getRanges()
@@ -133,6 +138,12 @@ class Grid:
         if self.dim == 1:
             return np.zeros((1, 1))
         return self.origin[1] + (np.arange(self.y_start, self.y_end) + self.offset[1])[:, None] * self.spacing[1]
+
+    @property
+    def lines(self) -> tuple[Array, ...]:
+        """Coordinates x, and y in 2D, of all points of the grid, m; on every rank."""
+        sides = zip(self.origin, self.shape, self.offset, self.spacing, strict=False)
+        return tuple(start + (np.arange(n) + offset) * spacing for start, n, offset, spacing in sides)
 
     def nodes_and_faces(self, side: int) -> tuple[Array, Array]:
         """Coordinates in x (side 0) or y (1) of the owned points with a neighbour before and behind, and of the faces between.
@@ -182,5 +193,27 @@ class Grid:
         out[row : row + gy1 - gy0, col : col + gx1 - gx0] = np.reshape(values, (gy1 - gy0, gx1 - gx0))
         return out
 
+    def __deepcopy__(self, memo: dict[int, Any]) -> "Grid":
+        """A grid of its own DMDA. Collective."""
+        return Grid(self.shape, self.lengths, self.dm.comm, self.origin, self._ends)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """What is pickled: the numbers, from which as many ranks make the grid again, together."""
+        return _on_ranks, (self.comm.size, self.shape, self.lengths, self.origin, self._ends)
+
     def destroy(self) -> None:
-        self.dm.destroy()
+        """Free the DMDA. Collective."""
+        self._own.free()
+
+
+def _on_ranks(ranks: int, shape: tuple[int, ...], lengths: tuple[float, ...], origin: Any, ends: Any) -> Grid:
+    """A pickled grid, on one rank or all of them. Collective.
+
+    Raises
+    ------
+    InputError : it was another number of ranks.
+    """
+    comm = PETSc.COMM_SELF if ranks == 1 else PETSc.COMM_WORLD
+    if comm.getSize() != ranks:
+        raise InputError(f"pickled on {ranks} ranks, each with its part: {comm.getSize()} ranks cannot take it up")
+    return Grid(shape, lengths, comm, origin, ends)

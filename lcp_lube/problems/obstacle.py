@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
+from ..base.owned import Owned
 from ..base.parallel import Array
 from .box import BoxProblem
 from .grid import Grid
@@ -26,10 +27,11 @@ class ObstacleEquations:
 
     def __init__(self, semilinear: SemilinearProblem):
         self.semilinear, self.b = semilinear, semilinear.b
-        self._jacobian = semilinear.A.duplicate(copy=True)
+        self._own = Owned(self, semilinear.grid.dm.comm)
+        self._jacobian = self._own(semilinear.A.duplicate(copy=True))
         for option in (PETSc.Mat.Option.SYMMETRIC, PETSc.Mat.Option.SYMMETRY_ETERNAL):
             self._jacobian.setOption(option, True)
-        self._diagonal = self._jacobian.createVecLeft()
+        self._diagonal = self._own(self._jacobian.createVecLeft())
 
     def residual(self, v: Array) -> Array:
         return self.semilinear.residual(v)
@@ -46,8 +48,7 @@ class ObstacleEquations:
         return self.semilinear.reduce.sum(terms) / self.semilinear.unknowns
 
     def destroy(self) -> None:
-        for obj in (self._diagonal, self._jacobian):
-            obj.destroy()
+        self._own.free()
         self.semilinear.destroy()
 
 
@@ -111,6 +112,10 @@ class ObstacleProblem(BoxProblem):
             "turning_point": self.turning_point,
         }
 
+    def at_sides(self, name: str, x: Array, y: Array) -> Array:
+        """v is given there; f, the force of the obstacles, goes on."""
+        return self._data[3](x, y) if name == "v" else np.full(np.broadcast(x, y).shape, np.nan)
+
     def explain(self, outcome: Outcome, message: str) -> tuple[Outcome, str]:
         """Beyond the turning point there is no solution without contact with the upper obstacle.
 
@@ -159,3 +164,6 @@ class ObstacleProblem(BoxProblem):
         if self._transfer is not None:
             self._transfer.destroy()
         super().destroy()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return ObstacleProblem, (self.grid, self.lam, *self._data)

@@ -2,10 +2,11 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
+from ..base.owned import Owned
 from ..base.parallel import Array, Reduce
 from ..errors import InputError
 from .certificate import Certificate, certificate_tol
@@ -138,9 +139,10 @@ class SemilinearProblem:
     """
 
     kind = "equations"
+    units: ClassVar[dict[str, str]] = {}
 
     def __init__(self, grid: Grid, source: Source, v0: float = 0.0, boundary: Surface | None = None):
-        self.grid, self.source, self.v0 = grid, source, v0
+        self.grid, self.source, self.v0, self._boundary = grid, source, v0, boundary
         self.reduce: Reduce = grid.reduce
         self._x, self._y = (np.ravel(a) for a in np.broadcast_arrays(grid.x, grid.y))
         dx, dy = grid.spacing
@@ -149,8 +151,9 @@ class SemilinearProblem:
         west_east, south_north = np.full(grid.box, -across_x), np.full(grid.box, -across_y)
         self.diagonal = 2.0 * (across_x + across_y)
         entries = [(0, 0, np.full(grid.box, self.diagonal)), (0, -1, west_east), (0, 1, west_east)]
-        self.A = assemble(grid, [*entries, (-1, 0, south_north), (1, 0, south_north)])
-        self._in, self._out = self.A.createVecs()
+        self._own = Owned(self, grid.dm.comm)
+        self.A = self._own(assemble(grid, [*entries, (-1, 0, south_north), (1, 0, south_north)]))
+        self._in, self._out = map(self._own, self.A.createVecs())
         self.b = np.zeros(grid.local_size) if boundary is None else _boundary_terms(grid, boundary)
 
     @property
@@ -218,6 +221,10 @@ class SemilinearProblem:
         """v; it has no unit."""
         return {"v": (fields["v"], "")}
 
+    def at_sides(self, name: str, x: Array, y: Array) -> Array:
+        """v is given there."""
+        return np.zeros(np.broadcast(x, y).shape) if self._boundary is None else self._boundary(x, y)
+
     def prolong(self, coarse: "SemilinearProblem", fields: Fields, interior: bool) -> Fields:
         """v from a coarser grid, interpolated bilinearly. Collective."""
         transfer = Transfer(coarse.grid, self.grid)
@@ -226,10 +233,12 @@ class SemilinearProblem:
         return {"v": v}
 
     def destroy(self) -> None:
-        """Free the PETSc objects."""
-        for obj in (self._in, self._out, self.A):
-            obj.destroy()
+        """Free the PETSc objects. Collective."""
+        self._own.free()
         self.grid.destroy()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return SemilinearProblem, (self.grid, self.source, self.v0, self._boundary)
 
 
 def _share(part: float, whole: float) -> float:

@@ -2,11 +2,12 @@
 
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 from ..base.parallel import Array, Reduce
 from .certificate import Certificate
 from .grid import Grid
+from .shown import Shown
 
 Fields = dict[str, Array]  # this rank's points of each field, by name, in the grid's order
 
@@ -36,8 +37,20 @@ class Problem(Protocol):
         """The JSON keys that are this problem's own: loads, fronts, counts. Collective."""
         ...
 
+    @property
+    def units(self) -> dict[str, str]:
+        """Units of `quantities`, by key; what is left out has none."""
+        ...
+
     def physical(self, fields: Fields) -> dict[str, tuple[Array, str]]:
         """Fields to print, plot and store: name -> (values in SI, unit)."""
+        ...
+
+    def at_sides(self, name: str, x: Array, y: Array) -> Array | None:
+        """One of the physical fields at points of the sides, SI, shape of x + y; NaN where its value follows from the inside.
+
+        None where the unknowns have no sides.
+        """
         ...
 
     def prolong(self, coarse: Any, fields: Fields, interior: bool) -> Fields:
@@ -120,18 +133,27 @@ class Enclosure:
         return {"certified": self.certified, "certified_message": self.message, **bounds}
 
 
-@dataclass
-class Solution:
-    """Fields and record of one run.
+@dataclass(eq=False, repr=False)
+class Solution(Shown):
+    """Fields and record of one run: everything a user asks about it.
+
+    ``with solve("problem4") as s:`` frees the PETSc objects at the end of the block, as `destroy` does; the fields, numbers and
+    record stay. A solution that is merely dropped frees them too, on several ranks with the next solve.
+
+    The numbers that --json prints are attributes (s.load, s.p_max, s.flow ...), as a dictionary `quantities`, their units
+    `units`. The fields are attributes in SI as arrays of shape (ny, nx), or (nx,) in 1D: s.p, s.r, s.h and the points' s.x, s.y
+    of a film, s.v of other problems. On several ranks they are the rank's own part, and s.x, s.y say which; asking for a
+    field is then collective, asking for numbers is not.
 
     Attributes
     ----------
-    problem : the problem that was solved; it owns PETSc objects, see `destroy`.
-    fields : this rank's points; for a lubrication problem p (units of problem.p_unit above the cavitation pressure) and r.
+    problem : the problem that was solved; it owns PETSc objects.
+    fields : the solver's unknowns at this rank's points, flat; for a lubrication problem p (units of problem.p_unit above the
+        cavitation pressure) and r.
     outcome, message : how the run ended, in a word and in a sentence.
     certificate : from the problem's data alone.
     steps : the record of the outer loop.
-    settings : method, system, recipe, ksp_type ... as the JSON prints them.
+    settings : method (which gave the answer), system, recipe, ksp_type ... as the JSON prints them.
     times : seconds by stage: setup, assembly, linear, total.
     levels : nested iteration's grids, coarse to fine: nx, ny, iterations, linear_iterations, time_s; the last is this one.
     enclosure : the band that `certify` asked for.
@@ -149,12 +171,19 @@ class Solution:
     enclosure: Enclosure | None = None
 
     @property
-    def p(self) -> Array:
-        return self.fields["p"]
+    def method(self) -> str:
+        """The method that gave the answer."""
+        return self.settings["method"]
 
     @property
-    def r(self) -> Array:
-        return self.fields["r"]
+    def took_over(self) -> str | None:
+        """The method that was asked first, where another took over from it."""
+        return self.settings.get("took_over")
+
+    @property
+    def asked(self) -> str:
+        """The method that was asked first, whether or not it gave the answer."""
+        return self.took_over or self.method
 
     @property
     def converged(self) -> bool:
@@ -175,6 +204,12 @@ class Solution:
             self.message = f"{self.message}, but the certificate fails: {self.certificate.failure}"
         return self
 
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.destroy()
+
     def destroy(self) -> None:
-        """Free the PETSc objects behind the problem."""
+        """Free the PETSc objects behind the problem; a second time does nothing."""
         self.problem.destroy()

@@ -5,6 +5,7 @@ import scipy.sparse
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from ..base.owned import Owned
 from ..base.parallel import Array
 from .grid import Grid
 
@@ -39,8 +40,9 @@ class Transfer:
         weights.sort_indices()
         csr = (weights.indptr.astype(PETSc.IntType), weights.indices, weights.data)
         sizes = ((fine.local_size, fine.size), (coarse.local_size, coarse.size))
-        self.mat = PETSc.Mat().createAIJ(sizes, csr=csr, comm=fine.dm.comm)
-        self._x, self._y = self.mat.createVecs()
+        self._own = Owned(self, fine.dm.comm)
+        self.mat = self._own(PETSc.Mat().createAIJ(sizes, csr=csr, comm=fine.dm.comm))
+        self._x, self._y = map(self._own, self.mat.createVecs())
 
     def __call__(self, field: Array) -> Array:
         """The field on the fine grid. Collective."""
@@ -55,8 +57,7 @@ class Transfer:
         return self._x.array_r.copy()
 
     def destroy(self) -> None:
-        for obj in (self.mat, self._x, self._y):
-            obj.destroy()
+        self._own.free()
 
 
 def _weights(

@@ -69,6 +69,10 @@ class Formula:
     def __repr__(self) -> str:
         return f"Formula({self.text!r})"
 
+    def __reduce__(self) -> tuple[type, tuple[str]]:
+        """Pickled as its text."""
+        return Formula, (self.text,)
+
 
 def _check(value: Any) -> Any:
     """A number as a number, a text as it is if it is a formula; pydantic prints what InputError says."""

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from petsc4py import PETSc
 from pydantic import PrivateAttr
 
+from ..base.owned import Owned
 from ..base.parallel import Array
 from ..errors import InputError
 from ..problems.box import BoxProblem
@@ -103,10 +104,11 @@ class Callbacks:
 
     def __init__(self, grid: Grid, F: Callable[[Array], Any], J: Callable[[Array], Any], lower: Array, upper: Array):
         self.grid, self._F, self._J = grid, F, J
-        self._value = lower
+        self._lower, self._upper, self._value = lower, upper, lower
         self._fixed = lower == upper
         self._any_fixed = grid.reduce.sum(self._fixed.astype(float)) > 0
         self._mat: PETSc.Mat | None = None
+        self._own = Owned(self, grid.dm.comm)
 
     def residual(self, v: Array) -> Array:
         """F(v). Collective.
@@ -142,7 +144,7 @@ class Callbacks:
         if values.shape != (n, n):
             raise InputError(f"J(x) has shape {values.shape}: {(n, n)} is needed")
         if self._mat is None:
-            self._mat = PETSc.Mat().createDense((n, n), comm=self.grid.dm.comm)
+            self._mat = self._own(PETSc.Mat().createDense((n, n), comm=self.grid.dm.comm))
             self._mat.setUp()
         self._mat.getDenseArray()[:] = values
         self._mat.assemble()
@@ -154,7 +156,7 @@ class Callbacks:
         if csr.shape != (n, n):
             raise InputError(f"J(x) has shape {csr.shape}: {(n, n)} is needed")
         if self._mat is None:
-            self._mat = _aij(csr, self.grid.dm.comm)
+            self._mat = self._own(_aij(csr, self.grid.dm.comm))
         self._mat.zeroEntries()
         try:
             self._mat.setValuesCSR(csr.indptr.astype(PETSc.IntType), csr.indices.astype(PETSc.IntType), csr.data.astype(float))
@@ -168,8 +170,10 @@ class Callbacks:
         return 1.0
 
     def destroy(self) -> None:
-        if self._mat is not None:
-            self._mat.destroy()
+        self._own.free()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Callbacks, (self.grid, self._F, self._J, self._lower, self._upper)
 
 
 class UserProblem(BoxProblem):
@@ -186,6 +190,10 @@ class UserProblem(BoxProblem):
         fixed = lower == upper
         self.lower, self.upper = np.where(fixed, -np.inf, lower), np.where(fixed, np.inf, upper)
         self.dense = "dense" in self.jacobian(self.v0).getType()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        equations: Any = self.equations
+        return UserProblem, (self.grid, equations, equations._lower, equations._upper, self.v0)
 
     def certify(self, fields: Fields, eps1: float) -> Certificate:
         """Certificate of v, in the units of F. Collective.

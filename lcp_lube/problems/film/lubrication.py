@@ -9,6 +9,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from ...base.compiled import compiled
+from ...base.owned import Owned
 from ...base.parallel import Array
 from ..certificate import Certificate, certificate_tol
 from ..grid import Grid
@@ -16,9 +17,10 @@ from ..solution import Fields
 from ..transfer import Transfer
 from .exact import ExactSolution
 from .forces import Shaft
-from .quantities import quantities
+from .quantities import open_pressures, quantities, units
 from .reynolds import BoxScheme, assemble, side_points, sides, term_squares
 
+MATRICES = ("A", "B", "_vectors")
 UNIT = 2.0**-53  # largest relative error of one operation
 IDLE = 1e-8  # share of what the pressures alone would drive through the sides, below which a flow is none
 UNEVEN = 1e-4  # part of the flow that the rounding of pressures inside may make of a mass defect, at most
@@ -67,20 +69,22 @@ class LubricationProblem:
         self.extras: Callable[[dict[str, Any]], dict[str, Any]] | None = None
         self.reduce = grid.reduce
         self.c = scheme.c.ravel()
+        self._own = Owned(self, grid.dm.comm)
 
     @cached_property
     def A(self) -> PETSc.Mat:
         """Assembled at first use, as B is: a method that works on the stencil alone is spared their time and memory."""
-        return assemble(self.grid, self.scheme.pressure_entries())
+        return self._own(assemble(self.grid, self.scheme.pressure_entries()))
 
     @cached_property
     def B(self) -> PETSc.Mat:
-        return assemble(self.grid, self.scheme.void_entries())
+        return self._own(assemble(self.grid, self.scheme.void_entries()))
 
     @cached_property
     def _vectors(self) -> tuple[PETSc.Vec, PETSc.Vec]:
         """`multiply` lends them its arrays."""
-        return self.A.createVecs()
+        x, y = self.A.createVecs()
+        return self._own(x), self._own(y)
 
     @property
     def unknowns(self) -> int:
@@ -232,6 +236,28 @@ class LubricationProblem:
             "h": (self.scheme.h.ravel(), "m"),
         }
 
+    @property
+    def units(self) -> dict[str, str]:
+        """Units of the quantities, in 1D per metre of width."""
+        return units(self.grid.dim)
+
+    def at_sides(self, name: str, x: Array, y: Array) -> Array:
+        """Given pressures (at a corner the mean of its two), the film, and the void: what enters west, none above p_c."""
+        if name == "h":
+            return np.array(self.film(x, y), dtype=float)
+        grid = self.grid
+        total, count = np.zeros(np.broadcast(x, y).shape), np.zeros(np.broadcast(x, y).shape)
+        for k, p in enumerate(open_pressures(self)):
+            if p is not None:
+                at = (x, y)[k // 2] == grid.origin[k // 2] + (k % 2) * grid.lengths[k // 2]
+                total, count = total + np.where(at, p, 0.0), count + at
+        with np.errstate(invalid="ignore"):
+            p_sides = total / count  # NaN where no side has a pressure
+        if name == "p":
+            return p_sides + self.p_c
+        enters = (x == grid.origin[0]) & (grid.ends[0][0] == "open")
+        return np.where(enters, self.r_in, np.where(p_sides > 0, 0.0, np.nan))
+
     def prolong(self, coarse: "LubricationProblem", fields: Fields, interior: bool) -> Fields:
         """p and r on this grid from a coarser one, by interpolating z = p/P - r/R bilinearly (P, R: largest p and r).
 
@@ -247,10 +273,20 @@ class LubricationProblem:
         root = np.sqrt(z * z + 4.0 * m) if interior else np.abs(z)
         return {"p": 0.5 * P * (root + z), "r": 0.5 * R * (root - z)}
 
+    def free_matrices(self) -> None:
+        """Free A and B, which are assembled again at need. Collective."""
+        self._own.free()
+        for name in MATRICES:
+            self.__dict__.pop(name, None)
+
     def destroy(self) -> None:
-        """Free the PETSc objects."""
-        made = self.__dict__
-        for obj in (made.get("A"), made.get("B"), *made.get("_vectors", ())):
-            if obj is not None:
-                obj.destroy()
+        """Free the PETSc objects. Collective."""
+        self.free_matrices()
         self.grid.destroy()
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name not in (*MATRICES, "_own")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._own = Owned(self, self.grid.dm.comm)

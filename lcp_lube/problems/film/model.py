@@ -138,7 +138,7 @@ class Model:
             film=film,
             exact=self.exact,
             shaft=self.shaft,
-            r_in=west.r,
+            r_in=west.r if west.kind == "open" else 0.0,
         )
         if isinstance(problem, GroovedProblem):
             problem.grooves = self.grooves

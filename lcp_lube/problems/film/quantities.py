@@ -16,6 +16,24 @@ from .fronts import first_cavity, fronts
 if TYPE_CHECKING:
     from .lubrication import LubricationProblem
 
+# Of a 2D film; what is not named has none. In 1D everything is per metre of width.
+UNITS = {
+    **dict.fromkeys(("p_max", "p_ambient", "p_unit"), "Pa"),
+    **dict.fromkeys(("load", "load_above_ambient", "bearing_load", "load_vector", "force", "friction"), "N"),
+    **dict.fromkeys(("p_max_at", "min_h", "min_h_at", "rupture", "reformation"), "m"),
+    **dict.fromkeys(("flow", "side_leakage", "groove_flow"), "m3/s"),
+    "cavitated_area": "m2",
+    "power_loss": "W",
+    "moment": "N m",
+    "attitude_deg": "deg",
+}
+PER_WIDTH = {"N": "N/m", "W": "W/m", "m3/s": "m2/s", "m2": "m"}
+
+
+def units(dim: int) -> dict[str, str]:
+    """Units of the quantities of a film in one or two dimensions, by key."""
+    return {name: PER_WIDTH.get(unit, unit) if dim == 1 else unit for name, unit in UNITS.items()}
+
 
 def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any]:
     """Integrals and extrema of the fields, and the scene's own numbers (`problem.extras`). Collective.

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -42,6 +42,7 @@ class SqueezeProblem:
     """
 
     kind = "lubrication"  # as every step is
+    units: ClassVar[dict[str, str]] = {}
 
     def __init__(
         self,
@@ -209,6 +210,11 @@ class SqueezeProblem:
         """Pressure, void fraction and gap at the end, dimensionless."""
         h = np.full(self.grid.local_size, self.gap(self.time))
         return {"p": (fields["p"] * (self.p_wall or 1.0), ""), "r": (fields["r"], ""), "h": (h, "")}
+
+    def at_sides(self, name: str, x: Array, y: Array) -> Array:
+        """p_wall, the gap, and no void unless p_wall = 0."""
+        void = 0.0 if self.p_wall else np.nan
+        return np.full(np.broadcast(x, y).shape, {"p": self.p_wall, "r": void, "h": self.gap(self.time)}[name])
 
     def prolong(self, coarse: Any, fields: Fields, interior: bool) -> Fields:
         """Nothing: every march begins with the full film."""

@@ -71,7 +71,4 @@ class SqueezeStep(LubricationProblem):
 
     def destroy(self) -> None:
         """Free the PETSc objects, but for the grid's."""
-        made = self.__dict__
-        for obj in (made.get("A"), made.get("B"), *made.get("_vectors", ())):
-            if obj is not None:
-                obj.destroy()
+        self.free_matrices()
