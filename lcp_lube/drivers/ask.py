@@ -46,7 +46,7 @@ class Ask:
     resume : go on from such a file, as if the run had not been stopped. What is not given anew is as it was begun with.
     start : a neighbouring scene's `Solution`, from which this one's own start is interpolated. It takes the coarser grids'
         place, unless `nested` asks for these; where it leads nowhere, the run begins again without it.
-    rescue : whether other methods may take over where the one asked for fails: settings['method'] says which one did, settings['took_over'] from which.
+    rescue : whether other methods may take over where the one asked for fails: `Solution.method` says which.
     reduction : solve no more than symmetry leaves (`symmetry`).
     memory_check : refuse a run that needs more memory than there is, by an estimate (`memory`).
     monitor : called after every step with its number and record.

@@ -19,9 +19,11 @@ if TYPE_CHECKING:
 # Of a 2D film; what is not named has none. In 1D everything is per metre of width.
 UNITS = {
     **dict.fromkeys(("p_max", "p_ambient", "p_unit"), "Pa"),
-    **dict.fromkeys(("load", "load_above_ambient", "bearing_load", "load_vector", "force", "friction"), "N"),
-    **dict.fromkeys(("p_max_at", "min_h", "min_h_at", "rupture", "reformation"), "m"),
-    **dict.fromkeys(("flow", "side_leakage", "groove_flow"), "m3/s"),
+    **dict.fromkeys(
+        ("load", "pressure_integral", "load_above_ambient", "bearing_load", "load_vector", "force", "friction"), "N"
+    ),
+    **dict.fromkeys(("p_max_at", "min_h", "min_h_at", "rupture", "reformation", "ruptures", "reformations"), "m"),
+    **dict.fromkeys(("flow", "side_leakage", "flow_growth", "groove_flow"), "m3/s"),
     "cavitated_area": "m2",
     "power_loss": "W",
     "moment": "N m",
