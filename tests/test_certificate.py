@@ -83,3 +83,54 @@ def test_failure_names_what_is_broken():
     certificate = Certificate({"residual": 1.0, "complementarity": 1e-9, "mass_defect": float("nan")}, 1e-4)
     assert certificate.failure == "residual 1.00e+00 > 1.0e-04, mass_defect nan > 1.0e-04"
     assert Certificate({}, 1e-4).holds
+
+
+FED = {
+    "family": "bearing",
+    "L": 0.01,
+    "n": 24,
+    "fluid": {"mu": 0.01},
+    "film": {"shape": "linear", "h_start": 3e-6, "h_end": 1e-6},
+}
+RING = {"shape": "journal", "c": 5e-6, "eccentricity": 0.6}
+NEXT_TO_NOTHING_FLOWS = {
+    "closed at the east": {"U": 1.0, "sides": {"west": 2e5, "east": "closed"}},
+    "closed at the west": {"U": -1.0, "sides": {"west": "closed", "east": 2e5}},
+    "closed, slow": {"U": 1e-10, "sides": {"west": 2e5, "east": "closed"}},
+    "closed, deep pocket": {
+        "U": 1.0,
+        "film": [FED["film"], {"shape": "pocket", "depth": 1e-3, "x": [0.003, 0.007]}],
+        "sides": {"west": 2e5, "east": "closed"},
+    },
+    "ring": {
+        "U": 1.0,
+        "dimension": 2,
+        "n": 9,
+        "film": RING,
+        "sides": {"west": "periodic", "east": "periodic", "south": 3e5, "north": "closed"},
+    },
+}
+SPOILT = {
+    "scaled": lambda a: a * 1.01,
+    "shifted": lambda a: a + 0.01 * np.abs(a).max(),
+    "negative": lambda a: -a,
+    "zero": lambda a: 0.0 * a,
+    "one point": lambda a: np.where(np.arange(a.size) == np.argmax(a), 0.9 * a, a),
+    "turned round": lambda a: np.roll(a, a.size // 3),
+    "NaN": lambda a: np.where(np.arange(a.size) == a.size // 2, np.nan, a),
+}
+
+
+@pytest.mark.parametrize("name", NEXT_TO_NOTHING_FLOWS)
+def test_where_next_to_nothing_flows_through(name):
+    """A mass defect knows its own rounding; what is no solution still breaks the certificate."""
+    found = solve(load_scene({**FED, **NEXT_TO_NOTHING_FLOWS[name]}), method="active-set")
+    assert found.converged, found.message
+    p, r = found.fields["p"], found.fields["r"]
+    for damage, spoil in SPOILT.items():
+        if name == "closed, slow" and damage == "turned round":
+            continue  # p is the side's everywhere, to 1e-9
+        with np.errstate(all="ignore"):
+            assert not found.problem.certify({"p": spoil(p), "r": r}, 1e-8).holds, damage
+    assert not found.problem.certify({"p": p, "r": r + 0.01}, 1e-8).holds
+    found.destroy()
