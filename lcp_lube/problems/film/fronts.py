@@ -25,7 +25,7 @@ def fronts(problem: LubricationProblem, p: Array, r: Array) -> tuple[list[float]
     extrapolated linearly, is zero. A cavity that begins with the void that enters at the west has no rupture.
     """
     if not problem.U:
-        return None, None  # at rest a film does not cavitate
+        return [], []  # at rest a film does not cavitate
     grid, film, scheme = problem.grid, problem.film, problem.scheme
     dx, start, L = grid.spacing[0], grid.origin[0], grid.lengths[0]
     x, row = grid.x[0], middle_row(problem) - grid.y_start

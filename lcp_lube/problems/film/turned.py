@@ -108,10 +108,12 @@ class TurnedProblem(LubricationProblem):
             out[name] = [L - out[name][0], *out[name][1:]] if out[name] is not None else None
         for name in PLACES:
             out[name] = L - out[name] if out[name] is not None else None
+        for name in ("ruptures", "reformations"):
+            out[name] = sorted(L - x for x in out[name])
         out["flow"] = {**out["flow"], "west": out["flow"]["east"], "east": out["flow"]["west"]}
         out["friction"] = -out["friction"]
         if self.extras:
-            out |= self.extras(self, fields["p"], fields["r"])
+            out |= self.extras(out)
             carried = out.get("bearing_load", out["load_above_ambient"])
             out["friction_coefficient"] = -out["friction"] / carried if carried > 0 else None
         return out
