@@ -219,6 +219,7 @@ SHAPES: dict[str, Entry] = {
 DRIVERS: dict[str, Entry] = {
     "accuracy": Entry("lcp_lube.drivers.accuracy", "finer and finer grids until a quantity is as good as asked for"),
     "balance": Entry("lcp_lube.drivers.balance", "the film that carries the load asked for"),
+    "position": Entry("lcp_lube.drivers.position", "where a journal lies under a load, by Newton's method"),
     "attitude": Entry("lcp_lube.drivers.attitude", "the attitude that follows from the load's direction"),
     "time": Entry("lcp_lube.drivers.time", "step by step, where the film moves"),
     "turned": Entry("lcp_lube.drivers.turned", "a wall that moves to smaller x, by the mirror image"),

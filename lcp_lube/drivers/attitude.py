@@ -16,16 +16,19 @@ STEEPEST, FLATTEST = 2.0, 0.3  # slope of the force's angle over the attitude; w
 
 def applies(scene: Solvable, ask: Ask) -> bool:
     """Whether the attitude is left open."""
-    return isinstance(scene, GroovedJournalScene) and scene.attitude_deg is None
+    return isinstance(scene, GroovedJournalScene) and scene.attitude_deg is None and scene.balance is None
+
+
+def half_film_attitude(e: float) -> float:
+    """The attitude of a short journal with half a film (Ocvirk), as a start, rad."""
+    return math.atan2(0.25 * math.pi * math.sqrt(1.0 - e * e), max(e, 1e-3))
 
 
 def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     """The solution at the attitude that follows from the load's direction. Collective."""
     assert isinstance(scene, GroovedJournalScene)
     known = ask.start.settings.get("attitude_deg") if ask.start is not None else None
-    # A long journal's attitude without grooves (Sommerfeld, half film), as a start.
-    e = scene.eccentricity
-    attitude = math.radians(known) if known is not None else math.atan2(0.25 * math.pi * math.sqrt(1.0 - e * e), max(e, 1e-3))
+    attitude = math.radians(known) if known is not None else half_film_attitude(scene.eccentricity)
     solution: Solution | None = None
     before: tuple[float, float] | None = None
     slope = 1.0

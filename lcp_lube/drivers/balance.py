@@ -14,6 +14,7 @@ from typing import Any
 from ..errors import InputError
 from ..problems.solution import Outcome, Solution
 from ..scenes.balance import BalanceTable
+from ..scenes.grooved import GroovedJournalScene
 from ..scenes.scene import Scene, Solvable, as_scene
 from .ask import Ask
 from .compose import Inner
@@ -95,7 +96,7 @@ def _logit(e: float) -> float:
 
 def applies(scene: Solvable, ask: Ask) -> bool:
     """Whether the scene has a load to carry."""
-    return getattr(scene, "balance", None) is not None
+    return getattr(scene, "balance", None) is not None and not isinstance(scene, GroovedJournalScene)  # see `position`
 
 
 def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:

@@ -14,6 +14,7 @@ from ..problems.film.grooves import Groove
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model, Side
 from ..problems.film.turning import Turning
+from .balance import BalanceTable
 from .scene import Count, Finite, NotNegative, Positive, Scene
 from .units import measured, metres
 
@@ -45,6 +46,7 @@ class GroovedJournalScene(Scene):
     p_groove: NotNegative = measured("Pa", 0.0, "pressure in the grooves, above p_c")
     p_end: NotNegative = measured("Pa", 0.0, "pressure at both ends, above p_c")
     p_c: Finite = measured("Pa", 0.0, "cavitation pressure")
+    balance: BalanceTable | None = Field(None, description="load to carry; eccentricity and attitude are found for it")
     scheme: str | None = Field("face", description="form of the Couette flux: face")
     n: Count = Field(360, description="points around, and an odd number near a sixteenth of them across")
     nx: Count | None = Field(None, description="points around; default n")
@@ -58,6 +60,8 @@ class GroovedJournalScene(Scene):
         gaps = [(b - a) % 360.0 or 360.0 for a, b in zip(places, [*places[1:], *places[:1]], strict=True)]
         if places and min(gaps) <= self.groove_deg:
             raise ValueError(f"grooves_deg = {self.grooves_deg}: grooves of {self.groove_deg:g} degrees overlap there")
+        if self.balance is not None and (self.attitude_deg is not None or self.balance.vary not in (None, "eccentricity")):
+            raise ValueError("balance: eccentricity and attitude follow from the load: neither attitude_deg nor another vary")
         if self.preload and len(places) < 2:
             raise ValueError(f"preload = {self.preload:g}: lobes lie between at least two grooves")
         if not places and not self.p_end > 0:

@@ -1,0 +1,122 @@
+"""Where a journal lies under a load of given size and direction: Newton's method with the film's exact stiffness.
+
+Unknowns are t = log(e/(1 - e)) of the eccentricity e, in which the logarithm of the load is nearly linear, and the attitude;
+the equations are log(W/load) = 0 and that the force lies in the load's line. The stiffness matrix of the film
+(`coefficients`) gives their derivatives, so a handful of solves do, each started from the last; coarse grids come first.
+"""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..problems.solution import Outcome, Solution
+from ..scenes.grooved import GroovedJournalScene
+from ..scenes.scene import Solvable
+from .ask import Ask
+from .attitude import half_film_attitude
+from .coefficients import coefficients
+from .compose import Inner
+
+MOST_SOLVES = 25  # on a grid
+COARSEST, COARSE_TOL = 120, 1e-2  # points around on the first grid, and how well its journal's place is worth knowing
+LONGEST = (2.0, 0.4)  # of a step in t and in the attitude (rad)
+WIDEST = 14.0  # of t: eccentricities from 1e-6 to 1 - 1e-6
+
+
+def applies(scene: Solvable, ask: Ask) -> bool:
+    """Whether it is a journal of which load and direction are given, and its place is sought."""
+    return isinstance(scene, GroovedJournalScene) and scene.balance is not None
+
+
+def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
+    """The solution at the place where the film's force is opposite to the load. Collective.
+
+    Returns
+    -------
+    Solution : settings['balance'] as of any balance; where no place carries the load, outcome LOAD_NOT_CARRIED.
+    """
+    assert isinstance(scene, GroovedJournalScene) and scene.balance is not None  # as `applies` found
+    table, known = scene.balance, ask.start.settings if ask.start is not None else {}
+    e = known.get("balance", {}).get("value", scene.eccentricity)
+    phi = math.radians(known["attitude_deg"]) if "attitude_deg" in known else half_film_attitude(e)
+    free = scene.model_copy(update={"balance": None})
+    shapes = [scene.shape]
+    while ask.nested is not False and not known and shapes[0][0] >= 2 * COARSEST and shapes[0][1] >= 7:
+        shapes.insert(0, (shapes[0][0] // 2, shapes[0][1] // 2 | 1))
+    near, solves = ask.start, 0
+    t = math.log(max(e, 1e-3) / (1.0 - max(e, 1e-3)))
+    for shape in shapes:
+        tol = table.tol if shape == shapes[-1] else max(table.tol, COARSE_TOL)
+        solution, t, phi, count, found = _on_grid(
+            free.with_shape(shape), replace(ask, start=near), inner, t, phi, table.load, tol
+        )
+        if near is not None and near is not ask.start:
+            near.destroy()  # type: ignore[union-attr]
+        near, solves = solution, solves + count
+    carried = solution.problem.quantities(solution.fields)["load"]
+    value = 1.0 / (1.0 + math.exp(-t))
+    answer = f"eccentricity = {value:.8g} at {math.degrees(phi):.6g} degrees carries {carried:.8g}"
+    if solution.converged and not found:
+        solution.outcome, solution.message = Outcome.LOAD_NOT_CARRIED, f"{table.load:g} asked for; the nearest: {answer}"
+    record = {
+        "vary": "eccentricity",
+        "value": value,
+        "load": table.load,
+        "carried": carried,
+        "iterations": count,
+        "solves": solves,
+    }
+    solution.settings |= {
+        "balance": record,
+        "attitude_deg": math.degrees(phi),
+        "why": [*solution.settings["why"], f"balance: {answer}, found in {count} solves on this grid, {solves} in all"],
+    }
+    return solution
+
+
+def _on_grid(
+    scene: Any, ask: Ask, inner: Inner, t: float, phi: float, load: float, tol: float
+) -> tuple[Solution, float, float, int, bool]:
+    """Newton's method on one grid: solution, t, attitude, number of solves, whether the place was found. Collective."""
+    solution: Solution | None = None
+    for count in range(1, MOST_SOLVES + 1):
+        e = 1.0 / (1.0 + math.exp(-t))
+        at = scene.model_copy(update={"eccentricity": e, "attitude_deg": math.degrees(phi)})
+        new = inner(at, replace(ask, start=solution or ask.start))
+        if solution is not None:
+            solution.destroy()
+        solution = new
+        if not solution.converged:
+            return solution, t, phi, count, False
+        force = np.array(solution.problem.quantities(solution.fields)["force"])
+        W = float(np.hypot(*force))
+        off = math.atan2(-force[1], -force[0])
+        short = math.log(W / load) if W > 0 else -math.inf
+        if abs(short) <= tol and abs(off) <= tol:
+            return solution, t, phi, count, True
+        if count == MOST_SOLVES or (abs(t) >= WIDEST and short * t < 0):
+            return solution, t, phi, count, False
+        step = _newton(at, solution, force, (short, off), e, phi) if W > 0 else (LONGEST[0], 0.0)
+        t = min(max(t + min(max(step[0], -LONGEST[0]), LONGEST[0]), -WIDEST), WIDEST)
+        phi += min(max(step[1], -LONGEST[1]), LONGEST[1])
+    raise AssertionError("the loop returns")
+
+
+def _newton(at: Any, solution: Solution, force: Any, residual: tuple[float, float], e: float, phi: float) -> Any:
+    """Steps in t and in the attitude, from the exact derivative of the force. Collective."""
+    (one,) = coefficients(at, solution)
+    along = residual[1]
+    turn = np.array([[math.cos(along), -math.sin(along)], [math.sin(along), math.cos(along)]])
+    K = turn @ one.K @ turn.T  # back from the axes along the force
+    c = at.clearance
+    towards, across = np.array([math.cos(phi), math.sin(phi)]), np.array([-math.sin(phi), math.cos(phi)])
+    moves = np.stack([c * e * (1.0 - e) * towards, c * e * across], axis=1)  # of the journal with t and with the attitude
+    change = -K @ moves
+    square = float(force @ force)
+    jacobian = np.stack([force @ change, force[0] * change[1] - force[1] * change[0]]) / square
+    try:
+        return np.linalg.solve(jacobian, [-residual[0], -residual[1]])
+    except np.linalg.LinAlgError:
+        return np.array([math.copysign(0.5, -residual[0]), 0.0])
