@@ -73,20 +73,19 @@ def measured(n: int, keep: int, repeat: int) -> dict[str, Any]:
 def shares(results: Path, repeat: int, quick: bool) -> None:
     """The seconds by part, and the gain of keeping the Jacobian."""
     from lcp_lube.base.resumable import ResumableCsv
+    from lcp_lube.output.table import line
 
     store = ResumableCsv(results / "bergamaschi_table2_shares.csv", COLUMNS, ("n", "keep"), signed=True)
-    print(f"\n{'n':>5} {'keep':>4} {'it':>3} {'CPU s':>8} {'Jacobian':>9} {'factor':>7} {'solve':>6} {'rest':>6} {'MB':>6}   k")
+    widths = (5, 4, 3, 8, 9, 7, 6, 6, 6, 12)
+    print("\n" + line(["n", "keep", "it", "CPU s", "Jacobian", "factor", "solve", "rest", "MB", "k"], widths))
     for n in SIZES[: 2 if quick else None]:
         for keep in KEEPS:
             row = store.find(n=n, keep=keep) or store.add(measured(n, keep, 1 if n > 2000 else repeat))
             total = float(row["total_s"])
             part = [100.0 * float(row[name]) / total for name in ("jacobian_s", "factor_s", "solve_s", "rest_s")]
-            share = f"{part[0]:>7.0f} % {part[1]:>5.0f} % {part[2]:>4.0f} % {part[3]:>4.0f} %"
-            head = f"{n:>5} {keep:>4} {row['iterations']:>3} {float(row['cpu_s']):>8.3f}"
-            print(
-                f"{head} {share} {float(row['memory_mb']):>6.0f}   {float(row['k']):.8f} {row['outcome']} {store.age(row)}",
-                flush=True,
-            )
+            numbers = [row["iterations"], f"{float(row['cpu_s']):.3f}", *(f"{share:.0f} %" for share in part)]
+            numbers += [f"{float(row['memory_mb']):.0f}", f"{float(row['k']):.8f}"]
+            print(line([str(n), str(keep), *numbers], widths), row["outcome"], store.age(row), flush=True)
     print(
         "printed: n = 200 Jacobian 47 %, factor 22 %, solve 1 % of 1.30 s; n = 1000 30 %, 51 %, 1 % of 69.41 s (600 MHz Alpha)"
     )

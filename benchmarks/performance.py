@@ -35,6 +35,7 @@ from lcp_lube.base.resumable import ResumableCsv, Row
 from lcp_lube.linear import cavity
 from lcp_lube.linear.krylov import Krylov
 from lcp_lube.output.results import machine, versions
+from lcp_lube.output.table import table
 from lcp_lube.problems.film.lubrication import LubricationProblem
 from lcp_lube.registry import PACKAGE
 from lcp_lube.solvers.newton import Stopping
@@ -363,8 +364,7 @@ def show(rows: list[Row]) -> str:
 
     names = [name for name in SHOWN if any(row[name] for row in rows)]
     lines = [names, *([short(row[name]) for name in names] for row in rows)]
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    return "\n".join("  ".join(f"{cell:>{w}}" for cell, w in zip(line, widths, strict=True)) for line in lines)
+    return "\n".join(table(lines))
 
 
 def main() -> None:

@@ -2,24 +2,29 @@
 
 import csv
 import shlex
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import matplotlib
 import numpy as np
 import pytest
+from drawn_text import overlapping
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.text import Text
 
 from lcp_lube.api import solve
 from lcp_lube.errors import InputError
 from lcp_lube.registry import METHODS, STABILITY, MethodEntry
 from lcp_lube.scenes.scene import load_scene
 from lcp_lube.studies import experiment, known, precision, turning_point
-from lcp_lube.studies.log import NAME, write_log
+from lcp_lube.studies.drawing import STYLE
+from lcp_lube.studies.log import NAME, load, write_log
 from lcp_lube.studies.map_picture import Axis, Panels, tick
 from lcp_lube.studies.map_picture import picture as map_picture
 from lcp_lube.studies.outcome_map import tallies, tally
-from lcp_lube.studies.precision_picture import against_seconds
+from lcp_lube.studies.precision_picture import against_krylov, against_seconds, parts
 from lcp_lube.studies.precision_words import cheapest, error, fastest, front, loose, seconds, sentence, which
 from lcp_lube.studies.reference import WRONG, References
 from lcp_lube.studies.starts_picture import apart, chosen, converged, equal_starts, lines_sentence, map_sentence
@@ -129,6 +134,81 @@ def test_words_name_the_cheapest_run(quick: Path) -> None:
     other = {**best, "system": "peer", "method": "another code", "wall_s": str(3 * seconds(best)), "cpu_s": "1e9"}
     found = next(line for line in which([*rows, other]) if line.startswith("| problem1 | 1 %"))
     assert "| another code, 3 times |" in found
+
+
+def test_what_was_not_run_is_told_from_what_is_beyond_a_method() -> None:
+    run = {
+        "scene": "a",
+        "system": "full",
+        "nested": "False",
+        "outcome": "converged",
+        "recipe": "r",
+        "eps": "1e-8",
+        "cpu_s": "1",
+    }
+
+    def row(method: str, n: int, error: float) -> Row:
+        return {**run, "method": method, "n": str(n), "points": str(n * n), "wall_s": str(n), "load_error": str(error)}
+
+    coarse = [row("fas", 10, 1e-2), row("fas", 40, 1e-5), row("din", 10, 1e-2)]
+    assert "not run above 10 a side: minutes" in which(coarse)[-1]
+    assert which(coarse)[-1].endswith("| not run |")  # of other codes nothing at all
+    assert any(text.startswith("  din ") and text.endswith("not run   not run") for text in cheapest(coarse))
+    tried = [*coarse, row("din", 40, 1e-3)]
+    assert "does not get there" in which(tried)[-1]
+    assert any(text.startswith("  din ") and text.endswith("-         -") for text in cheapest(tried))
+
+
+def test_the_load_of_the_machine_is_told() -> None:
+    row = {"date": "2026-01-02", "machine": "a machine", "petsc": "3.18.5"}
+    assert load([row]) == "load average not noted"
+    busy = [{**row, "load_average": "1.5"}, {**row, "load_average": "13.0"}, row]
+    assert load(busy) == "load average 1.5 to 13 in 2 runs, not noted in 1 stored ones"
+    assert float(experiment.environment()["load_average"]) >= 0.0
+
+
+@pytest.fixture
+def printed() -> Iterator[None]:
+    """The charts' own sizes of type."""
+    with matplotlib.rc_context(STYLE):
+        yield
+
+
+def stored(name: str) -> list[Row]:
+    return read(Path(__file__).parents[1] / "benchmarks" / "results" / f"{name}.csv")
+
+
+@pytest.mark.parametrize(
+    "draw", [lambda rows: against_seconds(rows, "load"), lambda rows: against_seconds(rows, "rupture"), against_krylov, parts]
+)
+def test_panels_of_the_full_chart_can_be_read(draw: Any, printed: None) -> None:
+    """At most seven lines a panel, none empty, no text over another, nothing set smaller than 6.5 points."""
+    rows = stored("precision")
+    figure = draw(rows)
+    panels = [axes for axes in figure.axes if axes.get_title(loc="left")]
+    assert len(panels) >= 6
+    for axes in panels:
+        lines = [
+            line
+            for line in axes.lines
+            if len(line.get_xdata()) and line.get_marker() != "x" and line.get_linestyle() not in (":", "None")
+        ]
+        colours = {line.get_color() for line in lines if line.get_linewidth() < 3.0}
+        assert 1 <= len(colours) <= 7
+    legend = next(found for axes in figure.axes if (found := axes.get_legend()))
+    black = [str(line.get_label()) for line in legend.get_lines() if line.get_color() == "#000000"]
+    assert all(name.startswith("other codes") for name in black)  # a colour that no method has
+    assert overlapping(figure) == []
+    assert min(text.get_fontsize() for text in figure.findobj(Text) if text.get_text().strip()) >= 6.5
+
+
+@pytest.mark.parametrize("name", ["film_ratio", "roughness", "supply_speed", "conditions", "inner_tolerance", "turning_point"])
+def test_full_maps_can_be_read(name: str, printed: None) -> None:
+    module = STABILITY[name].load().__self__
+    rows = stored(f"stability_{name}")
+    figure = map_picture(rows, module.panels, module.x, module.y, module.sentence(rows), module.right)
+    assert overlapping(figure) == []
+    assert min(text.get_fontsize() for text in figure.findobj(Text) if text.get_text().strip()) >= 6.5
 
 
 def test_failures_are_rows_and_crosses(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 pytest.importorskip("matplotlib")
+from drawn_text import overlapping
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
 from matplotlib.text import Text
 
 from lcp_lube.api import solve
@@ -174,20 +174,6 @@ def test_pads_keep_their_shape(L: float, width: float, bearing: Any) -> None:
         assert drawn == pytest.approx(np.clip(true, 1 / maps.SLENDER, maps.SLENDER), rel=0.01)
         assert min(box.height, box.width) > 0.3 * figure.dpi and max(box.height, box.width) > 2.0 * figure.dpi
         assert any("too long" in a.get_xlabel() for a in figure.findobj(Axes)) == (abs(drawn / true - 1) > 0.01)
-
-
-def overlapping(figure: Any) -> list[tuple[str, str]]:
-    """Pairs of texts that cover one another."""
-    figure.draw_without_rendering()
-    outside = []  # ticks beyond an axis's ends are kept by it, but not drawn
-    for axis in figure.findobj(Axis):
-        low, high = sorted(axis.get_view_interval())
-        unseen = [tick for tick in axis.get_major_ticks() if not (axis.axes.axison and low <= tick.get_loc() <= high)]
-        outside += [text for tick in unseen for text in (tick.label1, tick.label2)]
-    hidden = {id(text) for text in outside}
-    texts = [t for t in figure.findobj(Text) if t.get_visible() and t.get_text().strip() and id(t) not in hidden]
-    boxes = [(t.get_text(), t.get_window_extent().padded(-1.0)) for t in texts]
-    return [(a, b) for k, (a, one) in enumerate(boxes) for b, other in boxes[k + 1 :] if one.overlaps(other)]
 
 
 @pytest.mark.parametrize("size", ["30\nwidth_mm = 20", "100\nwidth_mm = 10", "10\nwidth_mm = 100", "20\nwidth_mm = 40", "20"])

@@ -20,6 +20,7 @@ from petsc4py import PETSc
 
 from .. import __version__
 from ..api import solve
+from ..output.table import table
 from ..registry import PACKAGE
 from ..scenes.scene import load_scene
 
@@ -225,7 +226,7 @@ def text_of(report: dict[str, Any]) -> str:
         "machine": f"{report['ranks']} ranks, {report['cores']} cores, {report['memory_gb']} GB, "
         f"OMP_NUM_THREADS {report['omp_num_threads'] or 'unset'}",
     }
-    lines = [f"{title + ':':<11} {row}" for title, row in rows.items()]
+    lines = table([(f"{title}:", row) for title, row in rows.items()], align="<<", least=[11], gap=" ")
     for check in report["self_check"]:
         verdict = "passed" if check["passed"] else "FAILED"
         error = f", load off by {check['error']:.1e} from the exact one" if check.get("error") is not None else ""

@@ -11,6 +11,7 @@ from ..base.options import check_unread
 from ..errors import InputError, nearest
 from ..output.console import say
 from ..output.results import as_dict, finite, summary
+from ..output.table import table as text_table
 from ..problems.solution import Step
 from ..registry import METHODS, SHAPES, STABILITY, SYSTEMS, recipe_line, recipe_names
 from ..scenes.scene import scene_line, scene_names
@@ -161,8 +162,7 @@ def run_list(args: argparse.Namespace) -> int:
     }
     for title, lines in groups.items():
         say(f"{title}:")
-        for name, line in lines.items():
-            say(f"  {name:<16} {line}")
+        say("\n".join(text_table([*lines.items()], align="<<", least=[16], gap=" ", indent="  ")))
     return 0
 
 

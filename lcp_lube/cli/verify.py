@@ -13,6 +13,7 @@ from mpi4py import MPI
 from ..api import solve
 from ..base.options import check_unread
 from ..output.results import finite
+from ..output.table import table as rows_of
 from ..scenes.scene import load_scene
 from ..studies.verify_cases import CASES, QUICK, Case, Reference
 
@@ -130,21 +131,21 @@ def _row(
 
 def table(verdicts: Sequence[Verdict]) -> str:
     """Ours, reference, errors by grid, order and verdict, for people."""
-    lines = [f"{'quantity':<33} {'ours':>15} {'reference':>15}  {'relative error by grid':<26} order (needed)   verdict"]
+    cells = [["quantity", "ours", "reference", "relative error by grid", "order (needed)", "verdict"]]
+    for row in (row for verdict in verdicts for row in verdict.rows):
+        order = "-" if row.order is None or row.errors[-1] <= ROUNDING else f"{row.order:.2f}"
+        needed = f"({row.reference.order:g})" if row.reference.order else ""
+        numbers = (f"{row.values[-1]:.9g}", f"{row.reference.value:.9g}", " ".join(f"{error:8.1e}" for error in row.errors))
+        verdict_word = "ok" if row.passed else f"FAIL: {row.fault}"
+        cells.append([f"  {row.quantity}", *numbers, f"{order:>5} {needed}", verdict_word])
+    head, *told = rows_of(cells, align="<>><<<", least=[33, 15, 15, 26])
+    printed, lines = iter(told), [head]
     for verdict in verdicts:
         case, grids = verdict.case, ", ".join(verdict.rows[0].grids)
         data = "".join(f", {key} = {value}" for key, value in case.data.items())
         lines += ["", f"{case.name} ({case.scene}{data}; {grids}): {case.source}"]
         lines += [f"  {failure}" for failure in verdict.failures]
-        for row in verdict.rows:
-            errors = " ".join(f"{error:8.1e}" for error in row.errors)
-            order = "-" if row.order is None or row.errors[-1] <= ROUNDING else f"{row.order:.2f}"
-            needed = f"({row.reference.order:g})" if row.reference.order else ""
-            verdict_word = "ok" if row.passed else f"FAIL: {row.fault}"
-            lines.append(
-                f"  {row.quantity:<31} {row.values[-1]:15.9g} {row.reference.value:15.9g}  {errors:<26} "
-                f"{order:>5} {needed:<10} {verdict_word}"
-            )
+        lines += [next(printed) for _ in verdict.rows]
         if case.note:
             lines.append(f"  ({case.note})")
     good = sum(verdict.passed for verdict in verdicts)

@@ -6,6 +6,7 @@ from typing import Any
 from ..api import solve
 from ..errors import InputError, nearest
 from ..output.results import as_dict
+from ..output.table import table as table_lines
 from ..problems.solution import Problem
 from ..registry import METHODS, SYSTEMS, read_recipe
 from ..scenes.scene import Scene
@@ -146,17 +147,10 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
     cells = [[heading for _, heading, _ in columns]]
     for row in flat:
         cells.append(["-" if row.get(key) is None else format(row[key], form) for key, _, form in columns])
-    widths = [max(len(line[k]) for line in cells) for k in range(len(columns))]
-    left = [form == "s" for _, _, form in columns]
-    lines = [
-        "  ".join(
-            f"{cell:<{width}}" if text else f"{cell:>{width}}" for cell, width, text in zip(line, widths, left, strict=True)
-        )
-        for line in cells
-    ]
+    lines = table_lines(cells, align="".join("<" if form == "s" else ">" for _, _, form in columns))
     failed = [
         f"{row['method']}, {row['recipe'] or 'default recipe'}: {row['message']}"
         for row in rows
         if row["outcome"] != "converged"
     ]
-    return "\n".join([*(line.rstrip() for line in lines), *failed])
+    return "\n".join([*lines, *failed])

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WIDTH = 7.2  # inches: a page's text width, so that the type is read at the size it is set
-COLOURS = ("#0072B2", "#009E73", "#D55E00", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito's
+COLOURS = ("#0072B2", "#009E73", "#D55E00", "#CC79A7", "#E69F00", "#56B4E9")  # Okabe and Ito's, but for black
 MARKERS = ("o", "s", "^", "v", "D", "P", "*", "<", ">")
 STYLE: Any = {
     "font.size": 8.0,

@@ -1,5 +1,6 @@
 """What the charts share: where their runs are kept, and one run as a row."""
 
+import os
 from collections.abc import Sequence
 from datetime import date
 from hashlib import sha256
@@ -21,7 +22,7 @@ from .reference import WRONG, Reference
 # Outcomes of the charts, beside those of `Outcome`: left by us, and solved, but by the method's fallback.
 KRYLOV_LIMIT, FELL_BACK = "krylov_limit", "fell_back"
 RECORD = """outcome iterations linear_iterations centrality backtracking c1 c2 ksp_type pc_type load rupture min_p min_r
-    machine petsc date message""".split()  # noqa: SIM905
+    machine load_average petsc date message""".split()  # noqa: SIM905
 
 
 def open_store(path: Path, key: Sequence[str], columns: Sequence[str]) -> ResumableCsv:
@@ -47,7 +48,8 @@ def scene_key(scene: Scene) -> tuple[str, str]:
 
 def environment() -> dict[str, str]:
     """What a run's seconds depend on, and when it was made."""
-    return {"machine": machine(), "petsc": versions()["petsc"], "date": date.today().isoformat()}
+    load = f"{os.getloadavg()[0]:.1f}"  # jobs that wanted a core when the run had ended
+    return {"machine": machine(), "load_average": load, "petsc": versions()["petsc"], "date": date.today().isoformat()}
 
 
 class _Enough(Exception):

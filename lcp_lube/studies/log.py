@@ -39,5 +39,14 @@ def _sections(path: Path, name: str, rows: Sequence[Row], text: str, pictures: S
     petsc = ", ".join(sorted({row["petsc"] for row in rows if row.get("petsc")}))
     span = dates[0] if len(dates) == 1 else f"{dates[0]} to {dates[-1]}" if dates else "never"
     links = ", ".join(os.path.relpath(picture, path.parent) for picture in pictures)
-    sections[name] = f"\n## {name}\n\n{links}: {len(rows)} runs, {span}, {machines}, PETSc {petsc}.\n\n{text}\n"
+    sections[name] = f"\n## {name}\n\n{links}: {len(rows)} runs, {span}, {machines}, PETSc {petsc}; {load(rows)}.\n\n{text}\n"
     return [sections[key] for key in sorted(sections)]
+
+
+def load(rows: Sequence[Row]) -> str:
+    """How busy the machine was, as the rows tell it: what their seconds are worth."""
+    told = sorted(float(row["load_average"]) for row in rows if row.get("load_average"))
+    untold = len(rows) - len(told)
+    said = [f"load average {told[0]:g} to {told[-1]:g} in {len(told)} runs"] if told else []
+    said += [f"not noted in {untold} stored ones" if told else "load average not noted"] if untold else []
+    return ", ".join(said)

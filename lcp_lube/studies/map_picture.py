@@ -14,7 +14,7 @@ from mpi4py import MPI
 
 from ..base.resumable import Row
 from ..problems.solution import Outcome
-from .drawing import new_figure, save
+from .drawing import WIDTH, new_figure, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -112,7 +112,11 @@ def picture(
     """All panels, with one colour scale and one legend; panels that are the same in every cell are drawn once."""
     down = unique(rows, panels.down) if panels.down else [""]
     titles = _merged(rows, panels, x, y)
-    lines_each = math.ceil(len(titles) / panels.columns)
+    words = max(
+        0.062 * len(x.label), *(0.078 * len(title) for title in titles.values())
+    )  # inches of the widest text of a panel
+    fits = max(1, min(panels.columns, int((WIDTH - 0.8) / (words + 0.1))))
+    lines_each = math.ceil(len(titles) / fits)
     columns = math.ceil(len(titles) / lines_each)
     kept = [row for row in rows if row[panels.across] in titles]
     blocks = {d: chosen(kept, **({panels.down: d} if panels.down else {})) for d in down}
@@ -156,8 +160,8 @@ def _crowded(labels: Sequence[str]) -> bool:
 
 
 def _height(rows: Sequence[Row], y: Axis) -> float:
-    """Of a panel in inches: a line of type for every cell."""
-    return max(0.75, 0.155 * len(values_of(rows, y)))
+    """Of a panel in inches: a line of type for every cell, and room for its label."""
+    return max(0.75, 0.155 * len(values_of(rows, y)), 0.064 * len(y.label))
 
 
 def _merged(rows: Sequence[Row], panels: Panels, x: Axis, y: Axis) -> dict[str, str]:
@@ -190,7 +194,7 @@ def _cells(axes: Axes, rows: Sequence[Row], panels: Panels, x: Axis, y: Axis, ri
 
     xs, ys = values_of(rows, x), values_of(rows, y)
     cells = np.full((len(ys), len(xs)), np.nan)
-    small = 6.0 if len(xs) <= 7 else 5.0  # points
+    small = 6.5  # points, the least that is read at a column's width
     for (at_x, at_y), here in groups(rows, (x.column, y.column)).items():
         i, j = xs.index(at_x), ys.index(at_y)
         failed = [row for row in here if not right(row)]
@@ -200,7 +204,7 @@ def _cells(axes: Axes, rows: Sequence[Row], panels: Panels, x: Axis, y: Axis, ri
             mark = FAILURES.get(worst, ("p", ""))[0]
             axes.plot(i - 0.22 * part, j, ls="none", marker=mark, mfc="none", ms=4.0, color="0.25")
             if part:
-                axes.text(i + 0.15, j, f"{len(failed)}/{len(here)}", ha="center", va="center", fontsize=small - 1.0)
+                axes.text(i + 0.15, j, f"{len(failed)}/{len(here)}", ha="center", va="center", fontsize=small)
             continue
         cells[j, i] = max(1, *(int(row["iterations"]) for row in here))
         colour = "white" if cells[j, i] > 60 else "black"

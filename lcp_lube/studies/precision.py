@@ -44,6 +44,11 @@ RECIPES: dict[int, dict[str, dict[str | None, int]]] = {
         "cavity": {"bcgs_amg": ALL},
     },
 }
+# The paper's other inner solvers, for its own method; dense LU in small sizes, where minutes begin with n = 1000 (table 8).
+PAPER: dict[int, dict[str | None, int]] = {
+    1: {"lu": 200, "mumps": 1000, "bjacobi": 200},
+    2: {"lu": 31, "mumps": 63, "bjacobi": 63},
+}
 ACCURACIES = {1: (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6), 2: (1e-1, 1e-2, 1e-3, 1e-4)}  # of auto --accuracy
 FINEST = {1: (100_000,), 2: (1500, 1500)}  # grids that it may go to
 
@@ -51,6 +56,8 @@ REPEATS = 3  # of which the median counts
 LONG = 0.3  # seconds; a longer run is not repeated: its clock is steady enough
 KRYLOV_MOST = 20_000  # iterations
 ENOUGH = 3.0  # seconds; after such a run a configuration is not tried on larger grids
+
+MARKS = "`-`: no run gets there. `not run`: none did on the grids run, and larger ones, which others have, would take minutes."
 
 KEY = ("scene", "data", "n", "method", "nested", "system", "recipe", "eps", "ranks")
 CLOCKS = ("wall_s", "cpu_s")
@@ -93,7 +100,8 @@ def configurations(dimension: int, quick: bool = False) -> Iterator[Configuratio
         tolerances = TOLERANCES[-1:] if method in FINAL else TOLERANCES
         for system in entry.systems or ("auto",):
             recipes = [*RECIPES[dimension].get(system, {None: ALL}).items()]
-            for recipe, most in recipes[:1] if quick else recipes:
+            more = [*PAPER[dimension].items()] if (method, system) == ("din", "full") else []
+            for recipe, most in recipes[:1] if quick else [*recipes, *more]:
                 first = recipe == (recipes[-1] if dimension == 2 else recipes[0])[0]  # the one for large grids
                 for nested in (False, True) if entry.nested and first else (False,):
                     for eps in tolerances:
@@ -134,7 +142,7 @@ def chart(sources: Sequence[str], quick: bool = False, results: Path = Path("lcp
     say(table)
     pictures = draw_all(rows, results / stem, store.comm)
     if not quick:
-        text = "\n".join([sentence(rows, "load"), "", *which(rows), "", "```text", table, "```"])
+        text = "\n".join([sentence(rows, "load"), "", *which(rows), "", MARKS, "", "```text", table, "```"])
         write_log(results, "precision", rows, text, pictures)
     say(
         f"{', '.join(map(str, pictures))}: {len(rows)} runs, {len(store.rows) - before} of them new; the others stood in "

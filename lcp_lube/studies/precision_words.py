@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from ..base.resumable import Row
+from ..output.table import table
 
 LEVELS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 PEER = "peer"  # what stands in the column `system` for other codes
@@ -65,11 +66,13 @@ def cheapest(rows: Sequence[Row]) -> list[str]:
     lines = []
     for scene, mine in by_scene(rows).items():
         head = f"{scene}: seconds of the fastest run whose load is within"
-        lines.append(head + "".join(f"{percent(level):>10}" for level in LEVELS))
+        cells = [[head, *map(percent, LEVELS)]]
         for method in dict.fromkeys(row["method"] for row in mine):
-            runs = [fastest([row for row in mine if row["method"] == method], level) for level in LEVELS]
-            cells = "".join(f"{seconds(run):>10.2g}" if run else f"{'-':>10}" for run in runs)
-            lines.append(f"  {method:<{len(head) - 2}}{cells}")
+            theirs = [row for row in mine if row["method"] == method]
+            runs = [fastest(theirs, level) for level in LEVELS]
+            none = "not run" if finest(theirs) < finest(mine) else "-"
+            cells.append([f"  {method}", *(f"{seconds(run):.2g}" if run else none for run in runs)])
+        lines += table(cells, align="<", least=[0, *[8] * len(LEVELS)])
         for level in LEVELS:
             run = fastest(mine, level)
             if run:
@@ -90,10 +93,25 @@ def which(rows: Sequence[Row], quantity: str = "load") -> list[str]:
             for theirs in (list(filter(published, mine)), [row for row in mine if row["system"] == PEER]):
                 rival = fastest(theirs, level, quantity)
                 label = f"{rival['method']}, " * (rival["system"] == PEER) if rival else ""
-                rivals.append(f"{label}{seconds(rival) / seconds(best):.2g} times" if rival else "-")
+                rivals.append(f"{label}{seconds(rival) / seconds(best):.2g} times" if rival else unreached(theirs, mine))
             name = describe(best).rpartition(": ")[0]
             lines.append(f"| {scene} | {percent(level)} | {name} | {time(best)} | {' | '.join(rivals)} |")
     return lines
+
+
+def finest(rows: Sequence[Row]) -> int:
+    """Points of the largest grid that some runs were made on."""
+    return max((int(row["points"]) for row in rows if row["points"]), default=0)
+
+
+def unreached(theirs: Sequence[Row], everyone: Sequence[Row]) -> str:
+    """Why no run of some reaches an accuracy: they were not run on grids as fine as others', or it is beyond them."""
+    if not theirs:
+        return "not run"
+    if finest(theirs) < finest(everyone):
+        largest = max((row["n"] for row in theirs if row["points"]), key=int)
+        return f"not run above {largest} a side: minutes"
+    return "does not get there"
 
 
 def describe(row: Row) -> str:

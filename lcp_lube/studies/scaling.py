@@ -15,6 +15,7 @@ from typing import Any
 
 from ..base.resumable import ResumableCsv, Row
 from ..output.console import say
+from ..output.table import table as lines_of
 from ..scenes.scene import load_scene
 from .experiment import open_store, run
 from .scaling_picture import draw
@@ -27,7 +28,7 @@ REPEATS = 3
 CHOICES: dict[str, Any] = {"method": "active-set", "system": "cavity", "recipe": "bcgs_amg", "nested": True}
 
 KEY = ("kind", "scene", "n", "ranks")
-COLUMNS = ("wall_s", "cpu_s", "runs", "levels", "finest_linear", "memory_mb", "load_average")
+COLUMNS = ("wall_s", "cpu_s", "runs", "levels", "finest_linear", "memory_mb")
 
 
 def chart(quick: bool = False, results: Path = Path("lcp_lube_results")) -> int:
@@ -82,7 +83,6 @@ def fill(store: ResumableCsv, kind: str, scene: str, n: int, repeats: int) -> Ro
         "runs": repeats,
         "levels": " ".join(str(level["iterations"]) for level in first["levels"]),
         "finest_linear": first["linear_iterations"],
-        "load_average": f"{os.getloadavg()[0]:.1f}",
     }
     row = store.add({**values, "kind": kind, "scene": scene, "n": n, "ranks": store.comm.size})
     say(f"{kind} {scene} {n} x {n}, {store.comm.size} ranks: {row['outcome']}, {row['iterations']} steps, {row['wall_s']} s")
@@ -91,17 +91,15 @@ def fill(store: ResumableCsv, kind: str, scene: str, n: int, repeats: int) -> Ro
 
 def table(rows: list[Row]) -> list[str]:
     """The rows as lines; speed-up against one rank on the same grid (strong) and seconds against it (weak)."""
-    lines = [f"{'':<26}{'ranks':>6}{'s':>9}{'us/point':>10}{'against 1':>10}{'steps':>7}{'Krylov':>7}{'MB':>8}"]
+    cells = [["", "", "", "ranks", "s", "us/point", "against 1", "steps", "Krylov", "MB"]]
     for row in sorted(rows, key=lambda row: (row["kind"], row["scene"], int(row["n"]), int(row["ranks"]))):
         one = reference(rows, row)
         seconds = float(row["wall_s"])
         ratio = f"{float(one['wall_s']) / seconds:.2f}" if one and can_time(row) else ""
-        lines.append(
-            f"{row['kind']:<7}{row['scene']:<10}{row['n']:>6}   {row['ranks']:>6}{seconds:>9.2f}"
-            f"{1e6 * seconds / int(row['n']) ** 2:>10.2f}{ratio:>10}{row['iterations']:>7}{row['finest_linear']:>7}"
-            f"{float(row['memory_mb'] or 0):>8.0f}"
-        )
-    return lines
+        point = f"{1e6 * seconds / int(row['n']) ** 2:.2f}"
+        counts = (row["iterations"], row["finest_linear"], f"{float(row['memory_mb'] or 0):.0f}")
+        cells.append([row["kind"], row["scene"], row["n"], row["ranks"], f"{seconds:.2f}", point, ratio, *counts])
+    return lines_of(cells, align="<<")
 
 
 def reference(rows: list[Row], row: Row) -> Row | None:

@@ -161,7 +161,7 @@ def _map(axes: Axes, rows: Sequence[Row]) -> None:
         if converged(row):
             cells[j, i] = float(row["iterations"])
             colour = "white" if cells[j, i] > 130 else "black"
-            axes.text(i, j, row["iterations"], ha="center", va="center", fontsize=6.0, color=colour)
+            axes.text(i, j, row["iterations"], ha="center", va="center", fontsize=6.5, color=colour)
         else:
             axes.plot(i, j, ls="none", marker=FAILURES[row["outcome"]][0], ms=3.5, color="0.45")
     axes.imshow(cells, origin="lower", cmap="Blues", norm=LogNorm(15, 500), aspect="equal")

@@ -2,6 +2,7 @@
 
 import re
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -15,6 +16,7 @@ from ..cli.asked import solution_of
 from ..errors import InputError
 from ..output.console import say
 from ..output.results import as_dict, machine
+from ..output.table import line
 from ..problems.solution import Solution
 from ..registry import PACKAGE
 from .table_specs import PAPERS, Spec
@@ -125,7 +127,7 @@ def run_published_table(
         record = store.find(command=command, ranks=store.comm.size)
         if stored and record is None:
             absent += 1
-            say(f"{layout.name(printed)}not run")
+            say(layout.name(printed, "not run"))
             continue
         if record is not None and not stored and not store.current(record):
             stale, record = stale + 1, None
@@ -134,7 +136,7 @@ def run_published_table(
             values = {"command": command, "ranks": store.comm.size, **run_command(command, spec.points)}
             if values["outcome"] == "refused":
                 refused += 1
-                say(f"{layout.name(printed)}refused: {values['message']}")
+                say(layout.name(printed, f"refused: {values['message']}"))
                 continue
             record = store.add(values)
         age = store.age(record)
@@ -198,15 +200,20 @@ class _Layout:
         return 2 * max(self.widths[name], 5) + 4
 
     def head(self) -> str:
-        return "  ".join([f"{n:<{self.widths[n]}}" for n in self.names] + [f"{n:^{self._width(n)}}" for n in self.measured])
+        return self._row(self.names, self.measured, "^")
 
-    def name(self, printed: Row) -> str:
-        return "".join(f"{printed[n]:<{self.widths[n]}}  " for n in self.names)
+    def name(self, printed: Row, said: str) -> str:
+        """A row that has no numbers, and why."""
+        return self._row([printed[n] for n in self.names], [said], "<")
+
+    def _row(self, names: Sequence[str], cells: Sequence[str], side: str) -> str:
+        widths = [*(self.widths[n] for n in self.names), *map(self._width, self.measured)]
+        return line([*names, *cells], widths, "<" * len(names) + side * len(cells))
 
     def line(self, printed: Row, record: Row) -> str:
         cells = [self._cell(n, printed[n], _ours(n, record)) for n in self.measured]
         outcome = "" if record["outcome"] == "converged" else f"  {record['outcome']}"
-        return self.name(printed) + "  ".join(cells) + outcome
+        return self._row([printed[n] for n in self.names], cells, "<") + outcome
 
     def _cell(self, name: str, printed: str, ours: str) -> str:
         ours = _rounded(ours, printed)
