@@ -25,7 +25,7 @@ from lcp_lube.studies.map_picture import Axis, Panels, tick
 from lcp_lube.studies.map_picture import picture as map_picture
 from lcp_lube.studies.outcome_map import tallies, tally
 from lcp_lube.studies.precision_picture import against_krylov, against_seconds, parts
-from lcp_lube.studies.precision_words import cheapest, error, fastest, front, loose, seconds, sentence, which
+from lcp_lube.studies.precision_words import cheapest, error, fastest, front, loose, seconds, sentence, timed, which
 from lcp_lube.studies.reference import WRONG, References
 from lcp_lube.studies.starts_picture import apart, chosen, converged, equal_starts, lines_sentence, map_sentence
 
@@ -157,6 +157,39 @@ def test_what_was_not_run_is_told_from_what_is_beyond_a_method() -> None:
     tried = [*coarse, row("din", 40, 1e-3)]
     assert "does not get there" in which(tried)[-1]
     assert any(text.startswith("  din ") and text.endswith("-         -") for text in cheapest(tried))
+
+
+def test_seconds_of_another_or_a_busy_machine_are_not_compared() -> None:
+    run = {
+        "scene": "a",
+        "system": "auto",
+        "method": "fas",
+        "nested": "False",
+        "recipe": "r",
+        "n": "9",
+        "points": "9",
+        "eps": "1e-8",
+    }
+    run |= {
+        "cpu_s": "1",
+        "wall_s": "1",
+        "outcome": "converged",
+        "load_error": "1e-5",
+        "machine": "one, 2 cores",
+        "load_average": "",
+    }
+    fast = {**run, "cpu_s": "0.1"}
+    rows = [
+        run,
+        run,
+        run,
+        {**fast, "machine": "other, 2 cores"},
+        {**fast, "load_average": "2.5"},
+        {**run, "load_average": "1.5"},
+    ]
+    assert timed(rows) == [run, run, run, rows[-1]]
+    assert sentence(rows, "load").endswith("Seconds are not compared of 2 runs of another or a busy machine.")
+    assert "| 1 s |" in which(rows)[-1]
 
 
 def test_the_load_of_the_machine_is_told() -> None:
@@ -361,7 +394,7 @@ def test_log_has_one_section_a_chart(tmp_path: Path) -> None:
     assert written.count("## ") == 2
     assert "first" not in written
     assert written.index("## a") < written.index("## b")
-    assert "b.png: 1 runs, 2026-01-02, a machine, PETSc 3.18.5." in written
+    assert "b.png: 1 runs, 2026-01-02, a machine, PETSc 3.18.5; load average not noted." in written
 
 
 @pytest.mark.rounding

@@ -61,3 +61,19 @@ def test_scenes(block, tmp_path, environment):
     (tmp_path / "my.toml").write_text(block)
     done = run(["lcp-lube", "solve", "my.toml"], tmp_path, environment)
     assert done.returncode == 0, done.stderr
+
+
+def test_what_is_said_of_the_maps_is_what_their_csv_say():
+    root = README.parent
+    script = [sys.executable, str(root / "benchmarks" / "map_table.py")]
+    *table, _, words = subprocess.run(script, check=True, capture_output=True, text=True).stdout.strip().split("\n")
+    compared = (root / "docs" / "comparison.md").read_text(encoding="utf-8")
+    assert all(line in compared for line in table)
+    assert words in README.read_text(encoding="utf-8")
+
+
+def test_what_is_said_of_the_precision_chart_is_what_it_says():
+    charts = (README.parent / "benchmarks" / "results" / "CHARTS.md").read_text(encoding="utf-8")
+    times = re.search(r"Within 1 % fastest: .*? takes ([\d.]+ to [\d.]+) times", charts)
+    assert times is not None
+    assert f"takes {times[1]} times as long for 1 %" in README.read_text(encoding="utf-8")

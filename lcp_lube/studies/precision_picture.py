@@ -12,7 +12,7 @@ from mpi4py import MPI
 from ..base.resumable import Row
 from ..registry import METHODS
 from .drawing import look, new_figure, save
-from .precision_words import ASKED, PEER, by_scene, error, fastest, front, loose, percent, seconds, sentence, time
+from .precision_words import ASKED, PEER, by_scene, error, fastest, front, loose, percent, seconds, sentence, time, timed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,15 +49,16 @@ def draw_all(rows: Sequence[Row], stem: Path, comm: MPI.Comm) -> list[Path]:
 def against_seconds(rows: Sequence[Row], quantity: str) -> Figure:
     """A panel a scene; of each method the cheapest run on every grid, and the Pareto front, named where asked."""
     shown = drawn(rows)
-    told = {row["scene"] for row in rows if error(row, quantity) is not None}  # several cavities have no one rupture point
-    rows = [row for row in rows if row["scene"] in told]
+    solved = {row["scene"] for row in rows if row["outcome"] == "converged"}
+    told = {row["scene"] for row in rows if error(row, quantity) is not None}
+    rows = [row for row in rows if row["scene"] in told or row["scene"] not in solved]  # several cavities: no one rupture point
     text = (
         "Of a method's systems, recipes and tolerances the fastest run on each grid; filled: the grid's error prevails, open: "
         "what the iteration leaves. Grey band: doubt of a reference that is not exact. "
         f"{left_out(shown, rows)}{sentence(rows, quantity)}"
     )
     figure, panels = _panels(shown, rows, text, AXES[quantity], "seconds", "Pareto front")
-    for scene, mine in by_scene(rows).items():
+    for scene, mine in by_scene(timed(rows)).items():
         axes = panels[scene]
         best = front(mine, quantity)
         axes.step([seconds(r) for r in best], _errors(best, quantity), where="post", color="0.8", lw=4.0, zorder=1)

@@ -1,5 +1,6 @@
 """What the precision chart says in words: which run is cheapest for an accuracy, and what fails, from the rows alone."""
 
+import re
 from collections import Counter
 from collections.abc import Sequence
 
@@ -14,6 +15,24 @@ ASKED = (1e-2, 1e-4)  # what the pictures answer: a per cent, a hundredth of it
 def seconds(row: Row) -> float:
     """What a run costs: seconds by the clock, or of the processor where that is less, because other jobs slowed the clock."""
     return min(float(row["wall_s"]), float(row["cpu_s"]))
+
+
+def timed(rows: Sequence[Row]) -> list[Row]:
+    """The rows whose seconds may be compared: of the machine that made most of them, without those made while it was busy.
+
+    Where most were made while it was busy, none is left out.
+    """
+    machine = Counter(row.get("machine") for row in rows).most_common(1)[0][0] if rows else None
+    cores = int(found[1]) if (found := re.search(r"(\d+) cores", machine or "")) else 1
+    here = [row for row in rows if row.get("machine") == machine]
+    quiet = [row for row in here if float(row.get("load_average") or 0.0) <= cores]
+    return quiet if 2 * len(quiet) > len(here) else here
+
+
+def untimed(rows: Sequence[Row]) -> str:
+    """How many rows count for outcomes and iterations alone."""
+    count = len(rows) - len(timed(rows))
+    return f" Seconds are not compared of {count} runs of another or a busy machine." if count else ""
 
 
 def error(row: Row, quantity: str) -> float | None:
@@ -64,7 +83,7 @@ def by_scene(rows: Sequence[Row]) -> dict[str, list[Row]]:
 def cheapest(rows: Sequence[Row]) -> list[str]:
     """Lines of a table: for each scene and method the seconds of its fastest run within each of LEVELS, and which one it is."""
     lines = []
-    for scene, mine in by_scene(rows).items():
+    for scene, mine in by_scene(timed(rows)).items():
         head = f"{scene}: seconds of the fastest run whose load is within"
         cells = [[head, *map(percent, LEVELS)]]
         for method in dict.fromkeys(row["method"] for row in mine):
@@ -83,7 +102,7 @@ def cheapest(rows: Sequence[Row]) -> list[str]:
 def which(rows: Sequence[Row], quantity: str = "load") -> list[str]:
     """Which method when, as a table in Markdown: the fastest run for each of ASKED, and how much longer others take."""
     lines = ["| scene | error of the load | fastest | s | paper's DIN | other codes |", "|---|---|---|---|---|---|"]
-    for scene, mine in by_scene(rows).items():
+    for scene, mine in by_scene(timed(rows)).items():
         for level in ASKED:
             best = fastest(mine, level, quantity)
             if best is None:
@@ -141,7 +160,7 @@ def failures(rows: Sequence[Row]) -> str:
 def sentence(rows: Sequence[Row], quantity: str) -> str:
     """For each of ASKED which method is fastest on how many scenes, and how much longer the paper's DIN takes."""
     parts = []
-    scenes = by_scene(rows)
+    scenes = by_scene(timed(rows))
     for level in ASKED:
         bests = {scene: best for scene, mine in scenes.items() if (best := fastest(mine, level, quantity))}
         wins = Counter(row["method"] for row in bests.values())
@@ -153,4 +172,4 @@ def sentence(rows: Sequence[Row], quantity: str) -> str:
         lost = len(scenes) - len(bests)
         text += f"; on {lost} of {len(scenes)} scenes no run gets there" if lost else ""
         parts.append(f"{text}." if bests else f"Within {percent(level)}: no run.")
-    return f"{' '.join(parts)} {failures(rows)}"
+    return f"{' '.join(parts)} {failures(rows)}{untimed(rows)}"
