@@ -11,7 +11,7 @@ export PRTE_MCA_rmaps_default_mapping_policy := :oversubscribe
 # The ranks are the parallelism; threads inside each would only compete.
 export OMP_NUM_THREADS := 1
 
-.PHONY: help setup demo test test-rounding test-petsc-new boundscheck mutations lint format charts clean
+.PHONY: help setup demo test test-rounding test-petsc-new boundscheck mutations lint format charts pictures clean
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | expand -t 16
@@ -55,6 +55,9 @@ format: $(READY) ## let ruff rewrite the code
 charts: $(READY) ## make the runs that benchmarks/results lacks, then draw all charts
 	$(BIN)/python benchmarks/precision_peers.py
 	for chart in precision stability scaling; do $(BIN)/lcp-lube chart $$chart --results benchmarks/results || exit; done
+
+pictures: $(READY) ## draw the pictures of README.md and docs/ anew
+	$(BIN)/python tools/pictures.py
 
 clean: ## remove caches and build products; .venv stays
 	rm -rf build dist *.egg-info .coverage .hypothesis .mypy_cache .pytest_cache .ruff_cache problem4.png

@@ -232,7 +232,7 @@ def test_panels_of_the_full_chart_can_be_read(draw: Any, printed: None) -> None:
     black = [str(line.get_label()) for line in legend.get_lines() if line.get_color() == "#000000"]
     assert all(name.startswith("other codes") for name in black)  # a colour that no method has
     assert overlapping(figure) == []
-    assert min(text.get_fontsize() for text in figure.findobj(Text) if text.get_text().strip()) >= 6.5
+    assert min(float(text.get_fontsize()) for text in figure.findobj(Text) if text.get_text().strip()) >= 6.5
 
 
 @pytest.mark.parametrize("name", ["film_ratio", "roughness", "supply_speed", "conditions", "inner_tolerance", "turning_point"])
@@ -241,7 +241,7 @@ def test_full_maps_can_be_read(name: str, printed: None) -> None:
     rows = stored(f"stability_{name}")
     figure = map_picture(rows, module.panels, module.x, module.y, module.sentence(rows), module.right)
     assert overlapping(figure) == []
-    assert min(text.get_fontsize() for text in figure.findobj(Text) if text.get_text().strip()) >= 6.5
+    assert min(float(text.get_fontsize()) for text in figure.findobj(Text) if text.get_text().strip()) >= 6.5
 
 
 def test_failures_are_rows_and_crosses(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
