@@ -189,6 +189,8 @@ class Fas:
         if k + 1 == len(self._levels):
             for s in range(2):
                 self._relax(level, max(COARSEST_SWEEPS, 2 * level.nx, 2 * level.ny) // 2, s == 1)
+            if not level.split:
+                self._kernels.solve_exactly(level.z, level.kx, level.ky, level.c, *level.periodic, 10)
             level.seconds += perf_counter() - begin
             return
         coarse = self._levels[k + 1]
