@@ -55,7 +55,7 @@ FILMS = {
     "journal .5": ("journal", {"eccentricity": 0.5}, 0.1),
     "journal .95": ("journal", {"eccentricity": 0.95}, 0.1),
     "journal .99": ("journal", {"eccentricity": 0.99}, 0.1),
-    "dimples": ("textured_slider", {"K": 4}, 0.35),
+    "dimples": ("textured_slider", {"K": 4}, 0.2),
     "rough": ("rough", {}, 0.2),
     "rough, film ratio 100": ("rough", {"amplitude": 15e-6, "h_floor": 5e-7, "cells": 20}, 0.2),
 }
@@ -110,18 +110,79 @@ def test_full_multigrid_alone_is_as_good_as_the_grid():
         solution.destroy()
 
 
-@pytest.mark.parametrize(
-    "changes", [{"K": 3, "depth": 135e-6}, {"K": 2, "depth": 135e-6, "p_a": 1e4, "p_b": 1e4, "p_side": 1e4}]
-)
-def test_hard_films_are_handed_over_within_few_cycles(changes):
+@pytest.mark.parametrize("changes", [{"K": 3}, {"K": 2, "p_a": 1e4, "p_b": 1e4, "p_side": 1e4}, {"K": 8, "n": 100}])
+def test_deep_dimples_are_not_handed_over(changes):
+    """Film ratio 10. Where a coarse grid no longer sees the dimples, the one above it is solved exactly."""
+    changes = {**changes, "depth": 135e-6}
     solution, other = run("textured_slider", changes), solve(load_scene("textured_slider", changes), method="active-set")
-    assert solution.converged and other.converged
-    if solution.settings["took_over"]:
-        assert solution.settings["method"] == "active-set" and solution.settings["details"]["cycles"] <= 5
-        assert "stalled" in solution.message
+    assert solution.converged and solution.settings["took_over"] is None, solution.message
+    assert solution.settings["details"]["cycles"] <= 20
     agree(solution, other, 1e-5)
     solution.destroy()
     other.destroy()
+
+
+class Pad:
+    """A tilted pad with a square pocket."""
+
+    def __init__(self, start, end, depth):
+        self.start, self.end, self.depth = start, end, depth
+
+    def __call__(self, x, y=0.0):
+        x, y = np.broadcast_arrays(np.asarray(x) / 0.1, np.asarray(y) / 0.1)
+        pocket = (abs(x - 0.5) < 0.2) & (abs(y - 0.5) < 0.2)
+        return self.start + (self.end - self.start) * x + np.where(pocket, self.depth, 0.0)
+
+
+@pytest.mark.parametrize("n", [75, 100, 150])
+@pytest.mark.parametrize("depth", [1e-4, 1e-3, 1e-2])
+@pytest.mark.parametrize("heights", [(1e-5, 1e-5), (13e-6, 7e-6), (7e-6, 13e-6)])
+def test_deep_pockets(heights, depth, n):
+    """Conductances that differ by up to 1e9: a pocket is a region of one pressure, also where two coarse points lie in it."""
+    scene = FilmScene.of(Pad(*heights, depth), dimension=2, nx=n, ny=n, U=1.0, **ROUND)
+    solution = solve(scene, method="fas")
+    assert solution.converged and solution.settings["took_over"] is None, solution.message
+    assert solution.settings["details"]["cycles"] <= 8
+    assert solution.certificate.measures["mass_defect"] < 1e-5
+    if n == 75 and depth < 1e-2:  # there rounding leaves the direct solver's own pressure uncertain by 1e-4
+        other = solve(scene, method="active-set", nested=False)
+        agree(solution, other, 1e-5)
+        other.destroy()
+    solution.destroy()
+
+
+@pytest.mark.parametrize("shape", [(72, 37), (128, 63), (101, 50)])
+@pytest.mark.parametrize("eccentricity", [0.5, 0.9])
+def test_films_closed_to_a_ring(eccentricity, shape):
+    """Their fronts cross the seam, which nobody may see."""
+    changes = {"nx": shape[0], "ny": shape[1], "eccentricity": eccentricity, "round": "periodic", "p_side": 1e5}
+    solution, other = run("journal", changes), solve(load_scene("journal", changes), method="active-set")
+    assert solution.converged and solution.settings["took_over"] is None, solution.message
+    assert solution.settings["details"]["convergence_factor"] < 0.45
+    agree(solution, other)
+    solution.destroy()
+    other.destroy()
+
+
+@pytest.mark.parametrize("rings", [(False, False), (True, False), (False, True)])
+def test_the_coarsest_grid_is_solved_exactly(rings):
+    """By elimination, whatever the conductances: to rounding, with periodic sides too."""
+    from lcp_lube.solvers.fas import exact
+
+    random = np.random.default_rng(3)
+    for ny, nx in ((1, 9), (2, 2), (7, 4), (5, 12), (20, 17)):
+        kx, ky = 10.0 ** random.uniform(-3, 3, (ny + 2, nx + 3)), 10.0 ** random.uniform(-3, 3, (ny + 3, nx + 2))
+        z, c = np.zeros((ny + 2, nx + 2)), random.standard_normal((ny + 2, nx + 2))
+        c += 0.5 - c[:, 1:-1].mean(axis=1, keepdims=True)  # a closed line that takes in void for ever has no solution
+        if rings[0]:
+            kx[:, nx + 1] = kx[:, 1]
+        if rings[1]:
+            ky[ny + 1] = ky[1]
+        z[1:-1, 1:-1] = random.standard_normal((ny, nx))
+        exact.wrap(z, *rings)
+        assert exact.solve(z, kx, ky, c, *rings)
+        terms = (np.abs(c) ** 2).sum() + (kx.max() * np.abs(z).max()) ** 2
+        assert exact.residual_square(z, kx, ky, c) < 1e-24 * terms
 
 
 @settings(max_examples=30, deadline=None)
@@ -282,7 +343,8 @@ def test_any_number_of_ranks(tmp_path: Path, serial, ranks):
             assert found["outcome"] == expected["outcome"] == "converged", (name, found["message"])
             assert found["levels"] == expected["levels"], name
             if expected["took_over"] is None:
-                assert found["took_over"] is None and abs(found["iterations"] - expected["iterations"]) <= 1, name
+                slack = 3 if name == "hard" else 1  # the cycles stall there, and a finer grid is solved exactly
+                assert found["took_over"] is None and abs(found["iterations"] - expected["iterations"]) <= slack, name
             for field, whole in values.items():
                 tolerance = 1e-7 * max(np.abs(whole).max(), 1e-3)
                 np.testing.assert_allclose(fields[f"{name}_{field}"], whole, rtol=0, atol=tolerance, err_msg=name)

@@ -31,7 +31,8 @@ from ..steplength import StepLengthError
 EPS = float(np.finfo(float).eps)
 WINDOW = 3  # cycles over which the fall of ||G|| is judged
 TRUNCATIONS = {"none": 0, "clip": 1, "points": 2}  # see `fas_kernels.correct`
-COARSEST_SWEEPS = 40
+COARSEST_SWEEPS = 40  # where its Newton steps do not settle
+EXACT = (1200, 5000, 10_000)  # points of the coarsest grid once the cycles have stalled, and stalled again
 BORDER = 4  # lines on either side of the border between two ranks
 
 
@@ -74,7 +75,7 @@ class Fas:
     start : fields p and r.
     """
 
-    state: tuple[str, ...] = ("z", "norm", "_recent", "_taken", "_first")  # what a cycle starts from
+    state: tuple[str, ...] = ("z", "norm", "_recent", "_taken", "_first", "_depth")  # what a cycle starts from
 
     def __init__(
         self, problem: LubricationProblem, stages: Stages, options: FasOptions, eps1: float, start: Fields | None = None
@@ -88,6 +89,7 @@ class Fas:
         self._harmonic, self._truncation = options.weights == "harmonic", TRUNCATIONS[options.truncation]
         with stages("assembly"):
             self._levels = fas_levels.hierarchy(fas_levels.finest(problem), self._harmonic)
+        self._depth = len(self._levels)
         self._c_norm = problem.reduce.norm(problem.c)
         self._recent: tuple[float, ...] = (inf,) * WINDOW
         self._taken, self._first, self._correction = 0, inf, 0.0
@@ -148,12 +150,15 @@ class Fas:
         ------
         StepLengthError : ||G|| has stalled.
         """
+        anew = self._taken == 0
         if self.norm > self.options.stall * self._recent[0] and self.norm > self.eps1:
-            if not self.norm < 1.0:
-                self.z = np.zeros(self.problem.grid.local_size)  # nothing to start from (`run.Run.take_over`)
-            raise StepLengthError(f"||G|| is at {self.norm:.1e} of ||c|| after {self._taken} cycles and has stalled")
+            if not self._retreat():
+                if not self.norm < 1.0:
+                    self.z = np.zeros(self.problem.grid.local_size)  # nothing to start from (`run.Run.take_over`)
+                raise StepLengthError(f"||G|| is at {self.norm:.1e} of ||c|| after {self._taken} cycles and has stalled")
+            anew = not self.norm < self._first
         with self.stages("cycles"):
-            if self._taken == 0:
+            if anew:
                 self._full_multigrid()
             else:
                 self._cycle(0, self.options.cycle)
@@ -168,13 +173,26 @@ class Fas:
         step = self.problem.reduce.comm.allreduce(self._correction) if self._levels[0].comm is not None else self._correction
         return Step(self.norm, float(np.sqrt(step)), 1.0)
 
+    def _retreat(self) -> bool:
+        """Do without the coarsest grids, on which the film's cavities are too small to be seen; false if that has been tried.
+
+        The finest grid that can be solved exactly takes their place: the problem's own one if it is small.
+        """
+        own = self._levels[0].nx * self._levels[0].ny
+        for points in EXACT if own > EXACT[-1] else EXACT[-1:]:
+            for k, level in enumerate(self._levels[: self._depth - 1]):
+                if level.nx * level.ny <= points:
+                    self._depth, self._recent = k + 1, (inf,) * WINDOW
+                    return True
+        return False
+
     def _full_multigrid(self) -> None:
         """From the coarsest grid up, one cycle on each. Collective."""
-        for k in reversed(range(len(self._levels))):
+        for k in reversed(range(self._depth)):
             level = self._levels[k]
             if k:
                 level.c[:] = level.f
-            if k + 1 < len(self._levels):
+            if k + 1 < self._depth:
                 coarse = self._levels[k + 1]
                 where = (level.first, level.by_x, level.by_y, self._harmonic)
                 self._kernels.interpolate(level.z, coarse.part(coarse.z), level.kx, level.ky, *where)
@@ -186,11 +204,11 @@ class Fas:
         begin, o = perf_counter(), self.options
         level = self._levels[k]
         level.visits += 1
-        if k + 1 == len(self._levels):
-            for s in range(2):
-                self._relax(level, max(COARSEST_SWEEPS, 2 * level.nx, 2 * level.ny) // 2, s == 1)
-            if not level.split:
-                self._kernels.solve_exactly(level.z, level.kx, level.ky, level.c, *level.periodic, 10)
+        if k + 1 == self._depth:
+            self._correction = 0.0
+            if not self._tools.solve(level):
+                for s in range(2):
+                    self._relax(level, max(COARSEST_SWEEPS, 2 * level.nx, 2 * level.ny) // 2, s == 1)
             level.seconds += perf_counter() - begin
             return
         coarse = self._levels[k + 1]
@@ -203,15 +221,18 @@ class Fas:
         self._kernels.add_balance(coarse.old, coarse.kx, coarse.ky, coarse.c)
         level.seconds += perf_counter() - begin
         self._cycle(k + 1, kind)
-        if kind != "V" and k + 2 < len(self._levels):
+        if kind != "V" and k + 2 < self._depth:
             self._cycle(k + 1, "V" if kind == "F" else kind)
         begin = perf_counter()
         fine = (level.z, coarse.part(coarse.z), coarse.part(coarse.old), level.kx, level.ky)
         self._correction = self._kernels.correct(*fine, *where, self._harmonic, self._truncation)  # type: ignore[arg-type]
         level.share(level.z)
         if o.front:
-            level.work += self._kernels.relax_front(level.z, level.kx, level.ky, level.c, o.front, o.width)
-            level.share(level.z)
+            # What lies beyond a periodic side must be new at each sweep: else fronts that cross it wander for ever.
+            parts = o.front if any(level.periodic) else 2 if level.split else 1
+            for count in (o.front // parts + (n < o.front % parts) for n in range(parts)):
+                level.work += self._kernels.relax_front(level.z, level.kx, level.ky, level.c, count, o.width)
+                level.share(level.z)
         self._relax(level, o.post, True)
         level.seconds += perf_counter() - begin
 
@@ -220,8 +241,8 @@ class Fas:
 
         That makes up for what these did not hear of: the factor is that of one rank, where without it it doubles.
         """
-        if sweeps:
-            self._kernels.sweep(level.z, level.kx, level.ky, level.c, sweeps, down)
+        for count in [1] * sweeps if level.periodic[0] else [sweeps] * bool(sweeps):
+            self._kernels.sweep(level.z, level.kx, level.ky, level.c, count, down)
             level.share(level.z)
         if sweeps and level.split:
             for first in (0, level.z.shape[0] - BORDER - 2):

@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from ...base.compiled import kernel
 from ...base.parallel import Array
 
+REACH = 8  # cells within which a cavity ends, if it does so at the front that is looked at
+
 
 @kernel
 def sweep(z: Array, kx: Array, ky: Array, c: Array, count: int, down: bool) -> None:
@@ -350,13 +352,24 @@ def inject(z: Array, out: Array, y0: int, by_x: bool, by_y: bool) -> None:
 
 
 @kernel
+def reforms(z: Array, m: int, i: int) -> bool:
+    """Whether the film is full again soon to the east of point i of row m."""
+    east, last = i + 1, min(i + REACH, z.shape[1] - 2)
+    while east <= last and z[m, east] <= 0.0:
+        east += 1
+    return east <= last
+
+
+@kernel
 def correct(
     z: Array, new: Array, old: Array, kx: Array, ky: Array, y0: int, by_x: bool, by_y: bool, harmonic: bool, truncation: int
 ) -> float:
     """Add the interpolated new - old of the coarse grid; returns the sum of squares of what was added.
 
-    truncation: 0 none; 1 a point that would cross its front stops there; 2 no correction at all at points that would, or that
-    have a coarse neighbour that lies, or lay, on the other side.
+    Where the film reforms, what flows back into the cavity returns: a point between that and a coarse point in the full film is
+    corrected as the latter, not by a part of it.
+    truncation: 0 none; 1 that, and a point that would cross its front stops there; 2 no correction at all at points that
+    would, or that have a coarse neighbour that lies, or lay, on the other side.
     """
     ny, nx = z.shape[0] - 2, z.shape[1] - 2
     south, north, e = np.zeros(nx + 2), np.zeros(nx + 2), np.zeros(nx + 2)
@@ -376,7 +389,18 @@ def correct(
             for i in range(1, nx + 1):
                 v = share(ky[m, i], ky[m + 1, i], harmonic)
                 e[i] = v * south[i] + (1.0 - v) * north[i]
+            if truncation == 1:
+                for i in range(1, nx + 1):
+                    if z[m, i] > 0.0:
+                        if z[m - 1, i] <= 0.0 and z[m + 1, i] > 0.0 and reforms(z, m - 1, i):
+                            e[i] = north[i]
+                        elif z[m + 1, i] <= 0.0 and z[m - 1, i] > 0.0 and reforms(z, m + 1, i):
+                            e[i] = south[i]
             before = -2
+        if truncation == 1 and by_x:
+            for i in range(1, nx, 2):
+                if z[m, i] > 0.0 and z[m, i - 1] <= 0.0 and z[m, i + 1] > 0.0:
+                    e[i] = e[i + 1]
         if truncation == 2:
             last = row + (by_y and j % 2 == 0)
             for i in range(1, nx + 1):
@@ -520,65 +544,3 @@ def pressure_and_void(z: Array, b_C: Array) -> tuple[Array, Array]:
             p[j, i] = here if here > 0.0 else 0.0
             r[j, i] = here / b_C[j, i] if here < 0.0 else 0.0
     return p, r
-
-
-@kernel
-def solve_exactly(z: Array, kx: Array, ky: Array, c: Array, ring_x: bool, ring_y: bool, most: int) -> bool:
-    """Newton's method (active set) on one small grid, by elimination; returns whether the signs of z settled.
-
-    Sweeps alone would take as many as the conductances differ by where two points of a grid lie in one deep pocket.
-    """
-    ny, nx = z.shape[0] - 2, z.shape[1] - 2
-    n = nx * ny
-    wide = ny <= nx  # the shorter direction runs fastest, so that elimination meets few rows
-    J, d = np.zeros((n, n)), np.zeros(n)
-    G = np.zeros(nx + 2)
-    for _ in range(most):
-        J[:] = 0.0
-        for m in range(1, ny + 1):
-            balance_row(z, kx, ky, m, G)
-            for i in range(1, nx + 1):
-                at = (i - 1) * ny + m - 1 if wide else (m - 1) * nx + i - 1
-                d[at] = c[m, i] - G[i]
-                full = z[m, i] > 0.0
-                k_W, k_E, k_S, k_N = kx[m, i], kx[m, i + 1], ky[m, i], ky[m + 1, i]
-                J[at, at] += k_W + k_E + k_S + k_N if full else 1.0
-                east = i + 1 if i < nx else (1 if ring_x else 0)
-                west = i - 1 if i > 1 else (nx if ring_x else 0)
-                north = m + 1 if m < ny else (1 if ring_y else 0)
-                south = m - 1 if m > 1 else (ny if ring_y else 0)
-                if east:
-                    J[(east - 1) * ny + m - 1 if wide else (m - 1) * nx + east - 1, at] -= k_E if full else 1.0
-                if full and west:
-                    J[(west - 1) * ny + m - 1 if wide else (m - 1) * nx + west - 1, at] -= k_W
-                if full and north:
-                    J[(i - 1) * ny + north - 1 if wide else (north - 1) * nx + i - 1, at] -= k_N
-                if full and south:
-                    J[(i - 1) * ny + south - 1 if wide else (south - 1) * nx + i - 1, at] -= k_S
-        for k in range(n):
-            if J[k, k] <= 0.0:
-                return False
-            for row in range(k + 1, n):
-                if J[row, k] != 0.0:
-                    f = J[row, k] / J[k, k]
-                    for col in range(k + 1, n):
-                        J[row, col] -= f * J[k, col]
-                    d[row] -= f * d[k]
-        for k in range(n - 1, -1, -1):
-            for col in range(k + 1, n):
-                d[k] -= J[k, col] * d[col]
-            d[k] /= J[k, k]
-        changed = 0
-        for m in range(1, ny + 1):
-            for i in range(1, nx + 1):
-                at = (i - 1) * ny + m - 1 if wide else (m - 1) * nx + i - 1
-                new = z[m, i] + d[at]
-                changed += (new > 0.0) != (z[m, i] > 0.0)
-                z[m, i] = new
-        if ring_x:
-            z[:, 0], z[:, nx + 1] = z[:, nx], z[:, 1]
-        if ring_y:
-            z[0], z[ny + 1] = z[ny], z[1]
-        if changed == 0:
-            return True
-    return False

@@ -12,10 +12,11 @@ from ...base.parallel import Array
 from ...errors import InputError
 from ...problems.film.lubrication import LubricationProblem
 from ...problems.grid import Grid
-from . import kernels
+from . import exact, kernels
 
 FEWEST = 3  # points a side of the coarsest grid, at least
 FEWEST_LINES = 8  # of a rank; grids with fewer are held whole by every rank
+MOST_ENTRIES = 5_000_000  # of a banded matrix that is eliminated
 STRONG = 4.0  # times the mean conductance of the other direction: then points are left out in the strong one alone
 
 
@@ -239,6 +240,23 @@ def _coarser(fine: Level, harmonic: bool) -> Level | None:
     restrict(fine, coarse, coarse.c, harmonic, fine.c)
     coarse.f, coarse.old = coarse.c.copy(), np.zeros_like(coarse.z)
     return coarse
+
+
+def solve(level: Level) -> bool:
+    """Newton's method (`exact`) on a level, on every rank if it is dealt to several; whether it settled. Collective."""
+    comm, n = level.comm, level.ny
+    if level.nx * n * (4 * min(level.nx, n) + 1) > MOST_ENTRIES:  # odd numbers of points between periodic sides
+        return False
+    if comm is None or not level.split:
+        return exact.solve(level.z, level.kx, level.ky, level.c, *level.periodic)
+    whole = _empty(level.nx, n, 0, n, None, False, level.periodic)
+    for name in ("z", "c", "kx", "ky"):
+        mine, out = getattr(level, name), getattr(whole, name)
+        rows = mine[1 if level.y0 else 0 : level.y1 - level.y0 + 1 if level.y1 < n else None]
+        np.concatenate(comm.allgather(np.ascontiguousarray(rows)), out=out)
+    settled = exact.solve(whole.z, whole.kx, whole.ky, whole.c, *level.periodic)
+    level.z[:] = whole.z[level.y0 : level.y1 + 2]
+    return settled
 
 
 def restrict(fine: Level, coarse: Level, out: Array, harmonic: bool, given: Array | None = None) -> None:

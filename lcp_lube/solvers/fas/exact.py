@@ -1,0 +1,148 @@
+"""The coarsest grid's problem to rounding: Newton's method on the active set, each step by banded elimination.
+
+Sweeps alone would need as many as the conductances differ by where two points of the grid lie in one deep pocket: it is a
+region of one pressure, which they hardly move.
+"""
+
+import numpy as np
+
+from ...base.compiled import kernel
+from ...base.parallel import Array
+from .kernels import balance_row, relax_pairs
+
+MOST_STEPS = 60
+PATIENCE = 4  # steps without a fall of the residual by 10 %, after which sweeps take over for a while
+SWEEPS, RESCUE_SWEEPS, MOST_SWEEPS = 8, 32, 512  # between two steps; where they have stalled, at first and at most
+
+
+@kernel
+def solve(z: Array, kx: Array, ky: Array, c: Array, ring_x: bool, ring_y: bool) -> bool:
+    """Solve G(z) = c in place, arrays as in `kernels`; returns whether the signs of z settled.
+
+    Each step is followed by sweeps, which bring order into the signs where steps alone cycle. Where the signs do not settle,
+    z is the best that was met.
+    """
+    ny, nx = z.shape[0] - 2, z.shape[1] - 2
+    best, least, stalled, rescue = z.copy(), np.inf, 0, RESCUE_SWEEPS
+    for _ in range(MOST_STEPS):
+        full = z > 0.0
+        stepped = newton_step(z, kx, ky, c, ring_x, ring_y)
+        wrap(z, ring_x, ring_y)
+        if stepped and (full == (z > 0.0)).all():
+            return True
+        sweeps = SWEEPS
+        if stalled == PATIENCE or not stepped:
+            sweeps, rescue, stalled = rescue, min(2 * rescue, MOST_SWEEPS), 0
+        for s in range(sweeps):
+            for m in range(ny):
+                relax_pairs(z, kx, ky, c, ny - m if s % 2 else m + 1, 1, nx + 1)
+            wrap(z, ring_x, ring_y)
+        size = residual_square(z, kx, ky, c)
+        stalled = 0 if size < 0.8 * least else stalled + 1
+        if size < least:
+            best[:], least = z, size
+    z[:] = best
+    return False
+
+
+@kernel
+def wrap(z: Array, ring_x: bool, ring_y: bool) -> None:
+    """The frame beyond periodic sides."""
+    if ring_x:
+        z[:, 0], z[:, -1] = z[:, -2], z[:, 1]
+    if ring_y:
+        z[0], z[-1] = z[-2], z[1]
+
+
+@kernel
+def residual_square(z: Array, kx: Array, ky: Array, c: Array) -> float:
+    """||c - G(z)||^2."""
+    G, total = np.zeros(z.shape[1]), 0.0
+    for m in range(1, z.shape[0] - 1):
+        balance_row(z, kx, ky, m, G)
+        for i in range(1, z.shape[1] - 1):
+            total += (c[m, i] - G[i]) ** 2
+    return total
+
+
+@kernel
+def place(a: int, n: int, ring: bool) -> int:
+    """Position of line a of n in the order of elimination: round a ring from both ends, so that neighbours stay near."""
+    if not ring:
+        return a
+    return 2 * a if 2 * a < n else 2 * (n - 1 - a) + 1
+
+
+@kernel
+def newton_step(z: Array, kx: Array, ky: Array, c: Array, ring_x: bool, ring_y: bool) -> bool:
+    """z += J^-1 (c - G(z)) for the signs of z; False where J is singular: a line is cavitated all the way round.
+
+    J is column diagonally dominant: no pivoting is needed. The shorter direction runs fastest, so that the band is narrow.
+    """
+    ny, nx = z.shape[0] - 2, z.shape[1] - 2
+    by_columns = ny * (2 if ring_x else 1) <= nx * (2 if ring_y else 1)
+    fast, slow, ring = (ny, nx, ring_x) if by_columns else (nx, ny, ring_y)
+    n, b = nx * ny, min(2 * fast if ring else fast, nx * ny - 1)
+    J, d = np.zeros((n, 2 * b + 1)), np.zeros(n)  # J[row, column - row + b]
+    at = np.empty((ny + 2, nx + 2), dtype=np.int64)
+    for m in range(1, ny + 1):
+        for i in range(1, nx + 1):
+            s, f = (i - 1, m - 1) if by_columns else (m - 1, i - 1)
+            at[m, i] = place(s, slow, ring) * fast + f
+    G = np.zeros(nx + 2)
+    for m in range(1, ny + 1):
+        balance_row(z, kx, ky, m, G)
+        for i in range(1, nx + 1):
+            here, full = at[m, i], z[m, i] > 0.0
+            d[here] = c[m, i] - G[i]
+            k_W, k_E, k_S, k_N = kx[m, i], kx[m, i + 1], ky[m, i], ky[m + 1, i]
+            J[here, b] += k_W + k_E + k_S + k_N if full else 1.0
+            if i < nx or ring_x:
+                to = at[m, i + 1 if i < nx else 1]
+                J[to, here - to + b] -= k_E if full else 1.0
+            if full and (i > 1 or ring_x):
+                to = at[m, i - 1 if i > 1 else nx]
+                J[to, here - to + b] -= k_W
+            if full and (m < ny or ring_y):
+                to = at[m + 1 if m < ny else 1, i]
+                J[to, here - to + b] -= k_N
+            if full and (m > 1 or ring_y):
+                to = at[m - 1 if m > 1 else ny, i]
+                J[to, here - to + b] -= k_S
+    if not eliminate(J, d, b):
+        return False
+    for m in range(1, ny + 1):
+        for i in range(1, nx + 1):
+            full = z[m, i] > 0.0
+            new = z[m, i] + d[at[m, i]]
+            if (new > 0.0) != full:  # a pressure has become a flow of void, or the other way round
+                diagonal = kx[m, i] + kx[m, i + 1] + ky[m, i] + ky[m + 1, i]
+                new = new * diagonal if full else new / diagonal
+            z[m, i] = new
+    return True
+
+
+@kernel
+def eliminate(J: Array, d: Array, b: int) -> bool:
+    """d = J^-1 d for a matrix of half bandwidth b without pivoting; J is overwritten. False at a pivot that is rounding."""
+    n = d.size
+    least = 1e-14 * J[:, b]
+    for k in range(n):
+        pivot = J[k, b]
+        if not pivot > least[k]:
+            return False
+        end = min(b, n - 1 - k)
+        for r in range(1, end + 1):
+            factor = J[k + r, b - r]
+            if factor != 0.0:
+                factor /= pivot
+                above, below = J[k], J[k + r]
+                for q in range(1, end + 1):
+                    below[b - r + q] -= factor * above[b + q]
+                d[k + r] -= factor * d[k]
+    for k in range(n - 1, -1, -1):
+        total = d[k]
+        for r in range(1, min(b, n - 1 - k) + 1):
+            total -= J[k, b + r] * d[k + r]
+        d[k] = total / J[k, b]
+    return True
