@@ -73,11 +73,11 @@ def test_fallback_takes_over_and_says_so():
     assert solution.converged and "took over" not in solution.message
     solution.destroy()
     rescued = run("problem3", {"n": 60}, method="active-set", options={"give_up": 1})  # an option is no wish to fail
-    assert rescued.converged and (rescued.method, rescued.took_over) == ("din-pc", "active-set")
+    assert rescued.converged and (rescued.method, rescued.asked, rescued.took_over) == ("din-pc", "active-set", "din-pc")
     assert (
         summary(as_dict(rescued))
         .splitlines()[0]
-        .startswith("problem3 (n = 60, scheme nodal) by din-pc, which took over from active-set, on")
+        .startswith("problem3 (n = 60, scheme nodal) by active-set, from which din-pc took over, on")
     )
     given_up = run("problem3", {"n": 60}, method="active-set", options={"give_up": 1}, rescue=False)
     assert given_up.outcome is Outcome.STEP_LENGTH and given_up.settings["took_over"] is None
@@ -203,7 +203,7 @@ def test_auto_without_what_it_likes_best(scene, changes, missing, recipe, monkey
         pytest.skip("this PETSc has no ML")
     best = run(scene, changes, method="active-set")
     sys = SimpleNamespace(hasExternalPackage=lambda name: name not in missing and has(name))
-    monkeypatch.setattr("lcp_lube.drivers.plan.PETSc", SimpleNamespace(Sys=sys))
+    monkeypatch.setattr("lcp_lube.drivers.plan.PETSc", SimpleNamespace(Sys=sys, Options=PETSc.Options))
     if "numba" in missing:
         for module in ("lcp_lube.linear.cavity", "lcp_lube.solvers.relaxation"):
             monkeypatch.setattr(f"{module}.find_spec", lambda name: None)

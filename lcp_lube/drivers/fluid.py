@@ -127,7 +127,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     why = f"fluid: {solves} solve{'s' * (solves > 1)} of a constant fluid's kind, viscosity by a change of unknown"
     settings = {**first.settings, "why": [why, *first.settings["why"]]}
     if rescued is not None:
-        settings |= {"method": rescued.method, "took_over": rescued.took_over}
+        settings |= {"method": rescued.method, "took_over": rescued.asked}
     settings["details"] = {**first.settings["details"], "fluid_solves": solves}
     done = {"problem": problem, "fields": fields, "outcome": outcome, "message": message, "certificate": certificate}
     return replace(first, **done, steps=steps, settings=settings, times=times).judged()  # type: ignore[arg-type]

@@ -29,7 +29,9 @@ def as_dict(solution: Solution) -> dict[str, Any]:
         "ny": grid.shape[1] if grid.dim == 2 else None,
         "unknowns": problem.unknowns,
         "ranks": grid.comm.size,
-        **{key: settings.get(key) for key in ("method", "took_over", "system", "scheme", "recipe", "ksp_type", "pc_type")},
+        "method": solution.asked,
+        "took_over": solution.took_over,
+        **{key: settings.get(key) for key in ("system", "scheme", "recipe", "ksp_type", "pc_type")},
         "outcome": str(solution.outcome),
         "converged": solution.converged,
         "message": solution.message,
@@ -161,7 +163,7 @@ def summary(data: dict[str, Any]) -> str:
     recipe = data["recipe"] or f"{data['ksp_type']} + {data['pc_type']}"
     system = f" on the {data['system']} system, {recipe}" if data["system"] else ""
     scheme = f", scheme {data['scheme']}" if data["scheme"] else ""
-    first = f", which took over from {data['took_over']}," if data["took_over"] else ""
+    first = f", from which {data['took_over']} took over," if data["took_over"] else ""
     measures = ", ".join(
         f"{name.replace('_', ' ')} {data[name]:.1e}{UNITS.get(name, '')}"
         for name in MEASURES

@@ -177,13 +177,13 @@ class Solution(Shown):
 
     @property
     def took_over(self) -> str | None:
-        """The method that was asked first, where another took over from it."""
-        return self.settings.get("took_over")
+        """The method that gave the answer in the place of the one asked for, which failed; None where that one gave it."""
+        return self.method if self.settings.get("took_over") else None
 
     @property
     def asked(self) -> str:
         """The method that was asked first, whether or not it gave the answer."""
-        return self.took_over or self.method
+        return self.settings.get("took_over") or self.method
 
     @property
     def converged(self) -> bool:

@@ -39,7 +39,7 @@ def _of_the_film(model: Any) -> list[str]:
     """Thickness and Reynolds number, of the median of the film: a deep pocket is no thick film."""
     places = [(np.arange(SAMPLES) + 0.5) / SAMPLES * length for length in model.lengths]
     with np.errstate(all="ignore"):
-        h = model.gap(places[0][None, :], places[1][:, None] if len(places) == 2 else None)
+        h = model.gap(places[0][None, :], places[1][:, None] if len(places) == 2 else np.zeros((1, 1)))
     h = float(np.median(h))
     if not 0 < h < np.inf:
         return []  # the discretisation says where the film is not positive

@@ -15,7 +15,7 @@ from ..solvers.newton import Stopping
 # Key of a row, heading, format; times have keys of their own, see `table`.
 COLUMNS = (
     ("method", "method", "s"),
-    ("took_over", "taken over from", "s"),
+    ("took_over", "taken over by", "s"),
     ("system", "system", "s"),
     ("recipe", "recipe", "s"),
     ("outcome", "outcome", "s"),
