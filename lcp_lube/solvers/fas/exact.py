@@ -11,8 +11,9 @@ from ...base.parallel import Array
 from .kernels import balance_row, relax_pairs
 
 MOST_STEPS = 60
+MOST_SINGULAR = 8
 PATIENCE = 4  # steps without a fall of the residual by 10 %, after which sweeps take over for a while
-SWEEPS, RESCUE_SWEEPS, MOST_SWEEPS = 8, 32, 512  # between two steps; where they have stalled, at first and at most
+SWEEPS, RESCUE_SWEEPS, MOST_SWEEPS = 8, 32, 4096  # between two steps; where they have stalled, at first and at most
 
 
 @kernel
@@ -23,13 +24,16 @@ def solve(z: Array, kx: Array, ky: Array, c: Array, ring_x: bool, ring_y: bool) 
     z is the best that was met.
     """
     ny, nx = z.shape[0] - 2, z.shape[1] - 2
-    best, least, stalled, rescue = z.copy(), np.inf, 0, RESCUE_SWEEPS
+    best, least, stalled, rescue, singular = z.copy(), np.inf, 0, RESCUE_SWEEPS, 0
     for _ in range(MOST_STEPS):
         full = z > 0.0
         stepped = newton_step(z, kx, ky, c, ring_x, ring_y)
         wrap(z, ring_x, ring_y)
         if stepped and (full == (z > 0.0)).all():
             return True
+        singular += not stepped
+        if singular > MOST_SINGULAR:  # void gathers in a line that is closed: there may be no solution
+            break
         sweeps = SWEEPS
         if stalled == PATIENCE or not stepped:
             sweeps, rescue, stalled = rescue, min(2 * rescue, MOST_SWEEPS), 0
