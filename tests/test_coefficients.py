@@ -177,12 +177,35 @@ def test_ranks(cli, ranks):
             assert np.array(b[name]) == pytest.approx(np.array(a[name]), abs=1e-6 * np.abs(a[name]).max())
 
 
+def test_a_table_for_rotor_programs(cli, tmp_path):
+    """In its axes, y up and the load along -y: our x is -y, our y is x; the load is carried at every speed."""
+    words = ("two_groove_journal", "--set", "nx=144", "--set", "ny=11", "--set", "balance.load=2000")
+    done = cli("coefficients", *words, "--speeds", "2000:4000:2", "--output", "b.csv")
+    assert done.status == 0, done.err
+    rows = list(csv.DictReader((tmp_path / "b.csv").read_text().splitlines()))
+    one = cli("coefficients", *words, "--set", "speed_rpm=4000", "--json").json
+    (xx, xy), (yx, yy) = one["coefficients"][0]["K"]
+    last = {name: float(value) for name, value in rows[1].items()}
+    assert last["frequency"] == pytest.approx(4000 * math.pi / 30) and one["load"] == pytest.approx(2000, rel=1e-5)
+    for name, value in {"kxx": yy, "kyy": xx, "kxy": -yx, "kyx": -xy}.items():
+        assert last[name] == pytest.approx(value, rel=1e-4), name
+
+
+def test_ross_takes_the_table(cli, tmp_path):
+    ross = pytest.importorskip("ross")
+    words = ("two_groove_journal", "--set", "nx=144", "--set", "ny=11", "--speeds", "2000:4000:2", "--output", "b.csv")
+    assert cli("coefficients", *words).status == 0
+    rows = list(csv.DictReader((tmp_path / "b.csv").read_text().splitlines()))
+    ross.BearingElement(n=0, **{name: [float(row[name]) for row in rows] for name in rows[0]})
+
+
 def test_text_and_bad_input(cli):
     done = cli("coefficients", "journal", "--nx", 60, "--ny", 15)
     assert done.status == 0 and "Kxy" in done.out and "whirl ratio" in done.out
     for words, message in (
         (("problem1",), "coefficients are of journals"),
         (("journal", "--frequency", "-1"), "--frequency -1"),
+        (("journal", "--speeds", "1:2:2"), "has no speed_rpm"),
         (("journal", "--frequency", "a"), "numbers in rad/s"),
         (("two_groove_journal", "--set", "groove_deg=179", "--set", "grooves_deg=[0,90]"), "overlap"),
         (("two_groove_journal", "--set", "grooves_deg=[]"), "p_end > 0"),

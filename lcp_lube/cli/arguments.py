@@ -205,6 +205,10 @@ def parse(own: list[str]) -> argparse.Namespace:
     coefficients.add_argument(
         "--frequency", default="0", metavar="F,F,...", help="of the motion, rad/s; default 0, the limit of slow motion"
     )
+    coefficients.add_argument(
+        "--speeds", metavar="FROM:TO:N", help="a csv row for each speed (rpm), in the columns and axes of rotor programs"
+    )
+    coefficients.add_argument("--output", type=Path, metavar="FILE.csv", help="of --speeds; default standard output")
     coefficients.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")
 
     doctor = command("doctor", "what is installed, what is missing, and a short self-check on one and two ranks")

@@ -3,17 +3,24 @@
 import argparse
 import json
 import math
+from pathlib import Path
 from typing import Any
+
+import numpy as np
+from mpi4py import MPI
 
 from ..api import solve
 from ..base.options import check_unread
-from ..drivers.coefficients import Coefficients, coefficients, stability
+from ..drivers.coefficients import Coefficients, coefficients, placed, stability
 from ..errors import InputError
 from ..output.console import say
+from ..output.files import replacing
 from ..output.results import as_dict, finite
-from ..scenes.scene import Scene
+from ..scenes.scene import Scene, as_scene
 from .asked import ask_of, scene_of
+from .sweep import parse_axis
 
+ROTOR = ("kxx", "kxy", "kyx", "kyy", "cxx", "cxy", "cyx", "cyy")  # N/m and N s/m, of frequency (rad/s), the speed
 KEYS = ("S", "sommerfeld", "eccentricity", "attitude_deg", "load")
 
 
@@ -31,6 +38,10 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"--frequency {args.frequency}: numbers in rad/s are needed, with commas between them") from None
     if getattr(scene, "turning", None) is None:
         raise InputError(f"scene {scene.name}: coefficients are of journals; it has no part that could be displaced")
+    if args.speeds is not None:
+        return table(args, scene, frequencies)
+    if args.output is not None:
+        raise InputError(f"--output {args.output}: --speeds FROM:TO:N is needed too")
     solution = solve(scene, ask_of(args))
     try:
         check_unread()
@@ -38,11 +49,51 @@ def run(args: argparse.Namespace) -> int:
         record = {key: data.get(key) for key in ("scene", "nx", "ny", "outcome", "converged", "message", *KEYS)}
         if solution.converged:
             found = coefficients(scene, solution, frequencies)
-            record |= report(found, scene, data)
+            record |= report(found, placed(scene, solution), data)
         say(json.dumps(finite(record)) if args.json else text(record))
     finally:
         solution.destroy()
     return 0 if solution.converged else 1
+
+
+def table(args: argparse.Namespace, scene: Scene, frequencies: list[float]) -> int:
+    """A csv row a speed, in the columns and axes of rotor programs. Collective.
+
+    Theirs: x to the right, y upwards, the journal turning from x to y; the load is its weight, along -y. Our x is -y, our y
+    is x.
+
+    Raises
+    ------
+    InputError : a scene without speed_rpm, a file that cannot be written.
+    """
+    if "speed_rpm" not in type(scene).model_fields:
+        raise InputError(f"--speeds: scene {scene.name} has no speed_rpm")
+    speeds = parse_axis(f"speed_rpm={args.speeds}").values
+    rows, near, failed = [], None, 0
+    for rpm in speeds:
+        at = as_scene(scene, {"speed_rpm": float(rpm)})
+        solution = solve(at, ask_of(args), start=near)
+        check_unread()
+        if near is not None:
+            near.destroy()
+        if solution.converged:
+            (one,) = coefficients(at, solution, frequencies[:1])
+            turn = np.array([[0.0, -1.0], [1.0, 0.0]])  # our axes as columns, in theirs
+            K, C = (turn.T @ matrix @ turn for matrix in (one.K, one.C))
+            values = [at.omega, *K.ravel(), *C.ravel()]  # type: ignore[attr-defined]
+            rows.append(",".join(f"{value:.9g}" for value in values))
+        failed += not solution.converged
+        near = solution
+    if near is not None:
+        near.destroy()
+    lines = "\n".join([",".join(("frequency", *ROTOR)), *rows]) + "\n"
+    if args.output is None:
+        say(lines.rstrip("\n"))
+    else:
+        with replacing(args.output, MPI.COMM_WORLD) as name:
+            if MPI.COMM_WORLD.rank == 0:
+                Path(name).write_text(lines)
+    return 1 if failed else 0
 
 
 def report(found: list[Coefficients], scene: Scene, data: dict[str, Any]) -> dict[str, Any]:

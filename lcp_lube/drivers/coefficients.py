@@ -78,8 +78,7 @@ def coefficients(scene: Scene, solution: Solution, frequencies: Sequence[float] 
     ------
     InputError : a scene without a journal, a fluid that depends on the pressure, a frequency below zero.
     """
-    if "attitude_deg" in solution.settings:  # found with the solution
-        scene = scene.model_copy(update={"attitude_deg": solution.settings["attitude_deg"]})
+    scene = placed(scene, solution)
     turning = getattr(scene, "turning", None)
     if turning is None:
         raise InputError(f"scene {scene.name}: coefficients are of journals; it has no part that could be displaced")
@@ -110,6 +109,14 @@ def coefficients(scene: Scene, solution: Solution, frequencies: Sequence[float] 
         Coefficients(nu, found.real, found.imag / nu if nu > 0 else found.imag)
         for nu, found in zip(frequencies, total, strict=True)
     ]
+
+
+def placed(scene: Scene, solution: Solution) -> Scene:
+    """The scene with the journal where the solution found it."""
+    found = {"attitude_deg": solution.settings["attitude_deg"]} if "attitude_deg" in solution.settings else {}
+    if balance := solution.settings.get("balance"):
+        found |= {balance["vary"]: balance["value"]}
+    return scene.model_copy(update={**found, "balance": None}) if found else scene
 
 
 def _of_film(
