@@ -3,12 +3,12 @@
 import argparse
 import re
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import NoReturn
 
 from .. import __version__
 from ..base.quantity import in_si
 from ..errors import InputError, nearest
-from ..registry import METHODS, STABILITY, scene_names
+from ..registry import STABILITY, scene_names
 
 
 class Parser(argparse.ArgumentParser):
@@ -289,16 +289,3 @@ def _scene_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--r0", type=number, help="start of r, 0.1")
     parser.add_argument("--mu", help="perturbation: mu1, mu2 (default) or adaptive")
     parser.add_argument("--conditions", help="step-length conditions, any of the letters FRCB; default FCB")
-
-
-def scene_changes(args: argparse.Namespace) -> tuple[list[str], list[str]]:
-    """The --set assignments for the scene (KEY or TABLE.KEY) and those for a method (METHOD.OPTION)."""
-    words = {text: text.partition("=")[0].partition(".") for text in args.set}
-    method = [text for text, (owner, dot, _) in words.items() if dot and owner.strip() in METHODS]
-    return [text for text in args.set if text not in method], method
-
-
-def method_options(args: argparse.Namespace) -> dict[str, Any]:
-    """The method's options that have a flag of their own, where given."""
-    named = {"p0": args.p0, "r0": args.r0, "mu": args.mu, "conditions": args.conditions}
-    return {name: value for name, value in named.items() if value is not None}

@@ -9,9 +9,9 @@ from ..base.quantity import in_si, quantity
 from ..drivers.ask import Ask
 from ..errors import InputError
 from ..problems.solution import Solution
+from ..registry import METHODS
 from ..scenes.scene import Scene, load_scene, parse_changes
 from ..solvers.newton import Monitor
-from .arguments import method_options, scene_changes
 
 
 def scene_of(args: argparse.Namespace, more: dict[str, Any] | None = None) -> Scene:
@@ -102,3 +102,16 @@ def solution_of(args: argparse.Namespace, monitor: Monitor | None = None) -> Sol
         reduction=args.reduction,
         memory_check=not args.no_memory_check,
     )
+
+
+def scene_changes(args: argparse.Namespace) -> tuple[list[str], list[str]]:
+    """The --set assignments for the scene (KEY or TABLE.KEY) and those for a method (METHOD.OPTION)."""
+    words = {text: text.partition("=")[0].partition(".") for text in args.set}
+    method = [text for text, (owner, dot, _) in words.items() if dot and owner.strip() in METHODS]
+    return [text for text in args.set if text not in method], method
+
+
+def method_options(args: argparse.Namespace) -> dict[str, Any]:
+    """The method's options that have a flag of their own, where given."""
+    named = {"p0": args.p0, "r0": args.r0, "mu": args.mu, "conditions": args.conditions}
+    return {name: value for name, value in named.items() if value is not None}
