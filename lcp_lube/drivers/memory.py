@@ -14,6 +14,7 @@ from importlib.util import find_spec
 from math import log2
 from pathlib import Path
 
+import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -228,6 +229,6 @@ def look_ahead(facts: Facts, plan: Plan, comm: MPI.Comm) -> None:
     ------
     InputError : as `check`.
     """
-    if facts.size >= LARGE:
+    if LARGE <= facts.size <= np.iinfo(PETSc.IntType).max // 2:  # beyond that the grid refuses by itself
         with recipe(plan.recipe):
             check(facts, plan, comm)

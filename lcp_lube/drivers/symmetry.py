@@ -25,7 +25,7 @@ from ..base.parallel import Array
 from ..problems.facts import Facts
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model, Side
-from ..problems.grid import Grid, places
+from ..problems.grid import Grid, some_places
 from ..problems.solution import Outcome, Problem, Solution
 from ..problems.transfer import Pick, numbers
 from ..scenes.scene import Solvable
@@ -147,10 +147,7 @@ def promising(scene: Solvable, ask: Ask) -> bool:
     if _at_rest(model):
         return True
     kinds = [tuple(side.kind for side in model.sides[k : k + 2]) for k in (0, 2)]
-    xs, *ys = (
-        np.unique(at[np.linspace(0, at.size - 1, min(at.size, most)).round().astype(int)])
-        for at, most in zip((places(*of) for of in zip(scene.shape, model.lengths, kinds, strict=False)), SAMPLE, strict=False)
-    )
+    xs, *ys = (some_places(*side) for side in zip(scene.shape, model.lengths, kinds, SAMPLE, strict=False))
     y = ys[0][:, None] if ys else np.zeros((1, 1))
     with np.errstate(all="ignore"):  # a film that is not positive is told where it is built
         h = np.broadcast_to(model.film(xs[None, :], y), (y.size, xs.size))

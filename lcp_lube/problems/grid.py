@@ -22,10 +22,10 @@ OFFSET = {"open": 1.0, "closed": 0.5, "mirror": 0.0, "periodic": 0.5}
 OPEN = ("open", "open")
 
 
-def places(n: int, length: float, ends: Sequence[str]) -> Array:
-    """Coordinates of the n points of a line between two ends, m."""
+def some_places(n: int, length: float, ends: Sequence[str], most: int) -> Array:
+    """Coordinates of at most so many of the n points of a line between two ends, its first and last among them, m."""
     meshes = n + OFFSET[ends[0]] + OFFSET[ends[1]] - 1.0
-    return (np.arange(n) + OFFSET[ends[0]]) * (length / meshes)
+    return (np.unique(np.linspace(0, n - 1, min(n, most)).round()) + OFFSET[ends[0]]) * (length / meshes)
 
 
 class Grid:
