@@ -1,6 +1,5 @@
 """The one exception for bad input."""
 
-import difflib
 from collections.abc import Iterable
 
 LONGEST = 700
@@ -20,6 +19,8 @@ class InputError(ValueError):
 
 def nearest(word: str, legal: Iterable[str], dash: str = "") -> str:
     """'; nearest is X', or nothing when nothing is near; a difference in capitals alone is the least."""
+    import difflib  # a run without a mistake needs it not
+
     names = list(legal)
     close = [name for name in names if name.lower() == word.lower()] or difflib.get_close_matches(word, names, 1, 0.5)
     if not close:

@@ -4,9 +4,11 @@ Imports no PETSc. A package from outside adds lines of its own: an entry point o
 is called with this module and puts entries into the tables (docs/architecture.md shows one).
 """
 
+import os
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from importlib import import_module, metadata
+from importlib import import_module
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -283,5 +285,23 @@ def read_recipe(name: str) -> dict[str, str]:
     return options
 
 
-for _point in metadata.entry_points(group="lcp_lube"):
-    _point.load()(sys.modules[__name__])
+def _announced() -> Iterator[bool]:
+    """Whether an installed package names our group, folder by folder of the path."""
+    for folder in sys.path:
+        try:
+            names = [name for name in os.listdir(folder or ".") if name.endswith((".dist-info", ".egg-info"))]
+        except OSError:  # no folder: an archive, or nothing
+            yield folder.endswith((".egg", ".zip")) and Path(folder).is_file()
+            continue
+        for name in names:
+            try:
+                yield b"[lcp_lube]" in Path(folder, name, "entry_points.txt").read_bytes()
+            except OSError:
+                continue
+
+
+if any(_announced()):
+    from importlib import metadata  # imports the standard library's mail and archives, more than all the rest of this module
+
+    for _point in metadata.entry_points(group="lcp_lube"):
+        _point.load()(sys.modules[__name__])

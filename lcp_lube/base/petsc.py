@@ -4,6 +4,8 @@ import os
 import re
 import sys
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from ..errors import InputError, nearest
@@ -13,6 +15,11 @@ LOGICAL = {"", "true", "false", "yes", "no", "on", "off", "1", "0"}
 LATE_FLAGS = {"options_left", "options_view", "malloc_dump"}
 PLAIN_FILES = {"history", "log_trace", "malloc_view", "log_summary"}
 LOG_FORMATS = ("default", "ascii_info", "ascii_info_detail", "ascii_csv", "ascii_xml", "ascii_flamegraph")
+
+# What the launchers of MPI's processes put into their environment.
+LAUNCHED = ("OMPI_COMM_WORLD_", "PMI_", "PMIX_", "MV2_COMM_", "PALS_", "ALPS_APP_", "SLURM_PROCID")
+# For Open MPI, where a process is alone: no daemon for others to come, no search for networks. That takes longer than a solve.
+ALONE = {"OMPI_MCA_ess_singleton_isolated": "1", "OMPI_MCA_btl": "self", "OMPI_MCA_pml": "ob1"}
 
 
 def start(arguments: list[str]) -> None:
@@ -32,7 +39,9 @@ def start(arguments: list[str]) -> None:
 
         mpi4py.rc.thread_level = "funneled"  # as PETSc would start it
         import petsc4py
-        from mpi4py import MPI  # noqa: F401  (starts MPI: what it says if it cannot is not caught below)
+
+        with _alone():
+            from mpi4py import MPI  # noqa: F401  (starts MPI: what it says if it cannot is not caught below)
     except ImportError as error:
         raise InputError(f"PETSc for Python is needed, see 'Installation' in README.md: {error}") from None
     sys.stderr.flush()
@@ -58,6 +67,24 @@ def start(arguments: list[str]) -> None:
     value = next((word for word in arguments if not word.startswith("-") and word in reason), None)
     culprit = f"{arguments[arguments.index(value) - 1]} {value}: " if value else ""
     raise InputError(f"{culprit}PETSc does not start: {reason}") from None
+
+
+@contextmanager
+def _alone() -> Iterator[None]:
+    """While MPI starts in a process that no launcher started: settings for one process, but for those that the user has made.
+
+    They go afterwards: a job that this process starts is not to inherit them.
+    """
+    if any(name.startswith(LAUNCHED) for name in os.environ):
+        yield
+        return
+    added = [name for name in ALONE if name not in os.environ]
+    os.environ.update((name, ALONE[name]) for name in added)
+    try:
+        yield
+    finally:
+        for name in added:
+            del os.environ[name]
 
 
 def forget_unread() -> None:

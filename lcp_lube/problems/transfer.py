@@ -1,13 +1,17 @@
 """Bilinear interpolation of a field from one grid of a rectangle to another one, on any number of ranks."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import scipy.sparse
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ..base.owned import Owned
 from ..base.parallel import Array
 from .grid import Grid
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
 
 
 class Transfer:
@@ -28,13 +32,15 @@ class Transfer:
     """
 
     def __init__(self, coarse: Grid, fine: Grid, nearest: bool = False, zero_boundary: bool = False):
+        from scipy.sparse import csr_matrix, kron  # here: a solve on one grid is spared its import
+
         self.coarse_shape = coarse.shape
         ranges = ((fine.x_start, fine.x_end), (fine.y_start, fine.y_end))
-        weights = scipy.sparse.csr_matrix([[1.0]])
+        weights = csr_matrix([[1.0]])
         for side in range(fine.dim):
             points = np.arange(*ranges[side])
             along = _weights(points, coarse, fine, side, nearest, zero_boundary)
-            weights = scipy.sparse.kron(along, weights, format="csr")
+            weights = kron(along, weights, format="csr")
         weights.indices = coarse.dm.getAO().app2petsc(weights.indices.astype(PETSc.IntType))
         weights.has_sorted_indices = False
         weights.sort_indices()
@@ -62,8 +68,10 @@ class Transfer:
 
 def _weights(
     points: np.ndarray, coarse: Grid, fine: Grid, side: int, nearest: bool, zero_boundary: bool
-) -> scipy.sparse.csr_matrix:
+) -> "csr_matrix":
     """Linear interpolation along one side as a matrix, a row for each of the fine points, a column for each coarse one."""
+    from scipy.sparse import csr_matrix
+
     n_coarse = coarse.shape[side]
     # Fine point i lies left + part / meshes coarse spacings behind the first coarse point: integers (offsets are multiples of
     # 1/2), so that nested points get one weight, 1.
@@ -82,7 +90,7 @@ def _weights(
     else:
         columns = columns % n_coarse if fine.periodic[side] else np.clip(columns, 0, n_coarse - 1)
         used = values > 0
-    return scipy.sparse.csr_matrix((values[used], (rows[used], columns[used])), shape=(points.size, n_coarse))
+    return csr_matrix((values[used], (rows[used], columns[used])), shape=(points.size, n_coarse))
 
 
 def numbers(grid: Grid) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -6,7 +6,6 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from scipy.interpolate import CubicSpline, RectBivariateSpline, RegularGridInterpolator
 
 from ...base.parallel import Array
 from ...errors import InputError
@@ -28,6 +27,8 @@ class Profile:
     @cached_property
     def _values(self) -> Callable[[Array, Array], Array]:
         """z at points y and x."""
+        from scipy.interpolate import CubicSpline, RectBivariateSpline, RegularGridInterpolator  # here: it takes a while
+
         if self.y.size == 1:
             if self.method == "cubic":
                 spline = CubicSpline(self.x, self.z[0])

@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-import scipy.sparse
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
@@ -262,14 +261,15 @@ def assemble(grid: Grid, entries: list[tuple[int, int, Array]]) -> PETSc.Mat:
     # Columns ascend with (dj, di) inside a rank; only at its edges do they have to be sorted.
     ordered = sorted(entries, key=lambda entry: entry[:2])
     columns = np.stack([number[1 + dj : 1 + dj + ny, 1 + di : 1 + di + nx] for dj, di, _ in ordered], axis=-1)
+    values = np.stack([np.broadcast_to(values, grid.box) for *_, values in ordered], axis=-1)
+    if grid.comm.size > 1 or any(grid.periodic):
+        order = np.argsort(columns, axis=-1)
+        columns, values = np.take_along_axis(columns, order, axis=-1), np.take_along_axis(values, order, axis=-1)
     inside = columns >= 0
-    values = np.stack([np.broadcast_to(values, grid.box) for *_, values in ordered], axis=-1)[inside]
     pointers = np.zeros(ny * nx + 1, dtype=PETSc.IntType)
     np.cumsum(inside.sum(axis=-1).ravel(), out=pointers[1:])
-    rows = scipy.sparse.csr_matrix((values, columns[inside], pointers), shape=(ny * nx, grid.size))
-    rows.sort_indices()
     size = (grid.local_size, grid.size)
-    return PETSc.Mat().createAIJWithArrays((size, size), (rows.indptr, rows.indices, rows.data), comm=grid.dm.comm)
+    return PETSc.Mat().createAIJWithArrays((size, size), (pointers, columns[inside], values[inside]), comm=grid.dm.comm)
 
 
 def term_squares(

@@ -7,7 +7,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import map_coordinates
 
 from ...base.parallel import Array
 
@@ -140,6 +139,8 @@ class RandomSurface:
 
     def __call__(self, x: Array, y: Array) -> Array:
         x, y = np.broadcast_arrays(x, y)
+        from scipy.ndimage import map_coordinates  # here: few films need it, and scipy takes a while
+
         at = [1.5 + y * (self.cells / self.lengths[1]), 1.5 + x * (self.cells / self.lengths[0])]
         return self.sigma / MEAN_SQUARE * map_coordinates(self._lattice, at, order=3, prefilter=False, mode="nearest")
 

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.ndimage import map_coordinates
 
 from ...base.parallel import Array
 from .gaps import Wave
@@ -57,6 +56,8 @@ class Rough:
     def __call__(self, x: Array, y: Array) -> Array:
         """h (m) at x and y (m)."""
         x, y = np.broadcast_arrays(x, y)
+        from scipy.ndimage import map_coordinates  # here: few films need it, and scipy takes a while
+
         at = [1.5 + y * (self.cells / self.lengths[1]), 1.5 + x * (self.cells / self.lengths[0])]
         surface = map_coordinates(self._lattice, at, order=3, prefilter=False, mode="nearest")
         return np.maximum(self.wave(x, y) + self.amplitude * surface, self.h_floor)
