@@ -21,6 +21,7 @@ SCENE_DIR = PACKAGE / "scenes"
 RECIPE_DIR = next((d for d in (PACKAGE / "options", PACKAGE.parent / "options") if d.is_dir()), PACKAGE / "options")
 
 SMALL = 20_000  # points up to which one grid and a direct solver cost less than setting up anything better
+FEW = 10_000  # points up to which a film in 2D is solved before multigrid's compiled loops are loaded (0.5 s)
 SMALL_BOX = 5_000  # the same where a contact area has to move by a cell a step
 
 

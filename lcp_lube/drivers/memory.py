@@ -56,6 +56,7 @@ MEASURED: dict[tuple[str, str, str], tuple[float, float]] = {
     ("equations 2D", "jacobian", "multigrid"): (550, 0),
     ("equations 2D", "jacobian", "umfpack"): (1310, 0),
 }
+LITTLE = 32 * MB  # a run that needs no more is not held up to see whether there is as much
 LARGE = 1_000_000  # points from which building the problem is itself worth a look ahead
 MULTIGRID = ("hypre", "ml", "gamg", "mg")
 
@@ -203,6 +204,8 @@ def check(facts: Facts, plan: Plan, comm: MPI.Comm, refuse: bool = True, before:
     before = resident() if before is None else before
     fixed = _libraries(facts, plan)
     base = comm.allreduce(before + fixed)
+    if needed < LITTLE:
+        return Estimate(base, base + int(needed))
     machine = comm.Split_type(MPI.COMM_TYPE_SHARED)
     share = (needed / comm.size + fixed) * machine.size
     built = machine.allreduce(resident() - before)  # part of what is needed, and no longer available
