@@ -16,9 +16,11 @@ def main(argv: list[str] | None = None) -> int:
     try:
         own, petsc_arguments = split(words)
         args = None if "-help" in petsc_arguments and not own else parse(own)
+        if args is not None:
+            args.words = words  # PETSc's among them
     except InputError as error:
         return _refuse(error)
-    if getattr(args, "json", False):
+    if getattr(args, "json", False) or getattr(args, "worker", False):
         _reserve_stdout()
     try:
         petsc_start.start(petsc_arguments)

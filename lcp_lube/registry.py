@@ -1,12 +1,11 @@
 """The one place where a name is bound to code: methods, systems, scene families, film shapes, drivers, charts, recipes.
 
-Imports no PETSc. A package from outside adds lines of its own: an entry point of the group 'lcp_lube' names a function, which
-is called with this module and puts entries into the tables (docs/architecture.md shows one).
+Imports no PETSc. A package from outside adds lines: an entry point of the group 'lcp_lube' names a function, which is called
+with this module (docs/architecture.md).
 """
 
 import os
 import sys
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from importlib import import_module
 from math import inf
@@ -21,7 +20,6 @@ SCENE_DIR = PACKAGE / "scenes"
 RECIPE_DIR = next((d for d in (PACKAGE / "options", PACKAGE.parent / "options") if d.is_dir()), PACKAGE / "options")
 
 SMALL = 20_000  # points up to which one grid and a direct solver cost less than setting up anything better
-FEW = 10_000  # points up to which a film in 2D is solved before multigrid's compiled loops are loaded (0.5 s)
 SMALL_BOX = 5_000  # the same where a contact area has to move by a cell a step
 
 
@@ -264,6 +262,11 @@ def recipe_names() -> list[str]:
     return sorted(path.stem for path in RECIPE_DIR.glob("*.opts"))
 
 
+def is_scene(name: str) -> bool:
+    """Whether it is a built-in scene's name."""
+    return Path(name).name == name and (SCENE_DIR / f"{name}.toml").is_file()
+
+
 def recipe_line(name: str) -> str:
     """First line of a recipe: what it is and when to use it."""
     return (RECIPE_DIR / f"{name}.opts").read_text().partition("\n")[0].lstrip("# ")
@@ -276,7 +279,7 @@ def read_recipe(name: str) -> dict[str, str]:
     ------
     InputError : no such recipe.
     """
-    if name not in recipe_names():
+    if Path(name).name != name or not (RECIPE_DIR / f"{name}.opts").is_file():
         raise InputError(f"--recipe {name}: no such recipe{nearest(name, recipe_names())}; see 'lcp-lube list'")
     options = {}
     for line in (RECIPE_DIR / f"{name}.opts").read_text().splitlines():
@@ -286,23 +289,10 @@ def read_recipe(name: str) -> dict[str, str]:
     return options
 
 
-def _announced() -> Iterator[bool]:
-    """Whether an installed package names our group, folder by folder of the path."""
-    for folder in sys.path:
-        try:
-            names = [name for name in os.listdir(folder or ".") if name.endswith((".dist-info", ".egg-info"))]
-        except OSError:  # no folder: an archive, or nothing
-            yield folder.endswith((".egg", ".zip")) and Path(folder).is_file()
-            continue
-        for name in names:
-            try:
-                yield b"[lcp_lube]" in Path(folder, name, "entry_points.txt").read_bytes()
-            except OSError:
-                continue
-
-
-if any(_announced()):
-    from importlib import metadata  # imports the standard library's mail and archives, more than all the rest of this module
+# First by eye: what reads these files properly takes longer to import than all the rest.
+_files = (file for folder in sys.path for file in Path(folder).glob("*-info/entry_points.txt"))
+if any(os.access(file, os.R_OK) and b"[lcp_lube]" in file.read_bytes() for file in _files):
+    from importlib import metadata
 
     for _point in metadata.entry_points(group="lcp_lube"):
         _point.load()(sys.modules[__name__])

@@ -76,6 +76,7 @@ def test_a_large_scene_is_refused_before_it_is_built(monkeypatch):
 
 def test_the_override(monkeypatch):
     monkeypatch.setattr(memory, "available", lambda: 1000)
+    monkeypatch.setattr(memory, "LITTLE", 0)
     with pytest.raises(InputError, match=r"100 points need about .* GB .*--no-memory-check"):
         solve(load_scene("problem1"))
     solution = solve(load_scene("problem1"), memory_check=False)

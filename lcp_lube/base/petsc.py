@@ -69,13 +69,18 @@ def start(arguments: list[str]) -> None:
     raise InputError(f"{culprit}PETSc does not start: {reason}") from None
 
 
+def launched() -> bool:
+    """Whether a launcher of MPI jobs has started this process: mpiexec, srun."""
+    return any(name.startswith(LAUNCHED) for name in os.environ)
+
+
 @contextmanager
 def _alone() -> Iterator[None]:
     """While MPI starts in a process that no launcher started: settings for one process, but for those that the user has made.
 
     They go afterwards: a job that this process starts is not to inherit them.
     """
-    if any(name.startswith(LAUNCHED) for name in os.environ):
+    if launched():
         yield
         return
     added = [name for name in ALONE if name not in os.environ]

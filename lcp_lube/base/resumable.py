@@ -51,6 +51,7 @@ class ResumableCsv:
         self._made: list[Row] = []  # by this process
         self.rows: list[Row] = self._on_rank_0(self._read)
         self._grow(name for row in self.rows[:1] for name in row)
+        self._read_before = (list(self.columns), list(self.rows))
 
     def find(self, **key: object) -> Row | None:
         """The row with these keys, its values as text."""
@@ -77,6 +78,24 @@ class ResumableCsv:
         ------
         InputError : the file cannot be written.
         """
+        row = self._take(values)
+        self.write()
+        return row
+
+    def again(self, made: Iterable[dict[str, Any]]) -> None:
+        """Write the file as if it had been filled in this order.
+
+        Raises
+        ------
+        InputError : the file cannot be written.
+        """
+        self.columns, self.rows, self._made = list(self._read_before[0]), list(self._read_before[1]), []
+        for values in made:
+            self._take(values)
+        self.write()
+
+    def _take(self, values: dict[str, Any]) -> Row:
+        """The row as text, in its place in memory."""
         if self.signed:
             values = {**values, **origin.signature([str(values[name]) for name in self.key])}
         self._grow(values)
@@ -88,7 +107,6 @@ class ResumableCsv:
         else:
             self.rows[self.rows.index(old)] = row
         self._made.append(row)
-        self.write()
         return row
 
     def write(self) -> None:

@@ -95,7 +95,7 @@ def _free_scene(own: list[str], petsc: list[str]) -> None:
 
 
 def parse(own: list[str]) -> argparse.Namespace:
-    """The command and its options.
+    """The command and its options; `words`: what they were read from.
 
     Raises
     ------
@@ -169,8 +169,19 @@ def parse(own: list[str]) -> argparse.Namespace:
         "--output", type=Path, metavar="FILE.csv", help="filled row by row; points that stand there are not solved again"
     )
     sweep.add_argument(
-        "--warm", action=argparse.BooleanOptionalAction, default=True, help="start from the neighbour's answer; default yes"
+        "--warm",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="start from the answer of the point before, along the last --vary; default yes",
     )
+    sweep.add_argument(
+        "--jobs",
+        type=whole,
+        metavar="N",
+        help="so many processes side by side, each with its lines of points along the last --vary (--no-warm: its points); "
+        "default: one a core where that pays, one under mpiexec",
+    )
+    sweep.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)  # one of these processes
 
     table = command("table", "reproduce a published table beside the printed one")
     table.add_argument("number", type=int, metavar="K")
@@ -219,7 +230,7 @@ def parse(own: list[str]) -> argparse.Namespace:
     new.add_argument("--from", dest="source", required=True, metavar="SCENE", help="a .toml file or a built-in name")
 
     command("list", "scenes, methods, systems and recipes, each with a line")
-    return parser.parse_args(own)
+    return parser.parse_args(own, argparse.Namespace(words=own))
 
 
 def number(text: str) -> float:

@@ -9,10 +9,12 @@ from petsc4py import PETSc
 from ..base.options import names_solver, wants_ksp
 from ..errors import InputError, nearest
 from ..problems.facts import Facts
-from ..registry import DEFAULT_METHOD, FEW, METHODS, SMALL, SMALL_BOX
+from ..registry import DEFAULT_METHOD, METHODS, SMALL, SMALL_BOX
 from .ask import Ask
 
-FEW = 2_500  # points up to which a few direct solves are as fast as multigrid, and right to the last digits at any film ratio
+# Points up to which a film in 2D is sooner solved directly than multigrid's compiled loops are loaded, and right to the last
+# digits at any film ratio. By the points alone, not by what the process has loaded: a scene takes the same way always.
+FEW = 10_000
 SMALL_RING = 200_000  # the same for a film that is periodic along the flow
 DIN_ONLY = {"r0", "mu", "conditions"}  # flags that only an interior method can heed
 
@@ -40,13 +42,13 @@ def plan(facts: Facts, ask: Ask, scene: str) -> Plan:
     if method == "auto":
         method = DEFAULT_METHOD[facts.kind]
         no_linear = system == "auto" and recipe is None and not nested and not options
-        reason = ""
+        why_direct = ""
         if method == "active-set" and no_linear and _suits_multigrid(facts):
-            if _few(facts):
-                reason = f"; with at most {FEW} points sooner done than multigrid's compiled loops are loaded"
-            else:
+            if facts.size > FEW:
                 method = "fas"
-        reason = METHODS[method].of(facts.kind).line + reason
+            else:
+                why_direct = f"; {FEW} points and fewer are solved sooner than multigrid's loops are loaded"
+        reason = METHODS[method].of(facts.kind).line + why_direct
         if facts.kind == "lubrication" and DIN_ONLY & set(options):
             method, reason = "din", f"{', '.join(sorted(DIN_ONLY & set(options)))} are its options"
         why.append(f"method {method}: {reason}")
@@ -90,16 +92,8 @@ def plan(facts: Facts, ask: Ask, scene: str) -> Plan:
 
 def _suits_multigrid(facts: Facts) -> bool:
     """Whether nonlinear multigrid is the fastest: in 2D, its loops compiled, nobody having asked for an inner solver."""
-    plane = facts.kind == "lubrication" and facts.dim == 2 and not any(facts.periodic) and facts.size > FEW
+    plane = facts.kind == "lubrication" and facts.dim == 2 and not any(facts.periodic)
     return plane and find_spec("numba") is not None and not wants_ksp()
-
-
-def _few(facts: Facts) -> bool:
-    """Whether a film is so small that what is loaded costs more than what is computed.
-
-    By the number of points alone, not by what this process has loaded before: the same scene is to take the same way always.
-    """
-    return facts.kind == "lubrication" and facts.dim == 2 and facts.ranks == 1 and facts.size <= FEW
 
 
 def default_recipe(facts: Facts, system: str, large: bool) -> tuple[str, str]:
@@ -118,7 +112,8 @@ def default_recipe(facts: Facts, system: str, large: bool) -> tuple[str, str]:
         return ("redundant_lu" if ranks > 1 else "dense_lu"), "a dense Jacobian: LAPACK"
     if facts.dim == 1 and system == "reduced" and ranks == 1:
         return "banded", "tridiagonal, an M-matrix: elimination in natural order, without pivoting or fill"
-    if _few(facts) and system == "reduced" and not any(facts.periodic):
+    film = facts.kind == "lubrication" and facts.dim == 2 and not any(facts.periodic)
+    if film and system == "reduced" and ranks == 1 and facts.size <= FEW:
         return "dissection", "an M-matrix of few points: elimination without pivoting, in nested dissection order"
     names = ("mumps", "superlu_dist") if ranks > 1 else ("superlu", "umfpack", "mumps")
     if facts.dim == 2 and ranks == 1:

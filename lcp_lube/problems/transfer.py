@@ -66,9 +66,7 @@ class Transfer:
         self._own.free()
 
 
-def _weights(
-    points: np.ndarray, coarse: Grid, fine: Grid, side: int, nearest: bool, zero_boundary: bool
-) -> "csr_matrix":
+def _weights(points: np.ndarray, coarse: Grid, fine: Grid, side: int, nearest: bool, zero_boundary: bool) -> "csr_matrix":
     """Linear interpolation along one side as a matrix, a row for each of the fine points, a column for each coarse one."""
     from scipy.sparse import csr_matrix
 

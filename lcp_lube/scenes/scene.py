@@ -11,7 +11,7 @@ from pydantic import Field, PrivateAttr, ValidationError
 from ..errors import InputError, nearest
 from ..problems.facts import Facts
 from ..problems.solution import Problem
-from ..registry import FAMILIES, SCENE_DIR, scene_names
+from ..registry import FAMILIES, SCENE_DIR, is_scene, scene_names
 from .changes import changed, plain
 from .faults import first_fault, known_keys
 from .units import Measured, stem, units_of
@@ -164,7 +164,7 @@ def read_scene(source: str | Path) -> tuple[dict[str, Any], Path, str]:
     source = str(source)
     if source.endswith(".toml"):
         path, name = Path(source), Path(source).stem
-    elif source in scene_names():
+    elif is_scene(source):
         path, name = SCENE_DIR / f"{source}.toml", source
     else:
         raise InputError(

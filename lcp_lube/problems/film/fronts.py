@@ -75,11 +75,13 @@ def first_cavity(grid: Grid, ruptures: list[float], reformations: list[float]) -
 
 
 def _rises_through(film: Film, level: Array, a: Array, b: Array, y: Array) -> Array:
-    """Where the film grows beyond a level between a and b, by bisection: at a jump too; a or b where it does not."""
-    for _ in range(50):
-        middle = 0.5 * (a + b)
-        thin = film(middle, y) < level
-        a, b = np.where(thin, middle, a), np.where(thin, b, middle)
+    """Where the film first grows to a level between a and b, by sections in 32: at a jump too; a or b where it does not."""
+    parts = np.arange(1, 32) / 32
+    for _ in range(10 if a.size else 0):
+        width = (b - a)[:, None]
+        thick = film(a[:, None] + width * parts, y[:, None]) >= level[:, None]
+        first = np.where(thick.any(axis=1), thick.argmax(axis=1), 31)  # the part at whose end the film has grown so far
+        a, b = a + width[:, 0] * (first / 32), np.where(first < 31, a + width[:, 0] * ((first + 1) / 32), b)
     return b
 
 

@@ -22,6 +22,7 @@ from .reynolds import BoxScheme, assemble, side_points, sides, term_squares
 
 MATRICES = ("A", "B", "_vectors")
 UNIT = 2.0**-53  # largest relative error of one operation
+MANY = 100_000  # points from which compiled loops, which spare A and B their memory, are worth being loaded
 IDLE = 1e-8  # share of what the pressures alone would drive through the sides, below which a flow is none
 UNEVEN = 1e-4  # part of the flow that the rounding of pressures inside may make of a mass defect, at most
 
@@ -108,7 +109,7 @@ class LubricationProblem:
 
     def term_norms(self, p: Array, r: Array) -> tuple[float, float, float, float]:
         """||A p||, ||B r||, ||A p + B r - c|| and ||diag(A) p||, rows of A p as the sums of their face flows. Collective."""
-        if find_spec("numba") is None:
+        if self.grid.size < MANY or find_spec("numba") is None:
             Ap, Br = self.multiply(self.A, p), self.multiply(self.B, r)
             s = self.scheme
             terms = (Ap, Br, self.balance(p, r), (s.k_W + s.k_E + s.k_S + s.k_N).ravel() * p)
