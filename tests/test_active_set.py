@@ -168,7 +168,7 @@ def test_very_fine_line():
 
 def test_auto_chooses_and_says_why():
     small, line = run("problem4", {"n": 20}, system="reduced"), run("problem1")
-    assert small.settings["method"] == "active-set" and small.settings["recipe"] in ("umfpack", "superlu", "mumps")
+    assert small.settings["method"] == "active-set" and small.settings["recipe"] == "dissection"
     assert line.settings["recipe"] == "banded" and any("tridiagonal" in reason for reason in line.settings["why"])
     din = run("problem1", options={"mu": "mu1"})
     assert din.settings["method"] == "din"
@@ -181,11 +181,12 @@ def test_auto_in_the_plane(monkeypatch):
     pytest.importorskip("numba")
     few = run("problem4", {"n": 20})
     assert few.settings["method"] == "active-set" and few.converged
+    assert any("10000 points and fewer are solved sooner" in reason for reason in few.settings["why"])
     few.destroy()
-    sweeps = run("problem4", {"n": 80})
+    sweeps = run("problem4", {"n": 150})
     assert sweeps.settings["method"] == "fas" and sweeps.converged and sweeps.total("linear_iterations") == 0
     monkeypatch.setattr("lcp_lube.drivers.plan.find_spec", lambda name: None)
-    steps = run("problem4", {"n": 80})
+    steps = run("problem4", {"n": 150})
     assert steps.settings["method"] == "active-set" and steps.converged
     np.testing.assert_allclose(sweeps.fields["p"], steps.fields["p"], atol=1e-6)
     sweeps.destroy()

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from queue import SimpleQueue
 from threading import Event, Thread
 from typing import Any
@@ -78,8 +79,11 @@ def side_by_side(words: Sequence[str], jobs: int, chains: Chains) -> Iterator[tu
         over.set()
         for worker in list(workers):
             worker.terminate()
-        for worker in list(workers):
-            worker.wait()
+        for thread in threads:
+            thread.join()
+        for worker in workers:
+            with suppress(BrokenPipeError), worker:  # which closes the pipes and waits
+                pass
 
 
 def _lead(
