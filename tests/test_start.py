@@ -90,6 +90,46 @@ def test_superlu_dist_has_one_thread_whatever_the_environment_says():
     assert before in ("1", "3") and after == "1 converged", done.stderr
 
 
+ALL = "import sys; from lcp_lube.__main__ import main; status = main(sys.argv[1:]); print(*sys.modules); sys.exit(status)"
+LATE = {"scipy", "numba", "matplotlib", "tqdm", "difflib", "h5py", "xarray"}  # what small solves do without
+
+
+@pytest.mark.parametrize("words", [("problem1",), ("problem4", "--n", "60"), ("problem4", "--n", "60", "--no-reduction")])
+def test_a_small_solve_imports_little(words):
+    """Counted, not timed: what is slow to import comes where it is used, and families of scenes one by one."""
+    done = subprocess.run(
+        [sys.executable, "-c", ALL, "solve", *words], env=ENVIRONMENT, capture_output=True, text=True, timeout=60, check=True
+    )
+    loaded = done.stdout.splitlines()[-1].split()
+    assert not LATE & {name.partition(".")[0] for name in loaded}
+    own = [name for name in loaded if name.startswith("lcp_lube")]
+    assert not [name for name in own if name.startswith(("lcp_lube.studies", "lcp_lube.solvers.fas", "lcp_lube.linear.pc"))]
+    assert not {"bearing", "textured", "squeeze", "obstacle", "semilinear", "user"} & {
+        name.rpartition(".")[2] for name in own if name.startswith("lcp_lube.scenes.")
+    }
+    assert len(own) <= 120
+
+
+def test_the_package_alone_imports_nothing():
+    code = "import sys; before = set(sys.modules); import lcp_lube; print(*set(sys.modules) - before)"
+    done = subprocess.run([sys.executable, "-c", code], env=ENVIRONMENT, capture_output=True, text=True, timeout=60, check=True)
+    loaded = done.stdout.split()
+    assert "lcp_lube" in loaded and not {"numpy", "petsc4py", "mpi4py", "pydantic"} & set(loaded) and len(loaded) < 20
+
+
+def test_a_process_alone_starts_no_daemon():
+    """Open MPI would start one for processes that never come; what it is told so stays with this process."""
+    code = (
+        "import os; from pathlib import Path; from lcp_lube.base import petsc\n"
+        "petsc.start([])\n"
+        "children = Path(f'/proc/self/task/{os.getpid()}/children')\n"
+        "print(children.read_text().split() if children.exists() else [])\n"
+        "print([name for name in petsc.ALONE if name in os.environ])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], env=ENVIRONMENT, capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout == "[]\n[]\n"
+
+
 def test_a_failed_write_costs_no_result(capsys, tmp_path, monkeypatch):
     """The disk fills up during the run: the summary, the other files, then one line and status 2."""
     from lcp_lube.output import files

@@ -168,19 +168,10 @@ def parse(own: list[str]) -> argparse.Namespace:
     sweep.add_argument(
         "--output", type=Path, metavar="FILE.csv", help="filled row by row; points that stand there are not solved again"
     )
-    sweep.add_argument(
-        "--warm",
-        action=argparse.BooleanOptionalAction,
-        default=True,
-        help="start from the answer of the point before, along the last --vary; default yes",
-    )
-    sweep.add_argument(
-        "--jobs",
-        type=whole,
-        metavar="N",
-        help="so many processes side by side, each with its lines of points along the last --vary (--no-warm: its points); "
-        "default: one a core where that pays, one under mpiexec",
-    )
+    text = "start from the answer of the point before, along the last --vary; default yes"
+    sweep.add_argument("--warm", action=argparse.BooleanOptionalAction, default=True, help=text)
+    text = "processes side by side, each with lines of points along the last --vary (--no-warm: points); default: where it pays"
+    sweep.add_argument("--jobs", type=whole, metavar="N", help=text)
     sweep.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)  # one of these processes
 
     table = command("table", "reproduce a published table beside the printed one")
