@@ -94,7 +94,7 @@ def test_limit_of_fine_grids_is_the_exact_solution() -> None:
         value = exact.values[name]
         assert value is not None
         off = abs(float(str(limit[name])) / value - 1)
-        assert off < 10 * float(str(limit[f"{name}_unsure"])) < 1e-3
+        assert off < max(10 * float(str(limit[f"{name}_unsure"])), 1e-13) < 1e-3  # problem 3's p_max is exact on every grid
 
 
 @pytest.mark.hypre

@@ -36,8 +36,7 @@ def run(name: str, start: str, method: str, alone: bool = False) -> tuple[Case, 
     """A published problem from a published start; alone: without the method that takes over after a failure."""
     case = CASES[name]()
     problem = Complementarity(case.F, case.J, case.lower, case.upper, case.starts[start], name=name)
-    options = {"beta": 1e-4} if alone else None  # the default: but with options given nothing takes over
-    solution = solve(problem, method=method, options=options, stopping={"eps1": 1e-10, "max_it": 200})
+    solution = solve(problem, method=method, rescue=not alone, stopping={"eps1": 1e-10, "max_it": 200})
     return case, solution
 
 
