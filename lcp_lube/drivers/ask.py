@@ -50,7 +50,7 @@ class Ask:
     reduction : solve no more than symmetry leaves (`symmetry`).
     memory_check : refuse a run that needs more memory than there is, by an estimate (`memory`).
     monitor : called after every step with its number and record.
-    comm : communicator; default all ranks.
+    comm : communicator of petsc4py or mpi4py; default all ranks.
     """
 
     method: str = "auto"
@@ -78,6 +78,8 @@ class Ask:
             raise InputError(f"--every {self.every}: at least 1 is needed")
         if self.options is None:
             object.__setattr__(self, "options", {})
+        if self.comm is not None:
+            object.__setattr__(self, "comm", PETSc.Comm(self.comm))  # mpi4py's will do too
 
     @property
     def mpi(self) -> MPI.Comm:

@@ -70,7 +70,7 @@ class Grid:
         self.spacing = tuple(length / meshes for length, meshes in zip(self.lengths, self.meshes, strict=True))
         self.origin = origin
         self.size = math.prod(self.shape)
-        comm = comm or PETSc.COMM_WORLD
+        comm = PETSc.Comm(comm or PETSc.COMM_WORLD)  # mpi4py's will do too
         self._check_size(comm)
         collect(comm)  # what earlier solves have left behind
         self._own = Owned(self, comm)
