@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from side_scenes import REDUCED, SCENES, reduced_solve
 
 from lcp_lube import load_scene, solve
-from lcp_lube.drivers.symmetry import Part, part_of
+from lcp_lube.drivers.film_part import Part, part_of
 from lcp_lube.scenes.bearing import BearingScene
 
 FEW = settings(max_examples=15, deadline=None)
@@ -157,7 +157,7 @@ def test_auto_reduces(name):
 def test_a_wrong_reduction_is_found_out(monkeypatch):
     """The certificate is that of the whole scene: a film that only seems symmetric is solved whole."""
     for check in ("_is_symmetric", "promising"):
-        monkeypatch.setattr(f"lcp_lube.drivers.symmetry.{check}", lambda *_: True)
+        monkeypatch.setattr(f"lcp_lube.drivers.film_part.{check}", lambda *_: True)
     scene = bearing({"shape": "formula", "h": "2e-6 - 1e-4*x + 5e-5*y"}, ny=9)
     assert kind(scene) == "mirror"
     solution, whole = solve(scene), solve(scene, method="active-set")

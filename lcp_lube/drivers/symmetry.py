@@ -1,53 +1,67 @@
 """No more model than a scene needs: what does not vary is not solved for, what mirrors itself is solved once.
 
-In the order in which they are looked for:
-
-constant : the pressure is the same at every open side, and the film is everywhere the same, or the wall at rest: that pressure
-    is the answer.
-line : film and sides do not depend on y (both sides along the flow closed or periodic): one line is solved in 1D.
-mirror : the film is symmetric about the middle of the width, and the sides south and north are alike: half the width is solved,
-    with a closed side in the middle. For an odd number of lines the middle one lies on that side and has half cells.
-
-The reduced equations are the whole problem's own, with like unknowns put in one: their answer, spread out again, is certified
-on the whole problem's data like any other, and where that fails the whole problem is solved. (A film that does not cavitate
-needs no choice: the active-set method's first step is its one linear solve.)
+`film_part` and `rectangle_part` say what is left of a scene. The reduced equations are the whole problem's own, with like
+unknowns put in one: their answer, spread out again, is certified on the whole problem's data like any other, and where that
+fails the whole problem is solved. (A film that does not cavitate needs no choice: the active-set method's first step is its one
+linear solve.)
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from petsc4py import PETSc
 
-from ..base.parallel import Array
-from ..problems.facts import Facts
-from ..problems.film.lubrication import LubricationProblem
-from ..problems.film.model import Model, Side
-from ..problems.grid import Grid, some_places
-from ..problems.solution import Outcome, Problem, Solution
+from ..problems.grid import Grid
+from ..problems.solution import Fields, Outcome, Problem, Solution
 from ..problems.transfer import Pick, numbers
 from ..scenes.scene import Solvable
+from . import film_part, rectangle_part
 from .ask import Ask, Start
 from .compose import Inner
 from .memory import look_ahead
 from .plan import plan
 
-SAME = 1e-12  # relative difference that coordinates' rounding leaves between two values of one film
 
-SAMPLE = (65, 5)  # columns and lines that are compared first, before anything is built
+class Part(Solvable, Protocol):
+    """What is left of a scene. kind : names it; sentence : says what it is, and why."""
 
-SENTENCES = {
-    "constant": "nothing to solve: the pressure is the same at every side, and nothing else moves the fluid",
-    "line": "solved in 1D: neither the film nor the sides depend on y",
-    "mirror": "half the width is solved: the film and the sides are symmetric about its middle",
-}
+    @property
+    def kind(self) -> str: ...
+
+    @property
+    def sentence(self) -> str: ...
+
+    def answer(self, problem: Problem) -> Fields | None: ...
+
+    def places(self, grid: Grid) -> tuple[NDArray[np.int64], NDArray[np.int64]]: ...
+
+
+class Family(Protocol):
+    """What a module with parts offers. UNLIKELY, NONE : why there is none, by a few points and by all of them."""
+
+    UNLIKELY: str
+    NONE: str
+
+    def applies(self, scene: Solvable) -> bool: ...
+
+    def promising(self, scene: Solvable) -> bool: ...
+
+    def part_of(self, scene: Solvable, problem: Problem) -> Part | None: ...
+
+
+FAMILIES: Sequence[Family] = (film_part, rectangle_part)  # type: ignore[assignment]
+
+
+def family_of(scene: Solvable) -> Family | None:
+    """Where parts of this scene are looked for, if anywhere."""
+    return next((family for family in FAMILIES if family.applies(scene)), None)
 
 
 def applies(scene: Solvable, ask: Ask) -> bool:
-    """Whether there is something that symmetries could be looked for in: a film."""
-    return model_of(scene) is not None and not isinstance(scene, Part)
+    """Whether there is something that symmetries could be looked for in."""
+    return family_of(scene) is not None
 
 
 def why_not(ask: Ask) -> str:
@@ -61,24 +75,20 @@ def why_not(ask: Ask) -> str:
     return "checkpoints hold the whole problem" if ask.checkpoint or ask.resume else ""
 
 
-def model_of(scene: Solvable) -> Model | None:
-    """The film behind a scene, where it is one of a fluid with constant viscosity and density."""
-    model = getattr(scene, "model", None)
-    return model if isinstance(model, Model) and model.law is None else None
-
-
 def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     """The whole problem's solution from the least part that has it; from itself where there is none. Collective."""
-    if reason := why_not(ask) or ("" if promising(scene, ask) else "neither film nor sides have a symmetry"):
+    family = family_of(scene)
+    assert family is not None  # as `applies` found
+    if reason := why_not(ask) or ("" if family.promising(scene) else family.UNLIKELY):
         return _whole(inner(scene, ask), reason)
     if ask.memory_check:
         facts = scene.facts(ask.comm)
         look_ahead(facts, plan(facts, ask, scene.name), ask.mpi)
     problem = scene.build(ask.comm)
-    part = part_of(scene, problem)
+    part = family.part_of(scene, problem)
     if part is None:
         problem.destroy()
-        return _whole(inner(scene, ask), "film and sides do not share a symmetry")
+        return _whole(inner(scene, ask), family.NONE)
     solution = solve_part(part, problem, ask, inner)
     if solution.outcome is not Outcome.WRONG_SOLUTION:
         return solution
@@ -92,98 +102,6 @@ def _whole(solution: Solution, reason: str) -> Solution:
     return solution
 
 
-@dataclass(frozen=True)
-class Part:
-    """What is left of a scene.
-
-    kind : a key of SENTENCES. shape : that of the whole scene's grid, in 1D for 'line'.
-    """
-
-    whole: Solvable
-    kind: str
-
-    @property
-    def name(self) -> str:
-        return self.whole.name
-
-    @property
-    def scheme(self) -> str | None:
-        return self.whole.scheme
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        return self.whole.shape[:1] if self.kind == "line" else self.whole.shape
-
-    def with_shape(self, shape: tuple[int, ...]) -> "Part":
-        return Part(self.whole.with_shape(shape), self.kind)
-
-    def _model(self) -> tuple[Model, tuple[int, ...]]:
-        """The part's own film, and its grid."""
-        model = model_of(self.whole)
-        assert model is not None  # as `applies` found
-        if self.kind == "line":
-            return replace(model, lengths=model.lengths[:1], exact=None), self.shape
-        nx, ny = self.shape
-        west, east, south, _ = model.sides
-        south = south if south.kind == "open" else Side("closed")
-        half = (west, east, south, Side("mirror" if ny % 2 else "closed"))
-        lengths = (model.lengths[0], 0.5 * model.lengths[1])
-        return replace(model, lengths=lengths, sides=half, exact=None), (nx, (ny + 1) // 2)
-
-    def facts(self, comm: PETSc.Comm | None = None) -> Facts:
-        model, shape = self._model()
-        return model.facts(shape, comm)
-
-    def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
-        """The discrete problem of the part. Collective."""
-        model, shape = self._model()
-        return model.build(shape, comm)
-
-
-def promising(scene: Solvable, ask: Ask) -> bool:
-    """Whether some columns and lines of the film look like one of a part: nothing is built for films that do not."""
-    model = model_of(scene)
-    assert model is not None  # as `applies` found
-    if _at_rest(model):
-        return True
-    kinds = [tuple(side.kind for side in model.sides[k : k + 2]) for k in (0, 2)]
-    xs, *ys = (some_places(*side) for side in zip(scene.shape, model.lengths, kinds, SAMPLE, strict=False))
-    y = ys[0][:, None] if ys else np.zeros((1, 1))
-    with np.errstate(all="ignore"):  # a film that is not positive is told where it is built
-        h = np.broadcast_to(model.film(xs[None, :], y), (y.size, xs.size))
-        mirrored = model.film(xs[None, :], model.lengths[-1] - y) if ys else np.inf
-        return bool(np.all(np.abs(h / h[:1] - 1.0) <= SAME) if ys else np.ptp(h) <= SAME * h.max()) or bool(
-            np.all(np.abs(mirrored / h - 1.0) <= SAME)
-        )
-
-
-def _at_rest(model: Model) -> bool:
-    """Whether neither the wall nor a difference of pressures moves the fluid."""
-    return not model.U and len({side.p for side in model.sides[: 2 * len(model.lengths)] if side.kind == "open"}) == 1
-
-
-def part_of(scene: Solvable, problem: Problem) -> Part | None:
-    """The least part of a scene that gives its whole answer; None where that is the scene itself. Collective."""
-    model = model_of(scene)
-    if model is None or not isinstance(problem, LubricationProblem):
-        return None
-    grid = problem.grid
-    west, east, *ends = model.sides
-    pressures = {side.p for side in model.sides[: 2 * grid.dim] if side.kind == "open"}
-    if _at_rest(model):
-        return Part(scene, "constant")
-    if len(pressures) == 1 and not west.r and "closed" not in (west.kind, east.kind) and _is_constant(problem):
-        return Part(scene, "constant")
-    if grid.dim == 1:
-        return None
-    if "open" not in (ends[0].kind, ends[1].kind) and _all_lines_are_one(problem):
-        return Part(scene, "line")
-    faces = not (model.mean_cubes and model.scheme == "upwind")  # whether the discretisation asks for the film there
-    if ends[0] == ends[1] and grid.shape[1] // 2 >= grid.comm.size and _is_symmetric(problem, faces):
-        return Part(scene, "mirror")
-    return None
-
-
 def solve_part(part: Part, problem: Problem, ask: Ask, inner: Inner) -> Solution:
     """The whole problem's solution from its part's. Collective.
 
@@ -191,101 +109,39 @@ def solve_part(part: Part, problem: Problem, ask: Ask, inner: Inner) -> Solution
     ----------
     problem : the whole one. ask : its `start` is a neighbour's whole problem.
     """
-    assert isinstance(problem, LubricationProblem)  # as `part_of` found
     details = {"reduction": part.kind}
-    if part.kind == "constant":
-        model = model_of(part.whole)
-        assert model is not None
-        p = next(side.p for side in model.sides if side.kind == "open") / problem.p_unit
-        n = problem.grid.local_size
-        fields = {"p": np.full(n, p), "r": np.zeros(n)}
+    known = part.answer(problem)
+    if known is not None:
         eps1 = ask.stopping_for((1e-8, 1e-8)).eps1
         settings = {
             "scene": part.name,
             "method": "none",
             "scheme": part.scheme,
             "eps1": eps1,
-            "why": [SENTENCES["constant"]],
+            "why": [part.sentence],
             "details": details,
         }
-        certificate = problem.certify(fields, eps1)
-        return Solution(problem, fields, Outcome.CONVERGED, "nothing to solve", certificate, [], settings).judged()
+        certificate = problem.certify(known, eps1)
+        return Solution(problem, known, Outcome.CONVERGED, "nothing to solve", certificate, [], settings).judged()
     start = None
     if ask.start is not None:
         small = part.build(problem.grid.dm.comm)
         near = problem.prolong(ask.start.problem, ask.start.fields, False)  # type: ignore[arg-type]
         take = Pick(problem.grid, small.grid, *numbers(small.grid))
         start = Start(small, {name: take(values) for name, values in near.items()}, ask.start.settings)
+        take.destroy()
     solution = inner(part, replace(ask, start=start))
     if start is not None:
         start.problem.destroy()
     small_problem = solution.problem
-    j, i = numbers(problem.grid)
-    spread = Pick(small_problem.grid, problem.grid, *((0 * j, i) if part.kind == "line" else (_mirrored(problem.grid, j), i)))
+    spread = Pick(small_problem.grid, problem.grid, *part.places(problem.grid))
     fields = {name: spread(values) for name, values in solution.fields.items()}
+    spread.destroy()
     small_problem.destroy()
     settings = {
         **solution.settings,
-        "why": [SENTENCES[part.kind], *solution.settings["why"]],
+        "why": [part.sentence, *solution.settings["why"]],
         "details": {**solution.settings["details"], **details},
     }
     certificate = problem.certify(fields, solution.settings["eps1"])
     return replace(solution, problem=problem, fields=fields, certificate=certificate, settings=settings).judged()
-
-
-def _is_constant(problem: LubricationProblem) -> bool:
-    """Whether all points and faces have one film thickness. Collective."""
-    if _edges(problem, "x") or _edges(problem, "y"):
-        return False  # between points, where no one looks
-    h, largest = problem.scheme.h, problem.reduce.max(problem.scheme.h)
-    return _all_close(problem, [(h, largest)]) and _all_close(problem, [(faces, largest) for faces in _films(problem)])
-
-
-def _all_lines_are_one(problem: LubricationProblem) -> bool:
-    """Whether the film does not depend on y. Collective."""
-    if _edges(problem, "y"):
-        return False
-    grid, film = problem.grid, problem.film
-    x_nodes, x_faces = grid.nodes_and_faces(0)
-    first = np.array([[grid.origin[1]]])
-    if not _all_close(problem, [(problem.scheme.h, film(grid.x, first))]):
-        return False
-    lines = [film(x[None, :], first) for x in (x_nodes, x_faces, x_nodes)]
-    return _all_close(problem, list(zip(_films(problem), lines, strict=True)))
-
-
-def _is_symmetric(problem: LubricationProblem, faces: bool) -> bool:
-    """Whether h(x, y) = h(x, width - y), at the points, and on the faces too. Collective."""
-    grid = problem.grid
-    mirror = 2 * grid.origin[1] + grid.lengths[1]
-    edges = np.unique(_edges(problem, "y"))
-    if not np.allclose(edges, np.sort(mirror - edges), rtol=0.0, atol=SAME * grid.lengths[1]):
-        return False
-    some = np.unique(np.linspace(0, grid.box[0] - 1, SAMPLE[1]).round().astype(int))  # most films that are not tell so at once
-    if not _all_close(problem, [(problem.scheme.h[some], problem.film(grid.x, mirror - grid.y[some]))]):
-        return False
-    pairs = list(zip(_films(problem), _films(problem, mirror), strict=True))
-    return _all_close(problem, pairs if faces else pairs[:1])
-
-
-def _edges(problem: LubricationProblem, axis: str) -> Sequence[float]:
-    """Where the film jumps, inside a cell perhaps."""
-    return getattr(problem.film, "jumps", lambda axis: ())(axis)
-
-
-def _films(problem: LubricationProblem, mirror: float | None = None) -> list[Array]:
-    """The film at the points, x faces and y faces, or at y = mirror - theirs."""
-    grid, film = problem.grid, problem.film
-    x_nodes, x_faces = grid.nodes_and_faces(0)
-    y_nodes, y_faces = grid.nodes_and_faces(1) if grid.dim == 2 else (np.zeros(1), np.zeros(0))
-    lines = [line if mirror is None else mirror - line for line in (y_nodes, y_nodes, y_faces)]
-    return [film(x[None, :], y[:, None]) for x, y in zip((x_nodes, x_faces, x_nodes), lines, strict=True)]
-
-
-def _all_close(problem: LubricationProblem, pairs: list[tuple[Array, Any]]) -> bool:
-    worst = max(float(np.max(np.abs(a / b - 1.0), initial=0.0)) for a, b in pairs)
-    return bool(problem.reduce.max(np.array([worst])) <= SAME)
-
-
-def _mirrored(grid: Grid, j: NDArray[np.int64]) -> NDArray[np.int64]:
-    return np.minimum(j, grid.shape[1] - 1 - j)

@@ -11,6 +11,7 @@ from petsc4py import PETSc
 from ..base.owned import Owned
 from ..base.parallel import Array
 from .box import BoxProblem
+from .fold import folded_axes, part_grid, part_shape, whole_lengths, whole_shape
 from .grid import Grid
 from .semilinear import Bratu, SemilinearProblem, Surface
 from .solution import Fields, Outcome
@@ -19,7 +20,7 @@ from .transfer import Transfer
 # Largest lambda for which -Lap v = lambda e^v, v = 0 on the boundary of the unit square, has a solution; the five-point
 # formula's is smaller by 1.5 h^2 (6.80674, 6.80777, 6.80803 for n = 32, 64, 128).
 TURNING_POINT, FIVE_POINT = 6.808124, 1.5
-COARSEST = 8  # points a side of multigrid's coarsest grid, at least (and as many as there are ranks)
+COARSEST = 8  # points a side of the whole rectangle on multigrid's coarsest grid, at least
 
 
 class ObstacleEquations:
@@ -57,7 +58,7 @@ class ObstacleProblem(BoxProblem):
 
     Parameters
     ----------
-    grid : the interior points.
+    grid : the interior points, or those of a part (`fold`).
     lam : lambda.
     lower, upper : the obstacles as functions of x and y.
     v0 : the start as a function; None: 0.01, the lower branch's side; or, where lambda lies beyond the turning point and
@@ -87,8 +88,8 @@ class ObstacleProblem(BoxProblem):
         equations = ObstacleEquations(SemilinearProblem(grid, Bratu(lam), boundary=boundary))
         least, most = grid.reduce.min(equations.b), grid.reduce.max(equations.b)
         self.homogeneous = least == most == 0.0
-        square = np.isclose(grid.lengths[0], grid.lengths[1], rtol=1e-12)
-        L, h = grid.lengths[0], max(grid.spacing)
+        L, width = whole_lengths(grid)
+        square, h = np.isclose(L, width, rtol=1e-12), max(grid.spacing)
         self.turning_point = (TURNING_POINT - FIVE_POINT * (h / L) ** 2) / L**2 if square and least >= 0 else None
         self._beyond = self.turning_point is not None and lam > self.turning_point
         self._bounded = grid.reduce.max(u) < np.inf
@@ -133,15 +134,16 @@ class ObstacleProblem(BoxProblem):
         )
 
     def coarser(self) -> "tuple[ObstacleProblem, Transfer] | None":
-        shape = tuple((n - 1) // 2 for n in self.grid.shape)
-        if self._coarser is None and min(shape) >= max(COARSEST, self.grid.comm.size):
-            grid = Grid(shape, self.grid.lengths, self.grid.dm.comm, self.grid.origin)
+        axes = folded_axes(self.grid)
+        shape = tuple((n - 1) // 2 for n in whole_shape(self.grid))
+        if self._coarser is None and min(shape) >= COARSEST and min(part_shape(shape, axes)) >= self.grid.comm.size:
+            grid = part_grid(shape, whole_lengths(self.grid), axes, self.grid.dm.comm, self.grid.origin)
             self._coarser = ObstacleProblem(grid, self.lam, *self._data, coarse=True)
         return None if self._coarser is None else (self._coarser, self._interpolation(self._coarser.grid))
 
     def _interpolation(self, coarse: Grid) -> Transfer:
         """Bilinear interpolation from a coarser grid, zero on the boundary; made once. Collective."""
-        if self._transfer is not None and self._transfer.coarse_shape != coarse.shape:
+        if self._transfer is not None and self._transfer.coarse_meshes != coarse.meshes:
             self._transfer.destroy()
             self._transfer = None
         if self._transfer is None:

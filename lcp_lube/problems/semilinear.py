@@ -11,6 +11,7 @@ from ..base.parallel import Array, Reduce
 from ..errors import InputError
 from .certificate import Certificate, certificate_tol
 from .film.reynolds import assemble, sides
+from .fold import FOLDED, shares
 from .grid import Grid
 from .solution import Fields
 from .transfer import Transfer
@@ -124,11 +125,11 @@ class SemilinearProblem:
     """f(v) = A v - b - dx dy g(v) = 0 on a grid, A the five-point formula times dx dy: (4, -1) where dx = dy.
 
     Row i balances what flows out of cell i against its source. The one field is v, on this rank's points. b is what the
-    values on the boundary bring.
+    values on the boundary bring. On a part of a rectangle (`fold`) nothing flows through the ends in its middle.
 
     Parameters
     ----------
-    grid : the interior points.
+    grid : the interior points, or those of a part.
     source : g.
     v0 : value of v at every point to start from.
     boundary : v on the boundary as a function of x and y; default 0.
@@ -146,13 +147,19 @@ class SemilinearProblem:
         self.reduce: Reduce = grid.reduce
         self._x, self._y = (np.ravel(a) for a in np.broadcast_arrays(grid.x, grid.y))
         dx, dy = grid.spacing
-        across_x, across_y = dy / dx, dx / dy
-        self._face = (across_x, across_x, across_y, across_y)  # west, east, south, north
-        west_east, south_north = np.full(grid.box, -across_x), np.full(grid.box, -across_y)
-        self.diagonal = 2.0 * (across_x + across_y)
-        entries = [(0, 0, np.full(grid.box, self.diagonal)), (0, -1, west_east), (0, 1, west_east)]
+        x_share, y_share = shares(grid)
+        self.cells = (grid.cell * x_share * y_share).ravel()
+        across_x, across_y = dy / dx * y_share, dx / dy * x_share
+        _, east, _, north = sides(grid, FOLDED)
+        # Conductances of the faces west, east, south, north; they broadcast to the box.
+        self.faces = (across_x, np.where(east, 0.0, across_x), across_y, np.where(north, 0.0, across_y))
+        west_east, south_north = (self.faces[k] + self.faces[k + 1] for k in (0, 2))
+        self.diagonal = np.broadcast_to(west_east + south_north, grid.box).ravel()
+        self.largest_diagonal = 2.0 * (dy / dx + dx / dy)
+        beside = zip(((0, -1), (0, 1), (-1, 0), (1, 0)), self.faces, strict=True)
+        entries = [(0, 0, self.diagonal.reshape(grid.box)), *((*at, np.broadcast_to(-k, grid.box)) for at, k in beside)]
         self._own = Owned(self, grid.dm.comm)
-        self.A = self._own(assemble(grid, [*entries, (-1, 0, south_north), (1, 0, south_north)]))
+        self.A = self._own(assemble(grid, entries))
         self._in, self._out = map(self._own, self.A.createVecs())
         self.b = np.zeros(grid.local_size) if boundary is None else _boundary_terms(grid, boundary)
 
@@ -173,7 +180,7 @@ class SemilinearProblem:
 
     def supply(self, v: Array) -> Array:
         """dx dy g(v), what the source gives each cell."""
-        return self.grid.cell * self.source.value(self._x, self._y, v)
+        return self.cells * self.source.value(self._x, self._y, v)
 
     def residual(self, v: Array) -> Array:
         """f(v) = A v - b - dx dy g(v). Collective."""
@@ -181,7 +188,7 @@ class SemilinearProblem:
 
     def jacobian_diagonal(self, v: Array) -> Array:
         """Diagonal of f'(v); off it f' is A."""
-        return self.diagonal - self.grid.cell * self.source.slope(self._x, self._y, v)
+        return self.diagonal - self.cells * self.source.slope(self._x, self._y, v)
 
     def certify(self, fields: Fields, eps1: float) -> Certificate:
         """Certificate of v. Collective.
@@ -194,8 +201,8 @@ class SemilinearProblem:
         v, red = fields["v"], self.reduce
         flow, supply = self.flow(v), self.supply(v)
         scale = red.norm(flow) + red.norm(supply)
-        rounding = ROUNDING * (self.diagonal * red.norm(v) + red.norm(self.b))
-        at_sides = [np.where(at, k * v.reshape(self.grid.box), 0.0) for at, k in zip(sides(self.grid), self._face, strict=True)]
+        rounding = ROUNDING * (self.largest_diagonal * red.norm(v) + red.norm(self.b))
+        at_sides = [np.where(at, k * v.reshape(self.grid.box), 0.0) for at, k in zip(sides(self.grid), self.faces, strict=True)]
         out = sum(red.sum(part) for part in at_sides) - red.sum(self.b)
         rounding_out = ROUNDING * (sum(red.sum(np.abs(part)) for part in at_sides) + red.sum(np.abs(self.b)))
         given = red.sum(np.abs(supply))
@@ -209,7 +216,7 @@ class SemilinearProblem:
             )
 
     def quantities(self, fields: Fields) -> dict[str, Any]:
-        """max_v, sum_v = dx dy sum v, and max_error where the solution is known. Collective."""
+        """Of a whole rectangle: max_v, sum_v = dx dy sum v, and max_error where the solution is known. Collective."""
         v = fields["v"]
         out = {"max_v": self.reduce.max(v), "sum_v": self.grid.cell * self.reduce.sum(v)}
         exact = self.source.exact(self._x, self._y)
@@ -255,9 +262,9 @@ def _boundary_terms(grid: Grid, boundary: Surface) -> Array:
     InputError : the boundary's formula has no finite value at a point next to which a grid point lies.
     """
     dx, dy = grid.spacing
-    b = np.zeros(grid.box)
+    b, (x_share, y_share) = np.zeros(grid.box), shares(grid)
     for at_side, (ox, oy) in zip(sides(grid), ((-dx, 0.0), (dx, 0.0), (0.0, -dy), (0.0, dy)), strict=True):
-        weight = dy / dx if ox else dx / dy
+        weight = dy / dx * y_share if ox else dx / dy * x_share
         b += np.where(at_side, weight * boundary(grid.x + ox, grid.y + oy), 0.0)
     if not np.isfinite(grid.reduce.sum(b)):
         raise InputError("boundary: no finite value at some points of the boundary")

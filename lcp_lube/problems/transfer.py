@@ -23,18 +23,18 @@ class Transfer:
     Parameters
     ----------
     nearest : take the nearest coarse point's value instead (for fields with jumps).
-    zero_boundary : the field is zero on the boundary: interpolate to that.
+    zero_boundary : the field is zero on the boundary: interpolate to that, but at ends through which nothing flows.
 
     Attributes
     ----------
     mat : the interpolation as a matrix, for PCMG.
-    coarse_shape : points of the coarse grid.
+    coarse_meshes : spacings of the coarse grid from side to side.
     """
 
     def __init__(self, coarse: Grid, fine: Grid, nearest: bool = False, zero_boundary: bool = False):
         from scipy.sparse import csr_matrix, kron  # here: a solve on one grid is spared its import
 
-        self.coarse_shape = coarse.shape
+        self.coarse_meshes = coarse.meshes
         ranges = ((fine.x_start, fine.x_end), (fine.y_start, fine.y_end))
         weights = csr_matrix([[1.0]])
         for side in range(fine.dim):
@@ -84,6 +84,8 @@ def _weights(points: np.ndarray, coarse: Grid, fine: Grid, side: int, nearest: b
     columns = np.concatenate([left, left + 1])
     values = np.concatenate([1.0 - right, right])
     if zero_boundary:
+        last = n_coarse - 1 if fine.ends[side][1] in ("closed", "mirror") else n_coarse
+        columns = np.minimum(columns, last)  # beyond a closed end lies the mirror image
         used = (columns >= 0) & (columns < n_coarse) & (values > 0)
     else:
         columns = columns % n_coarse if fine.periodic[side] else np.clip(columns, 0, n_coarse - 1)

@@ -5,6 +5,7 @@ from typing import Annotated, ClassVar
 from petsc4py import PETSc
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
+from ..base.parallel import Array
 from ..problems.grid import Grid
 from ..problems.obstacle import ObstacleProblem
 from .formula import Formula, FormulaText
@@ -68,7 +69,25 @@ class ObstacleScene(Scene):
         InputError : obstacles that cross, a formula without a value, more ranks than the grid can be dealt to.
         """
         lengths = (self.x[1] - self.x[0], self.y[1] - self.y[0])
-        grid = Grid(self.shape, lengths, comm, (self.x[0], self.y[0]))
+        return self.problem_on(Grid(self.shape, lengths, comm, (self.x[0], self.y[0])))
+
+    def problem_on(self, grid: Grid) -> ObstacleProblem:
+        """The discrete problem on a grid of the rectangle, or of a part of it (`problems.fold`). Collective."""
         v0 = None if self.v0 is None else Formula(self.v0)
-        surfaces = (Formula(self.v_lower), Formula(self.v_upper), v0, Formula(self.boundary))
-        return ObstacleProblem(grid, self.lam, *surfaces, coarse=self._coarse)
+        return ObstacleProblem(
+            grid, self.lam, Formula(self.v_lower), Formula(self.v_upper), v0, self.on_boundary, coarse=self._coarse
+        )
+
+    @property
+    def rectangle(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Where x and y start and end."""
+        return self.x, self.y
+
+    @property
+    def on_boundary(self) -> Formula:
+        """v on the boundary."""
+        return Formula(self.boundary)
+
+    def inside(self, x: Array, y: Array) -> list[Array]:
+        """What varies over the rectangle and is not v: the obstacles, and a start that was given."""
+        return [Formula(text)(x, y) for text in (self.v_lower, self.v_upper, self.v0) if text is not None]

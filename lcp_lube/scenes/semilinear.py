@@ -2,13 +2,17 @@
 
 from typing import Annotated, ClassVar
 
+import numpy as np
 from petsc4py import PETSc
 from pydantic import Field
 
+from ..base.parallel import Array
 from ..problems.grid import Grid
 from ..problems.semilinear import Bratu, ManufacturedCubic, PoissonCubic, SemilinearProblem, Source, Surface
 from .formula import Formula, FormulaText
 from .scene import Count, Finite, NotNegative, Scene
+
+Rectangle = tuple[tuple[float, float], tuple[float, float]]
 
 
 class SemilinearScene(Scene):
@@ -35,6 +39,19 @@ class SemilinearScene(Scene):
         """v on the boundary; None for 0."""
         return None
 
+    @property
+    def rectangle(self) -> Rectangle:
+        """Where x and y start and end."""
+        return (0.0, 1.0), (0.0, 1.0)
+
+    def inside(self, x: Array, y: Array) -> list[Array]:
+        """What varies over the rectangle and is not v: the source, at v0 and beside it."""
+        return [self.source.value(x, y, np.full(np.broadcast(x, y).shape, v)) for v in (self.v0, self.v0 + 1.0)]
+
+    def problem_on(self, grid: Grid) -> SemilinearProblem:
+        """The discrete problem on a grid of the rectangle, or of a part of it (`problems.fold`). Collective."""
+        return SemilinearProblem(grid, self.source, self.v0, self.on_boundary)
+
     def build(self, comm: PETSc.Comm | None = None) -> SemilinearProblem:
         """The discrete problem on this scene's grid. Collective.
 
@@ -42,7 +59,7 @@ class SemilinearScene(Scene):
         ------
         InputError : more ranks than the grid can be dealt to, or values on the boundary that are not finite.
         """
-        return SemilinearProblem(Grid(self.shape, (1.0, 1.0), comm), self.source, self.v0, self.on_boundary)
+        return self.problem_on(Grid(self.shape, (1.0, 1.0), comm))
 
 
 class BratuScene(SemilinearScene):

@@ -20,6 +20,7 @@ from ..base.parallel import Array
 from ..base.stages import Stages
 from ..errors import InputError
 from ..linear.krylov import Krylov, LinearSolverError
+from ..problems.fold import whole_lengths
 from ..problems.semilinear import SemilinearProblem
 from ..problems.solution import Fields, Step
 from .job import Job
@@ -63,7 +64,7 @@ class PlainNewton:
         self.v = start["v"].copy() if start else np.full(problem.grid.local_size, problem.v0)
         self.climbing = start is None and problem.climbs
         grid = problem.grid
-        x, y = ((points - o) / side for points, o, side in zip((grid.x, grid.y), grid.origin, grid.lengths, strict=True))
+        x, y = ((points - o) / side for points, o, side in zip((grid.x, grid.y), grid.origin, whole_lengths(grid), strict=True))
         self._bump = (np.sin(np.pi * x) * np.sin(np.pi * y)).ravel()  # A's first eigenvector
         with stages("assembly"):
             self.mat = problem.A.duplicate(copy=True)
@@ -135,7 +136,7 @@ class PlainNewton:
         if not self.climbing:
             eta = 0.0 if self.krylov.direct else self.options.eta
             # f itself is no more accurate than this: below it nothing can be asked to decrease.
-            rounding = float(np.finfo(float).eps) * problem.diagonal * reduce.norm(self.v)
+            rounding = float(np.finfo(float).eps) * problem.largest_diagonal * reduce.norm(self.v)
 
             def decreases(alpha: float) -> bool:
                 trial = reduce.norm(problem.residual(self.v + alpha * d))

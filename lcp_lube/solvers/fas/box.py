@@ -91,13 +91,13 @@ class BoxFas:
     def _hierarchy(self, equations: ObstacleEquations) -> list[_Grid]:
         grid, tools = self.problem.grid, self._tools
         dx, dy = grid.spacing
-        across_x, across_y = np.full(grid.box, dy / dx), np.full(grid.box, dx / dy)
-        finest = tools.level_of(grid, across_x, across_x, across_y, across_y, equations.b.reshape(grid.box))
+        faces = (np.broadcast_to(k, grid.box) for k in equations.semilinear.faces)
+        finest = tools.level_of(grid, *faces, equations.b.reshape(grid.box))
         levels = tools.hierarchy(finest, False)
         bounds, m = np.zeros((2, *finest.z.shape)), np.zeros_like(finest.z)
         for k, bound in enumerate((self.problem.lower, self.problem.upper)):
             tools.put(finest, grid, bounds[k], bound)
-        m[1:-1, 1:-1] = grid.cell
+        tools.put(finest, grid, m, equations.semilinear.cells)
         rows = slice(None) if finest.comm is None else slice(grid.y_start, grid.y_end)
         x = grid.origin[0] + dx * np.arange(1, grid.shape[0] + 1)
         y = (grid.origin[1] + dy * np.arange(1, grid.shape[1] + 1))[rows]

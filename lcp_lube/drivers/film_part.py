@@ -1,0 +1,215 @@
+"""Films: what does not vary is not solved for, what mirrors itself about the middle of the width is solved once.
+
+In the order in which they are looked for:
+
+constant : the pressure is the same at every open side, and the film is everywhere the same, or the wall at rest: that pressure
+    is the answer.
+line : film and sides do not depend on y (both sides along the flow closed or periodic): one line is solved in 1D.
+mirror : the film is symmetric about the middle of the width, and the sides south and north are alike: half the width is solved,
+    with a closed side in the middle. For an odd number of lines the middle one lies on that side and has half cells.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from ..base.parallel import Array
+from ..problems.facts import Facts
+from ..problems.film.lubrication import LubricationProblem
+from ..problems.film.model import Model, Side
+from ..problems.grid import Grid, some_places
+from ..problems.solution import Fields, Problem
+from ..problems.transfer import numbers
+from ..scenes.scene import Solvable
+
+SAME = 1e-12  # relative difference that coordinates' rounding leaves between two values of one film
+
+SAMPLE = (65, 5)  # columns and lines that are compared first, before anything is built
+
+SENTENCES = {
+    "constant": "nothing to solve: the pressure is the same at every side, and nothing else moves the fluid",
+    "line": "solved in 1D: neither the film nor the sides depend on y",
+    "mirror": "half the width is solved: the film and the sides are symmetric about its middle",
+}
+UNLIKELY = "neither film nor sides have a symmetry"
+NONE = "film and sides do not share a symmetry"
+
+
+def applies(scene: Solvable) -> bool:
+    """Whether there is something that symmetries could be looked for in: a film."""
+    return model_of(scene) is not None and not isinstance(scene, Part)
+
+
+def model_of(scene: Solvable) -> Model | None:
+    """The film behind a scene, where it is one of a fluid with constant viscosity and density."""
+    model = getattr(scene, "model", None)
+    return model if isinstance(model, Model) and model.law is None else None
+
+
+@dataclass(frozen=True)
+class Part:
+    """What is left of a scene.
+
+    kind : a key of SENTENCES. shape : that of the whole scene's grid, in 1D for 'line'.
+    """
+
+    whole: Solvable
+    kind: str
+
+    @property
+    def sentence(self) -> str:
+        return SENTENCES[self.kind]
+
+    @property
+    def name(self) -> str:
+        return self.whole.name
+
+    @property
+    def scheme(self) -> str | None:
+        return self.whole.scheme
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return self.whole.shape[:1] if self.kind == "line" else self.whole.shape
+
+    def with_shape(self, shape: tuple[int, ...]) -> "Part":
+        return Part(self.whole.with_shape(shape), self.kind)
+
+    def _model(self) -> tuple[Model, tuple[int, ...]]:
+        """The part's own film, and its grid."""
+        model = model_of(self.whole)
+        assert model is not None  # as `applies` found
+        if self.kind == "line":
+            return replace(model, lengths=model.lengths[:1], exact=None), self.shape
+        nx, ny = self.shape
+        west, east, south, _ = model.sides
+        south = south if south.kind == "open" else Side("closed")
+        half = (west, east, south, Side("mirror" if ny % 2 else "closed"))
+        lengths = (model.lengths[0], 0.5 * model.lengths[1])
+        return replace(model, lengths=lengths, sides=half, exact=None), (nx, (ny + 1) // 2)
+
+    def facts(self, comm: PETSc.Comm | None = None) -> Facts:
+        model, shape = self._model()
+        return model.facts(shape, comm)
+
+    def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
+        """The discrete problem of the part. Collective."""
+        model, shape = self._model()
+        return model.build(shape, comm)
+
+    def answer(self, problem: Problem) -> Fields | None:
+        """The whole problem's fields, where there is nothing to solve."""
+        if self.kind != "constant":
+            return None
+        model = model_of(self.whole)
+        assert model is not None and isinstance(problem, LubricationProblem)  # as `part_of` found
+        p = next(side.p for side in model.sides if side.kind == "open") / problem.p_unit
+        n = problem.grid.local_size
+        return {"p": np.full(n, p), "r": np.zeros(n)}
+
+    def places(self, grid: Grid) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Line and column in the part that the owned points of the whole grid are like."""
+        j, i = numbers(grid)
+        return (0 * j if self.kind == "line" else np.minimum(j, grid.shape[1] - 1 - j)), i
+
+
+def promising(scene: Solvable) -> bool:
+    """Whether some columns and lines of the film look like one of a part: nothing is built for films that do not."""
+    model = model_of(scene)
+    assert model is not None  # as `applies` found
+    if _at_rest(model):
+        return True
+    kinds = [tuple(side.kind for side in model.sides[k : k + 2]) for k in (0, 2)]
+    xs, *ys = (some_places(*side) for side in zip(scene.shape, model.lengths, kinds, SAMPLE, strict=False))
+    y = ys[0][:, None] if ys else np.zeros((1, 1))
+    with np.errstate(all="ignore"):  # a film that is not positive is told where it is built
+        h = np.broadcast_to(model.film(xs[None, :], y), (y.size, xs.size))
+        mirrored = model.film(xs[None, :], model.lengths[-1] - y) if ys else np.inf
+        return bool(np.all(np.abs(h / h[:1] - 1.0) <= SAME) if ys else np.ptp(h) <= SAME * h.max()) or bool(
+            np.all(np.abs(mirrored / h - 1.0) <= SAME)
+        )
+
+
+def _at_rest(model: Model) -> bool:
+    """Whether neither the wall nor a difference of pressures moves the fluid."""
+    return not model.U and len({side.p for side in model.sides[: 2 * len(model.lengths)] if side.kind == "open"}) == 1
+
+
+def part_of(scene: Solvable, problem: Problem) -> Part | None:
+    """The least part of a scene that gives its whole answer; None where that is the scene itself. Collective."""
+    model = model_of(scene)
+    if model is None or not isinstance(problem, LubricationProblem):
+        return None
+    grid = problem.grid
+    west, east, *ends = model.sides
+    pressures = {side.p for side in model.sides[: 2 * grid.dim] if side.kind == "open"}
+    if _at_rest(model):
+        return Part(scene, "constant")
+    if len(pressures) == 1 and not west.r and "closed" not in (west.kind, east.kind) and _is_constant(problem):
+        return Part(scene, "constant")
+    if grid.dim == 1:
+        return None
+    if "open" not in (ends[0].kind, ends[1].kind) and _all_lines_are_one(problem):
+        return Part(scene, "line")
+    faces = not (model.mean_cubes and model.scheme == "upwind")  # whether the discretisation asks for the film there
+    if ends[0] == ends[1] and grid.shape[1] // 2 >= grid.comm.size and _is_symmetric(problem, faces):
+        return Part(scene, "mirror")
+    return None
+
+
+def _is_constant(problem: LubricationProblem) -> bool:
+    """Whether all points and faces have one film thickness. Collective."""
+    if _edges(problem, "x") or _edges(problem, "y"):
+        return False  # between points, where no one looks
+    h, largest = problem.scheme.h, problem.reduce.max(problem.scheme.h)
+    return _all_close(problem, [(h, largest)]) and _all_close(problem, [(faces, largest) for faces in _films(problem)])
+
+
+def _all_lines_are_one(problem: LubricationProblem) -> bool:
+    """Whether the film does not depend on y. Collective."""
+    if _edges(problem, "y"):
+        return False
+    grid, film = problem.grid, problem.film
+    x_nodes, x_faces = grid.nodes_and_faces(0)
+    first = np.array([[grid.origin[1]]])
+    if not _all_close(problem, [(problem.scheme.h, film(grid.x, first))]):
+        return False
+    lines = [film(x[None, :], first) for x in (x_nodes, x_faces, x_nodes)]
+    return _all_close(problem, list(zip(_films(problem), lines, strict=True)))
+
+
+def _is_symmetric(problem: LubricationProblem, faces: bool) -> bool:
+    """Whether h(x, y) = h(x, width - y), at the points, and on the faces too. Collective."""
+    grid = problem.grid
+    mirror = 2 * grid.origin[1] + grid.lengths[1]
+    edges = np.unique(_edges(problem, "y"))
+    if not np.allclose(edges, np.sort(mirror - edges), rtol=0.0, atol=SAME * grid.lengths[1]):
+        return False
+    some = np.unique(np.linspace(0, grid.box[0] - 1, SAMPLE[1]).round().astype(int))  # most films that are not tell so at once
+    if not _all_close(problem, [(problem.scheme.h[some], problem.film(grid.x, mirror - grid.y[some]))]):
+        return False
+    pairs = list(zip(_films(problem), _films(problem, mirror), strict=True))
+    return _all_close(problem, pairs if faces else pairs[:1])
+
+
+def _edges(problem: LubricationProblem, axis: str) -> Sequence[float]:
+    """Where the film jumps, inside a cell perhaps."""
+    return getattr(problem.film, "jumps", lambda axis: ())(axis)
+
+
+def _films(problem: LubricationProblem, mirror: float | None = None) -> list[Array]:
+    """The film at the points, x faces and y faces, or at y = mirror - theirs."""
+    grid, film = problem.grid, problem.film
+    x_nodes, x_faces = grid.nodes_and_faces(0)
+    y_nodes, y_faces = grid.nodes_and_faces(1) if grid.dim == 2 else (np.zeros(1), np.zeros(0))
+    lines = [line if mirror is None else mirror - line for line in (y_nodes, y_nodes, y_faces)]
+    return [film(x[None, :], y[:, None]) for x, y in zip((x_nodes, x_faces, x_nodes), lines, strict=True)]
+
+
+def _all_close(problem: LubricationProblem, pairs: list[tuple[Array, Any]]) -> bool:
+    worst = max(float(np.max(np.abs(a / b - 1.0), initial=0.0)) for a, b in pairs)
+    return bool(problem.reduce.max(np.array([worst])) <= SAME)

@@ -1,0 +1,69 @@
+"""Half or a quarter of a rectangle's grid, for what is symmetric about the middle in x, in y, or in both.
+
+Its first points, with nothing flowing through the ends in the middle. For an even number of points the middle is the outer face
+of the last cell; for an odd number the last point lies on it, in half a cell. The part's rows are the whole problem's for
+symmetric unknowns, halved on a middle line, so that a symmetric matrix stays one.
+"""
+
+import numpy as np
+from petsc4py import PETSc
+
+from ..base.parallel import Array
+from .grid import OPEN, Grid
+
+Axes = tuple[bool, bool]  # whether x and y are folded
+FOLDED = ("closed", "mirror")
+
+
+def part_shape(shape: tuple[int, ...], axes: Axes) -> tuple[int, ...]:
+    """Numbers of points of the part."""
+    return tuple((n + 1) // 2 if folded else n for n, folded in zip(shape, axes, strict=True))
+
+
+def part_grid(
+    shape: tuple[int, ...],
+    lengths: tuple[float, ...],
+    axes: Axes,
+    comm: PETSc.Comm | None = None,
+    origin: tuple[float, float] = (0.0, 0.0),
+) -> Grid:
+    """The part's grid of a rectangle with these numbers of points and sides; the whole one where no axis is folded. Collective.
+
+    Raises
+    ------
+    InputError : more ranks than the part can be dealt to.
+    """
+    west_east, south_north = (
+        ("open", "mirror" if n % 2 else "closed") if f else OPEN for n, f in zip(shape, axes, strict=True)
+    )
+    halves = tuple(0.5 * length if folded else length for length, folded in zip(lengths, axes, strict=True))
+    return Grid(part_shape(shape, axes), halves, comm, origin, (west_east, south_north))
+
+
+def folded_axes(grid: Grid) -> Axes:
+    """Which axes of a grid of this file, or of a whole rectangle, are folded."""
+    x, y = (last in FOLDED for _, last in grid.ends)
+    return x, y
+
+
+def whole_shape(grid: Grid) -> tuple[int, ...]:
+    """Numbers of points of the whole that a part belongs to."""
+    return tuple(
+        2 * n - (last == "mirror") if last in FOLDED else n for n, (_, last) in zip(grid.shape, grid.ends, strict=True)
+    )
+
+
+def whole_lengths(grid: Grid) -> tuple[float, ...]:
+    """Sides of the whole that a part belongs to."""
+    return tuple(2.0 * length if f else length for length, f in zip(grid.lengths, folded_axes(grid), strict=True))
+
+
+def shares(grid: Grid) -> tuple[Array, Array]:
+    """What the owned columns, shape (1, nx_local), and lines, (ny_local, 1), have of a cell: 1, on a mirror line 1/2."""
+    (_, x_end), (_, y_end) = grid.ends
+    i = np.arange(grid.x_start, grid.x_end)[None, :]
+    j = np.arange(grid.y_start, grid.y_end)[:, None]
+    return (
+        np.where((i == grid.shape[0] - 1) & (x_end == "mirror"), 0.5, 1.0),
+        np.where((j == grid.shape[1] - 1) & (y_end == "mirror"), 0.5, 1.0),
+    )
