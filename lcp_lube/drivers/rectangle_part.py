@@ -12,7 +12,7 @@ from petsc4py import PETSc
 
 from ..base.parallel import Array
 from ..problems.facts import Facts
-from ..problems.fold import Axes, part_grid, part_shape
+from ..problems.fold import part_grid, part_shape
 from ..problems.grid import OPEN, Grid, some_places
 from ..problems.solution import Fields, Problem
 from ..problems.transfer import numbers
@@ -35,7 +35,7 @@ class Quarter:
     """A quarter, or a half, of a scene; shape : that of the whole scene's grid."""
 
     whole: Family
-    axes: Axes
+    axes: tuple[bool, bool]
 
     @property
     def kind(self) -> str:
@@ -96,9 +96,9 @@ def part_of(scene: Family, problem: Problem) -> Quarter | None:
     """The least part of a scene that gives its whole answer; None where that is the scene itself. Collective."""
     grid: Grid = problem.grid
     differs = np.array([not same for same in _mirrored(scene, grid.x, grid.y)], dtype=float)
-    x, y = (grid.reduce.max(differs[k : k + 1]) == 0 for k in range(2))
-    nx, ny = part_shape(grid.shape, (x, y))
-    axes = x and nx < grid.shape[0], y and ny < grid.shape[1] and ny >= grid.comm.size
+    x, y = (bool(grid.reduce.max(differs[k : k + 1]) == 0) for k in range(2))
+    nx, ny = grid.shape
+    axes = x and nx > 1 and grid.comm.size <= ny, y and ny > 1 and grid.comm.size <= ny // 2  # lines for every rank
     return Quarter(scene, axes) if any(axes) else None
 
 

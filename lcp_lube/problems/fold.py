@@ -1,4 +1,4 @@
-"""Half or a quarter of a rectangle's grid, for what is symmetric about the middle in x, in y, or in both.
+"""Half of a line's grid, half or a quarter of a rectangle's, for what is symmetric about the middle in x, in y, or in both.
 
 Its first points, with nothing flowing through the ends in the middle. For an even number of points the middle is the outer face
 of the last cell; for an odd number the last point lies on it, in half a cell. The part's rows are the whole problem's for
@@ -11,7 +11,7 @@ from petsc4py import PETSc
 from ..base.parallel import Array
 from .grid import OPEN, Grid
 
-Axes = tuple[bool, bool]  # whether x and y are folded
+Axes = tuple[bool, ...]  # whether x, and in 2D y, are folded
 FOLDED = ("closed", "mirror")
 
 
@@ -27,23 +27,21 @@ def part_grid(
     comm: PETSc.Comm | None = None,
     origin: tuple[float, float] = (0.0, 0.0),
 ) -> Grid:
-    """The part's grid of a rectangle with these numbers of points and sides; the whole one where no axis is folded. Collective.
+    """The part's grid, of a whole with these numbers of points and sides; the whole one where no axis is folded. Collective.
 
     Raises
     ------
     InputError : more ranks than the part can be dealt to.
     """
-    west_east, south_north = (
-        ("open", "mirror" if n % 2 else "closed") if f else OPEN for n, f in zip(shape, axes, strict=True)
-    )
+    middle = ("mirror" if n % 2 else "closed" for n in shape)
+    ends = [("open", end) if folded else OPEN for end, folded in zip(middle, axes, strict=True)]
     halves = tuple(0.5 * length if folded else length for length, folded in zip(lengths, axes, strict=True))
-    return Grid(part_shape(shape, axes), halves, comm, origin, (west_east, south_north))
+    return Grid(part_shape(shape, axes), halves, comm, origin, (ends[0], ends[-1]))
 
 
 def folded_axes(grid: Grid) -> Axes:
     """Which axes of a grid of this file, or of a whole rectangle, are folded."""
-    x, y = (last in FOLDED for _, last in grid.ends)
-    return x, y
+    return tuple(last in FOLDED for _, last in grid.ends)
 
 
 def whole_shape(grid: Grid) -> tuple[int, ...]:
@@ -58,12 +56,16 @@ def whole_lengths(grid: Grid) -> tuple[float, ...]:
     return tuple(2.0 * length if f else length for length, f in zip(grid.lengths, folded_axes(grid), strict=True))
 
 
-def shares(grid: Grid) -> tuple[Array, Array]:
-    """What the owned columns, shape (1, nx_local), and lines, (ny_local, 1), have of a cell: 1, on a mirror line 1/2."""
-    (_, x_end), (_, y_end) = grid.ends
-    i = np.arange(grid.x_start, grid.x_end)[None, :]
-    j = np.arange(grid.y_start, grid.y_end)[:, None]
-    return (
-        np.where((i == grid.shape[0] - 1) & (x_end == "mirror"), 0.5, 1.0),
-        np.where((j == grid.shape[1] - 1) & (y_end == "mirror"), 0.5, 1.0),
-    )
+def column_shares(grid: Grid) -> Array:
+    """What the owned columns, shape (1, nx_local), have of a cell: 1, on a mirror line 1/2."""
+    return _shares(grid, 0, grid.x_start, grid.x_end)[None, :]
+
+
+def line_shares(grid: Grid) -> Array:
+    """The same for the owned lines of a rectangle, shape (ny_local, 1)."""
+    return _shares(grid, 1, grid.y_start, grid.y_end)[:, None]
+
+
+def _shares(grid: Grid, side: int, start: int, end: int) -> Array:
+    halved = (np.arange(start, end) == grid.shape[side] - 1) & (grid.ends[side][1] == "mirror")
+    return np.where(halved, 0.5, 1.0)

@@ -11,7 +11,7 @@ from ..base.parallel import Array, Reduce
 from ..errors import InputError
 from .certificate import Certificate, certificate_tol
 from .film.reynolds import assemble, sides
-from .fold import FOLDED, shares
+from .fold import FOLDED, column_shares, line_shares
 from .grid import Grid
 from .solution import Fields
 from .transfer import Transfer
@@ -147,7 +147,7 @@ class SemilinearProblem:
         self.reduce: Reduce = grid.reduce
         self._x, self._y = (np.ravel(a) for a in np.broadcast_arrays(grid.x, grid.y))
         dx, dy = grid.spacing
-        x_share, y_share = shares(grid)
+        x_share, y_share = column_shares(grid), line_shares(grid)
         self.cells = (grid.cell * x_share * y_share).ravel()
         across_x, across_y = dy / dx * y_share, dx / dy * x_share
         _, east, _, north = sides(grid, FOLDED)
@@ -262,7 +262,7 @@ def _boundary_terms(grid: Grid, boundary: Surface) -> Array:
     InputError : the boundary's formula has no finite value at a point next to which a grid point lies.
     """
     dx, dy = grid.spacing
-    b, (x_share, y_share) = np.zeros(grid.box), shares(grid)
+    b, x_share, y_share = np.zeros(grid.box), column_shares(grid), line_shares(grid)
     for at_side, (ox, oy) in zip(sides(grid), ((-dx, 0.0), (dx, 0.0), (0.0, -dy), (0.0, dy)), strict=True):
         weight = dy / dx * y_share if ox else dx / dy * x_share
         b += np.where(at_side, weight * boundary(grid.x + ox, grid.y + oy), 0.0)

@@ -9,16 +9,20 @@ theta per cell and a difference formula w M^m - m_old for dM/dt, step m reads
 
 which is A p + B r = c with B diagonal: a blend of the columns of A and -B is a column diagonally dominant M-matrix as in the
 steady problem, and every method for that one solves it.
+
+The step is symmetric about x = 1/2: `HalfLine` is a grid of half of it, with no flow through its end in the middle.
 """
 
 import numpy as np
 
 from ...base.parallel import Array
 from ..certificate import Certificate, certificate_tol
+from ..fold import FOLDED, column_shares, part_grid
 from ..grid import Grid
 from ..solution import Fields
+from ..transfer import Pick, numbers
 from .lubrication import LubricationProblem
-from .reynolds import BoxScheme
+from .reynolds import BoxScheme, sides
 
 
 class SqueezeStep(LubricationProblem):
@@ -26,6 +30,7 @@ class SqueezeStep(LubricationProblem):
 
     Parameters
     ----------
+    grid : of the whole line, or of half of it.
     h : gap at the step's end.
     weight : w of the difference formula, 1/time.
     old : m_old, what the formula has of the contents M of earlier steps, per owned point.
@@ -35,13 +40,14 @@ class SqueezeStep(LubricationProblem):
     def __init__(self, grid: Grid, h: float, weight: float, old: Array, p_wall: float):
         dx, box = grid.spacing[0], grid.box
         p_unit = p_wall or 1.0
-        ones, none = np.ones(box), np.zeros(box)
-        k = p_unit * h**3 / dx * ones
-        self.h, self.weight, self.old = h, weight, old
-        at_side = (np.arange(grid.x_start, grid.x_end)[None, :] == np.array([[0], [grid.shape[0] - 1]])).sum(axis=0)
-        c = 2.0 * dx * (old.reshape(box) - weight * h) + k * (p_wall / p_unit) * at_side
-        storage = 2.0 * dx * weight * h * ones
-        scheme = BoxScheme(k, k, none, none, -storage, none, c, none, none, h * ones)
+        none = np.zeros(box)
+        k = p_unit * h**3 / dx * np.ones(box)
+        k_E = np.where(sides(grid, FOLDED)[1], 0.0, k)  # in the middle nothing flows
+        self.h, self.weight, self.old, self._share = h, weight, old, column_shares(grid)
+        west, east, *_ = sides(grid)
+        c = 2.0 * dx * self._share * (old.reshape(box) - weight * h) + k * (p_wall / p_unit) * (west.astype(int) + east)
+        storage = 2.0 * dx * weight * h * self._share
+        scheme = BoxScheme(k, k_E, none, none, -storage, none, c, none, none, np.full(box, h))
         super().__init__(
             grid,
             scheme,
@@ -57,7 +63,7 @@ class SqueezeStep(LubricationProblem):
         """As for the steady problem, but what flows in and does not flow out must be stored. Collective."""
         steady, red = super().certify(fields, eps1), self.reduce
         p, r = fields["p"], fields["r"]
-        rates = 2.0 * self.grid.spacing[0] * (self.weight * self.h * (1.0 - r) - self.old)
+        rates = 2.0 * self.grid.spacing[0] * self._share.ravel() * (self.weight * self.h * (1.0 - r) - self.old)
         west, east, *_ = self.boundary_flows(p, np.zeros_like(r))
         defect, scale = abs(west - east - red.sum(rates)), abs(west) + abs(east) + red.sum(np.abs(rates))
         # Largest of all pressures: that of the ends, where the cavity leaves no point full.
@@ -72,3 +78,27 @@ class SqueezeStep(LubricationProblem):
     def destroy(self) -> None:
         """Free the PETSc objects, but for the grid's."""
         self.free_matrices()
+
+
+class HalfLine:
+    """Half of a march's line, its own grid, and what of a step lies there.
+
+    Parameters
+    ----------
+    whole : the grid of the march. Collective.
+    """
+
+    def __init__(self, whole: Grid):
+        self.grid = part_grid(whole.shape, whole.lengths, (True,), whole.dm.comm, whole.origin)
+        j, i = numbers(whole)
+        self.take = Pick(whole, self.grid, *numbers(self.grid))
+        self.spread = Pick(self.grid, whole, j, np.minimum(i, whole.shape[0] - 1 - i))
+
+    def step(self, whole: SqueezeStep) -> SqueezeStep:
+        """The half's problem of a time step. Collective."""
+        return SqueezeStep(self.grid, whole.h, whole.weight, self.take(whole.old), whole.p_sides[0])
+
+    def destroy(self) -> None:
+        """Free the PETSc objects. Collective."""
+        for obj in (self.spread, self.take, self.grid):
+            obj.destroy()
