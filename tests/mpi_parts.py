@@ -1,17 +1,19 @@
 """Bratu, obstacle and squeeze scenes, reduced and whole, on the ranks that it is started on: by how much they differ."""
 
 import json
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
+from side_scenes import reduced_solve
 
 from lcp_lube import load_scene, solve
 
 SCENES = {
     "bratu": {"nx": 17, "ny": 14},
     "obstacle_bratu": {"nx": 20, "ny": 21},
-    "obstacle_bratu, multigrid": {"nx": 150, "ny": 161},
-    "squeeze": {"n": 31, "steps": 20},
+    "obstacle_bratu, multigrid": {"nx": 40, "ny": 49},
+    "squeeze": {"n": 31, "steps": 6},
 }
 
 
@@ -19,7 +21,11 @@ def main() -> None:
     record = {}
     for name, changes in SCENES.items():
         scene = load_scene(name.split(",")[0], changes)
-        part, whole = (solve(scene, reduction=reduction, stopping={"eps1": 1e-11}) for reduction in (True, False))
+        how: dict[str, Any] = {"stopping": {"eps1": 1e-11}}
+        if "multigrid" in name:
+            how |= {"method": "active-set", "recipe": "multigrid"}
+        part = (reduced_solve if "multigrid" in name else solve)(scene, **how)
+        whole = solve(scene, reduction=False, **how)
         reduce = whole.problem.grid.reduce
         record[name] = {
             "converged": bool(part.converged and whole.converged),
