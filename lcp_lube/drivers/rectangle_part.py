@@ -4,7 +4,9 @@ Symmetric must be all that the equation is made of: source, bounds, values on th
 several solutions. Newton's steps from there are then symmetric too.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +18,7 @@ from ..problems.fold import part_grid, part_shape
 from ..problems.grid import OPEN, Grid, some_places
 from ..problems.solution import Fields, Problem
 from ..problems.transfer import numbers
-from ..scenes.obstacle import ObstacleScene
 from ..scenes.scene import Solvable
-from ..scenes.semilinear import SemilinearScene
 
 SAME = 1e-12  # difference that rounding leaves between two values, relative, or to 1 where v itself is of that order
 
@@ -27,14 +27,26 @@ SAMPLE = 33  # columns and lines that are compared first, before anything is bui
 UNLIKELY = "source, bounds, start and boundary do not all mirror themselves about the middle, neither in x nor in y"
 NONE = UNLIKELY
 
-Family = ObstacleScene | SemilinearScene
+
+class Rectangular(Solvable, Protocol):
+    """A scene with one unknown on a rectangle: where that lies, and all that the equation is made of."""
+
+    @property
+    def rectangle(self) -> tuple[tuple[float, float], tuple[float, float]]: ...
+
+    @property
+    def on_boundary(self) -> Callable[[Array, Array], Array] | None: ...
+
+    def inside(self, x: Array, y: Array) -> list[Array]: ...
+
+    def problem_on(self, grid: Grid) -> Problem: ...
 
 
 @dataclass(frozen=True)
 class Quarter:
     """A quarter, or a half, of a scene; shape : that of the whole scene's grid."""
 
-    whole: Family
+    whole: Rectangular
     axes: tuple[bool, bool]
 
     @property
@@ -82,17 +94,17 @@ class Quarter:
 
 def applies(scene: Solvable) -> bool:
     """Whether it is one unknown on a rectangle."""
-    return isinstance(scene, ObstacleScene | SemilinearScene)
+    return hasattr(scene, "problem_on")  # not by its class: no family is loaded that is not asked for
 
 
-def promising(scene: Family) -> bool:
+def promising(scene: Rectangular) -> bool:
     """Whether some columns and lines of the data mirror themselves: nothing is built for a scene where they do not."""
     sides = zip(scene.shape, scene.rectangle, strict=True)
     xs, ys = (start + some_places(n, end - start, OPEN, SAMPLE) for n, (start, end) in sides)
     return any(_mirrored(scene, xs[None, :], ys[:, None]))
 
 
-def part_of(scene: Family, problem: Problem) -> Quarter | None:
+def part_of(scene: Rectangular, problem: Problem) -> Quarter | None:
     """The least part of a scene that gives its whole answer; None where that is the scene itself. Collective."""
     grid: Grid = problem.grid
     differs = np.array([not same for same in _mirrored(scene, grid.x, grid.y)], dtype=float)
@@ -102,7 +114,7 @@ def part_of(scene: Family, problem: Problem) -> Quarter | None:
     return Quarter(scene, axes) if any(axes) else None
 
 
-def _mirrored(scene: Family, x: Array, y: Array) -> tuple[bool, bool]:
+def _mirrored(scene: Rectangular, x: Array, y: Array) -> tuple[bool, bool]:
     """Whether all data at these columns and lines are what they are at the mirror images in x, and in y."""
     (x0, x1), (y0, y1) = scene.rectangle
     ends_x, ends_y = np.array([[x0, x1]]), np.array([[y0], [y1]])
