@@ -87,7 +87,7 @@ class Wave:
         """Return h (m) at x and y (m), with the broadcast shape of both; the film does not depend on y."""
         s = np.clip((np.asarray(x, dtype=float) - self.start) / self.length, 0, 1)
         h = np.asarray(self.h_min + (self.h_max - self.h_min) * _UNIT[self.shape, self.form](s))
-        return h if y is None else np.broadcast_arrays(h, np.asarray(y))[0].copy()
+        return h if y is None or np.shape(y) == h.shape else np.broadcast_arrays(h, np.asarray(y))[0].copy()
 
     def breakpoints(self) -> tuple[float, ...]:
         """Return the two ends (kinks) and the middle (extremum) of the wave, x in m."""
@@ -112,7 +112,7 @@ class JournalGap:
         # 1 + e cos phi = (1 - e) + 2 e cos^2(phi/2) keeps its digits next to h_min.
         half = np.cos(np.pi * np.asarray(x, dtype=float) / self.L)
         h = self.c * ((1.0 - self.eccentricity) + 2.0 * self.eccentricity * half**2)
-        return h if y is None else np.broadcast_arrays(h, np.asarray(y))[0].copy()
+        return h if y is None or np.shape(y) == h.shape else np.broadcast_arrays(h, np.asarray(y))[0].copy()
 
     def breakpoints(self) -> tuple[float, ...]:
         """Return the two ends and the narrowest place, x in m."""

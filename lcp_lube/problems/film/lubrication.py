@@ -129,7 +129,7 @@ class LubricationProblem:
         What leaves a cell enters the next one to the last bit, which A p + B r - c cannot say: where conductances differ by
         1e9 and more the rounding of A's diagonal is a leak, and where little flows through a ring the rounding of c is one.
         """
-        s, box, at_sides = self.scheme, self.grid.box, sides(self.grid)
+        s, box, at_sides = self.scheme, self.grid.box, self._at_sides
         frame_p, frame_r = (self.grid.ghosted(a, outside=0.0) for a in (p, r))
         p, r = p.reshape(box), r.reshape(box)
         around = [frame_p[1:-1, :-2], frame_p[1:-1, 2:], frame_p[:-2, 1:-1], frame_p[2:, 1:-1]]
@@ -143,6 +143,11 @@ class LubricationProblem:
         # The difference first: it may be small, and the pressures too, where the flows themselves are large.
         dragged = (s.couette_E + s.b_C * r) - (s.couette_W - s.b_W * frame_r[1:-1, :-2])
         return (pressed + dragged - self._sources).ravel()
+
+    @cached_property
+    def _at_sides(self) -> tuple[Any, ...]:
+        """Masks of the points beside the open sides."""
+        return sides(self.grid)
 
     @cached_property
     def _sources(self) -> Array:
