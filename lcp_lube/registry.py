@@ -79,7 +79,7 @@ METHODS: dict[str, MethodEntry] = {
         nested=True,
         nested_above=SMALL,
         interior=False,
-        fallback=("din-pc", "monotone"),
+        fallback=("monotone", "din-pc"),
         variants={
             "box": MethodEntry(
                 "lcp_lube.solvers.box_active_set:build",
@@ -138,7 +138,7 @@ METHODS: dict[str, MethodEntry] = {
         systems=(),
         interior=False,
         eps=(1e-11, inf),
-        fallback=("active-set", "din-pc", "monotone"),
+        fallback=("active-set", "monotone", "din-pc"),
         variants={
             "box": MethodEntry(
                 "lcp_lube.solvers.fas.box:build",

@@ -172,7 +172,10 @@ class Run:
         steps = self.steps
         for k, name in enumerate(METHODS[self.chosen.method].of(self.problem.kind).fallback, start=1):
             if self.outcome is Outcome.CONVERGED:
-                break
+                failure = self.problem.certify(self.fields, self.stopping.eps1).failure
+                if not failure:
+                    break
+                self.outcome, self.message = Outcome.WRONG_SOLUTION, f"{self.message}, but the certificate fails: {failure}"
             record.append((self.outcome, self.message, [astuple(step) for step in self.steps]))
             failures += f"{self.method} failed ({self.message}); "
             entry = METHODS[name].of(self.problem.kind)

@@ -2,29 +2,24 @@
 
 from collections.abc import Callable
 from functools import cached_property
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
 
-from ...base.compiled import compiled
 from ...base.owned import Owned
 from ...base.parallel import Array
-from ..certificate import Certificate, certificate_tol
+from ..certificate import Certificate
 from ..grid import Grid
 from ..solution import Fields
 from ..transfer import Transfer
+from .certify import certify
 from .exact import ExactSolution
 from .forces import Shaft
 from .quantities import open_pressures, quantities, units
-from .reynolds import BoxScheme, assemble, side_points, sides, term_squares
+from .reynolds import BoxScheme, assemble, side_points, sides
 
 MATRICES = ("A", "B", "_vectors")
-UNIT = 2.0**-53  # largest relative error of one operation
-MANY = 100_000  # points from which compiled loops, which spare A and B their memory, are worth being loaded
-IDLE = 1e-8  # share of what the pressures alone would drive through the sides, below which a flow is none
-UNEVEN = 1e-4  # part of the flow that the rounding of pressures inside may make of a mass defect, at most
 
 
 class LubricationProblem:
@@ -107,18 +102,6 @@ class LubricationProblem:
         y.resetArray()
         return out
 
-    def term_norms(self, p: Array, r: Array) -> tuple[float, float, float, float]:
-        """||A p||, ||B r||, ||A p + B r - c|| and ||diag(A) p||, rows of A p as the sums of their face flows. Collective."""
-        if self.grid.size < MANY or find_spec("numba") is None:
-            Ap, Br = self.multiply(self.A, p), self.multiply(self.B, r)
-            s = self.scheme
-            terms = (Ap, Br, self.balance(p, r), (s.k_W + s.k_E + s.k_S + s.k_N).ravel() * p)
-            return tuple(map(self.reduce.norm, terms))  # type: ignore[return-value]
-        s, framed = self.scheme, (self.grid.ghosted(field, outside=0.0) for field in (p, r))
-        squares = compiled(term_squares)(*framed, s.k_W, s.k_E, s.k_S, s.k_N, s.b_C, s.b_W, s.c)
-        norms = np.sqrt([self.reduce.sum(np.array([square])) for square in squares])
-        return tuple(map(float, norms))  # type: ignore[return-value]
-
     def flow(self, p: Array, r: Array) -> Array:
         """F1 = A p + B r - c, the flow balance of every point in m2/s. Collective."""
         return self.multiply(self.A, p) + self.multiply(self.B, r) - self.c
@@ -159,54 +142,8 @@ class LubricationProblem:
         return s.c - c
 
     def certify(self, fields: Fields, eps1: float) -> Certificate:
-        """Certificate of the fields p and r for a run whose tolerance was eps1. Collective.
-
-        residual: ||A p + B r - c||, beyond what rounding of p and c makes of it, over ||A p|| + ||B r|| + ||c||;
-        complementarity: max_i |min(p_i / max|p|, r_i)|, which bounds negative p, negative r and products alike;
-        mass_defect: |flow in - flow out| / flow, over the open sides (`mass_defect`).
-        """
-        red, p, r = self.reduce, fields["p"], fields["r"]
-        pressure, void, residual, diagonal = self.term_norms(p, r)
-        # Of p itself, which in a deep pocket is more than all that flows, and of c as a difference of the wall's flows.
-        rounding = 2 * UNIT * (diagonal + red.norm(self.scheme.b_C.ravel()))
-        scale, p_max = pressure + void + red.norm(self.c), red.max(np.abs(p))
-        if not red.norm(self.c):  # nothing drives the film, p = 0: what is left of it is measured by its unit
-            s = self.scheme
-            scale, p_max = scale + red.norm((s.k_W + s.k_E + s.k_S + s.k_N).ravel()), max(p_max, 1.0)
-        return Certificate(
-            measures={
-                "residual": np.maximum(residual - rounding, 0.0) / scale if scale != 0 else 0.0,  # NaN stays NaN
-                "complementarity": red.max(np.abs(np.minimum(p / p_max if p_max > 0 else p, r))),
-                "mass_defect": self.mass_defect(p, r),
-            },
-            tol=certificate_tol(eps1),
-            extremes={"min_p": red.min(p) * self.p_unit, "min_r": red.min(r)},
-        )
-
-    def mass_defect(self, p: Array, r: Array) -> float:
-        """|flow in - flow out| over the open sides, beyond what rounding makes of it, in parts of the flow. Collective.
-
-        The flow is the largest of what comes in, of what the wall drags through every cross-section of the film, also if
-        nothing comes in, and of IDLE times what the pressures would drive through the sides' cells alone: below this the
-        flows are differences of pressures that are equal to as many digits as a solve has. Rounding is that of the sums here,
-        and of p inside, where the conductances may be 1e9 times the sides' (up to UNEVEN parts of the flow).
-        """
-        s, reduce = self.scheme, self.reduce
-        flows = west, east, south, north = self.boundary_flows(p, r)
-        net = abs(west - east + south - north)
-        inflow = max(west, 0.0) + max(-east, 0.0) + max(south, 0.0) + max(-north, 0.0)
-        dragged = s.flow_unit * (reduce.min(-s.b_C) if self.U else 0.0) * (self.grid.shape[1] if self.grid.dim == 2 else 1)
-        at = np.abs(p).reshape(self.grid.box)
-        driven = reduce.norm(self.c) > 0  # or else p = 0, and p_unit measures what is left of it
-        at = at if driven else at + 1.0
-        pressed = 0.0
-        for k, points, side in zip((s.k_W, s.k_E, s.k_S, s.k_N), side_points(self.grid), self.p_sides, strict=True):
-            pressed += s.flow_unit * reduce.sum(k[points] * (at[points] + side / self.p_unit))
-        flow = max(inflow, dragged, IDLE * pressed if driven else pressed)
-        inside = UNIT * s.flow_unit * reduce.sum((s.k_W + s.k_E + s.k_S + s.k_N) * at)
-        rounding = 8 * UNIT * (pressed + sum(map(abs, flows))) + min(inside, UNEVEN * flow)
-        excess = net - rounding  # NaN stays NaN
-        return 0.0 if excess <= 0 else excess / flow if flow != 0 else np.inf
+        """Certificate of the fields p and r for a run whose tolerance was eps1 (`film.certify`). Collective."""
+        return certify(self, fields["p"], fields["r"], eps1)
 
     def boundary_flows(self, p: Array, r: Array) -> tuple[float, float, float, float]:
         """Scaled flow through the west, east, south and north side, positive towards larger x or y.

@@ -270,25 +270,3 @@ def assemble(grid: Grid, entries: list[tuple[int, int, Array]]) -> PETSc.Mat:
     np.cumsum(inside.sum(axis=-1).ravel(), out=pointers[1:])
     size = (grid.local_size, grid.size)
     return PETSc.Mat().createAIJWithArrays((size, size), (pointers, columns[inside], values[inside]), comm=grid.dm.comm)
-
-
-def term_squares(
-    p: Array, r: Array, k_W: Array, k_E: Array, k_S: Array, k_N: Array, b_C: Array, b_W: Array, c: Array
-) -> tuple[float, float, float, float]:
-    """Sums of the squares of A p, B r, A p + B r - c and diag(A) p over this rank's points, for `compiled`.
-
-    p and r have a frame of neighbours.
-    """
-    ny, nx = c.shape
-    pressure, void, balance, diagonal = 0.0, 0.0, 0.0, 0.0
-    for j in range(ny):
-        for i in range(nx):
-            here = p[j + 1, i + 1]
-            x = k_W[j, i] * (here - p[j + 1, i]) + k_E[j, i] * (here - p[j + 1, i + 2])
-            y = k_S[j, i] * (here - p[j, i + 1]) + k_N[j, i] * (here - p[j + 2, i + 1])
-            a, b = x + y, b_C[j, i] * r[j + 1, i + 1] + b_W[j, i] * r[j + 1, i]
-            pressure += a * a
-            void += b * b
-            balance += (a + b - c[j, i]) ** 2
-            diagonal += ((k_W[j, i] + k_E[j, i] + k_S[j, i] + k_N[j, i]) * here) ** 2
-    return pressure, void, balance, diagonal

@@ -21,7 +21,6 @@ from ...base.parallel import Array
 from ...base.stages import Stages
 from ...errors import InputError
 from ...linear.krylov import Krylov
-from ...problems.certificate import certificate_tol
 from ...problems.film.lubrication import LubricationProblem
 from ...problems.solution import Fields, Step
 from ..job import Job
@@ -129,8 +128,9 @@ class Fas:
     def _norm(self) -> float:
         """||G|| / ||c||; where rounding in G's sums alone exceeds eps1, on very fine grids, relative to that. Collective.
 
-        Many small residuals of one sign are a flow that is lost. Where little flows through the sides of a film, the
-        certificate sees more of it than ||G|| does: then eps1 times the ratio of the mass defect to a tenth of what may be.
+        Many small residuals of one sign are a flow that is lost. Where little flows through the sides of a film, or pressures
+        drive next to nothing beside the wall, the certificate sees more of it than ||G|| does: then eps1 times the ratio of
+        its mass defect or residual to a tenth of what may be.
         """
         level = self._levels[0]
         sums = np.array(self._kernels.norms(level.z, level.kx, level.ky, level.c))
@@ -140,8 +140,8 @@ class Fas:
         norm = float(residual / (max(self._c_norm, 16 * EPS * terms / self.eps1) or 1.0))
         if norm > self.eps1:
             return norm
-        fields = self.fields
-        return max(norm, self.eps1 * self.problem.mass_defect(fields["p"], fields["r"]) / (0.1 * certificate_tol(self.eps1)))
+        seen = self.problem.certify(self.fields, self.eps1)
+        return max(norm, self.eps1 * max(seen.measures["mass_defect"], seen.measures["residual"]) / (0.1 * seen.tol))
 
     def advance(self) -> Step:
         """Full multigrid, or one cycle; the step is what the coarse grids corrected. Collective.

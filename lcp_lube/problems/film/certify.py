@@ -1,0 +1,152 @@
+"""What certifies a film's answer: how far it is from balance in every cell, from complementarity, from flow in = flow out."""
+
+from importlib.util import find_spec
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...base.compiled import compiled
+from ...base.parallel import Array
+from ..certificate import Certificate, certificate_tol
+from .reynolds import side_points
+
+if TYPE_CHECKING:
+    from .lubrication import LubricationProblem
+
+UNIT = 2.0**-53  # largest relative error of one operation
+IDLE = 1e-8  # share of what the pressures alone would drive through the sides, below which a flow is none
+UNEVEN = 1e-4  # part of the flow that the rounding of pressures inside may make of a mass defect, at most
+MANY = 100_000  # points from which compiled loops, which spare memory, are worth being loaded
+LEAST = 1e-200  # below any void or pressure
+
+
+def certify(problem: "LubricationProblem", p: Array, r: Array, eps1: float) -> Certificate:
+    """Certificate of p (in p_unit) and r for a run whose tolerance was eps1. Collective.
+
+    residual: ||A p + B r - c||, beyond what rounding of p and c makes of it, over ||A p|| + ||B r|| + ||c||; or, where that is
+    more, the largest balance of one cell in parts of what would move its own pressure by max|p|, or its void by 1 (`worst`);
+    complementarity: max_i |min(p_i / max|p|, r_i)|, which bounds negative p, negative r and products alike; where the wall
+    drags more than the pressures could push, r counts as the pressure that would push as much (`void_scale`);
+    mass_defect: |flow in - flow out| / flow, over the open sides (`mass_defect`).
+    """
+    red, s = problem.reduce, problem.scheme
+    p_max, driven = red.max(np.abs(p)), red.norm(problem.c)
+    if not driven:  # p = 0: what is left of it is measured by its unit
+        p_max = max(p_max, 1.0)
+    pressure, void, residual, diagonal, worst = misfits(problem, p, r, p_max)
+    # Of p itself, which in a deep pocket is more than all that flows, and of c as a difference of the wall's flows.
+    rounding = 2 * UNIT * (diagonal + red.norm(s.b_C.ravel()))
+    scale = pressure + void + driven
+    if not driven:
+        scale += red.norm((s.k_W + s.k_E + s.k_S + s.k_N).ravel())
+    over_all = np.maximum(residual - rounding, 0.0) / scale if scale != 0 else 0.0  # NaN stays NaN
+    return Certificate(
+        measures={
+            "residual": float(np.maximum(over_all, worst)),
+            "complementarity": red.max(np.abs(np.minimum(p / (p_max or 1.0), r / void_scale(problem, p_max)))),
+            "mass_defect": mass_defect(problem, p, r),
+        },
+        tol=certificate_tol(eps1),
+        extremes={"min_p": red.min(p) * problem.p_unit, "min_r": red.min(r)},
+    )
+
+
+def void_scale(problem: "LubricationProblem", p_max: float) -> Array:
+    """The void that carries as much through a cell as p_max could push there, at most 1.
+
+    It is 1 unless the pressures are far below what the wall could build up: beside such pressures a void of 1e-10, which is
+    nothing to the wall's flow, may be all the flow that they drive.
+    """
+    s = problem.scheme
+    with np.errstate(divide="ignore", over="ignore"):
+        pushed = (s.k_W + s.k_E + s.k_S + s.k_N) * p_max / -s.b_C
+    return np.clip(pushed, LEAST, 1.0).ravel()
+
+
+def misfits(problem: "LubricationProblem", p: Array, r: Array, p_max: float) -> tuple[float, float, float, float, float]:
+    """||A p||, ||B r||, ||A p + B r - c|| and ||diag(A) p||, rows of A p as the sums of their face flows, and the worst cell.
+
+    Collective.
+    """
+    s, reduce = problem.scheme, problem.reduce
+    framed = [problem.grid.ghosted(field, outside=0.0) for field in (p, r)]
+    loop = compiled(cell_misfits) if find_spec("numba") else array_misfits
+    *squares, worst = loop(*framed, s.k_W, s.k_E, s.k_S, s.k_N, s.b_C, s.b_W, s.c, p_max)
+    norms = [float(np.sqrt(reduce.sum(np.array([square])))) for square in squares]
+    return *norms, reduce.max(np.array([worst]))  # type: ignore[return-value]
+
+
+def cell_misfits(
+    p: Array, r: Array, k_W: Array, k_E: Array, k_S: Array, k_N: Array, b_C: Array, b_W: Array, c: Array, p_max: float
+) -> tuple[float, float, float, float, float]:
+    """Sums of the squares of A p, B r, A p + B r - c and diag(A) p over this rank's points, and the worst cell; `compiled`.
+
+    p and r have a frame of neighbours. A cell's misfit, beyond the rounding of its own terms, is at least its diagonal times
+    the change of p that mends it: it is told in parts of that for p_max, and where the cell is cavitated, of b_C if that is
+    less. The norms cannot see a film that is thin, or pressures next to nothing, beside flows that are large.
+    """
+    ny, nx = c.shape
+    pressure, void, balance, diagonal, worst = 0.0, 0.0, 0.0, 0.0, 0.0
+    for j in range(ny):
+        for i in range(nx):
+            here, west, east, south, north = p[j + 1, i + 1], p[j + 1, i], p[j + 1, i + 2], p[j, i + 1], p[j + 2, i + 1]
+            w, e, s, n = k_W[j, i], k_E[j, i], k_S[j, i], k_N[j, i]
+            x, y = w * (here - west) + e * (here - east), s * (here - south) + n * (here - north)
+            own, entering = b_C[j, i] * r[j + 1, i + 1], b_W[j, i] * r[j + 1, i]
+            a, b, k = x + y, own + entering, w + e + s + n
+            left = a + b - c[j, i]
+            pressure += a * a
+            void += b * b
+            balance += left * left
+            diagonal += (k * here) ** 2
+            terms = k * abs(here) + w * abs(west) + e * abs(east) + s * abs(south) + n * abs(north)
+            excess = abs(left) - 8 * 2.0**-53 * (terms + abs(b_C[j, i]) + abs(b_W[j, i]) + abs(c[j, i]))
+            if excess > 0.0:
+                moved = k * p_max
+                if here < r[j + 1, i + 1] * p_max:
+                    moved = min(moved, -b_C[j, i])
+                worst = max(worst, excess / moved if moved > 0.0 else np.inf)
+    return pressure, void, balance, diagonal, worst
+
+
+def array_misfits(
+    p: Array, r: Array, k_W: Array, k_E: Array, k_S: Array, k_N: Array, b_C: Array, b_W: Array, c: Array, p_max: float
+) -> tuple[float, float, float, float, float]:
+    """`cell_misfits` by array arithmetic, where points are few or numba is missing."""
+    here, void_here, entering = p[1:-1, 1:-1], r[1:-1, 1:-1], b_W * r[1:-1, :-2]
+    pairs = ((k_W, p[1:-1, :-2]), (k_E, p[1:-1, 2:]), (k_S, p[:-2, 1:-1]), (k_N, p[2:, 1:-1]))
+    a, k, own = sum(k * (here - beside) for k, beside in pairs), k_W + k_E + k_S + k_N, b_C * void_here
+    b, left = own + entering, a + own + entering - c
+    terms = k * np.abs(here) + sum(k * np.abs(beside) for k, beside in pairs)
+    excess = np.abs(left) - 8 * UNIT * (terms + np.abs(b_C) + np.abs(b_W) + np.abs(c))
+    moved = np.where(here < void_here * p_max, np.minimum(k * p_max, -b_C), k * p_max)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        worst = np.where(excess > 0, np.where(moved > 0, excess / moved, np.inf), 0.0)
+    squares = [float(np.sum(np.square(term))) for term in (a, b, left, k * here)]
+    return *squares, float(np.max(worst, initial=0.0))  # type: ignore[return-value]
+
+
+def mass_defect(problem: "LubricationProblem", p: Array, r: Array) -> float:
+    """|flow in - flow out| over the open sides, beyond what rounding makes of it, in parts of the flow. Collective.
+
+    The flow is the largest of what comes in, of what the wall drags through every cross-section of the film, also if
+    nothing comes in, and of IDLE times what the pressures would drive through the sides' cells alone: below this the
+    flows are differences of pressures that are equal to as many digits as a solve has. Rounding is that of the sums here,
+    and of p inside, where the conductances may be 1e9 times the sides' (up to UNEVEN parts of the flow).
+    """
+    s, reduce, grid = problem.scheme, problem.reduce, problem.grid
+    flows = west, east, south, north = problem.boundary_flows(p, r)
+    net = abs(west - east + south - north)
+    inflow = max(west, 0.0) + max(-east, 0.0) + max(south, 0.0) + max(-north, 0.0)
+    dragged = s.flow_unit * (reduce.min(-s.b_C) if problem.U else 0.0) * (grid.shape[1] if grid.dim == 2 else 1)
+    at = np.abs(p).reshape(grid.box)
+    driven = reduce.norm(problem.c) > 0  # or else p = 0, and p_unit measures what is left of it
+    at = at if driven else at + 1.0
+    pressed = 0.0
+    for k, points, side in zip((s.k_W, s.k_E, s.k_S, s.k_N), side_points(grid), problem.p_sides, strict=True):
+        pressed += s.flow_unit * reduce.sum(k[points] * (at[points] + side / problem.p_unit))
+    flow = max(inflow, dragged, IDLE * pressed if driven else pressed)
+    inside = UNIT * s.flow_unit * reduce.sum((s.k_W + s.k_E + s.k_S + s.k_N) * at)
+    rounding = 8 * UNIT * (pressed + sum(map(abs, flows))) + min(inside, UNEVEN * flow)
+    excess = net - rounding  # NaN stays NaN
+    return 0.0 if excess <= 0 else excess / flow if flow != 0 else np.inf
