@@ -7,7 +7,10 @@ import numpy as np
 import pytest
 from wild_films import judge
 
-COUNT = 500
+COUNT = 300
+# Among films of 5,000 seeds one or two end uncertified: pressures that are rounding of what the wall drags through a ring.
+# More than two among 300 are then as good as impossible.
+UNCERTIFIED = 2
 
 
 def test_films_that_nobody_tuned_for(tmp_path, capsys):
@@ -16,15 +19,39 @@ def test_films_that_nobody_tuned_for(tmp_path, capsys):
     with capsys.disabled():
         print(f"\nwild films from WILD_SEED={first}")
     verdicts = [judge(seed, tmp_path) for seed in range(first, first + COUNT)]
-    bad = [verdict for verdict in verdicts if not verdict.good]
-    # About one in a thousand is still open: an active set that cycles at rounding, and what takes over.
-    assert len(bad) <= 4, f"{len(bad)} of {COUNT}: {bad}"
+    wrong = [verdict for verdict in verdicts if verdict.wrong]
+    assert not wrong
+    uncertified = [verdict for verdict in verdicts if not verdict.good]
+    assert len(uncertified) <= UNCERTIFIED, uncertified
     kinds = {verdict.what for verdict in verdicts}
     assert {"refused", "converged"} <= kinds
     assert np.mean([verdict.what == "converged" for verdict in verdicts]) > 0.6
 
 
-@pytest.mark.parametrize("seed, why", [(368, "nearest profile, U < 0"), (681, "at rest"), (665, "a ring next to empty")])
+CERTIFIED_WRONG_ONCE = [
+    (30814, "thin parts beside a wall that drags all"),
+    (30880, "no pressure but rounding's"),
+    (902845, "a pocket behind a film of 1e-15 of its conductance"),
+]
+
+
+@pytest.mark.parametrize("seed, why", CERTIFIED_WRONG_ONCE)
+@pytest.mark.parametrize("method", ["active-set", "din-pc", "monotone", "fas"])
+def test_films_with_answers_that_the_certificate_once_let_pass(seed, why, method, tmp_path):
+    """No method alone calls a wrong answer converged."""
+    assert not judge(seed, tmp_path, method=method, rescue=False).wrong
+
+
+ONCE_FAILED = [
+    (368, "nearest profile, U < 0"),
+    (681, "at rest"),
+    (665, "a ring next to empty"),
+    (904489, "sqrt(x), U < 0"),
+    *CERTIFIED_WRONG_ONCE,
+]
+
+
+@pytest.mark.parametrize("seed, why", ONCE_FAILED)
 def test_films_that_once_failed(seed, why, tmp_path):
     verdict = judge(seed, tmp_path)
     assert verdict.good and verdict.what == "converged", verdict

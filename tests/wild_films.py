@@ -157,6 +157,10 @@ class Verdict:
     ratio: float = 0.0
 
     @property
+    def wrong(self) -> bool:
+        return self.what == "converged" and not self.error <= WRONG
+
+    @property
     def good(self) -> bool:
         """Refused, or right. A film whose conductances' ratio no double holds may end uncertified, but never wrong."""
         if self.what == "converged":
@@ -164,11 +168,11 @@ class Verdict:
         return self.what == "refused" or self.ratio > BEYOND
 
 
-def judge(seed: int, folder: Path) -> Verdict:
-    """Solve by `auto` and compare."""
+def judge(seed: int, folder: Path, **how_to: Any) -> Verdict:
+    """Solve by `auto`, or as `solve`'s keywords say, and compare."""
     scene = scene_of(seed, folder)
     try:
-        solution = solve(scene)
+        solution = solve(scene, **how_to)
     except InputError as refusal:
         return Verdict(seed, "refused", str(refusal))
     problem: Any = solution.problem

@@ -66,6 +66,7 @@ class Outcome(StrEnum):
     CONVERGED = "converged"
     MAX_ITERATIONS = "max_iterations"
     STEP_LENGTH = "step_length"
+    STALLED = "stalled"
     LINEAR_SOLVER = "linear_solver"
     NOT_FINITE = "not_finite"
     WRONG_SOLUTION = "wrong_solution"
@@ -79,6 +80,7 @@ class Outcome(StrEnum):
             Outcome.CONVERGED: "converged, and the certificate holds",
             Outcome.MAX_ITERATIONS: "the iteration limit was reached",
             Outcome.STEP_LENGTH: "no acceptable step length was found",
+            Outcome.STALLED: "the iteration stalled or went in circles",
             Outcome.LINEAR_SOLVER: "the inner linear solver failed",
             Outcome.NOT_FINITE: "the iterates overflowed or became NaN",
             Outcome.WRONG_SOLUTION: "the method stopped, but its answer is not a solution",

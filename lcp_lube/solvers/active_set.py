@@ -27,8 +27,9 @@ from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Fields, Step
 from .job import Job
 from .method_options import make_options
+from .newton import StalledError
+from .refined import check_refined
 from .relaxation import Relaxation, relaxation
-from .steplength import StepLengthError
 
 EPS = float(np.finfo(float).eps)
 RESCUE_SWEEPS, MOST_SWEEPS = 16, 2**14  # once stalled: at first, and at most
@@ -131,10 +132,11 @@ class ActiveSet:
 
         Raises
         ------
-        StepLengthError : after give_up steps.
+        StalledError : after give_up steps; the last one leaves pressures uncertain.
         """
         if self._taken == self.options.give_up:
-            raise StepLengthError(f"||G|| is at {self.norm:.1e} of ||c|| after {self._taken} steps: they seem to cycle")
+            steps = f"{self._taken} steps (active-set.give_up)"
+            raise StalledError(f"||G|| is at {self.norm:.1e} of ||c|| after {steps}: they seem to cycle")
         self._taken += 1
         full = self._branch()
         cavity = (~full).astype(float)
@@ -176,13 +178,18 @@ class ActiveSet:
         """Solve again with the same factors for what is left of G: their rounding is that of A's diagonal, G's is not.
 
         Returns how many signs that changes: of pressures that are next to nothing beside what the wall could make.
+
+        Raises
+        ------
+        StalledError : pressures stay uncertain (`refined`).
         """
-        reduce, none, last = self.problem.reduce, np.zeros_like(self.G), np.inf
+        reduce, none, last, left = self.problem.reduce, np.zeros_like(self.G), np.inf, 0.0
         for _ in range(REFINEMENTS):
             dp, dr, _ = self.system.resolve(-self.G, none, self.options.rtol)
             d = np.where(full, dp, -dr / self.s)
             parts = [(np.where(some, np.abs(d), 0.0), np.where(some, np.abs(self.z), 0.0)) for some in (full, ~full)]
             size = max(reduce.max(moved) / (reduce.max(whole) or 1.0) for moved, whole in parts)
+            left = reduce.max(parts[0][0])
             if not size < 0.5 * last:  # rounding, or NaN
                 break
             self.z = self.z + d
@@ -190,6 +197,7 @@ class ActiveSet:
             if size <= REFINED:
                 break
         self.norm = self._norm(self.z, self.G)
+        check_refined(self.problem, self.z, left)
         return reduce.sum((full != (self.z >= 0)).astype(float))
 
 

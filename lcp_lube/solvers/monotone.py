@@ -26,6 +26,7 @@ from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Fields, Step
 from .job import Job
 from .method_options import make_options
+from .refined import check_refined
 from .relaxation import relaxation
 
 EPS = float(np.finfo(float).eps)
@@ -177,18 +178,25 @@ class Monotone:
         return Step(self.norm, step_norm, 1.0, iterations, rtol=self.options.rtol)
 
     def _refine(self) -> None:
-        """Solve again with the same factors for what is left of G: their rounding is that of A's diagonal, G's is not."""
-        reduce, last = self.problem.reduce, np.inf
+        """Solve again with the same factors for what is left of G: their rounding is that of A's diagonal, G's is not.
+
+        Raises
+        ------
+        StalledError : pressures stay uncertain (`refined`).
+        """
+        reduce, last, left = self.problem.reduce, np.inf, 0.0
         for _ in range(REFINEMENTS):
             fields = self.fields
             d, _ = self.system.solve_again(-self.problem.balance(fields["p"], fields["r"]), self.options.rtol)
             size = reduce.max(np.abs(d)) / (reduce.max(np.abs(self.z)) or 1.0)
+            left = reduce.max(np.where(self.z > 0, np.abs(d), 0.0))
             if not size < 0.5 * last:  # rounding, or NaN
                 break
             self.z, last = self.z + d, size
             if size <= REFINED:
                 break
         self.norm = self._norm()
+        check_refined(self.problem, self.z, left)
 
 
 def build(job: Job) -> Monotone:

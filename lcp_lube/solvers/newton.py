@@ -15,6 +15,10 @@ class NoSolutionError(ArithmeticError):
     """The problem has no solution, as the method has found; the message says how it knows."""
 
 
+class StalledError(ArithmeticError):
+    """The method goes on without getting anywhere; the message says how it knows, and which option sets its patience."""
+
+
 class Method(Protocol):
     """What the loop and its caller need of a method: ||F|| at the start, one step at a time, and the fields it reached.
 
@@ -76,6 +80,8 @@ def iterate(
             step = method.advance()
         except StepLengthError as error:
             return Outcome.STEP_LENGTH, f"step {k}: no acceptable step length, {error}", steps
+        except StalledError as error:
+            return Outcome.STALLED, f"step {k}: {error}", steps
         except LinearSolverError as error:
             return Outcome.LINEAR_SOLVER, f"step {k}: {error}", steps
         except NoSolutionError as error:

@@ -23,6 +23,7 @@ from ..problems.box import BoxProblem
 from ..problems.solution import Fields, Step
 from .job import Job
 from .method_options import make_options
+from .newton import StalledError
 from .steplength import StepLengthError, armijo, halve_until
 
 DESCENT = 1e-10  # d is a direction of descent if its slope is below -DESCENT ||d||^2.1
@@ -31,7 +32,8 @@ DESCENT = 1e-10  # d is a direction of descent if its slope is below -DESCENT ||
 @dataclass(frozen=True)
 class SemismoothOptions:
     """rtol: of the inner solves. beta, halvings: Armijo's. patience: steps within which ||Phi|| has to halve. solved: the part
-    of its first ||Phi|| that ends a perturbed problem. fall, rise: factors of rho after a success and a failure."""
+    of its first ||Phi|| that ends a perturbed problem. fall, rise: factors of rho after a success and a failure.
+    rho_max: rho, in parts of its first, beyond which it is taken to have stalled."""
 
     rtol: float = 1e-8
     beta: float = 1e-4
@@ -40,6 +42,7 @@ class SemismoothOptions:
     solved: float = 1e-3
     fall: float = 0.3
     rise: float = 10.0
+    rho_max: float = 1e12
 
     def __post_init__(self) -> None:
         for name in ("rtol", "beta", "solved", "fall"):
@@ -50,6 +53,8 @@ class SemismoothOptions:
                 raise InputError(f"semismooth.{name} = {getattr(self, name)}: at least 1 is needed")
         if not 1 < self.rise < np.inf:
             raise InputError(f"semismooth.rise = {self.rise}: a number above 1 is needed")
+        if not self.rho_max >= 1:
+            raise InputError(f"semismooth.rho_max = {self.rho_max}: at least 1 is needed")
 
 
 def fischer(a: Array, b: Array) -> tuple[Array, Array, Array]:
@@ -185,6 +190,10 @@ class Semismooth:
             self._begin()
         elif self._since > o.patience:
             self.x, self.rho = self.centre, max(self._rho0, o.rise * self.rho)
+            if self.rho > o.rho_max * self._rho0:
+                raise StalledError(
+                    f"residual {self.norm:.1e}, and rho has risen by more than {o.rho_max:g} (semismooth.rho_max)"
+                )
             self._begin()
 
     def destroy(self) -> None:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 FAILURES: dict[str, tuple[str, str]] = {
     Outcome.MAX_ITERATIONS: ("x", "iteration limit"),
     Outcome.STEP_LENGTH: ("_", "no step length"),
+    Outcome.STALLED: ("v", "stalled"),
     Outcome.WRONG_SOLUTION: ("o", "wrong solution"),
     Outcome.LINEAR_SOLVER: ("+", "linear solver"),
     Outcome.NOT_FINITE: ("D", "not finite"),

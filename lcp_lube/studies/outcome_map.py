@@ -28,6 +28,7 @@ KRYLOV_MOST = 100_000
 WORDS = {
     "max_iterations": "at the iteration limit",
     "step_length": "without a step length",
+    "stalled": "stalled",
     "wrong_solution": "wrong",
     "linear_solver": "by the inner solver",
     "not_finite": "not finite",

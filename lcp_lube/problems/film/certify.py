@@ -1,7 +1,7 @@
 """What certifies a film's answer: how far it is from balance in every cell, from complementarity, from flow in = flow out."""
 
 from importlib.util import find_spec
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -70,7 +70,7 @@ def misfits(problem: "LubricationProblem", p: Array, r: Array, p_max: float) -> 
     """
     s, reduce = problem.scheme, problem.reduce
     framed = [problem.grid.ghosted(field, outside=0.0) for field in (p, r)]
-    loop = compiled(cell_misfits) if find_spec("numba") else array_misfits
+    loop: Any = compiled(cell_misfits) if find_spec("numba") else array_misfits
     *squares, worst = loop(*framed, s.k_W, s.k_E, s.k_S, s.k_N, s.b_C, s.b_W, s.c, p_max)
     norms = [float(np.sqrt(reduce.sum(np.array([square])))) for square in squares]
     return *norms, reduce.max(np.array([worst]))  # type: ignore[return-value]

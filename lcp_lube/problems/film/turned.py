@@ -31,7 +31,9 @@ class MirroredFilm:
     L: float
 
     def __call__(self, x: ArrayLike, y: ArrayLike | None = None, /) -> Array:
-        return self.film(self.L - np.asarray(x, dtype=float), y)
+        turned = self.L - np.asarray(x, dtype=float)
+        # The wall lies at 0, not beyond it by the last bit of L: sqrt(x) is a film.
+        return self.film(np.where((turned < 0) & (turned > -1e-12 * self.L), 0.0, turned), y)
 
     def breakpoints(self) -> tuple[float, ...]:
         return tuple(sorted(self.L - x for x in self.film.breakpoints()))

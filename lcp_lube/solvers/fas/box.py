@@ -24,7 +24,7 @@ from ...problems.obstacle import ObstacleEquations
 from ...problems.solution import Fields, Step
 from ..job import Job
 from ..method_options import make_options
-from ..steplength import StepLengthError
+from ..newton import StalledError
 from .driver import COARSEST_SWEEPS, WINDOW
 
 
@@ -146,10 +146,10 @@ class BoxFas:
 
         Raises
         ------
-        StepLengthError : the residual has stalled.
+        StalledError : the residual has stalled.
         """
         if self.norm > self.options.stall * self._recent[0]:
-            raise StepLengthError(f"the residual is at {self.norm:.1e} after {self._taken} cycles and has stalled")
+            raise StalledError(f"the residual is at {self.norm:.1e} after {self._taken} cycles and has stalled (fas.stall)")
         before = self.v
         with self.stages("cycles"):
             if self._taken == 0:

@@ -25,7 +25,7 @@ from ...problems.film.lubrication import LubricationProblem
 from ...problems.solution import Fields, Step
 from ..job import Job
 from ..method_options import make_options
-from ..steplength import StepLengthError
+from ..newton import StalledError
 
 EPS = float(np.finfo(float).eps)
 WINDOW = 3  # cycles over which the fall of ||G|| is judged
@@ -148,14 +148,16 @@ class Fas:
 
         Raises
         ------
-        StepLengthError : ||G|| has stalled.
+        StalledError : ||G|| has stalled.
         """
         anew = self._taken == 0
         if self.norm > self.options.stall * self._recent[0] and self.norm > self.eps1:
             if not self._retreat():
                 if not self.norm < 1.0:
                     self.z = np.zeros(self.problem.grid.local_size)  # nothing to start from (`run.Run.take_over`)
-                raise StepLengthError(f"||G|| is at {self.norm:.1e} of ||c|| after {self._taken} cycles and has stalled")
+                raise StalledError(
+                    f"||G|| is at {self.norm:.1e} of ||c|| after {self._taken} cycles and has stalled (fas.stall)"
+                )
             anew = not self.norm < self._first
         with self.stages("cycles"):
             if anew:
