@@ -7,7 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lcp_lube import load_scene, solve
+from lcp_lube.base.compiled import compiled
 from lcp_lube.problems.certificate import Certificate, certificate_tol
+from lcp_lube.problems.film.certify import array_misfits, cell_misfits, void_scale
 from lcp_lube.problems.film.gaps import Wave
 
 
@@ -134,3 +136,26 @@ def test_where_next_to_nothing_flows_through(name):
             assert not found.problem.certify({"p": spoil(p), "r": r}, 1e-8).holds, damage
     assert not found.problem.certify({"p": p, "r": r + 0.01}, 1e-8).holds
     found.destroy()
+
+
+def test_loops_and_arrays_measure_the_same():
+    """Large grids go by compiled loops, small ones by arrays."""
+    pytest.importorskip("numba")
+    random = np.random.default_rng(3)
+    p, r = random.uniform(0, 1e3, (2, 9, 12))
+    r[r < 500] = 0.0
+    scheme = random.uniform(1e-3, 1, (4, 7, 10))
+    carried, c = -random.uniform(0, 1, (2, 7, 10)), random.uniform(-1, 1, (7, 10))
+    for p_max in (1e3, 1e-3):
+        loops = compiled(cell_misfits)(p, r, *scheme, *carried, c, p_max)
+        np.testing.assert_allclose(loops, array_misfits(p, r, *scheme, *carried, c, p_max), rtol=1e-10)
+        assert loops[-1] > 0
+
+
+def test_void_counts_as_the_flow_that_pressures_drive():
+    """Beside pressures that push next to nothing, a void of 1e-9 may be all that they drive; none counts below itself."""
+    problem = make_problem((20,), Wave("sinusoid", "convergent-divergent", 15e-6, 25e-6, 0, 0.1), p_sides=(1e6, 2e5, 0, 0))
+    weak = void_scale(problem, 1e-9)
+    assert np.all(weak < 1e-3) and np.all(void_scale(problem, 1e9) == 1.0)
+    np.testing.assert_allclose(void_scale(problem, 2e-9), 2 * weak)
+    problem.destroy()
