@@ -60,3 +60,11 @@ def test_files_are_rooms():
     lengths = {str(path.relative_to(PACKAGE)): len(path.read_text().splitlines()) for path in FILES}
     long = {name: n for name, n in lengths.items() if n > 300}
     assert not {name: n for name, n in long.items() if name != "solvers/fas/kernels.py"}  # kernels stand together
+
+
+def test_the_page_lists_the_drivers():
+    """docs/architecture.md names them in their order."""
+    from lcp_lube.registry import DRIVERS
+
+    page = (PACKAGE.parent / "docs" / "architecture.md").read_text()
+    assert ", ".join(f"`{name}`" for name in DRIVERS) in " ".join(page.split())
