@@ -143,7 +143,7 @@ def test_any_error_is_told_in_one_line(text):
 @pytest.mark.parametrize("name", ["ksp_monitor", "ksp_view", "pc_factor_shift_type", "mat_type", "mat_mumps_icntl_14"])
 def test_an_option_of_a_ksp_is_a_wish_for_one(petsc_options, name):
     """Nonlinear multigrid, which solves no linear system, is not what 'auto' takes then."""
-    facts = load_scene("problem4", {"n": 12}).facts()
+    facts = load_scene("problem4", {"n": 120}).facts()
     chosen = [plan(facts, Ask(), "problem4").method]
     petsc_options(**{name: "dense" if name == "mat_type" else None})
     chosen.append(plan(facts, Ask(), "problem4").method)
