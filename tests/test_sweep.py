@@ -227,3 +227,26 @@ def test_rows_say_what_was_solved(cli, tmp_path):
         rows = list(csv.DictReader(file))
     assert [row["scene.mu [Pa s]"] for row in rows] == ["0.01", "0.01", "0.02", "0.02", "0.015", "0.015"]
     assert [row["scene.U [m/s]"] for row in rows] == ["1.0", "2.0"] * 3 and "gamma" in rows[-1]["settings"]
+
+
+def test_rows_of_another_layout_are_refused(cli, tmp_path):
+    words = ["sweep", "problem1", "--n", 20, "--vary", "U=1:2:2", "--output", "s.csv"]
+    assert cli(*words).status == 0
+    path = tmp_path / "s.csv"
+    text = path.read_text()
+    rows = table(text)
+    for change, message in (
+        (
+            lambda row: {name: value for name, value in row.items() if not name.startswith("scene.mu")},
+            "without the column 'scene.mu",
+        ),
+        (lambda row: {**row, "scene.old": "1"}, "with a column 'scene.old'"),
+    ):
+        with path.open("w", newline="") as file:
+            writer = csv.DictWriter(file, list(change(rows[0])))
+            writer.writeheader()
+            writer.writerows(map(change, rows))
+        before = path.read_text()
+        done = cli(*words)
+        assert done.status == 2 and message in done.err and "s.csv" in done.err and done.err.count("\n") == 1
+        assert path.read_text() == before

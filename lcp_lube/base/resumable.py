@@ -11,6 +11,7 @@ from mpi4py import MPI
 
 from ..errors import InputError
 from . import origin
+from .together import on_all_ranks
 
 Row = dict[str, str]
 
@@ -146,15 +147,13 @@ class ResumableCsv:
 
     def _on_rank_0(self, call: Callable[[], Any]) -> Any:
         """The call's result on every rank; its failure too, as an InputError."""
-        result, failure = None, None
-        if self.comm.rank == 0:
-            try:
-                result = call()
-            except InputError as error:
-                failure = str(error)
-            except (OSError, UnicodeDecodeError, csv.Error) as error:
-                failure = f"{self.path}: {getattr(error, 'strerror', None) or error}"
-        result, failure = self.comm.bcast((result, failure))
-        if failure is not None:
-            raise InputError(failure)
-        return result
+        result = None
+        with on_all_ranks(self.comm):
+            if self.comm.rank == 0:
+                try:
+                    result = call()
+                except InputError:
+                    raise
+                except (OSError, UnicodeDecodeError, csv.Error) as error:
+                    raise InputError(f"{self.path}: {getattr(error, 'strerror', None) or error}") from None
+        return self.comm.bcast(result)

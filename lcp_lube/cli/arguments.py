@@ -138,6 +138,7 @@ def parse(own: list[str]) -> argparse.Namespace:
     )
     solve.add_argument("--quantity", metavar="NAME", help="what --accuracy is about: load (default), p_max, friction, ...")
     solve.add_argument("--output", action="append", default=[], metavar="FILE", help=".npz, .vts (ParaView) or .h5")
+    solve.add_argument("--boundary", action="store_true", help="--output writes the points of the sides as well")
     solve.add_argument("--plot", metavar="FILE.png", help="picture of p, r and h")
     solve.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")
     solve.add_argument("--explain", action="store_true", help="say on stderr what was chosen, and why")

@@ -31,6 +31,8 @@ def run(args: argparse.Namespace) -> int:
 def run_solve(args: argparse.Namespace) -> int:
     if args.every is not None and (args.checkpoint is None or args.every < 1):
         raise InputError(f"--every {args.every}: at least 1, and --checkpoint FILE, are needed")
+    if args.boundary and not args.output:
+        raise InputError("--boundary: --output FILE is needed")
     from ..output import files
 
     for path in args.output:
@@ -57,7 +59,7 @@ def run_solve(args: argparse.Namespace) -> int:
         failed = []  # a file that cannot be written costs neither the result nor the other files
         for path in args.output:
             try:
-                files.save(solution, path)
+                files.save(solution, path, args.boundary)
             except InputError as error:
                 failed.append(str(error))
         if args.plot:

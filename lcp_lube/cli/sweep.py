@@ -4,7 +4,7 @@ import argparse
 import csv
 import io
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, KeysView, Sequence
 from contextlib import closing
 from dataclasses import replace
 from hashlib import sha256
@@ -101,6 +101,7 @@ def sweep(
     jobs = jobs_for(jobs, len(pieces), [prod(scene.shape) for scene in scenes])
     store = ResumableCsv(path, keys, ["digest"], comm, growing=True) if path else None
     if store:
+        _same_layout(store, [_data(scene).keys() for scene in scenes])
         store.write()  # before the first run, not after it, it turns out whether it can be
     rows: list[dict[str, Any] | None] = [store.find(digest=digest) if store else None for digest in digests]
     left = [piece for whole in pieces if (piece := [k for k in whole if rows[k] is None])]
@@ -127,6 +128,24 @@ def sweep(
         raise InputError(str(complete[0]["message"]))
     columns = [*keys, *(name for name in {name: 0 for row in complete for name in row} if name not in keys)]
     return complete, columns
+
+
+def _same_layout(store: ResumableCsv, data: list[KeysView[str]]) -> None:
+    """Refuse rows of an older version, or of another kind of scene: their columns would stay empty in the new ones."""
+    if not store.rows:
+        return
+    needed = ["settings", *(name for name in data[0] if all(name in one for one in data))]
+    known = {name for one in data for name in one}
+    there = store.columns
+    if lacks := next((name for name in needed if name not in there), None):
+        raise InputError(
+            f"{store.path}: rows of another layout, without the column '{lacks}'; move it away or name another file"
+        )
+    if strange := next((name for name in there if name.startswith("scene.") and name not in known), None):
+        raise InputError(
+            f"{store.path}: rows of another layout, with a column '{strange}' that this scene has not; "
+            "move it away or name another file"
+        )
 
 
 def _data(scene: Scene) -> dict[str, Any]:

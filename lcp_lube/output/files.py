@@ -15,6 +15,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..base.parallel import Array
+from ..base.together import on_all_ranks
 from ..errors import InputError, nearest
 from ..problems.frame import Frame
 from ..problems.grid import Grid
@@ -126,6 +127,9 @@ def replacing(path: Path, comm: MPI.Comm) -> Iterator[str]:
     """
     temporary = Path(comm.bcast(str(path.with_name(f".{path.stem}.{os.getpid()}{path.suffix.lower()}"))))
     reason = ""
+    with on_all_ranks(comm, f"{path}: could not be written"):  # PETSc's viewers would fail on rank 0 alone
+        if comm.rank == 0:
+            temporary.touch()
     try:
         yield str(temporary)
         if comm.rank == 0:

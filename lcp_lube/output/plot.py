@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.together import on_all_ranks
 from ..errors import InputError
 from ..problems.solution import Solution
 from .files import replacing
@@ -40,7 +41,8 @@ def plot(solution: Solution, path: str | Path) -> None:
     except ImportError:
         raise InputError(f"--plot {path}: pictures need matplotlib: pip install lcp-lube[plot]") from None
     picture = collect(solution)
-    with replacing(Path(path), solution.problem.grid.comm) as temporary:
+    comm = solution.problem.grid.comm
+    with replacing(Path(path), comm) as temporary, on_all_ranks(comm, str(path)):
         if picture is not None:
             with mpl.rc_context(STYLE):
                 date = {".pdf": "CreationDate", ".svg": "Date"}.get(Path(path).suffix.lower())

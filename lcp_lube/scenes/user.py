@@ -8,15 +8,18 @@ print(solve(problem).fields["v"])       # [2.00498756]
 """
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any, ClassVar
 
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import ArrayLike
 from petsc4py import PETSc
 from pydantic import PrivateAttr
 
 from ..base.owned import Owned
 from ..base.parallel import Array
+from ..base.together import on_all_ranks
 from ..errors import InputError
 from ..problems.box import BoxProblem
 from ..problems.certificate import Certificate, certificate_tol
@@ -38,7 +41,8 @@ class Complementarity(Scene):
     x0 : start, shape (n,); moved into the bounds.
 
     With a communicator, `solve(problem, comm=...)`, all five are of the rank's own entries, J gives a PETSc matrix of that
-    layout, and `n` is the whole number of unknowns. Without one every rank solves by itself.
+    layout, and `n` is the whole number of unknowns. Without one every rank solves by itself. What F or J raises on some of
+    several ranks is an InputError on all of them, if it is raised where F and J do not communicate.
     """
 
     problem_kind: ClassVar[str] = "user"
@@ -79,7 +83,7 @@ class Complementarity(Scene):
     def facts(self, comm: PETSc.Comm | None = None) -> Facts:
         """Whether J is dense only J itself can tell: it is asked for at the start, once. Collective."""
         if self._dense is None:
-            with np.errstate(all="ignore"):
+            with users_own(comm.tompi4py() if comm else MPI.COMM_SELF, "J(x)"), np.errstate(all="ignore"):
                 J = self.J(self.x0)
             self._dense = "dense" in J.getType() if isinstance(J, PETSc.Mat) else not hasattr(J, "tocsr")
         return Facts(self.problem_kind, self.shape, (comm or PETSc.COMM_SELF).getSize(), dense=self._dense)
@@ -97,6 +101,13 @@ class Complementarity(Scene):
             if given != owned:
                 raise InputError(f"x0 has {given} entries on rank {rank}, which owns {owned} of {self.n}")
         return UserProblem(grid, Callbacks(grid, self.F, self.J, self.lower, self.upper), self.lower, self.upper, self.x0)
+
+
+def users_own(comm: MPI.Comm, what: str) -> AbstractContextManager[None]:
+    """A call of the user's function: on one rank its exception is the caller's own, on more an InputError on all of them."""
+    if comm.size == 1:
+        return nullcontext()
+    return on_all_ranks(comm, what, caught=(Exception,))
 
 
 class Callbacks:
@@ -117,10 +128,11 @@ class Callbacks:
         ------
         InputError : F gives no vector of n real numbers.
         """
-        with np.errstate(all="ignore"):  # inf and NaN are told by the outer loop, or avoided by the line search
+        # inf and NaN are told by the outer loop, or avoided by the line search
+        with self._users_own("F(x)"), np.errstate(all="ignore"):
             F = _vector(self._F(v), "F(x)")
-        if F.size != v.size:
-            raise InputError(f"F(x) has {F.size} entries, x has {v.size}")
+            if F.size != v.size:
+                raise InputError(f"F(x) has {F.size} entries, x has {v.size}")
         return np.where(self._fixed, v - self._value, F)
 
     def jacobian(self, v: Array) -> PETSc.Mat:
@@ -130,13 +142,16 @@ class Callbacks:
         ------
         InputError : J gives no n-by-n matrix, or a sparse one of another pattern than before.
         """
-        with np.errstate(all="ignore"):
+        with self._users_own("J(x)"), np.errstate(all="ignore"):
             J = self._J(v)
         mat = J if isinstance(J, PETSc.Mat) else self._sparse(J) if hasattr(J, "tocsr") else self._dense(J)
         if self._any_fixed:
             mat.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
             mat.zeroRows((self.grid.first + np.flatnonzero(self._fixed)).astype(PETSc.IntType), 1.0)
         return mat
+
+    def _users_own(self, what: str) -> AbstractContextManager[None]:
+        return users_own(self.grid.comm, what)
 
     def _dense(self, J: Any) -> PETSc.Mat:
         values = np.asarray(J, dtype=float)

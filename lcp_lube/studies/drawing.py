@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from mpi4py import MPI
 
+from ..base.together import on_all_ranks
 from ..output.files import replacing
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ def save(build: Callable[[], Figure], path: Path, comm: MPI.Comm) -> None:
     """
     import matplotlib as mpl
 
-    with replacing(path, comm) as temporary:
+    with replacing(path, comm) as temporary, on_all_ranks(comm, str(path)):
         if comm.rank == 0:
             with mpl.rc_context(STYLE):
                 build().savefig(temporary, dpi=200)

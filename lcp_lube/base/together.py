@@ -1,0 +1,44 @@
+"""Work of one rank alone: when it fails there, it fails on all ranks."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from mpi4py import MPI
+
+from ..errors import InputError
+
+EXPECTED: tuple[type[Exception], ...] = (InputError, OSError)
+
+
+@contextmanager
+def on_all_ranks(comm: MPI.Comm, what: str = "", caught: tuple[type[Exception], ...] = EXPECTED) -> Iterator[None]:
+    """A block that may fail on some ranks and not on others; the lowest failure is raised on all. Collective.
+
+    The block itself must not communicate: a rank that has left it waits for those still in it.
+
+    Parameters
+    ----------
+    what : put before the reason.
+    caught : what is raised as an InputError on every rank; anything else leaves at once, on the rank where it arose.
+
+    Raises
+    ------
+    InputError : the same on every rank.
+    """
+    failure: Exception | None = None
+    try:
+        yield
+    except caught as error:
+        failure = error
+    reason = "" if failure is None else _reason(failure)
+    found = comm.allgather(reason)
+    if first := next(filter(None, found), ""):
+        raise InputError(f"{what}: {first}" if what else first) from failure
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, InputError):
+        return str(error) or "InputError"
+    if isinstance(error, OSError):
+        return error.strerror or str(error) or type(error).__name__
+    return f"{type(error).__name__}: {error}"
