@@ -413,3 +413,11 @@ def test_a_prefix_brings_numbers_to_three_digits(value: float) -> None:
     factor, unit = picture.prefix(value, "Pa")
     assert 1 - 1e-9 <= value * factor < 1000
     assert unit.endswith("Pa")
+
+
+def test_boundary_on_the_command_line(cli, tmp_path):
+    assert cli("solve", "problem1", "--n", 20, "--output", "a.npz", "--boundary").status == 0
+    with np.load(tmp_path / "a.npz") as saved:
+        assert saved["p"].shape == saved["x"].shape == (22,)
+    done = cli("solve", "problem1", "--n", 20, "--boundary")
+    assert done.status == 2 and done.err == "lcp-lube: --boundary: --output FILE is needed\n"
