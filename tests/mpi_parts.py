@@ -8,6 +8,7 @@ from mpi4py import MPI
 from side_scenes import reduced_solve
 
 from lcp_lube import load_scene, solve
+from lcp_lube.drivers import time
 
 SCENES = {
     "bratu": {"nx": 17, "ny": 14},
@@ -18,6 +19,7 @@ SCENES = {
 
 
 def main() -> None:
+    time.SHORT = 1  # of a squeeze film that is too short to pay
     record = {}
     for name, changes in SCENES.items():
         scene = load_scene(name.split(",")[0], changes)
