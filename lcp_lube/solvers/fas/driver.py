@@ -32,6 +32,8 @@ WINDOW = 3  # cycles over which the fall of ||G|| is judged
 TRUNCATIONS = {"none": 0, "clip": 1, "points": 2}  # see `fas_kernels.correct`
 COARSEST_SWEEPS = 40  # where its Newton steps do not settle
 EXACT = (1200, 5000, 10_000)  # points of the coarsest grid once the cycles have stalled, and stalled again
+EXTREME = 1000.0  # film ratio above which a small ||G|| says little of p, and the corrections have to be small too
+SETTLED = 1e-8  # of the largest pressure: what they may then be
 BORDER = 4  # lines on either side of the border between two ranks
 
 
@@ -90,6 +92,8 @@ class Fas:
             self._levels = fas_levels.hierarchy(fas_levels.finest(problem), self._harmonic)
         self._depth = len(self._levels)
         self._c_norm = problem.reduce.norm(problem.c)
+        h = problem.scheme.h
+        self._extreme = problem.reduce.max(h) > EXTREME * problem.reduce.min(h)
         self._recent: tuple[float, ...] = (inf,) * WINDOW
         self._taken, self._first, self._correction = 0, inf, 0.0
         if start is not None:
@@ -173,7 +177,11 @@ class Fas:
         if self._taken == 1:
             self._first = self.norm
         step = self.problem.reduce.comm.allreduce(self._correction) if self._levels[0].comm is not None else self._correction
-        return Step(self.norm, float(np.sqrt(step)), 1.0)
+        size = float(np.sqrt(step))
+        if self._extreme and not anew and self.norm <= self.eps1:
+            p_max = self.problem.reduce.max(self.z)
+            self.norm = max(self.norm, self.eps1 * size / (SETTLED * p_max)) if p_max > 0 else self.norm
+        return Step(self.norm, size, 1.0)
 
     def _retreat(self) -> bool:
         """Do without the coarsest grids, on which the film's cavities are too small to be seen; false if that has been tried.
