@@ -106,7 +106,10 @@ class ActiveSet:
     def _norm(self, z: Array, G: Array) -> float:
         """||G|| / ||c||; where rounding in G's sums alone exceeds eps1, on very fine grids, relative to that."""
         reduce, c = self.problem.reduce, self.problem.c
-        rounding = 16 * EPS * reduce.norm(self.diagonal * np.abs(z) + np.abs(c))
+        # c is a difference of the wall's flows, and knows no more than they do.
+        rounding = max(
+            16 * EPS * reduce.norm(self.diagonal * np.abs(z) + np.abs(c)), EPS * reduce.norm(self.problem.scheme.b_C.ravel())
+        )
         driven = reduce.norm(c) or reduce.norm(self.diagonal)  # nothing drives the film: p is measured by its unit
         return reduce.norm(G) / max(driven, rounding / self.eps1)
 

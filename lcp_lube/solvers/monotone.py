@@ -129,7 +129,11 @@ class Monotone:
     def _norm(self) -> float:
         fields, reduce, c = self.fields, self.problem.reduce, self.problem.c
         G = self.problem.balance(fields["p"], fields["r"])
-        rounding = 16 * EPS * reduce.norm(self.diagonal * np.abs(self.z) + np.abs(c))
+        # c is a difference of the wall's flows, and knows no more than they do.
+        rounding = max(
+            16 * EPS * reduce.norm(self.diagonal * np.abs(self.z) + np.abs(c)),
+            EPS * reduce.norm(self.problem.scheme.b_C.ravel()),
+        )
         driven = reduce.norm(c) or reduce.norm(self.diagonal)  # nothing drives the film: p is measured by its unit
         return reduce.norm(G) / max(driven, rounding / self.eps1)
 

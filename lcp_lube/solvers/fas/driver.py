@@ -33,7 +33,7 @@ TRUNCATIONS = {"none": 0, "clip": 1, "points": 2}  # see `fas_kernels.correct`
 COARSEST_SWEEPS = 40  # where its Newton steps do not settle
 EXACT = (1200, 5000, 10_000)  # points of the coarsest grid once the cycles have stalled, and stalled again
 EXTREME = 1000.0  # film ratio above which a small ||G|| says little of p, and the corrections have to be small too
-SETTLED = 1e-8  # of the largest pressure: what they may then be
+SETTLED = 1e-8  # of the largest pressure: what they may then be in the mean
 BORDER = 4  # lines on either side of the border between two ranks
 
 
@@ -180,7 +180,9 @@ class Fas:
         size = float(np.sqrt(step))
         if self._extreme and not anew and self.norm <= self.eps1:
             p_max = self.problem.reduce.max(self.z)
-            self.norm = max(self.norm, self.eps1 * size / (SETTLED * p_max)) if p_max > 0 else self.norm
+            self.norm = (
+                max(self.norm, self.eps1 * size / (SETTLED * p_max * np.sqrt(self.problem.size))) if p_max > 0 else self.norm
+            )
         return Step(self.norm, size, 1.0)
 
     def _retreat(self) -> bool:
