@@ -30,7 +30,8 @@ def certify(problem: "LubricationProblem", p: Array, r: Array, eps1: float) -> C
     mass_defect: |flow in - flow out| / flow, over the open sides (`mass_defect`).
     """
     red, s = problem.reduce, problem.scheme
-    p_max, driven = red.max(np.abs(p)), red.norm(problem.c)
+    # The ends' pressure is the scale where a cavity leaves no point full.
+    p_max, driven = max(red.max(np.abs(p)), max(problem.p_sides) / problem.p_unit), red.norm(problem.c)
     if not driven:  # p = 0: what is left of it is measured by its unit
         p_max = max(p_max, 1.0)
     pressure, void, residual, diagonal, worst = misfits(problem, p, r, p_max)
