@@ -24,7 +24,7 @@ from ..problems.film.model import Model, Side
 from ..problems.grid import Grid, some_places
 from ..problems.solution import Fields, Problem
 from ..problems.transfer import numbers
-from ..scenes.scene import Solvable
+from ..scenes.scene import Derived, Solvable
 
 SAME = 1e-12  # relative difference that coordinates' rounding leaves between two values of one film
 
@@ -51,26 +51,17 @@ def model_of(scene: Solvable) -> Model | None:
 
 
 @dataclass(frozen=True)
-class Part:
+class Part(Derived):
     """What is left of a scene.
 
     kind : a key of SENTENCES. shape : that of the whole scene's grid, in 1D for 'line'.
     """
 
-    whole: Solvable
     kind: str
 
     @property
     def sentence(self) -> str:
         return SENTENCES[self.kind]
-
-    @property
-    def name(self) -> str:
-        return self.whole.name
-
-    @property
-    def scheme(self) -> str | None:
-        return self.whole.scheme
 
     @property
     def shape(self) -> tuple[int, ...]:

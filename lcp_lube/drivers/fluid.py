@@ -16,7 +16,7 @@ from ..problems.film.fluid import Law, effective, with_density
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.solution import Fields, Outcome, Solution
-from ..scenes.scene import Solvable
+from ..scenes.scene import Derived, Solvable
 from .ask import Ask, Start
 from .compose import Inner
 
@@ -25,27 +25,14 @@ DENSITY = 0.1  # of eps1: relative change of the density at which it counts as s
 
 
 @dataclass(frozen=True)
-class Frozen:
+class Frozen(Derived):
     """A scene in q with the density held.
 
     p : pressures (Pa, owned points) that the density is taken from; None: it is constant.
     """
 
-    whole: Solvable
     law: Law
     p: Array | None = None
-
-    @property
-    def name(self) -> str:
-        return self.whole.name
-
-    @property
-    def scheme(self) -> str | None:
-        return self.whole.scheme
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        return self.whole.shape
 
     @property
     def constant(self) -> Model:

@@ -13,29 +13,24 @@ from ..problems.film.model import Model
 from ..problems.grid import Grid
 from ..problems.solution import Outcome, Solution
 from ..problems.transfer import Pick, numbers
-from ..scenes.scene import Solvable
+from ..scenes.scene import Derived, Solvable
 from .ask import Ask, Start
 from .compose import Inner
 
 
 @dataclass(frozen=True)
-class PadFilm:
+class PadFilm(Derived):
     """One of the films, on this grid."""
 
-    whole: Solvable
     model: Model
-    shape: tuple[int, ...]
+    points: tuple[int, ...]
 
     @property
-    def name(self) -> str:
-        return self.whole.name
-
-    @property
-    def scheme(self) -> str | None:
-        return self.whole.scheme
+    def shape(self) -> tuple[int, ...]:
+        return self.points
 
     def with_shape(self, shape: tuple[int, ...]) -> "PadFilm":
-        return replace(self, shape=shape)
+        return replace(self, points=shape)
 
     def facts(self, comm: PETSc.Comm | None = None) -> Facts:
         return self.model.facts(self.shape, comm)

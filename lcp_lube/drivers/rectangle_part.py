@@ -18,7 +18,7 @@ from ..problems.fold import part_grid, part_shape
 from ..problems.grid import OPEN, Grid, some_places
 from ..problems.solution import Fields, Problem
 from ..problems.transfer import numbers
-from ..scenes.scene import Solvable
+from ..scenes.scene import Derived, Solvable
 
 SAME = 1e-12  # difference that rounding leaves between two values, relative, or to 1 where v itself is of that order
 
@@ -43,10 +43,9 @@ class Rectangular(Solvable, Protocol):
 
 
 @dataclass(frozen=True)
-class Quarter:
+class Quarter(Derived):
     """A quarter, or a half, of a scene; shape : that of the whole scene's grid."""
 
-    whole: Rectangular
     axes: tuple[bool, bool]
 
     @property
@@ -58,18 +57,6 @@ class Quarter:
         what, how = ("a quarter", "in x and y") if all(self.axes) else ("a half", f"in {'x' if self.axes[0] else 'y'}")
         part, whole = (int(np.prod(shape)) for shape in (part_shape(self.shape, self.axes), self.shape))
         return f"{what} is solved, {part} of {whole} points: all data are symmetric about the middle {how}"
-
-    @property
-    def name(self) -> str:
-        return self.whole.name
-
-    @property
-    def scheme(self) -> str | None:
-        return self.whole.scheme
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        return self.whole.shape
 
     def with_shape(self, shape: tuple[int, ...]) -> "Quarter":
         return Quarter(self.whole.with_shape(shape), self.axes)  # type: ignore[arg-type]

@@ -15,7 +15,7 @@ from ..problems.facts import Facts
 from ..problems.film.squeeze import SqueezeProblem
 from ..problems.film.squeeze_step import HalfLine, SqueezeStep
 from ..problems.solution import Fields, Outcome, Solution, Step
-from ..scenes.scene import Solvable
+from ..scenes.scene import Derived, Solvable
 from .ask import Ask, Start
 from .compose import Inner
 from .plan import plan
@@ -27,19 +27,10 @@ HALF = "half of the line is solved: gap and pressures at the ends are symmetric 
 
 
 @dataclass(frozen=True)
-class TimeStep:
+class TimeStep(Derived):
     """One step of a march."""
 
-    whole: Solvable
     step: SqueezeStep
-
-    @property
-    def name(self) -> str:
-        return self.whole.name
-
-    @property
-    def scheme(self) -> str | None:
-        return self.whole.scheme
 
     @property
     def shape(self) -> tuple[int, ...]:

@@ -9,28 +9,14 @@ from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.turned import TurnedProblem
 from ..problems.solution import Solution
-from ..scenes.scene import Solvable
+from ..scenes.scene import Derived, Solvable
 from .ask import Ask, Start
 from .compose import Inner
 
 
 @dataclass(frozen=True)
-class Mirrored:
+class Mirrored(Derived):
     """The mirror image of a scene."""
-
-    whole: Solvable
-
-    @property
-    def name(self) -> str:
-        return self.whole.name
-
-    @property
-    def scheme(self) -> str | None:
-        return self.whole.scheme
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        return self.whole.shape
 
     @property
     def model(self) -> Model:

@@ -2,6 +2,7 @@
 
 import tomllib
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Protocol
 
@@ -40,6 +41,25 @@ class Solvable(Protocol):
     def facts(self, comm: PETSc.Comm | None = None) -> Facts: ...
 
     def build(self, comm: PETSc.Comm | None = None) -> Problem: ...
+
+
+@dataclass(frozen=True)
+class Derived:
+    """What a driver makes of a scene: by its name, of its scheme, on its grid unless it says otherwise."""
+
+    whole: Any
+
+    @property
+    def name(self) -> str:
+        return self.whole.name
+
+    @property
+    def scheme(self) -> str | None:
+        return self.whole.scheme
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return self.whole.shape
 
 
 class Scene(Measured):
