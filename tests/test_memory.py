@@ -17,16 +17,16 @@ GB = 2**30
 @pytest.mark.parametrize(
     "words, sizes",
     [
-        ("problem4 --method din --max-it 1", (50, 100, 160)),  # a direct solver
+        ("problem4 --method din --max-it 1 --no-rescue", (50, 100, 160)),  # a direct solver
         pytest.param(
-            "problem4 --method active-set --max-it 2 --system cavity --recipe bcgs_amg --set active-set.sweeps=9",
+            "problem4 --method active-set --max-it 2 --no-rescue --system cavity --recipe bcgs_amg --set active-set.sweeps=9",
             (100, 200, 300),
             marks=pytest.mark.hypre,
         ),
-        ("problem4 --method din --recipe gmres_ilu --max-it 1", (120,)),
+        ("problem4 --method din --recipe gmres_ilu --max-it 1 --no-rescue", (120,)),
         ("problem4 --method fas", (500,)),
-        ("problem1 --method din --max-it 2", (60_000,)),
-        ("problem1 --method din --max-it 2 --recipe lu", (1000,)),
+        ("problem1 --method din --max-it 2 --no-rescue", (60_000,)),
+        ("problem1 --method din --max-it 2 --no-rescue --recipe lu", (1000,)),
     ],
 )
 def test_peaks_are_foreseen(cli, words, sizes):
@@ -38,7 +38,7 @@ def test_peaks_are_foreseen(cli, words, sizes):
 
 
 def test_on_several_ranks(cli):
-    data = cli("solve", "problem4", "--n", 50, "--method", "din", "--max-it", 1, "--json", ranks=2).json
+    data = cli("solve", "problem4", "--n", 50, "--method", "din", "--max-it", 1, "--no-rescue", "--json", ranks=2).json
     assert data["memory_estimate_mb"] == pytest.approx(data["memory_mb"], rel=0.25)
 
 
