@@ -137,10 +137,10 @@ def test_a_failed_write_costs_no_result(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     honest = files.save
 
-    def save(solution, path):
+    def save(solution, path, boundary):
         if path == "full.npz":
             raise InputError(f"{path}: could not be written: No space left on device")
-        honest(solution, path)
+        honest(solution, path, boundary)
 
     monkeypatch.setattr(files, "save", save)
     assert main(["solve", "problem1", "--n", "20", "--output", "full.npz", "--output", "good.npz"]) == 2

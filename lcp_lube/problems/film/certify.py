@@ -71,7 +71,8 @@ def misfits(problem: "LubricationProblem", p: Array, r: Array, p_max: float) -> 
     """
     s, reduce = problem.scheme, problem.reduce
     framed = [problem.grid.ghosted(field, outside=0.0) for field in (p, r)]
-    loop: Any = compiled(cell_misfits) if find_spec("numba") else array_misfits
+    many = problem.grid.size >= MANY and find_spec("numba")
+    loop: Any = compiled(cell_misfits) if many else array_misfits
     *squares, worst = loop(*framed, s.k_W, s.k_E, s.k_S, s.k_N, s.b_C, s.b_W, s.c, p_max)
     norms = [float(np.sqrt(reduce.sum(np.array([square])))) for square in squares]
     return *norms, reduce.max(np.array([worst]))  # type: ignore[return-value]
