@@ -56,7 +56,8 @@ def journal(axes: Axes, picture: Picture, row: int | None = None) -> None:
     for name, place in picture.fronts.items() if row is None or row == picture.middle else ():
         gap = to_gap * picture.film(row, np.array([place]))[0]
         axes.plot(*around(place, np.array([1.0 - gap, outside])), color=RED)
-        axes.text(*around(place, outside + 0.06), name, ha="left", va="center", fontsize=8, color=RED)
+        at = around(place, outside + 0.06)
+        axes.text(*at, name, ha="left" if at[0] > 0 else "right", va="center", fontsize=8, color=RED)
     axes.plot(*around(start, np.array([1.0, outside])), color=GREY, lw=1.0)
     axes.text(*around(start, outside + 0.1), "0°", ha="center", va="center", fontsize=8, color=GREY)
     narrowest = -0.5 * np.pi + np.radians(attitude or 0.0)
