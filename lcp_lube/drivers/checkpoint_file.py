@@ -35,6 +35,7 @@ def write(path: Path, grid: Grid, header: dict[str, Any], arrays: list[tuple[str
     named = [(name, _checksum(grid, values)) for name, values in arrays]
     text = json.dumps({**header, "shape": grid.shape, "arrays": named}).encode()
     text += b" " * (-len(text) % 8) + b"\n" * 8  # the arrays begin at a multiple of 8
+    text = grid.comm.bcast(text)  # seconds in it are each rank's own, and so would be the place where its arrays begin
     line = f"{MAGIC} {FORMAT} {len(text):12d} {zlib.crc32(text):08x}"
     head = line.encode().ljust(63) + b"\n" + text
     temporary, comm = path.with_name(f".{path.name}.new"), grid.comm
