@@ -5,7 +5,6 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-import petsc4py
 from petsc4py import PETSc
 
 from ..errors import InputError, nearest
@@ -157,7 +156,3 @@ def explain_error(error: PETSc.Error) -> str:
         "",
     )
     return f"{culprit}PETSc: {text}"
-
-
-def petsc_version() -> str:
-    return f"PETSc {'.'.join(map(str, PETSc.Sys.getVersion()))}, petsc4py {petsc4py.__version__}"
