@@ -41,7 +41,7 @@ boundscheck: $(READY) ## the tests with every index of the compiled loops checke
 	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(CURDIR)/.numba_boundscheck_cache $(BIN)/python -m pytest -q
 
 mutations: $(READY) ## 2,000 damaged scenes, options and files; every recipe by method, system, sides and ranks
-	LCP_LUBE_MUTATIONS=2000 $(BIN)/python -m pytest -q tests/test_mutations.py tests/test_combinations.py --timeout 3000
+	LCP_LUBE_MUTATIONS=2000 $(BIN)/python -m pytest -q tests/whole/test_mutations.py tests/whole/test_combinations.py --timeout 3000
 
 lint: $(READY) ## ruff and mypy
 	$(BIN)/ruff check

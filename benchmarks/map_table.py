@@ -2,7 +2,7 @@
 
     python benchmarks/map_table.py
 
-Prints a line of docs/comparison.md's table for each map, and README.md's words on din-pc; tests/test_readme.py compares.
+Prints a line of docs/comparison.md's table for each map, and README.md's words on din-pc; tests/docs/test_readme.py compares.
 """
 
 import csv

@@ -1,6 +1,6 @@
 """The pictures of README.md and docs/, drawn anew by the commands that stand beside them: `make pictures`.
 
-tools/pictures.digest holds a digest of what they are drawn from; tests/test_examples.py finds one that is stale.
+tools/pictures.digest holds a digest of what they are drawn from; tests/docs/test_examples.py finds one that is stale.
 """
 
 import hashlib
@@ -25,7 +25,7 @@ def digest() -> str:
 
 def main() -> None:
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    subprocess.run([sys.executable, str(ROOT / "tests/test_examples.py")], check=True, env=environment)
+    subprocess.run([sys.executable, str(ROOT / "tests/docs/test_examples.py")], check=True, env=environment)
     words = FIRST.split()[1:-1]
     target = str(ROOT / "benchmarks/results/problem4.png")
     subprocess.run([sys.executable, "-m", "lcp_lube", *words, target], check=True, env=environment)

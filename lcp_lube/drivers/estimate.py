@@ -11,7 +11,7 @@ cell, so that differences can vanish on several grids while the error does not. 
 - the film's: the share of Int h^-3 that the jumps of the film inside a cell misplace on this grid, times how strongly the
   quantity was seen to answer to it.
 
-Its constants are chosen on random films with exact solutions (tests/test_accuracy.py).
+Its constants are chosen on random films with exact solutions (tests/drivers/test_accuracy.py).
 """
 
 from collections.abc import Sequence

@@ -12,7 +12,7 @@ from test_readme import environment, run
 
 __all__ = ["environment"]  # the fixture, with `lcp-lube` on the path
 
-GUIDE = Path(__file__).parent.parent / "docs" / "guide"
+GUIDE = Path(__file__).parents[2] / "docs" / "guide"
 PAGES = {page.stem: page.read_text(encoding="utf-8") for page in sorted(GUIDE.glob("*.md"))}
 
 

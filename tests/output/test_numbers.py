@@ -9,7 +9,7 @@ from lcp_lube import load_scene, solve
 from lcp_lube.output.results import as_dict
 from lcp_lube.registry import scene_names
 
-PAGE = Path(__file__).parents[1] / "docs" / "numbers.md"
+PAGE = Path(__file__).parents[2] / "docs" / "numbers.md"
 SMALL = {"textured_slider": {"K": 1}, "squeeze": {"n": 19, "steps": 8}}
 
 

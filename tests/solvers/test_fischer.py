@@ -21,7 +21,7 @@ from lcp_lube.solvers.steplength import armijo
 
 pytestmark = pytest.mark.rounding
 
-PUBLISHED = Path(__file__).parents[1] / "benchmarks" / "published" / "mezzadri_galligani_2018"
+PUBLISHED = Path(__file__).parents[2] / "benchmarks" / "published" / "mezzadri_galligani_2018"
 METHODS = ("fbn-a", "fbn-i")
 numbers = st.floats(-1e150, 1e150)
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-TOYS = Path(__file__).parent / "toys"
+TOYS = Path(__file__).parents[1] / "toys"
 
 
 @pytest.fixture

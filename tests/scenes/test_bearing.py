@@ -506,7 +506,7 @@ def test_another_methods_option_is_not_ignored(cli, given, chosen):
 
 # Documentation, and anything at all
 
-BLOCKS = re.findall(r"```toml\n(.*?)```", (Path(__file__).parents[1] / "docs" / "scene_files.md").read_text(), re.S)
+BLOCKS = re.findall(r"```toml\n(.*?)```", (Path(__file__).parents[2] / "docs" / "scene_files.md").read_text(), re.S)
 
 
 @pytest.mark.parametrize("block", BLOCKS)
@@ -518,7 +518,7 @@ def test_documented_scenes(tmp_path, block):
 
 
 def test_documented_shapes_are_all():
-    text = (Path(__file__).parents[1] / "docs" / "scene_files.md").read_text()
+    text = (Path(__file__).parents[2] / "docs" / "scene_files.md").read_text()
     for name in SHAPES:
         assert f"`{name}`" in text, name
 

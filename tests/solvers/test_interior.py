@@ -19,7 +19,7 @@ from lcp_lube.solvers.interior import Interior, InteriorOptions, build
 from lcp_lube.solvers.job import Job
 from lcp_lube.solvers.newton import Stopping, iterate
 
-TABLE = Path(__file__).parent.parent / "benchmarks" / "published" / "bergamaschi_zilli" / "table1.csv"
+TABLE = Path(__file__).parents[2] / "benchmarks" / "published" / "bergamaschi_zilli" / "table1.csv"
 PRINTED = [row for row in csv.DictReader(TABLE.read_text().splitlines()) if int(row["n"]) <= 4096]
 
 

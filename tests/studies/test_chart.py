@@ -208,7 +208,7 @@ def printed() -> Iterator[None]:
 
 
 def stored(name: str) -> list[Row]:
-    return read(Path(__file__).parents[1] / "benchmarks" / "results" / f"{name}.csv")
+    return read(Path(__file__).parents[2] / "benchmarks" / "results" / f"{name}.csv")
 
 
 @pytest.mark.parametrize(

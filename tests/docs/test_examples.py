@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-DOCS = Path(__file__).parent.parent / "docs"
+DOCS = Path(__file__).parents[2] / "docs"
 TEXT = (DOCS / "examples.md").read_text(encoding="utf-8")
 NUMBER = r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?"
 MOST_BYTES = 100_000

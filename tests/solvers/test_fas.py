@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import start
+from conftest import TESTS, start
 from films import FilmScene
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -334,7 +334,7 @@ def serial():
 @pytest.mark.parametrize("ranks", [2, 3])
 def test_any_number_of_ranks(tmp_path: Path, serial, ranks):
     """The same answer, and as many cycles to within one."""
-    job = start([str(Path(__file__).parent / "mpi_fas.py"), str(tmp_path)], ranks, tmp_path, timeout=400)
+    job = start([str(TESTS / "mpi_fas.py"), str(tmp_path)], ranks, tmp_path, timeout=400)
     assert job.status == 0, job.err
     record = json.loads((tmp_path / "record.json").read_text())
     with np.load(tmp_path / "fields.npz") as fields:
