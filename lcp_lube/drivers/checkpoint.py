@@ -21,7 +21,8 @@ from ..errors import InputError
 from ..problems.grid import Grid
 from ..problems.solution import Fields, Outcome, Step
 from ..scenes.scene import Scene, Solvable
-from ..solvers.newton import Method, Monitor, Stopping, iterate
+from ..solvers.method import Method
+from ..solvers.newton import Monitor, Stopping, iterate
 from . import checkpoint_file
 
 # What a run is made of, apart from its scene: the same on every resume.

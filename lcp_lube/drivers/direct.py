@@ -16,7 +16,8 @@ from ..registry import METHODS
 from ..scenes.scene import Solvable
 from ..solvers.enclosure import enclose
 from ..solvers.job import Job
-from ..solvers.newton import Method, Stopping
+from ..solvers.method import Method
+from ..solvers.newton import Stopping
 from . import memory
 from .ask import Ask, Start
 from .checkpoint import CHOICES, Checkpoint, Checkpointer, load

@@ -20,49 +20,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.parallel import Array
-from ..errors import InputError
-from ..linear.krylov import Krylov
 from ..linear.system import System, make_system
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Fields, Step
 from .job import Job
-from .method_options import make_options
+from .method import Method
+from .method_options import MethodOptions, least, make_options, part, positive
 from .newton import StalledError
-from .refined import check_refined
 from .relaxation import Relaxation, relaxation
+from .zform import EPS, ZForm
 
-EPS = float(np.finfo(float).eps)
 RESCUE_SWEEPS, MOST_SWEEPS = 16, 2**14  # once stalled: at first, and at most
 LEAST = 1e-15  # p_unit: a largest pressure below this is rounding
-REFINEMENTS, REFINED = 8, 1e-12  # solves that a direct solver adds to the last step, until z moves by less of itself
 
 
 @dataclass(frozen=True)
-class ActiveSetOptions:
+class ActiveSetOptions(MethodOptions):
     """patience: steps without a fall of ||G|| by 10 % before sweeps take over; give_up: steps after which it is taken to
     cycle; p0: full film at this p (p_unit) at the start; rtol: smallest relative tolerance of iterative inner solves; sweeps:
     of relaxation before the first step from a given start, and after each step; 0: none at all, also when stalled."""
 
-    p0: float = 1.0
-    patience: int = 4
-    give_up: int = 100
-    rtol: float = 1e-8
-    sweeps: int = 16
-
-    def __post_init__(self) -> None:
-        if not (np.isfinite(self.p0) and self.p0 > 0):
-            raise InputError(f"--p0 {self.p0}: a positive number is needed")
-        for name in ("patience", "give_up"):
-            if getattr(self, name) < 1:
-                raise InputError(f"active-set.{name} = {getattr(self, name)}: at least 1 is needed")
-        if self.sweeps < 0:
-            raise InputError(f"active-set.sweeps = {self.sweeps}: at least 0 is needed")
-        if not 0 < self.rtol < 1:
-            raise InputError(f"active-set.rtol = {self.rtol}: allowed are numbers between 0 and 1")
+    method = "active-set"
+    p0: float = positive(1.0, "--p0")
+    patience: int = least(1, 4)
+    give_up: int = least(1, 100)
+    rtol: float = part(1e-8)
+    sweeps: int = least(0, 16)
 
 
-class ActiveSet:
-    """The iterates z; `newton.iterate` runs it. `norm` is ||G(z)|| / ||c||, see `_norm`.
+class ActiveSet(Method):
+    """The iterates z; `newton.iterate` runs it. `norm` is ||G(z)|| / ||c||, see `zform.ZForm.norm`.
 
     Parameters
     ----------
@@ -80,13 +67,9 @@ class ActiveSet:
         start: Fields | None = None,
     ):
         self.problem, self.system, self.options, self.eps1 = problem, system, options, eps1
-        scheme = problem.scheme
-        # Cavitated columns of J then have A's diagonal: a step in z means the same in both phases.
-        self.diagonal = (scheme.k_W + scheme.k_E + scheme.k_S + scheme.k_N).ravel()
-        self.s = self.diagonal / -scheme.b_C.ravel()
-        self.z = start["p"] - start["r"] / self.s if start else np.full(problem.grid.local_size, options.p0)
-        self.G = self._residual(self.z)
-        self.norm = self._norm(self.z, self.G)
+        self.form = ZForm(problem)
+        self.z = self.form.z(start) if start else np.full(problem.grid.local_size, options.p0)
+        self._look()
         self._relaxation: Relaxation | None = relaxation(problem) if options.sweeps else None
         self._sweeps = options.sweeps if start else 0
         self._relax(self._sweeps)
@@ -94,39 +77,21 @@ class ActiveSet:
 
     @property
     def fields(self) -> Fields:
-        return {"p": np.maximum(self.z, 0.0), "r": self.s * np.maximum(-self.z, 0.0)}
+        return self.form.fields(self.z)
 
-    @property
-    def krylov(self) -> Krylov:
-        return self.system.krylov
-
-    def destroy(self) -> None:
-        self.system.destroy()
-
-    def _norm(self, z: Array, G: Array) -> float:
-        """||G|| / ||c||; where rounding in G's sums alone exceeds eps1, on very fine grids, relative to that."""
-        reduce, c = self.problem.reduce, self.problem.c
-        # c is a difference of the wall's flows, and knows no more than they do.
-        rounding = max(
-            16 * EPS * reduce.norm(self.diagonal * np.abs(z) + np.abs(c)), EPS * reduce.norm(self.problem.scheme.b_C.ravel())
-        )
-        driven = reduce.norm(c) or reduce.norm(self.diagonal)  # nothing drives the film: p is measured by its unit
-        return reduce.norm(G) / max(driven, rounding / self.eps1)
-
-    def _residual(self, z: Array) -> Array:
-        return self.problem.balance(np.maximum(z, 0.0), self.s * np.maximum(-z, 0.0))
+    def _look(self) -> None:
+        self.G = self.form.residual(self.z)
+        self.norm = self.form.norm(self.z, self.G, self.eps1)
 
     def _relax(self, sweeps: int, always: bool = False) -> None:
         """Sweeps from z, kept if ||G|| falls by them, or always."""
         if self._relaxation is None or not sweeps or self.norm <= self.eps1:
             return
-        fields = self.fields
-        p, r = self._relaxation(fields["p"], fields["r"], sweeps)
-        z = p - r / self.s
-        G = self._residual(z)
-        norm = self._norm(z, G)
-        if norm < self.norm or always:
-            self.z, self.G, self.norm = z, G, norm
+        before = self.z, self.G, self.norm
+        self.z = self.form.z(self._relaxation(self.fields, sweeps))
+        self._look()
+        if not (self.norm < before[2] or always):
+            self.z, self.G, self.norm = before
 
     def advance(self) -> Step:
         """One full Newton step, and sweeps: a few from a coarser grid's answer, many if ||G|| has stalled.
@@ -147,13 +112,15 @@ class ActiveSet:
         rtol = max(self.options.rtol, min(1e-2, max(0.1 * self.norm, 0.4 * self.eps1 / self.norm if self.norm else 1.0)))
         dp, dr, linear_iterations = self.system.solve(cavity, 1.0 - cavity, -self.G, np.zeros_like(self.G), rtol)
         with self.system.stages("step length"):
-            d = np.where(full, dp, -dr / self.s)
+            d = np.where(full, dp, -dr / self.form.s)
             self.z = self.z + d
-            self.G = self._residual(self.z)
-            self.norm = self._norm(self.z, self.G)
+            self._look()
             changed = self.problem.reduce.sum((full != (self.z >= 0)).astype(float))
         if not changed and self.system.direct:
-            changed = self._refine(full)
+            self.z = self.form.refine(self.z, full, lambda f: self._solve_again(f, full))
+            self._look()
+            # Signs of pressures that are next to nothing beside what the wall could make.
+            changed = self.problem.reduce.sum((full != (self.z >= 0)).astype(float))
         # In parts of the largest pressure, if that is far below p_unit: eps2 is no step then.
         p_max = float(np.clip(self.problem.reduce.max(self.z), LEAST, 1.0)) if self.norm > 8 * EPS else 1.0
         step_norm = self.problem.reduce.norm(d) / p_max if changed else 0.0
@@ -177,31 +144,10 @@ class ActiveSet:
             full.reshape(grid.box)[empty, np.argmax(z[empty], axis=1)] = True
         return full
 
-    def _refine(self, full: NDArray[np.bool_]) -> float:
-        """Solve again with the same factors for what is left of G: their rounding is that of A's diagonal, G's is not.
-
-        Returns how many signs that changes: of pressures that are next to nothing beside what the wall could make.
-
-        Raises
-        ------
-        StalledError : pressures stay uncertain (`refined`).
-        """
-        reduce, none, last, left = self.problem.reduce, np.zeros_like(self.G), np.inf, 0.0
-        for _ in range(REFINEMENTS):
-            dp, dr, _ = self.system.resolve(-self.G, none, self.options.rtol)
-            d = np.where(full, dp, -dr / self.s)
-            parts = [(np.where(some, np.abs(d), 0.0), np.where(some, np.abs(self.z), 0.0)) for some in (full, ~full)]
-            size = max(reduce.max(moved) / (reduce.max(whole) or 1.0) for moved, whole in parts)
-            left = reduce.max(parts[0][0])
-            if not size < 0.5 * last:  # rounding, or NaN
-                break
-            self.z = self.z + d
-            self.G, last = self._residual(self.z), size
-            if size <= REFINED:
-                break
-        self.norm = self._norm(self.z, self.G)
-        check_refined(self.problem, self.z, left)
-        return reduce.sum((full != (self.z >= 0)).astype(float))
+    def _solve_again(self, f: Array, full: NDArray[np.bool_]) -> Array:
+        """The step for another right-hand side with the matrix of the last one. Collective."""
+        dp, dr, _ = self.system.resolve(f, np.zeros_like(f), self.options.rtol)
+        return np.where(full, dp, -dr / self.form.s)
 
 
 def build(job: Job) -> ActiveSet:

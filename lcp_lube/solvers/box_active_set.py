@@ -13,13 +13,12 @@ from functools import lru_cache
 import numpy as np
 
 from ..base.parallel import Array
-from ..errors import InputError
 from ..linear.box import BoxSystem
-from ..linear.krylov import Krylov
 from ..problems.box import BoxProblem
 from ..problems.solution import Fields, Step
 from .job import Job
-from .method_options import make_options
+from .method import Method
+from .method_options import MethodOptions, make_options, part
 from .steplength import halve_until, inexact_decrease
 
 Trial = tuple[Array, Array, Array]  # v, f(v), R(v)
@@ -28,19 +27,15 @@ NEAR = 1e-2  # steps below this part of max |v| leave the size of f's terms as i
 
 
 @dataclass(frozen=True)
-class BoxActiveSetOptions:
+class BoxActiveSetOptions(MethodOptions):
     """rtol: relative tolerance of the first inner solves, which falls with ||R|| to 0.1 % of it; beta: of the decrease test."""
 
-    rtol: float = 1e-2
-    beta: float = 1e-4
-
-    def __post_init__(self) -> None:
-        for name in ("rtol", "beta"):
-            if not 0 < getattr(self, name) < 1:
-                raise InputError(f"active-set.{name} = {getattr(self, name)}: allowed are numbers between 0 and 1")
+    method = "active-set"
+    rtol: float = part(1e-2)
+    beta: float = part(1e-4)
 
 
-class BoxActiveSet:
+class BoxActiveSet(Method):
     """The iterates v; `newton.iterate` runs it.
 
     `norm` is max |D R(v)| against the mean size of the terms of f; steps are measured against max |v|.
@@ -65,13 +60,6 @@ class BoxActiveSet:
     @property
     def fields(self) -> Fields:
         return {"v": self.v}
-
-    @property
-    def krylov(self) -> Krylov:
-        return self.system.krylov
-
-    def destroy(self) -> None:
-        self.system.destroy()
 
     def _norm(self) -> float:
         if not np.isfinite(self._scale):  # f has overflowed, where R may still be the distance to a bound

@@ -7,13 +7,12 @@ from functools import lru_cache
 import numpy as np
 
 from ..base.parallel import Array
-from ..errors import InputError
-from ..linear.krylov import Krylov
 from ..linear.system import System, make_system
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Fields, Step
 from .job import Job
-from .method_options import make_options
+from .method import Method, constant_or
+from .method_options import MethodOptions, make_options, one_of, option, part, positive
 from .steplength import Centrality, feasible, halve_until, inexact_decrease, reduction
 
 Trial = tuple[Array, Array, Array]  # p, r, F1
@@ -35,10 +34,15 @@ def adaptive(gap: float, norm: float, n: int) -> float:
 
 
 MU_RULES: dict[str, Callable[[float, float, int], float]] = {"mu1": mu1, "mu2": mu2, "adaptive": adaptive}
+INSIDE = " (the method starts inside p, r > 0)"
+
+
+def subset_of_FRCB(letters: str) -> bool:
+    return set(letters) <= set("FRCB") and len(set(letters)) == len(letters)
 
 
 @dataclass(frozen=True)
-class DinOptions:
+class DinOptions(MethodOptions):
     """Parameters of DIN; the defaults are the paper's.
 
     p0 (in the problem's pressure unit) and r0 start every point. conditions is any combination of F (feasibility),
@@ -47,36 +51,21 @@ class DinOptions:
     KSP must test the true residual for that, -ksp_pc_side right).
     """
 
-    p0: float = 1.0
-    r0: float = 0.1
-    mu: str = "mu2"
-    conditions: str = "FCB"
-    sigma_max: float = 0.9
-    sigma_factor: float = 0.01
-    gamma: float = 0.5
-    theta: float = 0.5
-    beta: float = 1e-4
-    tol_min: float = 1e-8
-    inner: str = "relative"
-
-    def __post_init__(self) -> None:
-        if self.inner not in ("relative", "residual"):
-            raise InputError(f"din.inner = {self.inner}: allowed are relative, residual")
-        if self.mu not in MU_RULES:
-            raise InputError(f"--mu {self.mu}: allowed are {', '.join(MU_RULES)}")
-        if set(self.conditions) - set("FRCB") or len(set(self.conditions)) < len(self.conditions):
-            raise InputError(f"--conditions {self.conditions}: any combination of the letters F, R, C, B, each once")
-        for name in ("p0", "r0"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0):
-                raise InputError(f"--{name} {value}: a positive number is needed (the method starts inside p, r > 0)")
-        for name in ("sigma_max", "sigma_factor", "gamma", "theta", "beta", "tol_min"):
-            value = getattr(self, name)
-            if not 0 < value < 1:
-                raise InputError(f"din.{name} = {value}: allowed are numbers between 0 and 1")
+    method = "din"
+    p0: float = positive(1.0, "--p0", INSIDE)
+    r0: float = positive(0.1, "--r0", INSIDE)
+    mu: str = one_of("mu2", MU_RULES, "--mu")
+    conditions: str = option("FCB", subset_of_FRCB, "any combination of the letters F, R, C, B, each once", "--conditions")
+    sigma_max: float = part(0.9)
+    sigma_factor: float = part(0.01)
+    gamma: float = part(0.5)
+    theta: float = part(0.5)
+    beta: float = part(1e-4)
+    tol_min: float = part(1e-8)
+    inner: str = one_of("relative", ("relative", "residual"))
 
 
-class DIN:
+class DIN(Method):
     """The iterates and steps of DIN; `newton.iterate` runs it.
 
     Parameters
@@ -90,8 +79,7 @@ class DIN:
 
     def __init__(self, problem: LubricationProblem, system: System, options: DinOptions, start: Fields | None = None):
         self.problem, self.system, self.options = problem, system, options
-        self.p = start["p"].copy() if start else np.full(problem.grid.local_size, options.p0)
-        self.r = start["r"].copy() if start else np.full(problem.grid.local_size, options.r0)
+        self.p, self.r = constant_or(start, problem.grid.local_size, options.p0, options.r0)
         self.F1 = problem.flow(self.p, self.r)
         reduce = problem.reduce
         self.central = Centrality(reduce, self.p * self.r, problem.size, reduce.norm(self.F1), options.gamma)
@@ -100,13 +88,6 @@ class DIN:
     @property
     def fields(self) -> Fields:
         return {"p": self.p, "r": self.r}
-
-    @property
-    def krylov(self) -> Krylov:
-        return self.system.krylov
-
-    def destroy(self) -> None:
-        self.system.destroy()
 
     def forcing(self, sigma: float) -> float:
         """delta_k of the inner solves, at most 0.1 and small enough for (31), sigma_k > delta_k max(...)."""

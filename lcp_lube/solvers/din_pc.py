@@ -10,33 +10,28 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.parallel import Array
-from ..errors import InputError
 from ..linear.system import System, make_system
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Fields, Step
-from .din import DIN, DinOptions
+from .din import DIN, INSIDE, DinOptions
 from .job import Job
-from .method_options import make_options
+from .method_options import MethodOptions, make_options, part, positive
 from .steplength import feasible, halve_until
 
 CENTRING = (0.0, 0.01, 0.1)  # sigma at least; the next where the step would leave the central path's neighbourhood
 
 
 @dataclass(frozen=True)
-class DinPcOptions:
+class DinPcOptions(MethodOptions):
     """p0 (in p_unit), r0: start; boundary: part of the way to p = 0 or r = 0 that a step may go, at least; tol_min: relative
     tolerance of iterative inner solves; gamma: of the centrality conditions (28), (29)."""
 
-    p0: float = 1.0
-    r0: float = 0.1
-    boundary: float = 0.9995
-    tol_min: float = 1e-8
-    gamma: float = 0.5
-
-    def __post_init__(self) -> None:
-        DinOptions(p0=self.p0, r0=self.r0, tol_min=self.tol_min, gamma=self.gamma)
-        if not 0 < self.boundary < 1:
-            raise InputError(f"din-pc.boundary = {self.boundary}: allowed are numbers between 0 and 1")
+    method = "din-pc"
+    p0: float = positive(1.0, "--p0", INSIDE)
+    r0: float = positive(0.1, "--r0", INSIDE)
+    boundary: float = part(0.9995)
+    tol_min: float = part(1e-8)
+    gamma: float = part(0.5)
 
 
 class DinPc(DIN):

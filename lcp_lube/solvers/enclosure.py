@@ -15,6 +15,7 @@ from ..linear.system import make_system
 from ..problems.film.forces import ambient
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Enclosure, Fields
+from .zform import ZForm
 
 Mask = NDArray[np.bool_]
 UNIT = 2.0**-53  # largest relative error of one operation
@@ -25,7 +26,7 @@ REPAIRS = 40  # local corrections of a band before it is given up
 WIDEST = 0.1  # part of the largest pressure: a wider band, though proved, says that the answer is poor
 
 
-def balance(problem: LubricationProblem, p: Array, r: Array) -> tuple[Array, Array]:
+def balance(problem: LubricationProblem, fields: Fields) -> tuple[Array, Array]:
     """F1 = A p + B r - c as the sum of its face flows, and a bound on the rounding in it. Collective.
 
     Each of the 7 terms passes at most 8 roundings: difference, product, six additions. With u the unit roundoff, the error
@@ -33,8 +34,8 @@ def balance(problem: LubricationProblem, p: Array, r: Array) -> tuple[Array, Arr
     both. What is bounded is the error against the balance with the stored coefficients k, b, c taken as exact.
     """
     s, box = problem.scheme, problem.grid.box
-    frame_p, frame_r = (problem.grid.ghosted(a, outside=0.0) for a in (p, r))
-    p, r = p.reshape(box), r.reshape(box)
+    frame_p, frame_r = (problem.grid.ghosted(fields[name], outside=0.0) for name in "pr")
+    p, r = (fields[name].reshape(box) for name in "pr")
     terms = [
         s.k_W * (p - frame_p[1:-1, :-2]),
         s.k_E * (p - frame_p[1:-1, 2:]),
@@ -84,7 +85,7 @@ def conditions(problem: LubricationProblem) -> str:
     # Nothing but these terms: the matrices and the face flows agree on a vector without symmetries.
     number = grid.first + np.arange(grid.local_size)
     p, r = 1.0 + np.modf(0.618033988749895 * number)[0], np.modf(0.7548776662466927 * number)[0]
-    F, rounding = balance(problem, p, r)
+    F, rounding = balance(problem, {"p": p, "r": r})
     assembled = -problem.c.reshape(grid.box)
     for entries, values in ((s.pressure_entries(), p), (s.void_entries(), r)):
         for dj, di, entry in entries:
@@ -129,23 +130,16 @@ class _Band:
     """z, the price of a change in it, and the sign tests."""
 
     def __init__(self, problem: LubricationProblem, fields: Fields):
-        self.problem, scheme = problem, problem.scheme
-        self.diagonal = (scheme.k_W + scheme.k_E + scheme.k_S + scheme.k_N).ravel()
-        self.s = self.diagonal / -scheme.b_C.ravel()  # both kinds of columns then have A's diagonal
-        self.z = fields["p"] - fields["r"] / self.s
-        p, r = self.pair(self.z)
-        self.G, rounding = balance(problem, p, r)
+        self.problem, self.form = problem, ZForm(problem)
+        self.z = self.form.z(fields)
+        self.G, rounding = balance(problem, self.form.fields(self.z))
         # G moves by this much when p and r are rounded, which z - e and z + e are.
-        about = problem.grid.ghosted(np.abs(self.z) * self.diagonal, outside=0.0)
+        about = problem.grid.ghosted(np.abs(self.z) * self.form.diagonal, outside=0.0)
         near = about[1:-1, 1:-1] + about[1:-1, :-2] + about[1:-1, 2:]
         if problem.grid.dim == 2:
             near = near + about[:-2, 1:-1] + about[2:, 1:-1]
         # c is a difference of the wall's flows, rounded; methods take the difference at the faces (`problem.balance`).
-        self.slack = 4 * rounding + 8 * UNIT * (near - scheme.b_C).ravel()
-
-    def pair(self, z: Array) -> tuple[Array, Array]:
-        """p and r, complementary to the last bit: what is tested is this pair, s has no part in the proof."""
-        return np.maximum(z, 0.0), self.s * np.maximum(-z, 0.0)
+        self.slack = 4 * rounding + 8 * UNIT * (near - problem.scheme.b_C).ravel()
 
     def width(self, system: str, stages: Stages) -> Array:
         """e ~ J(z)^-1 (|G(z)| + slack), and a little for the error of the solve itself. Collective.
@@ -163,7 +157,7 @@ class _Band:
             dp, dr, _ = made.solve((~full).astype(float), full.astype(float), w, np.zeros_like(w), RTOL)
         finally:
             made.destroy()
-        return np.maximum(np.where(full, dp, -dr / self.s), 0.0)
+        return np.maximum(np.where(full, dp, -dr / self.form.s), 0.0)
 
     def prove(self, e: Array, sign: float) -> Fields | None:
         """The pair of z + sign e, its e enlarged where needed, if G has that sign there; None if this cannot be shown.
@@ -174,13 +168,13 @@ class _Band:
         """
         most = 16 * self.problem.reduce.max(e)
         for _ in range(REPAIRS):
-            p, r = self.pair(self.z + sign * e)
-            F, rounding = balance(self.problem, p, r)
+            pair = self.form.fields(self.z + sign * e)  # this is tested: s has no part in the proof
+            F, rounding = balance(self.problem, pair)
             lacking = rounding - sign * F  # NaN is lacking too
             fails = ~(lacking <= 0)
             if not self.problem.reduce.sum(fails.astype(float)):
-                return {"p": p, "r": r}
-            e = np.where(fails, e + (lacking + self.slack) / self.diagonal, e)
+                return pair
+            e = np.where(fails, e + (lacking + self.slack) / self.form.diagonal, e)
             if not self.problem.reduce.max(e) <= most:
                 break
         return None

@@ -10,13 +10,12 @@ from functools import lru_cache, partial
 import numpy as np
 
 from ..base.parallel import Array
-from ..errors import InputError
-from ..linear.krylov import Krylov
 from ..linear.system import System, make_system
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Fields, Step
 from .job import Job
-from .method_options import make_options
+from .method import Method, constant_or
+from .method_options import MethodOptions, make_options, option, part
 from .steplength import StepLengthError, armijo, halve_until, inexact_decrease
 
 SMALL = np.finfo(float).tiny / np.finfo(float).eps
@@ -46,7 +45,7 @@ def derivatives(p: Array, r: Array) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True)
-class FischerOptions:
+class FischerOptions(MethodOptions):
     """Parameters of FBN; the defaults are the paper's where it has them.
 
     p0 (in the problem's pressure unit) and r0 start every point. beta is the share of the predicted decrease that a step
@@ -54,24 +53,17 @@ class FischerOptions:
     delta_k = max(tol_min, min(delta_max, delta_factor ||F~||)): quadratic convergence down to tol_min.
     """
 
-    p0: float = 1.0
-    r0: float = 0.1
-    beta: float = 1e-4
-    theta: float = 0.5
-    delta_max: float = 0.1
-    delta_factor: float = 0.01
-    tol_min: float = 1e-8
-
-    def __post_init__(self) -> None:
-        for name in ("p0", "r0"):
-            if not np.isfinite(getattr(self, name)):
-                raise InputError(f"--{name} {getattr(self, name)}: a finite number is needed")
-        for name in ("beta", "theta", "delta_max", "delta_factor", "tol_min"):
-            if not 0 < getattr(self, name) < 1:
-                raise InputError(f"fbn.{name} = {getattr(self, name)}: allowed are numbers between 0 and 1")
+    method = "fbn"
+    p0: float = option(1.0, np.isfinite, "a finite number is needed", "--p0")
+    r0: float = option(0.1, np.isfinite, "a finite number is needed", "--r0")
+    beta: float = part(1e-4)
+    theta: float = part(0.5)
+    delta_max: float = part(0.1)
+    delta_factor: float = part(0.01)
+    tol_min: float = part(1e-8)
 
 
-class FischerNewton:
+class FischerNewton(Method):
     """The iterates and steps of FBN; `newton.iterate` runs it.
 
     Parameters
@@ -94,21 +86,13 @@ class FischerNewton:
         start: Fields | None = None,
     ):
         self.problem, self.system, self.options, self.merit = problem, system, options, merit
-        self.p = start["p"].copy() if start else np.full(problem.grid.local_size, options.p0)
-        self.r = start["r"].copy() if start else np.full(problem.grid.local_size, options.r0)
+        self.p, self.r = constant_or(start, problem.grid.local_size, options.p0, options.r0)
         self.F1, self.F2 = problem.flow(self.p, self.r), fischer_burmeister(self.p, self.r)
         self.norm = problem.reduce.norm(self.F1, self.F2)
 
     @property
     def fields(self) -> Fields:
         return {"p": self.p, "r": self.r}
-
-    @property
-    def krylov(self) -> Krylov:
-        return self.system.krylov
-
-    def destroy(self) -> None:
-        self.system.destroy()
 
     def advance(self) -> Step:
         """One step: the Newton direction of F~, then alpha = 1 halved until the merit function falls enough."""

@@ -22,18 +22,18 @@ import numpy as np
 from ..base.parallel import Array
 from ..errors import InputError
 from ..linear.box import BoxSystem
-from ..linear.krylov import Krylov
 from ..problems.box import BoxProblem
 from ..problems.solution import Fields, Step
 from .job import Job
-from .method_options import make_options
+from .method import Method
+from .method_options import MethodOptions, least, make_options, option, part, positive
 from .steplength import feasible, halve_until, inexact_decrease
 
 RTOL = (1e-12, 0.5)  # of the inner solves: what PETSc's test can tell apart, and what still is a solve
 
 
 @dataclass(frozen=True)
-class InteriorOptions:
+class InteriorOptions(MethodOptions):
     """Parameters of the interior point method.
 
     z0: start of z1 and z2; s0: of s1 and s2, 0 for v - l and u - v. sigma_max: sigma = min(sigma_max, mu). forcing: inner
@@ -42,25 +42,15 @@ class InteriorOptions:
     alpha before the run counts as failed. inside: the start keeps this part of the box (of 1, if wider) off the bounds.
     """
 
-    z0: float = 1.0
-    s0: float = 0.0
-    sigma_max: float = 0.2
-    forcing: float = 0.05
-    boundary: float = 0.9999
-    beta: float = 1e-4
-    halvings: int = 5
-    inside: float = 1e-3
-
-    def __post_init__(self) -> None:
-        if not (np.isfinite(self.z0) and self.z0 > 0):
-            raise InputError(f"interior.z0 = {self.z0}: a positive number is needed")
-        if not (np.isfinite(self.s0) and self.s0 >= 0):
-            raise InputError(f"interior.s0 = {self.s0}: a positive number, or 0 for the slacks of v, is needed")
-        for name in ("sigma_max", "forcing", "boundary", "beta", "inside"):
-            if not 0 < getattr(self, name) < 1:
-                raise InputError(f"interior.{name} = {getattr(self, name)}: allowed are numbers between 0 and 1")
-        if self.halvings < 1:
-            raise InputError(f"interior.halvings = {self.halvings}: at least 1 is needed")
+    method = "interior"
+    z0: float = positive(1.0)
+    s0: float = option(0.0, lambda s: 0 <= s < np.inf, "a positive number, or 0 for the slacks of v, is needed")
+    sigma_max: float = part(0.2)
+    forcing: float = part(0.05)
+    boundary: float = part(0.9999)
+    beta: float = part(1e-4)
+    halvings: int = least(1, 5)
+    inside: float = part(1e-3)
 
 
 @dataclass(frozen=True)
@@ -74,7 +64,7 @@ class Point:
     z2: Array
 
 
-class Interior:
+class Interior(Method):
     """The iterates of the interior point method; `newton.iterate` runs it. `norm` is ||H||, all five blocks.
 
     Parameters
@@ -107,13 +97,6 @@ class Interior:
     @property
     def fields(self) -> Fields:
         return {"v": self.at.v}
-
-    @property
-    def krylov(self) -> Krylov:
-        return self.system.krylov
-
-    def destroy(self) -> None:
-        self.system.destroy()
 
     def _H(self, at: Point) -> tuple[Array, ...]:
         """The five blocks; zero where a bound is absent."""

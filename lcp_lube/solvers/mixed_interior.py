@@ -13,13 +13,12 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..base.parallel import Array
-from ..errors import InputError
 from ..linear.box import BoxSystem
 from ..problems.box import BoxProblem
 from ..problems.solution import Fields, Step
 from .interior import Interior, InteriorOptions
 from .job import Job
-from .method_options import make_options
+from .method_options import least, make_options, positive
 from .steplength import StepLengthError
 
 STUCK = 1e-9  # steps shorter than this lead nowhere
@@ -29,14 +28,9 @@ STUCK = 1e-9  # steps shorter than this lead nowhere
 class MixedInteriorOptions(InteriorOptions):
     """Those of `InteriorOptions`, z0 being the least start of z1 and z2; and keep: steps that one Jacobian serves."""
 
-    z0: float = 1e-3
-    halvings: int = 20
-    keep: int = 1
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.keep < 1:
-            raise InputError(f"interior.keep = {self.keep}: at least 1 is needed")
+    z0: float = positive(1e-3)
+    halvings: int = least(1, 20)
+    keep: int = least(1, 1)
 
 
 class KeptJacobian:

@@ -19,33 +19,25 @@ from numpy.typing import NDArray
 
 from ..base.parallel import Array
 from ..base.stages import Stages
-from ..errors import InputError
-from ..linear.krylov import Krylov
 from ..linear.reduced import ReducedSystem
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Fields, Step
 from .job import Job
-from .method_options import make_options
-from .refined import check_refined
+from .method import Method
+from .method_options import MethodOptions, least, make_options, part
 from .relaxation import relaxation
+from .zform import ZForm
 
-EPS = float(np.finfo(float).eps)
-REFINEMENTS, REFINED = 8, 1e-12  # solves that a direct solver adds to the last step, until z moves by less of itself
 Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
-class MonotoneOptions:
+class MonotoneOptions(MethodOptions):
     """sweeps: of relaxation from each supersolution, 0: none; rtol: relative tolerance of iterative inner solves."""
 
-    sweeps: int = 32
-    rtol: float = 1e-10
-
-    def __post_init__(self) -> None:
-        if self.sweeps < 0:
-            raise InputError(f"monotone.sweeps = {self.sweeps}: at least 0 is needed")
-        if not 0 < self.rtol < 1:
-            raise InputError(f"monotone.rtol = {self.rtol}: allowed are numbers between 0 and 1")
+    method = "monotone"
+    sweeps: int = least(0, 32)
+    rtol: float = part(1e-10)
 
 
 class ModelSystem(ReducedSystem):
@@ -82,7 +74,7 @@ class ModelSystem(ReducedSystem):
         return self._unit * self._x.array_r, iterations
 
 
-class Monotone:
+class Monotone(Method):
     """The supersolutions z; `newton.iterate` runs it. `norm` is ||G(z)|| / ||c||, as the active set's.
 
     Parameters
@@ -101,11 +93,9 @@ class Monotone:
         start: Fields | None = None,
     ):
         self.problem, self.system, self.options, self.eps1 = problem, system, options, eps1
-        scheme = problem.scheme
-        self.diagonal = (scheme.k_W + scheme.k_E + scheme.k_S + scheme.k_N).ravel()
-        self.s = self.diagonal / -scheme.b_C.ravel()
+        self.form = ZForm(problem)
         n = problem.grid.local_size
-        z = start["p"] - start["r"] / self.s if start else np.ones(n)
+        z = self.form.z(start) if start else np.ones(n)
         self.z = z if np.isfinite(problem.reduce.norm(z)) else np.ones(n)
         self.cavity: Mask = self.z < 0
         if problem.grid.periodic[0]:  # no ring of a solution is empty all round
@@ -117,25 +107,10 @@ class Monotone:
 
     @property
     def fields(self) -> Fields:
-        return {"p": np.maximum(self.z, 0.0), "r": self.s * np.maximum(-self.z, 0.0)}
-
-    @property
-    def krylov(self) -> Krylov:
-        return self.system.krylov
-
-    def destroy(self) -> None:
-        self.system.destroy()
+        return self.form.fields(self.z)
 
     def _norm(self) -> float:
-        fields, reduce, c = self.fields, self.problem.reduce, self.problem.c
-        G = self.problem.balance(fields["p"], fields["r"])
-        # c is a difference of the wall's flows, and knows no more than they do.
-        rounding = max(
-            16 * EPS * reduce.norm(self.diagonal * np.abs(self.z) + np.abs(c)),
-            EPS * reduce.norm(self.problem.scheme.b_C.ravel()),
-        )
-        driven = reduce.norm(c) or reduce.norm(self.diagonal)  # nothing drives the film: p is measured by its unit
-        return reduce.norm(G) / max(driven, rounding / self.eps1)
+        return self.form.norm(self.z, self.form.residual(self.z), self.eps1)
 
     def _any(self, mask: Mask) -> bool:
         return bool(self.problem.reduce.sum(mask.astype(float)))
@@ -171,36 +146,14 @@ class Monotone:
             cavity = self.cavity | (self.z < 0) if self._above else self.cavity & ~wrong
         if self._above and self._relaxation is not None and self.norm > self.eps1:
             with self.system.stages("relaxation"):
-                fields = self.fields
-                p, r = self._relaxation(fields["p"], fields["r"], self.options.sweeps)
-                cavity |= p - r / self.s < 0
+                cavity |= self.form.z(self._relaxation(self.fields, self.options.sweeps)) < 0
         changed = self._any(cavity != self.cavity)
         if not changed and self.system.direct:
-            self._refine()
+            self.z = self.form.refine(self.z, self.z > 0, lambda f: self.system.solve_again(f, self.options.rtol)[0])
+            self.norm = self._norm()
         self.cavity = cavity
         step_norm = self.problem.reduce.norm(self.z - before) if changed else 0.0
         return Step(self.norm, step_norm, 1.0, iterations, rtol=self.options.rtol)
-
-    def _refine(self) -> None:
-        """Solve again with the same factors for what is left of G: their rounding is that of A's diagonal, G's is not.
-
-        Raises
-        ------
-        StalledError : pressures stay uncertain (`refined`).
-        """
-        reduce, last, left = self.problem.reduce, np.inf, 0.0
-        for _ in range(REFINEMENTS):
-            fields = self.fields
-            d, _ = self.system.solve_again(-self.problem.balance(fields["p"], fields["r"]), self.options.rtol)
-            size = reduce.max(np.abs(d)) / (reduce.max(np.abs(self.z)) or 1.0)
-            left = reduce.max(np.where(self.z > 0, np.abs(d), 0.0))
-            if not size < 0.5 * last:  # rounding, or NaN
-                break
-            self.z, last = self.z + d, size
-            if size <= REFINED:
-                break
-        self.norm = self._norm()
-        check_refined(self.problem, self.z, left)
 
 
 def build(job: Job) -> Monotone:

@@ -2,12 +2,12 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
-from ..linear.krylov import Krylov, LinearSolverError
-from ..problems.solution import Fields, Outcome, Step
+from ..linear.krylov import LinearSolverError
+from ..problems.solution import Outcome, Step
+from .method import Method
 from .steplength import StepLengthError
 
 
@@ -17,30 +17,6 @@ class NoSolutionError(ArithmeticError):
 
 class StalledError(ArithmeticError):
     """The method goes on without getting anywhere; the message says how it knows, and which option sets its patience."""
-
-
-class Method(Protocol):
-    """What the loop and its caller need of a method: ||F|| at the start, one step at a time, and the fields it reached.
-
-    A method that can be taken up again (`checkpoint`) names in `state` the attributes that a step starts from: numbers, arrays
-    of this rank's points, or tuples and dataclasses of these; so does the system that it uses. All else they make anew.
-    """
-
-    norm: float
-
-    @property
-    def fields(self) -> Fields: ...
-
-    @property
-    def krylov(self) -> Krylov | None:
-        """The KSP behind the steps, for the record; None for a method without one."""
-        ...
-
-    def advance(self) -> Step: ...
-
-    def destroy(self) -> None:
-        """Free the PETSc objects that the method made."""
-        ...
 
 
 @dataclass(frozen=True)

@@ -18,13 +18,13 @@ from petsc4py import PETSc
 
 from ..base.parallel import Array
 from ..base.stages import Stages
-from ..errors import InputError
 from ..linear.krylov import Krylov, LinearSolverError
 from ..problems.fold import whole_lengths
 from ..problems.semilinear import SemilinearProblem
 from ..problems.solution import Fields, Step
 from .job import Job
-from .method_options import make_options
+from .method import Method
+from .method_options import MethodOptions, make_options, option, part
 from .newton import NoSolutionError
 from .steplength import halve_until, inexact_decrease
 
@@ -32,26 +32,20 @@ LOOSEST = 0.1  # true relative residual of an inner solve that a proof may still
 
 
 @dataclass(frozen=True)
-class NewtonOptions:
+class NewtonOptions(MethodOptions):
     """Parameters of Newton's method.
 
     eta: relative tolerance of an iterative inner solver; beta: of the decrease test; relative: the run ends also where
     ||f|| <= relative ||f(v0)||, as table 3 of Bergamaschi and Zilli was stopped; 0 switches that off.
     """
 
-    eta: float = 1e-3
-    beta: float = 1e-4
-    relative: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.relative < 1:
-            raise InputError(f"newton.relative = {self.relative}: allowed are numbers from 0 to below 1")
-        for name in ("eta", "beta"):
-            if not 0 < getattr(self, name) < 1:
-                raise InputError(f"newton.{name} = {getattr(self, name)}: allowed are numbers between 0 and 1")
+    method = "newton"
+    eta: float = part(1e-3)
+    beta: float = part(1e-4)
+    relative: float = option(0.0, lambda part: 0 <= part < 1, "allowed are numbers from 0 to below 1")
 
 
-class PlainNewton:
+class PlainNewton(Method):
     """The iterates of v + alpha d, f'(v) d = -f(v) to a relative tolerance eta; `newton.iterate` runs it.
 
     alpha = 1 for a convex source from below; else it is halved until ||f|| decreases as an inexact Newton step must.

@@ -13,6 +13,7 @@ import numpy as np
 from ..base.compiled import compiled
 from ..base.parallel import Array
 from ..problems.film.lubrication import LubricationProblem
+from ..problems.solution import Fields
 
 
 def relaxation(problem: LubricationProblem) -> "Relaxation | None":
@@ -28,9 +29,9 @@ class Relaxation:
         s = problem.scheme
         self._over_a, self._over_b = 1.0 / (s.k_W + s.k_E + s.k_S + s.k_N), 1.0 / s.b_C
 
-    def __call__(self, p: Array, r: Array, sweeps: int) -> tuple[Array, Array]:
+    def __call__(self, fields: Fields, sweeps: int) -> Fields:
         """p and r after so many sweeps, to and fro in y. Collective."""
-        grid, s = self.problem.grid, self.problem.scheme
+        grid, s, p, r = self.problem.grid, self.problem.scheme, fields["p"], fields["r"]
         alone = grid.comm.size == 1 and not any(grid.periodic)
         for k in range(sweeps):
             if k == 0 or not alone:
@@ -39,7 +40,7 @@ class Relaxation:
             compiled(_sweep)(framed_p, framed_r, *coefficients, k % 2 == 1)
             if not alone or k == sweeps - 1:
                 p, r = (framed[1:-1, 1:-1].ravel() for framed in (framed_p, framed_r))
-        return p, r
+        return {"p": p, "r": r}
 
 
 def _sweep(

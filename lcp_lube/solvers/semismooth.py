@@ -17,12 +17,12 @@ import numpy as np
 
 from ..base.parallel import Array
 from ..base.stages import Stages
-from ..errors import InputError
 from ..linear.krylov import Krylov, LinearSolverError
 from ..problems.box import BoxProblem
 from ..problems.solution import Fields, Step
 from .job import Job
-from .method_options import make_options
+from .method import Method
+from .method_options import MethodOptions, least, make_options, option, part
 from .newton import StalledError
 from .steplength import StepLengthError, armijo, halve_until
 
@@ -30,31 +30,20 @@ DESCENT = 1e-10  # d is a direction of descent if its slope is below -DESCENT ||
 
 
 @dataclass(frozen=True)
-class SemismoothOptions:
+class SemismoothOptions(MethodOptions):
     """rtol: of the inner solves. beta, halvings: Armijo's. patience: steps within which ||Phi|| has to halve. solved: the part
     of its first ||Phi|| that ends a perturbed problem. fall, rise: factors of rho after a success and a failure.
     rho_max: rho, in parts of its first, beyond which it is taken to have stalled."""
 
-    rtol: float = 1e-8
-    beta: float = 1e-4
-    halvings: int = 30
-    patience: int = 40
-    solved: float = 1e-3
-    fall: float = 0.3
-    rise: float = 10.0
-    rho_max: float = 1e12
-
-    def __post_init__(self) -> None:
-        for name in ("rtol", "beta", "solved", "fall"):
-            if not 0 < getattr(self, name) < 1:
-                raise InputError(f"semismooth.{name} = {getattr(self, name)}: allowed are numbers between 0 and 1")
-        for name in ("halvings", "patience"):
-            if getattr(self, name) < 1:
-                raise InputError(f"semismooth.{name} = {getattr(self, name)}: at least 1 is needed")
-        if not 1 < self.rise < np.inf:
-            raise InputError(f"semismooth.rise = {self.rise}: a number above 1 is needed")
-        if not self.rho_max >= 1:
-            raise InputError(f"semismooth.rho_max = {self.rho_max}: at least 1 is needed")
+    method = "semismooth"
+    rtol: float = part(1e-8)
+    beta: float = part(1e-4)
+    halvings: int = least(1, 30)
+    patience: int = least(1, 40)
+    solved: float = part(1e-3)
+    fall: float = part(0.3)
+    rise: float = option(10.0, lambda rise: 1 < rise < np.inf, "a number above 1 is needed")
+    rho_max: float = least(1, 1e12)
 
 
 def fischer(a: Array, b: Array) -> tuple[Array, Array, Array]:
@@ -67,7 +56,7 @@ def fischer(a: Array, b: Array) -> tuple[Array, Array, Array]:
         return phi, 1.0 - np.where(r > 0, a / r, along), 1.0 - np.where(r > 0, b / r, along)
 
 
-class Semismooth:
+class Semismooth(Method):
     """The iterates x; `newton.iterate` runs it. `norm` is the largest |mid(x - u, F, x - l)| at x moved into the bounds.
 
     Parameters

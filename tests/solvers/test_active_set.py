@@ -144,7 +144,7 @@ def test_sweeps_converge_by_themselves():
     from lcp_lube.solvers.relaxation import Relaxation
 
     problem = load_scene("problem4", {"nx": 12, "ny": 9}).build()
-    p, r = Relaxation(problem)(np.ones(108), np.zeros(108), 2000)
+    p, r = Relaxation(problem)({"p": np.ones(108), "r": np.zeros(108)}, 2000).values()
     assert problem.reduce.norm(problem.flow(p, r)) < 1e-12 * problem.reduce.norm(problem.c)
     assert (p >= 0).all() and (r >= 0).all() and not (p * r).any()
     problem.destroy()

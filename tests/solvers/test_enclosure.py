@@ -144,7 +144,7 @@ def test_rounding_bound_of_the_balance(shape, film, scheme, seed):
     problem = make_problem(shape, film, scheme)
     noise = np.random.default_rng(seed)
     p, r = (noise.lognormal(sigma=8, size=problem.size) for _ in range(2))
-    F, rounding = balance(problem, p, r)
+    F, rounding = balance(problem, {"p": p, "r": r})
     A, B, c = rational(problem)
     for k in range(problem.size):
         exact = sum(A[k][j] * Fraction(p[j]) + B[k][j] * Fraction(r[j]) for j in range(problem.size)) - c[k]

@@ -34,7 +34,7 @@ def test_every_film_ends_from_above(shape, film, scheme, p_sides):
 
     def watch(method):
         p, r = (method.fields[name] for name in "pr")
-        size = method.diagonal * np.abs(method.z) + np.abs(problem.c)
+        size = method.form.diagonal * np.abs(method.z) + np.abs(problem.c)
         assert (problem.flow(p, r) >= -1e-11 * size.max()).all()
         if seen:
             assert (method.z <= seen[-1][0] + 1e-11 * np.abs(method.z).max()).all() and (seen[-1][1] <= method.cavity).all()

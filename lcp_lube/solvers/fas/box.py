@@ -7,10 +7,7 @@ which the coarse grid knows to its own mesh only. In FASCD (Bueler and Farrell) 
 """
 
 from dataclasses import dataclass
-from importlib.util import find_spec
 from itertools import pairwise
-from math import inf
-from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -18,43 +15,26 @@ import numpy as np
 from ...base.parallel import Array
 from ...base.stages import Stages
 from ...errors import InputError
-from ...linear.krylov import Krylov
 from ...problems.box import BoxProblem
 from ...problems.obstacle import ObstacleEquations
 from ...problems.solution import Fields, Step
 from ..job import Job
-from ..method_options import make_options
+from ..method_options import least, make_options
 from ..newton import StalledError
-from .driver import COARSEST_SWEEPS, WINDOW
+from .cycles import COARSEST_SWEEPS, CycleOptions, Cycles, need_numba
 
 
 @dataclass(frozen=True)
-class BoxFasOptions:
-    """cycle: V, F or W; pre, post: sweeps before and after the coarse grid; front: sweeps over the points within `width`
-    cells of the edge of a contact after each correction; stall: give up where the residual has not fallen below this part of
-    itself in three cycles."""
+class BoxFasOptions(CycleOptions):
+    """As `CycleOptions`; fronts are the edges of contacts."""
 
-    cycle: str = "F"
-    pre: int = 2
-    post: int = 2
-    front: int = 12
-    width: int = 3
-    stall: float = 0.3
-
-    def __post_init__(self) -> None:
-        if self.cycle not in ("V", "F", "W"):
-            raise InputError(f"fas.cycle = {self.cycle}: allowed are V, F, W")
-        for name in ("pre", "post", "front", "width"):
-            if getattr(self, name) < 0:
-                raise InputError(f"fas.{name} = {getattr(self, name)}: at least 0 is needed")
-        if self.pre + self.post == 0:
-            raise InputError("fas.pre = fas.post = 0: at least one sweep is needed")
-        if not 0 < self.stall <= 1:
-            raise InputError(f"fas.stall = {self.stall}: allowed are numbers above 0, up to 1")
+    pre: int = least(0, 2)
+    post: int = least(0, 2)
+    front: int = least(0, 12)
 
 
 class _Grid:
-    """What a level of an obstacle problem has beyond a `fas_levels.Level`: bounds, cell areas, coordinates, work space."""
+    """What a level of an obstacle problem has beyond a `levels.Level`: bounds, cell areas, coordinates, work space."""
 
     def __init__(self, level: Any, bounds: Array, m: Array, x: Array, y: Array):
         self.level, self.bounds, self.m, self.x, self.y = level, bounds, m, x, y
@@ -62,7 +42,7 @@ class _Grid:
         self.g, self.slope = (np.zeros_like(level.z) for _ in range(2))
 
 
-class BoxFas:
+class BoxFas(Cycles):
     """The iterates v; `newton.iterate` runs it. `norm` is that of the active set: max |D R(v)| against the terms of f.
 
     The first step is full multigrid, unless a start is given, the others are cycles.
@@ -71,11 +51,9 @@ class BoxFas:
     state: tuple[str, ...] = ("v", "norm", "_recent", "_first", "_taken")
 
     def __init__(self, problem: BoxProblem, stages: Stages, options: BoxFasOptions, start: Fields | None = None):
-        from . import box_kernels as box_fas_kernels
-        from . import kernels as fas_kernels
-        from . import levels as fas_levels
+        from . import box_kernels, kernels, levels
 
-        self._kernels, self._transfer, self._tools = box_fas_kernels, fas_kernels, fas_levels
+        self._kernels, self._transfer, self._tools = box_kernels, kernels, levels
         equations = problem.equations
         if not isinstance(equations, ObstacleEquations):
             raise InputError("--method fas: for obstacle problems on a rectangle; use active-set")
@@ -83,8 +61,8 @@ class BoxFas:
         self._source = equations.semilinear.source
         with stages("assembly"):
             self._grids = self._hierarchy(equations)
-        self._recent: tuple[float, ...] = (inf,) * WINDOW
-        self._taken, self._first = 0 if start is None else 1, inf
+        self._levels = [grid.level for grid in self._grids]
+        self._begin(start is not None)
         self.v = problem.v0 if start is None else np.clip(start["v"], problem.lower, problem.upper)
         self.norm = self._first = self._residual(self._grids[0])
 
@@ -128,19 +106,6 @@ class BoxFas:
     def fields(self) -> Fields:
         return {"v": self.v}
 
-    @property
-    def krylov(self) -> Krylov | None:
-        return None
-
-    @property
-    def details(self) -> dict[str, Any]:
-        """What the JSON tells of a run, see `fas_levels.record`. Collective."""
-        levels = [grid.level for grid in self._grids]
-        return self._tools.record(levels, self.problem.grid, self._taken - 1, self._first, self.norm)
-
-    def destroy(self) -> None:
-        """There is nothing of PETSc's here."""
-
     def advance(self) -> Step:
         """Full multigrid, or one cycle. Collective.
 
@@ -148,7 +113,7 @@ class BoxFas:
         ------
         StalledError : the residual has stalled.
         """
-        if self.norm > self.options.stall * self._recent[0]:
+        if self._stalled:
             raise StalledError(f"the residual is at {self.norm:.1e} after {self._taken} cycles and has stalled (fas.stall)")
         before = self.v
         with self.stages("cycles"):
@@ -156,8 +121,7 @@ class BoxFas:
                 self._full_multigrid()
             else:
                 self._cycle(0, self.options.cycle)
-            self._taken += 1
-        self._recent = (*self._recent[1:], self.norm if self._taken > 1 else inf)
+        self._count()
         self.norm = self._residual(self._grids[0])
         if self._taken == 1:
             self._first = self.norm
@@ -202,17 +166,17 @@ class BoxFas:
         level.work += sweeps * level.nx * (level.z.shape[0] - 2)
 
     def _full_multigrid(self) -> None:
-        """From the coarsest grid up, one cycle on each. Collective."""
         for fine, coarse in pairwise(self._grids):  # the start, seen from the coarse grids
             self._inject(fine, coarse, coarse.level.z)
             coarse.level.c[:] = coarse.level.f
-        for k in reversed(range(len(self._grids))):
-            if k + 1 < len(self._grids):
-                level, coarse_level = self._grids[k].level, self._grids[k + 1].level
-                level.z[:] = 0.0
-                self._add(level, coarse_level, np.zeros_like(coarse_level.part(coarse_level.z)))
-                self._clip(self._grids[k])
-            self._cycle(k, self.options.cycle)
+        super()._full_multigrid()
+
+    def _rise_to(self, k: int) -> None:
+        if k + 1 < self._depth:
+            level, coarse = self._levels[k], self._levels[k + 1]
+            level.z[:] = 0.0
+            self._add(level, coarse, np.zeros_like(coarse.part(coarse.z)))
+            self._clip(self._grids[k])
 
     def _inject(self, fine: _Grid, coarse: _Grid, into: Array) -> None:
         level = fine.level
@@ -228,20 +192,15 @@ class BoxFas:
         np.clip(grid.level.z, grid.bounds[0], grid.bounds[1], out=grid.level.z)
         grid.level.share(grid.level.z)
 
-    def _cycle(self, k: int, kind: str) -> None:
-        """One cycle from level k down and back. Collective."""
-        begin, o = perf_counter(), self.options
-        grid = self._grids[k]
-        level = grid.level
-        level.visits += 1
-        if k + 1 == len(self._grids):
-            for s in range(4):
-                self._relax(grid, max(COARSEST_SWEEPS, 2 * level.nx, 2 * level.ny) // 4, s % 2 == 1)
-            level.seconds += perf_counter() - begin
-            return
-        coarse = self._grids[k + 1]
-        lower = coarse.level
-        self._relax(grid, o.pre, False)
+    def _solve_coarsest(self, k: int) -> None:
+        level = self._levels[k]
+        for s in range(4):
+            self._relax(self._grids[k], max(COARSEST_SWEEPS, 2 * level.nx, 2 * level.ny) // 4, s % 2 == 1)
+
+    def _descend(self, k: int) -> None:
+        grid, coarse = self._grids[k], self._grids[k + 1]
+        level, lower = grid.level, coarse.level
+        self._relax(grid, self.options.pre, False)
         self._residual(grid)
         for part in range(2):
             level.share(grid.forces[part])
@@ -253,15 +212,12 @@ class BoxFas:
         self._kernels.coarse_right_side(
             lower.z, lower.kx, lower.ky, coarse.m, coarse.g, coarse.bounds, coarse.forces[0], coarse.forces[1], lower.c
         )
-        level.seconds += perf_counter() - begin
-        self._cycle(k + 1, kind)
-        if kind != "V" and k + 2 < len(self._grids):
-            self._cycle(k + 1, "V" if kind == "F" else kind)
-        begin = perf_counter()
-        self._add(level, lower, lower.part(lower.old))
+
+    def _ascend(self, k: int) -> None:
+        grid, lower = self._grids[k], self._levels[k + 1]
+        self._add(grid.level, lower, lower.part(lower.old))
         self._clip(grid)
-        self._relax(grid, o.post, True, near=True)
-        level.seconds += perf_counter() - begin
+        self._relax(grid, self.options.post, True, near=True)
 
 
 def build(job: Job) -> BoxFas:
@@ -272,6 +228,5 @@ def build(job: Job) -> BoxFas:
     InputError : an unknown option or a value out of range; numba is missing; no obstacle problem on a rectangle.
     """
     settings = make_options(BoxFasOptions, "fas", job.options)
-    if find_spec("numba") is None:
-        raise InputError("--method fas: its loops need numba, which is not installed (pip install numba)")
+    need_numba()
     return BoxFas(job.problem, job.stages, settings, job.start)

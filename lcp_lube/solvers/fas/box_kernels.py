@@ -1,6 +1,6 @@
 """Loops of the obstacle problem's multigrid over one rank's points, compiled when this module is imported.
 
-Arrays as in `fas_kernels`, all with a frame. f(v)_i = sum of k (v_i - v_neighbour) - m g(v_i) - c_i; m is the area of the cell.
+Arrays as in `kernels`, all with a frame. f(v)_i = sum of k (v_i - v_neighbour) - m g(v_i) - c_i; m is the area of the cell.
 """
 
 import numpy as np
@@ -50,7 +50,7 @@ def sweep(v: Array, kx: Array, ky: Array, bounds: Array, prepared: Array, count:
 def sweep_spans(
     v: Array, kx: Array, ky: Array, bounds: Array, prepared: Array, spans: NDArray[np.int32], found: int, count: int
 ) -> int:
-    """`count` sweeps, to and fro, over runs of points (`fas_kernels.front_spans`); returns how many points these are."""
+    """`count` sweeps, to and fro, over runs of points (`kernels.front_spans`); returns how many points these are."""
     points = 0
     for s in range(count):
         for k in range(found):

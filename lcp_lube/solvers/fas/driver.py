@@ -10,27 +10,22 @@ points. Full multigrid, from the coarsest grid up, gives the start. See docs/non
 """
 
 from dataclasses import dataclass
-from importlib.util import find_spec
 from math import inf
-from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 from ...base.parallel import Array
 from ...base.stages import Stages
-from ...errors import InputError
-from ...linear.krylov import Krylov
 from ...problems.film.lubrication import LubricationProblem
 from ...problems.solution import Fields, Step
 from ..job import Job
-from ..method_options import make_options
+from ..method_options import make_options, one_of
 from ..newton import StalledError
+from .cycles import COARSEST_SWEEPS, WINDOW, CycleOptions, Cycles, need_numba
 
 EPS = float(np.finfo(float).eps)
-WINDOW = 3  # cycles over which the fall of ||G|| is judged
-TRUNCATIONS = {"none": 0, "clip": 1, "points": 2}  # see `fas_kernels.correct`
-COARSEST_SWEEPS = 40  # where its Newton steps do not settle
+TRUNCATIONS = {"none": 0, "clip": 1, "points": 2}  # see `kernels.correct`
 EXACT = (1200, 5000, 10_000)  # points of the coarsest grid once the cycles have stalled, and stalled again
 EXTREME = 1000.0  # film ratio above which a small ||G|| says little of p, and the corrections have to be small too
 SETTLED = 1e-8  # of the largest pressure: what they may then be in the mean
@@ -38,35 +33,15 @@ BORDER = 4  # lines on either side of the border between two ranks
 
 
 @dataclass(frozen=True)
-class FasOptions:
-    """cycle: V, F or W; pre, post: sweeps before and after the coarse grid; front: sweeps over the points within `width`
-    cells of a front after each correction, both doubled where fronts are rare; truncation: of corrections at fronts, none,
-    clip or points; weights: of the interpolation, by the conductances of the faces (harmonic) or the same everywhere
-    (linear); stall: give up where ||G|| has not fallen below this part of itself in three cycles."""
+class FasOptions(CycleOptions):
+    """As `CycleOptions`, the sweeps at fronts doubled where these are rare; truncation: of corrections at fronts, none, clip
+    or points; weights: of the interpolation, by the conductances of the faces (harmonic) or the same everywhere (linear)."""
 
-    cycle: str = "F"
-    pre: int = 3
-    post: int = 3
-    front: int = 10
-    width: int = 3
-    truncation: str = "clip"
-    weights: str = "harmonic"
-    stall: float = 0.3
-
-    def __post_init__(self) -> None:
-        for name, legal in (("cycle", ("V", "F", "W")), ("truncation", TRUNCATIONS), ("weights", ("harmonic", "linear"))):
-            if getattr(self, name) not in legal:
-                raise InputError(f"fas.{name} = {getattr(self, name)}: allowed are {', '.join(legal)}")
-        for name in ("pre", "post", "front", "width"):
-            if getattr(self, name) < 0:
-                raise InputError(f"fas.{name} = {getattr(self, name)}: at least 0 is needed")
-        if self.pre + self.post == 0:
-            raise InputError("fas.pre = fas.post = 0: at least one sweep is needed")
-        if not 0 < self.stall <= 1:
-            raise InputError(f"fas.stall = {self.stall}: allowed are numbers above 0, up to 1")
+    truncation: str = one_of("clip", TRUNCATIONS)
+    weights: str = one_of("harmonic", ("harmonic", "linear"))
 
 
-class Fas:
+class Fas(Cycles):
     """The iterates z; `newton.iterate` runs it. `norm` is that of `active_set`, ||G(z)|| / ||c||.
 
     The first step is full multigrid, the others are cycles; a given start takes full multigrid's place.
@@ -82,23 +57,20 @@ class Fas:
         self, problem: LubricationProblem, stages: Stages, options: FasOptions, eps1: float, start: Fields | None = None
     ):
         # numba starts with this import, 0.4 s: only where the method is used.
-        from . import kernels as fas_kernels
-        from . import levels as fas_levels
+        from . import kernels, levels
 
-        self._kernels, self._tools = fas_kernels, fas_levels
+        self._kernels, self._tools = kernels, levels
         self.problem, self.stages, self.options, self.eps1 = problem, stages, options, eps1
         self._harmonic, self._truncation = options.weights == "harmonic", TRUNCATIONS[options.truncation]
         with stages("assembly"):
-            self._levels = fas_levels.hierarchy(fas_levels.finest(problem), self._harmonic)
-        self._depth = len(self._levels)
+            self._levels = levels.hierarchy(levels.finest(problem), self._harmonic)
+        self._begin(start is not None)
         self._c_norm = problem.reduce.norm(problem.c)
         h = problem.scheme.h
         self._extreme = problem.reduce.max(h) > EXTREME * problem.reduce.min(h)
-        self._recent: tuple[float, ...] = (inf,) * WINDOW
-        self._taken, self._first, self._correction = 0, inf, 0.0
+        self._correction = 0.0
         if start is not None:
             self.z = start["p"] + problem.scheme.b_C.ravel() * start["r"]
-            self._taken = 1
         self.norm = self._norm()
         self._first = self.norm
 
@@ -116,18 +88,6 @@ class Fas:
         z = self._tools.own(self._levels[0], self.problem.grid)
         p, r = self._kernels.pressure_and_void(z, self.problem.scheme.b_C)
         return {"p": p.ravel(), "r": r.ravel()}
-
-    @property
-    def krylov(self) -> Krylov | None:
-        return None
-
-    @property
-    def details(self) -> dict[str, Any]:
-        """What the JSON tells of a run, see `fas_levels.record`. Collective."""
-        return self._tools.record(self._levels, self.problem.grid, self._taken - 1, self._first, self.norm)
-
-    def destroy(self) -> None:
-        """There is nothing of PETSc's here."""
 
     def _norm(self) -> float:
         """||G|| / ||c||; where rounding in G's sums alone exceeds eps1, on very fine grids, relative to that. Collective.
@@ -155,7 +115,7 @@ class Fas:
         StalledError : ||G|| has stalled.
         """
         anew = self._taken == 0
-        if self.norm > self.options.stall * self._recent[0] and self.norm > self.eps1:
+        if self._stalled and self.norm > self.eps1:
             if not self._retreat():
                 if not self.norm < 1.0:
                     self.z = np.zeros(self.problem.grid.local_size)  # nothing to start from (`run.Run.take_over`)
@@ -168,8 +128,7 @@ class Fas:
                 self._full_multigrid()
             else:
                 self._cycle(0, self.options.cycle)
-            self._taken += 1
-        self._recent = (*self._recent[1:], self.norm if self._taken > 1 else inf)
+        self._count()
         with self.stages("norm"):
             self.norm = self._norm()
         if not np.isfinite(self.norm):
@@ -198,44 +157,35 @@ class Fas:
                     return True
         return False
 
-    def _full_multigrid(self) -> None:
-        """From the coarsest grid up, one cycle on each. Collective."""
-        for k in reversed(range(self._depth)):
-            level = self._levels[k]
-            if k:
-                level.c[:] = level.f
-            if k + 1 < self._depth:
-                coarse = self._levels[k + 1]
-                where = (level.first, level.by_x, level.by_y, self._harmonic)
-                self._kernels.interpolate(level.z, coarse.part(coarse.z), level.kx, level.ky, *where)
-                level.share(level.z)
-            self._cycle(k, self.options.cycle)
-
-    def _cycle(self, k: int, kind: str) -> None:
-        """One cycle from level k down and back. Collective."""
-        begin, o = perf_counter(), self.options
+    def _rise_to(self, k: int) -> None:
         level = self._levels[k]
-        level.visits += 1
-        if k + 1 == self._depth:
-            self._correction = 0.0
-            if not self._tools.solve(level):
-                for s in range(2):
-                    self._relax(level, max(COARSEST_SWEEPS, 2 * level.nx, 2 * level.ny) // 2, s == 1)
-            level.seconds += perf_counter() - begin
-            return
-        coarse = self._levels[k + 1]
-        self._relax(level, o.pre, False)
-        where = (level.first, level.by_x, level.by_y)
+        if k:
+            level.c[:] = level.f
+        if k + 1 < self._depth:
+            coarse = self._levels[k + 1]
+            where = (level.first, level.by_x, level.by_y, self._harmonic)
+            self._kernels.interpolate(level.z, coarse.part(coarse.z), level.kx, level.ky, *where)
+            level.share(level.z)
+
+    def _solve_coarsest(self, k: int) -> None:
+        level = self._levels[k]
+        self._correction = 0.0
+        if not self._tools.solve(level):
+            for s in range(2):
+                self._relax(level, max(COARSEST_SWEEPS, 2 * level.nx, 2 * level.ny) // 2, s == 1)
+
+    def _descend(self, k: int) -> None:
+        level, coarse = self._levels[k], self._levels[k + 1]
+        self._relax(level, self.options.pre, False)
         self._tools.restrict(level, coarse, coarse.c, self._harmonic)
-        self._kernels.inject(level.z, coarse.part(coarse.old), *where)
+        self._kernels.inject(level.z, coarse.part(coarse.old), level.first, level.by_x, level.by_y)
         coarse.gather(coarse.old)
         coarse.z[:] = coarse.old
         self._kernels.add_balance(coarse.old, coarse.kx, coarse.ky, coarse.c)
-        level.seconds += perf_counter() - begin
-        self._cycle(k + 1, kind)
-        if kind != "V" and k + 2 < self._depth:
-            self._cycle(k + 1, "V" if kind == "F" else kind)
-        begin = perf_counter()
+
+    def _ascend(self, k: int) -> None:
+        o, level, coarse = self.options, self._levels[k], self._levels[k + 1]
+        where = (level.first, level.by_x, level.by_y)
         fine = (level.z, coarse.part(coarse.z), coarse.part(coarse.old), level.kx, level.ky)
         self._correction = self._kernels.correct(*fine, *where, self._harmonic, self._truncation)  # type: ignore[arg-type]
         level.share(level.z)
@@ -246,7 +196,6 @@ class Fas:
                 level.work += self._kernels.relax_front(level.z, level.kx, level.ky, level.c, count, o.width)
                 level.share(level.z)
         self._relax(level, o.post, True)
-        level.seconds += perf_counter() - begin
 
     def _relax(self, level: Any, sweeps: int, down: bool) -> None:
         """Sweeps without a word between them; then, where other ranks go on, once more over the lines that border on theirs.
@@ -272,6 +221,5 @@ def build(job: Job) -> Fas:
     InputError : an unknown option or a value out of range; numba is missing.
     """
     settings = make_options(FasOptions, "fas", job.options)
-    if find_spec("numba") is None:
-        raise InputError("--method fas: its loops need numba, which is not installed (pip install numba)")
+    need_numba()
     return Fas(job.problem, job.stages, settings, job.stopping.eps1, job.start)

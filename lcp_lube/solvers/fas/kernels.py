@@ -1,6 +1,6 @@
 """Loops of the nonlinear multigrid over one rank's points, compiled when this module is imported.
 
-Arrays have a frame of neighbours (`fas_levels.Level`): point (j, i) of the rank stands at z[j + 1, i + 1], its west and east
+Arrays have a frame of neighbours (`levels.Level`): point (j, i) of the rank stands at z[j + 1, i + 1], its west and east
 face at kx[j + 1, i + 1] and kx[j + 1, i + 2], its south and north face at ky[j + 1, i + 1] and ky[j + 2, i + 1]. z > 0 is a
 pressure, z < 0 minus the flow of void -b_C r that leaves the cell. With it the balance of a point is
 

@@ -22,7 +22,7 @@ STRONG = 4.0  # times the mean conductance of the other direction: then points a
 
 @dataclass
 class Level:
-    """One grid: lines y0 to y1 of an nx by ny grid, in arrays with a frame of neighbours (`fas_kernels`).
+    """One grid: lines y0 to y1 of an nx by ny grid, in arrays with a frame of neighbours (`kernels`).
 
     Attributes
     ----------

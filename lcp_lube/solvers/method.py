@@ -1,0 +1,48 @@
+"""What the outer loop and its caller need of a method: ||F|| at the start, one step at a time, and the fields it reached."""
+
+from typing import Any
+
+import numpy as np
+
+from ..base.parallel import Array
+from ..linear.krylov import Krylov
+from ..problems.solution import Fields, Step
+
+
+class Method:
+    """Base of all methods.
+
+    Attributes
+    ----------
+    state : the attributes that a step starts from: numbers, arrays of this rank's points, or tuples and dataclasses of these.
+        A checkpoint keeps them, all else is made anew; a method without any cannot be taken up again.
+    norm : ||F|| at the present fields, in the method's own measure.
+    system : the matrix behind the steps and its KSP; None for a method without one.
+    """
+
+    state: tuple[str, ...] = ()
+    norm: float
+    system: Any = None
+
+    @property
+    def fields(self) -> Fields:
+        raise NotImplementedError
+
+    @property
+    def krylov(self) -> Krylov | None:
+        """The KSP behind the steps, for the record."""
+        return self.system and self.system.krylov
+
+    def advance(self) -> Step:
+        """One step. Collective."""
+        raise NotImplementedError
+
+    def destroy(self) -> None:
+        """Free the PETSc objects that the method made; a python PC must not outlive this."""
+        if self.system is not None:
+            self.system.destroy()
+
+
+def constant_or(start: Fields | None, n: int, p0: float, r0: float) -> tuple[Array, Array]:
+    """p and r of a start, or p0 and r0 at all n points of this rank."""
+    return (start["p"].copy(), start["r"].copy()) if start else (np.full(n, p0), np.full(n, r0))
