@@ -9,6 +9,7 @@ from .. import __version__
 from ..base.quantity import in_si
 from ..errors import InputError, nearest
 from ..registry import STABILITY, scene_names
+from .explore.options import explore_options
 
 
 class Parser(argparse.ArgumentParser):
@@ -87,7 +88,7 @@ def _free_scene(own: list[str], petsc: list[str]) -> None:
     def is_scene(word: str) -> bool:
         return word.endswith(".toml") or word in scene_names()
 
-    if own[:1] not in (["solve"], ["compare"], ["sweep"]) or any(is_scene(word) for word in own):
+    if own[:1] not in (["solve"], ["compare"], ["sweep"], ["explore"]) or any(is_scene(word) for word in own):
         return
     taken = [k for k, word in enumerate(petsc) if is_scene(word) and petsc[k - 1] != "-options_file"]
     if len(taken) == 1:
@@ -213,6 +214,10 @@ def parse(own: list[str]) -> argparse.Namespace:
     )
     coefficients.add_argument("--output", type=Path, metavar="FILE.csv", help="of --speeds; default standard output")
     coefficients.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")
+
+    explore = command("explore", "a local page with the scene's numbers as sliders; pressure, film and numbers follow")
+    _scene_options(explore)
+    explore_options(explore, number, whole)
 
     doctor = command("doctor", "what is installed, what is missing, and a short self-check on one and two ranks")
     doctor.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")

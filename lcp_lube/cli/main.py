@@ -141,6 +141,12 @@ def run_coefficients(args: argparse.Namespace) -> int:
     return run(args)
 
 
+def run_explore(args: argparse.Namespace) -> int:
+    from .explore.command import run
+
+    return run(args)
+
+
 def run_sweep(args: argparse.Namespace) -> int:
     from .sweep import run
 
@@ -173,6 +179,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "compare": run_compare,
     "sweep": run_sweep,
     "coefficients": run_coefficients,
+    "explore": run_explore,
     "table": run_table,
     "chart": run_chart,
     "verify": run_verify,

@@ -1,6 +1,5 @@
 """`lcp-lube new FILE --from SCENE`: a scene file to edit, with every key, its unit, meaning, default and what is allowed."""
 
-import json
 import os
 import textwrap
 from contextlib import suppress
@@ -16,6 +15,7 @@ from ..errors import InputError
 from .faults import models_of, tags_of
 from .scene import family_of, load_scene, read_scene
 from .units import SUFFIXES, Measured, stem
+from .written import toml_value
 
 WIDTH = 110
 LIMITS = {"exclusiveMinimum": "> {:g}", "minimum": ">= {:g}", "exclusiveMaximum": "< {:g}", "maximum": "<= {:g}"}
@@ -116,14 +116,14 @@ def _key(
     fixed = get_args(field.annotation)
     if given is None and len(fixed) == 1 and fixed[0] == field.default:
         return []  # a family's own number of dimensions: there is nothing to choose
-    text = _described(model, key, field)
+    text = described(model, key, field)
     allowed = _allowed(schema)
     default = field.default
     none = default is PydanticUndefined or default is None or isinstance(default, BaseModel)
-    words = [text, f"allowed: {allowed}" if allowed else "", "" if none or key == "family" else f"default {_value(default)}"]
+    value = "" if none else toml_value(default)
+    words = [text, f"allowed: {allowed}" if allowed else "", "" if none or key == "family" else f"default {value}"]
     comment = textwrap.wrap("; ".join(word for word in words if word), WIDTH)
-    value = "" if none else _value(default)
-    line = f"{given} = {_value(data[given])}" if given is not None else f"# {key} = {value}".rstrip()
+    line = f"{given} = {toml_value(data[given])}" if given is not None else f"# {key} = {value}".rstrip()
     return [*(f"# {part}" for part in comment), line, ""]
 
 
@@ -155,7 +155,7 @@ def _parts(models: list[type[BaseModel]], name: str, given: Any) -> list[str]:
     return lines
 
 
-def _described(model: type[BaseModel], key: str, field: FieldInfo) -> str:
+def described(model: type[BaseModel], key: str, field: FieldInfo) -> str:
     """What the field means; a family that only changes a default leaves that to the model above it."""
     for one in model.__mro__:
         above = getattr(one, "model_fields", {}).get(key)
@@ -174,16 +174,3 @@ def _allowed(schema: dict[str, Any]) -> str:
             found.append(", ".join(map(str, one["enum"])))
         found += [words.format(one[limit]) for limit, words in LIMITS.items() if limit in one and abs(one[limit]) < 2**31 - 2]
     return ", ".join(dict.fromkeys(found))
-
-
-def _value(value: Any) -> str:
-    """A value as TOML."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)
-    if isinstance(value, (list, tuple)):
-        return f"[{', '.join(map(_value, value))}]"
-    if isinstance(value, dict):
-        return f"{{{', '.join(f'{key} = {_value(item)}' for key, item in value.items())}}}"
-    return repr(value)

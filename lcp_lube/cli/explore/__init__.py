@@ -1,0 +1,1 @@
+"""`lcp-lube explore`: a scene's numbers as sliders on a local page."""

@@ -1,0 +1,163 @@
+"""The page's server: 127.0.0.1 alone, a token in the address, nothing fetched from anywhere else.
+
+Of the standard library: Panel, marimo and trame would each bring a web framework (tornado and bokeh, starlette, aiohttp) for
+one page, and run Python in threads of their own, where PETSc must be called from one. Here handlers only queue what a page
+asks, and the thread that started PETSc answers.
+"""
+
+import hmac
+import json
+import queue
+import secrets
+import threading
+from concurrent.futures import Future
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from importlib.resources import files
+from typing import Any, Self
+
+from ...errors import InputError
+from .answers import Answers
+
+HOST = "127.0.0.1"
+LARGEST = 100_000  # bytes of a request
+PAGE = {"": ("page.html", "text/html"), "page.js": ("page.js", "text/javascript"), "page.css": ("page.css", "text/css")}
+# The browser itself refuses whatever would leave this machine.
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data: blob:; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+
+
+class Server:
+    """Handlers in threads, answers in the thread that calls `serve`.
+
+    Attributes
+    ----------
+    address : of the page, with its token.
+    """
+
+    def __init__(self, answers: Answers, port: int = 0):
+        self.answers = answers
+        self.token = secrets.token_urlsafe(24)
+        self.asked: queue.SimpleQueue[tuple[str, dict[str, Any], Future[tuple[bytes, str]]]] = queue.SimpleQueue()
+        handler = type("PageHandler", (Handler,), {"server_of_page": self})
+        try:
+            self._http = ThreadingHTTPServer((HOST, port), handler)
+        except OSError as error:
+            raise InputError(f"--port {port}: {error.strerror}; 0 takes a free one") from None
+        self._http.daemon_threads = True
+        self.host = f"{HOST}:{self._http.server_address[1]}"
+        self.address = f"http://{self.host}/{self.token}/"
+
+    def __enter__(self) -> Self:
+        threading.Thread(target=self._http.serve_forever, daemon=True).start()
+        return self
+
+    def __exit__(self, *raised: object) -> None:
+        self._http.shutdown()
+        self._http.server_close()
+
+    def serve(self) -> None:
+        """Answer, one request after the other, until KeyboardInterrupt."""
+        while True:
+            try:
+                what, request, future = self.asked.get(timeout=0.5)  # wakes up: a signal is looked at between two waits
+            except queue.Empty:
+                continue
+            try:
+                future.set_result(self.answers.reply(what, request))
+            except KeyboardInterrupt:
+                future.cancel()
+                raise
+            except Exception as error:  # one page's fault is no other's
+                future.set_exception(error)
+
+
+class Handler(BaseHTTPRequestHandler):
+    """One connection of a browser."""
+
+    server_of_page: Server
+    protocol_version = "HTTP/1.1"
+    timeout = 60.0  # of a connection on which nothing comes
+
+    def do_GET(self) -> None:
+        name = self._inside()
+        if name is None:
+            return
+        if name in PAGE:
+            file, kind = PAGE[name]
+            self._send(200, (files(__package__) / file).read_bytes(), f"{kind}; charset=utf-8")
+        elif name == "scene":
+            self._ask(name, {})
+        else:
+            self._refuse(404, "no such page")
+
+    def do_POST(self) -> None:
+        name = self._inside()
+        if name is None:
+            return
+        if self.headers.get_content_type() != "application/json":
+            self._refuse(415, "JSON is needed")  # which no form of another site can send
+            return
+        try:
+            length = int(self.headers.get("Content-Length", ""))
+        except ValueError:
+            length = -1
+        if not 0 <= length <= LARGEST:
+            self._refuse(413, f"a request of at most {LARGEST} bytes, with its length, is needed")
+            return
+        try:
+            request = json.loads(self.rfile.read(length))
+        except (ValueError, RecursionError):
+            request = None
+        if not isinstance(request, dict):
+            self._refuse(400, "a JSON object is needed")
+            return
+        self._ask(name, request)
+
+    def _inside(self) -> str | None:
+        """The path behind the token; None, and refused, if token or host is not ours."""
+        page = self.server_of_page
+        token, _, name = self.path.partition("?")[0].lstrip("/").partition("/")
+        # The name of the host too: another site's name that leads to 127.0.0.1 is not ours.
+        if not hmac.compare_digest(token.encode(), page.token.encode()) or self.headers.get("Host") != page.host:
+            self._refuse(403, "the address that lcp-lube has printed is needed, with its token")
+            return None
+        return name
+
+    def _ask(self, what: str, request: dict[str, Any]) -> None:
+        future: Future[tuple[bytes, str]] = Future()
+        self.server_of_page.asked.put((what, request, future))
+        try:
+            body, kind = future.result()
+        except InputError as error:
+            self._refuse(400, str(error))
+        except Exception as error:
+            self._refuse(500, f"{type(error).__name__}: {error}")
+        else:
+            self._send(200, body, kind)
+
+    def _refuse(self, status: int, words: str) -> None:
+        self.close_connection = True  # whatever was sent along is not read
+        self._send(status, json.dumps({"refused": words}).encode(), "application/json")
+
+    def _send(self, status: int, body: bytes, kind: str) -> None:
+        try:
+            self.send_response(status)
+            for name, value in {
+                "Content-Type": kind,
+                "Content-Length": str(len(body)),
+                "Content-Security-Policy": POLICY,
+                "Referrer-Policy": "no-referrer",
+                "X-Content-Type-Options": "nosniff",
+                "Cache-Control": "no-store",
+                **({"Connection": "close"} if self.close_connection else {}),
+            }.items():
+                self.send_header(name, value)
+            self.end_headers()
+            self.wfile.write(body)
+        except ConnectionError:
+            self.close_connection = True  # the page was closed
+
+    def log_message(self, format: str, *args: object) -> None:
+        """Nothing: addresses have the token in them."""
