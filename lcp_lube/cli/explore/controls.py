@@ -67,6 +67,8 @@ def _table(model: Measured, prefix: str, hidden: frozenset[str] | set[str] = fro
         key, value = field.alias or name, getattr(model, name)
         if name in HIDDEN or name in hidden:
             continue
+        if len(_literal(field.annotation)) == 1 and value is not None:
+            continue  # there is nothing to choose
         if isinstance(value, Measured):
             found += _table(value, f"{prefix}{key}.")
         elif isinstance(value, list) and value and all(isinstance(item, Measured) for item in value):
