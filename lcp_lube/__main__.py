@@ -6,12 +6,16 @@ import sys
 import traceback
 
 from .base import petsc as petsc_start
-from .cli.arguments import parse, split
+from .cli.arguments import parse, parser_of_all
+from .cli.completion import complete
+from .cli.words import split
 from .errors import InputError
 
 
 def main(argv: list[str] | None = None) -> int:
     """Run one command line; returns the exit status (0 converged, 1 not, 2 bad input, 130 interrupted)."""
+    if "_ARGCOMPLETE" in os.environ:  # the shell asks what may stand here
+        complete(parser_of_all())
     words = sys.argv[1:] if argv is None else argv
     try:
         own, petsc_arguments = split(words)

@@ -7,7 +7,8 @@ import re
 import pytest
 
 from lcp_lube.__main__ import main
-from lcp_lube.cli.arguments import check_options_file, parse, split
+from lcp_lube.cli.arguments import parse
+from lcp_lube.cli.words import check_options_file, split
 from lcp_lube.errors import InputError
 from lcp_lube.registry import METHODS, SYSTEMS, recipe_names, scene_names
 

@@ -20,8 +20,9 @@ from petsc4py import PETSc
 from lcp_lube import load_scene, solve
 from lcp_lube.__main__ import main
 from lcp_lube.cli import main as cli
-from lcp_lube.cli.arguments import parse, split
+from lcp_lube.cli.arguments import parse
 from lcp_lube.cli.asked import scene_of
+from lcp_lube.cli.words import split
 from lcp_lube.errors import InputError
 from lcp_lube.registry import METHODS
 from lcp_lube.scenes.scene import parse_changes
