@@ -25,6 +25,7 @@ from ..errors import InputError
 from ..linear.krylov import Krylov
 from ..problems.facts import Facts
 from ..problems.film.cavity import cavity_sign
+from ..problems.film.flows import point_weights
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.turning import Turning
@@ -132,11 +133,12 @@ def _of_film(
     cavity = cavity_sign(problem.reduce, p, r) < 0
     x = grid.x
     theta = np.broadcast_to(turning.theta(x + first), grid.box).ravel()
-    storage = 2.0 * grid.spacing[0] * problem.scheme.h.ravel()
+    size = point_weights(grid)
+    storage = 2.0 * grid.spacing[0] * size * problem.scheme.h.ravel()
     M = np.where(cavity, storage, 0.0)
     shift = STEP * problem.reduce.min(problem.scheme.h)
     h = problem.scheme.h.ravel()
-    weight = -grid.cell * problem.p_unit * np.where(cavity, 0.0, 1.0)  # of z' in the force: cavitated cells have no p'
+    weight = -grid.cell * size * problem.p_unit * np.where(cavity, 0.0, 1.0)  # of z' in the force: cavitated cells have no p'
     sides = np.stack([weight * np.cos(theta), weight * np.sin(theta)])
     out = np.zeros((len(frequencies), 2, 2), dtype=complex)
     solver = _Linear(problem, cavity)
@@ -163,7 +165,8 @@ def _derivative(problem: LubricationProblem, model: Model, moved: Displaced, ste
     """dG/de at fixed fields: exact, as G is a cubic in e (conductances in h^3, Couette terms in h). Collective."""
     values = []
     for size in (-2.0, -1.0, 1.0, 2.0):
-        other = replace(model, gap=replace(moved, e=size * step), exact=None).build(problem.grid.shape, problem.grid.dm.comm)  # type: ignore[arg-type]
+        gap, places = replace(moved, e=size * step), problem.grid.places
+        other = replace(model, gap=gap, exact=None, places=places).build(problem.grid.shape, problem.grid.dm.comm)  # type: ignore[arg-type]
         values.append(other.flow(p, r))
         other.destroy()
     a, b, c, d = values

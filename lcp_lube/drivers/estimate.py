@@ -75,16 +75,16 @@ def misplaced_film(problem: Problem) -> float:
     grid = problem.grid
     share = 0.0
     for side in range(grid.dim):
-        n, spacing = grid.shape[side], grid.spacing[side]
-        start = grid.origin[side] + (grid.offset[side] - 1.0) * spacing  # a point, on the boundary or beyond it
-        fine = (start + (np.arange(n + 1)[:, None] + _LOOKS) * spacing).ravel()
-        face = start + (np.arange(n + 1) + 0.5) * spacing
+        n, around = grid.shape[side], grid.with_neighbours(side)  # points, on the boundary and beyond it
+        meshes = np.diff(around)
+        fine = (around[:-1, None] + _LOOKS * meshes[:, None]).ravel()
+        face = around[:-1] + 0.5 * meshes
         across = 1 - side
         if grid.dim == 1:
             lines = np.zeros(1)
         else:
-            picked = np.unique(np.linspace(1, grid.shape[across], min(LINES, grid.shape[across])).round())
-            lines = grid.origin[across] + (picked - 1.0 + grid.offset[across]) * grid.spacing[across]
+            picked = np.unique(np.linspace(0, grid.shape[across] - 1, min(LINES, grid.shape[across])).round())
+            lines = grid.lines[across][picked.astype(int)]
         film = [
             np.broadcast_to(problem.film(*((at[None, :], lines[:, None])[:: 1 - 2 * side])), (lines.size, at.size))
             for at in (fine, face)

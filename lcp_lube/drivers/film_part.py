@@ -21,7 +21,7 @@ from ..base.parallel import Array
 from ..problems.facts import Facts
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model, Side
-from ..problems.grid import Grid, some_places
+from ..problems.grid import EVEN, Grid, some_places
 from ..problems.solution import Fields, Problem
 from ..problems.transfer import numbers
 from ..scenes.scene import Derived, Solvable
@@ -74,14 +74,16 @@ class Part(Derived):
         """The part's own film, and its grid."""
         model = model_of(self.whole)
         assert model is not None  # as `applies` found
+        x, y = model.lines(self.whole.shape) if len(self.whole.shape) == 2 else EVEN
         if self.kind == "line":
-            return replace(model, lengths=model.lengths[:1], exact=None), self.shape
+            return replace(model, lengths=model.lengths[:1], exact=None, places=(x, None)), self.shape
         nx, ny = self.shape
+        y = None if y is None else y[: (ny + 1) // 2]
         west, east, south, _ = model.sides
         south = south if south.kind == "open" else Side("closed")
         half = (west, east, south, Side("mirror" if ny % 2 else "closed"))
         lengths = (model.lengths[0], 0.5 * model.lengths[1])
-        return replace(model, lengths=lengths, sides=half, exact=None), (nx, (ny + 1) // 2)
+        return replace(model, lengths=lengths, sides=half, exact=None, places=(x, y)), (nx, (ny + 1) // 2)
 
     def facts(self, comm: PETSc.Comm | None = None) -> Facts:
         model, shape = self._model()
@@ -176,7 +178,9 @@ def _all_lines_are_one(problem: LubricationProblem) -> bool:
 def _is_symmetric(problem: LubricationProblem, faces: bool) -> bool:
     """Whether h(x, y) = h(x, width - y), at the points, and on the faces too. Collective."""
     grid = problem.grid
-    mirror = 2 * grid.origin[1] + grid.lengths[1]
+    mirror, y = 2 * grid.origin[1] + grid.lengths[1], grid.lines[1]
+    if not np.allclose(y, mirror - y[::-1], rtol=0.0, atol=SAME * grid.lengths[1]):
+        return False
     edges = np.unique(_edges(problem, "y"))
     if not np.allclose(edges, np.sort(mirror - edges), rtol=0.0, atol=SAME * grid.lengths[1]):
         return False

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.parallel import Array
-from ..problems.film.flows import point_weights
+from ..problems.film.flows import line_weights
 from ..problems.film.lubrication import LubricationProblem
 
 if TYPE_CHECKING:
@@ -16,11 +16,17 @@ if TYPE_CHECKING:
 NOISE = 1e-9  # of a field's scale: less is rounding and is not drawn
 
 
-def ahead(problem: LubricationProblem) -> float:
-    """How far (m) from a point to where the scheme knows the void: half a spacing, or 0 (scheme 'upwind'). Collective."""
-    s, weight = problem.scheme, point_weights(problem.grid).reshape(problem.grid.box)
+def ahead(problem: LubricationProblem) -> Array:
+    """How far (m) from the points of a line to where the scheme knows the void: half a spacing, or 0 (scheme 'upwind').
+
+    Of all columns, on every rank. Collective.
+    """
+    s, weight = problem.scheme, line_weights(problem.grid)
     apart = np.where(s.couette_E == 0.0, 0.0, s.couette_E / weight - problem.U / s.flow_unit * s.h)
-    return float(np.sign(problem.U)) * 0.5 * problem.grid.spacing[0] if problem.reduce.max(np.abs(apart)) > 0.0 else 0.0
+    around = problem.grid.with_neighbours(0)
+    half = 0.5 * np.diff(around)
+    way = (half[1:] if problem.U >= 0 else -half[:-1]) * float(np.sign(problem.U) ** 2)
+    return way if problem.reduce.max(np.abs(apart)) > 0.0 else 0.0 * way
 
 
 def void_at_faces(problem: LubricationProblem, r: Array, sign: Array) -> Array:
@@ -39,12 +45,13 @@ def void_at_faces(problem: LubricationProblem, r: Array, sign: Array) -> Array:
     moves = np.abs(s.couette_E) > 0.0  # nothing passes a closed side or a wall at rest
     full = np.where(moves, s.couette_E, 1.0)
     void = np.where(moves, -s.b_C * r / full, r)
-    at = ahead(problem)
+    way = ahead(problem)
+    at, downstream = way[grid.x_start : grid.x_end], way.max() > 0.0
     h = np.broadcast_to(problem.film(grid.x + at, grid.y), grid.box)
-    speed = problem.U / s.flow_unit * point_weights(grid).reshape(grid.box) * h
+    speed = problem.U / s.flow_unit * line_weights(grid) * h
     layer = (s.couette_E + s.b_C * r) / np.where(moves, speed, 1.0)
     framed = grid.ghosted(sign.ravel())[1:-1]
-    beyond = (framed[:, 2:] if at > 0 else framed[:, :-2]) if at else sign
+    beyond = (framed[:, 2:] if downstream else framed[:, :-2]) if way.any() else sign
     inside = moves & (sign < 0.0) & (beyond < 0.0)
     return np.where(inside, 1.0 - np.minimum(layer, 1.0), void).ravel()
 

@@ -64,20 +64,17 @@ def colour_map(figure: Figure | SubFigure, axes: Axes, picture: Picture, name: s
     label = NAMES.get(name, name) + (f" ({unit})" if unit else "")
     (scale_x, label_x), (scale_y, label_y) = picture.along, picture.across
     x, y = (_to_the_sides(at, start, L) for at, start, L in zip((picture.x, picture.y), grid.origin, grid.lengths, strict=True))
-    dx, dy = x[-1] - x[-2], y[-1] - y[-2]
-    box = (x[0] - 0.5 * dx, x[-1] + 0.5 * dx, y[0] - 0.5 * dy, y[-1] + 0.5 * dy)
     ratio = shape(picture)
     width_over_height = scale_x * grid.lengths[0] / (scale_y * grid.lengths[1])
-    image = axes.imshow(
-        np.pad(factor * values, 1, mode="edge"),
-        extent=tuple(scale * edge for scale, edge in zip((scale_x, scale_x, scale_y, scale_y), box, strict=True)),
-        origin="lower",
-        cmap=MAPS.get(name, "viridis"),
-        interpolation="nearest",
-        vmin=factor * limits[0],
-        vmax=factor * limits[1],
-        aspect=ratio * width_over_height,
-    )
+    look: dict[str, Any] = {"cmap": MAPS.get(name, "viridis"), "vmin": factor * limits[0], "vmax": factor * limits[1]}
+    cells = np.pad(factor * values, 1, mode="edge")
+    edges_x, edges_y = scale_x * _cell_edges(x), scale_y * _cell_edges(y)
+    if grid.even:
+        box = (edges_x[0], edges_x[-1], edges_y[0], edges_y[-1])
+        image: Any = axes.imshow(cells, extent=box, origin="lower", interpolation="nearest", **look)
+    else:
+        image = axes.pcolormesh(edges_x, edges_y, cells, rasterized=True, **look)
+    axes.set_aspect(ratio * width_over_height)
     x_limits, y_limits = (
         (scale * start, scale * (start + length))
         for scale, start, length in zip((scale_x, scale_y), grid.origin, grid.lengths, strict=True)
@@ -117,6 +114,12 @@ def _few_ticks() -> Any:
     from matplotlib.ticker import MaxNLocator
 
     return MaxNLocator(nbins=5, min_n_ticks=2)
+
+
+def _cell_edges(at: Array) -> Array:
+    """Half-way between points, and as far beyond the first and the last one."""
+    half = 0.5 * np.diff(at)
+    return np.concatenate([at[:1] - half[:1], at[:-1] + half, at[-1:] + half[-1:]])
 
 
 def _to_the_sides(at: Array, start: float, length: float) -> Array:

@@ -1,7 +1,7 @@
 """What rank 0 draws of a Solution: fields thinned and gathered, units that suit them, the title."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -39,7 +39,7 @@ class Picture:
     scales: dict[str, float]
     sign: Array
     void: Array
-    ahead: float = 0.0
+    ahead: Array = field(default_factory=lambda: np.zeros(1))
     middle: int = 0
     exact: ExactSolution | None = None
 
@@ -144,7 +144,7 @@ def collect(solution: Solution) -> Picture | None:
         scales |= {"p": _pressure_scale(problem), "r": 1.0}
         rows = taken(grid.shape[1], ny) if grid.dim == 2 else np.zeros(1)
         more = {
-            "ahead": ahead(problem),
+            "ahead": ahead(problem)[taken(grid.shape[0], nx)],
             "middle": int(np.argmin(np.abs(rows - middle_row(problem)))),
             "exact": problem.exact() if problem.exact is not None else None,
         }

@@ -1,4 +1,4 @@
-"""Uniform grids of interior points, distributed by a PETSc DMDA. The only file that knows ghost points."""
+"""Grids of interior points on straight lines, distributed by a PETSc DMDA. The only file that knows ghost points."""
 
 import math
 import os
@@ -20,6 +20,8 @@ BYTES_PER_POINT = 250  # of the coefficients, A, B and the fields alone: no run 
 # cell at the other end follows.
 OFFSET = {"open": 1.0, "closed": 0.5, "mirror": 0.0, "periodic": 0.5}
 OPEN = ("open", "open")
+Places = tuple[Array | None, Array | None]  # of the lines of points in x and y, m from the corner; None: evenly spaced
+EVEN: Places = (None, None)
 
 
 def some_places(n: int, length: float, ends: Sequence[str], most: int) -> Array:
@@ -34,6 +36,9 @@ class Grid:
     Arrays of owned points are flat, in PETSc's order on this rank: y outer, x inner. `box` gives their
     two-dimensional shape (1 line in 1D).
 
+    Lines may lie unevenly (`places`). `spacing` and `cell` are then means, in whose parts `widths` and `steps` tell the cells
+    and the distances between points: a cell ends half-way between two points.
+
     Parameters
     ----------
     shape : numbers of interior points, (nx,) or (nx, ny).
@@ -41,6 +46,7 @@ class Grid:
     comm : PETSc communicator; default all ranks.
     origin : coordinates of the corner x = y = 0 of the description above, in metres.
     ends : kinds (`OFFSET`) of the two ends in x and in y; spacings and first points as above are those of open ends.
+    places : coordinates of the lines of points in x and in y from that corner, ascending, m; None: evenly spaced.
 
     Raises
     ------
@@ -54,6 +60,7 @@ class Grid:
         comm: PETSc.Comm | None = None,
         origin: tuple[float, float] = (0.0, 0.0),
         ends: tuple[tuple[str, str], tuple[str, str]] = (OPEN, OPEN),
+        places: Places = EVEN,
     ):
         if any(n < 1 for n in shape):
             raise InputError(f"grid {'x'.join(map(str, shape))}: at least 1 interior point a side is needed")
@@ -68,7 +75,8 @@ class Grid:
         # Spacings from side to side.
         self.meshes = tuple(n + OFFSET[a] + OFFSET[b] - 1.0 for n, (a, b) in zip(self.shape, self.ends, strict=True))
         self.spacing = tuple(length / meshes for length, meshes in zip(self.lengths, self.meshes, strict=True))
-        self.origin = origin
+        self.origin, self.places = origin, places
+        self._around = tuple(self._with_neighbours(side) for side in range(self.dim))
         self.size = math.prod(self.shape)
         comm = PETSc.Comm(comm or PETSc.COMM_WORLD)  # mpi4py's will do too
         self._check_size(comm)
@@ -123,27 +131,83 @@ class Grid:
         return int(self.starts[self.comm.rank])
 
     @property
+    def even(self) -> bool:
+        """Whether all lines are evenly spaced."""
+        return all(places is None for places in self.places[: self.dim])
+
+    @property
     def cell(self) -> float:
-        """Length (1D, m) or area (2D, m2) of a grid cell."""
+        """Length (1D, m) or area (2D, m2) of a grid cell; of uneven lines their mean."""
         return float(np.prod(self.spacing))
 
     @property
     def x(self) -> Array:
         """Owned x coordinates in metres, shape (1, nx_local)."""
-        return self.origin[0] + (np.arange(self.x_start, self.x_end) + self.offset[0])[None, :] * self.spacing[0]
+        return self._line(0, self.x_start, self.x_end)[None, :]
 
     @property
     def y(self) -> Array:
         """Owned y coordinates in metres, shape (ny_local, 1); 0 in 1D."""
         if self.dim == 1:
             return np.zeros((1, 1))
-        return self.origin[1] + (np.arange(self.y_start, self.y_end) + self.offset[1])[:, None] * self.spacing[1]
+        return self._line(1, self.y_start, self.y_end)[:, None]
 
     @property
     def lines(self) -> tuple[Array, ...]:
         """Coordinates x, and y in 2D, of all points of the grid, m; on every rank."""
-        sides = zip(self.origin, self.shape, self.offset, self.spacing, strict=False)
-        return tuple(start + (np.arange(n) + offset) * spacing for start, n, offset, spacing in sides)
+        return tuple(self._line(side, 0, n) for side, n in enumerate(self.shape))
+
+    def _line(self, side: int, start: int, end: int) -> Array:
+        places = self.places[side]
+        if places is not None:
+            return self.origin[side] + places[start:end]
+        return self.origin[side] + (np.arange(start, end) + self.offset[side]) * self.spacing[side]
+
+    def with_neighbours(self, side: int) -> Array:
+        """Coordinates of all points of a side, what lies before the first and behind the last one among them, m."""
+        around = self._around[side]
+        if around is None:
+            around = (np.arange(-1, self.shape[side] + 1) + self.offset[side]) * self.spacing[side]
+        return self.origin[side] + around
+
+    def _with_neighbours(self, side: int) -> Array | None:
+        """Uneven lines with what lies before the first and behind the last one: a side, a mirror image or the other end."""
+        places, (first, last), L = self.places[side], self.ends[side], self.lengths[side]
+        if places is None:
+            return None
+        second = places[1] if places.size > 1 else L
+        before = {"open": 0.0, "closed": -places[0], "mirror": -second, "periodic": places[-1] - L}[first]
+        last_but_one = places[-2] if places.size > 1 else before
+        behind = {"open": L, "closed": 2.0 * L - places[-1], "mirror": 2.0 * L - last_but_one, "periodic": places[0] + L}[last]
+        return np.concatenate([[before], places, [behind]])
+
+    def _owned(self, side: int) -> tuple[int, int]:
+        return ((self.x_start, self.x_end), (self.y_start, self.y_end))[side]
+
+    def steps(self, side: int) -> Array:
+        """Distances in m, in x (side 0) or y (1), across the faces before, between and behind the owned points.
+
+        Across a closed or mirror end to the mirror image: nothing flows there.
+        """
+        start, end = self._owned(side)
+        around = self._around[side]
+        return np.full(end - start + 1, self.spacing[side]) if around is None else np.diff(around)[start : end + 1]
+
+    def widths(self, side: int, everywhere: bool = False) -> Array:
+        """Widths of the owned columns (side 0) or lines (1) of cells, or of all, in spacings: 1, and 1/2 on a mirror."""
+        start, end = (0, self.shape[side]) if everywhere else self._owned(side)
+        around, number, (first, last) = self._around[side], np.arange(start, end), self.ends[side]
+        halved = (number == 0) & (first == "mirror") | (number == self.shape[side] - 1) & (last == "mirror")
+        whole = 1.0 if around is None else (0.5 * (around[2:] - around[:-2]) / self.spacing[side])[start:end]
+        return np.where(halved, 0.5, 1.0) * whole
+
+    def rims(self, side: int) -> tuple[float, float]:
+        """Distances from the outermost lines of points to the two sides, in spacings."""
+        around = self._around[side]
+        if around is None:
+            first, last = (OFFSET[end] for end in self.ends[side])
+            return first, last
+        return float(around[1]) / self.spacing[side], float(self.lengths[side] - around[-2]) / self.spacing[side]
 
     def nodes_and_faces(self, side: int) -> tuple[Array, Array]:
         """Coordinates in x (side 0) or y (1) of the owned points with a neighbour before and behind, and of the faces between.
@@ -151,8 +215,13 @@ class Grid:
         Each comes from its number alone, so that the two cells of a face see the same film even where it jumps there, and what
         leaves one cell enters the next. Nothing lies beyond a closed or mirror end: its own coordinate stands there.
         """
-        start, end = ((self.x_start, self.x_end), (self.y_start, self.y_end))[side]
-        points, faces, n, offset = np.arange(start - 1, end + 1), np.arange(start, end + 1), self.shape[side], self.offset[side]
+        start, end = self._owned(side)
+        around, n, offset, L = self._around[side], self.shape[side], self.offset[side], self.lengths[side]
+        if around is not None:
+            at_points, at_faces = around[start : end + 2], (0.5 * (around[1:] + around[:-1]))[start : end + 1]
+            within = np.mod if self.periodic[side] else lambda at, length: np.clip(at, 0.0, length)
+            return self.origin[side] + within(at_points, L), self.origin[side] + within(at_faces, L)
+        points, faces = np.arange(start - 1, end + 1), np.arange(start, end + 1)
         if self.periodic[side]:
             points, faces = points % n, faces % n
         lines = (np.clip(k + shift, 0.0, self.meshes[side]) for k, shift in ((points, offset), (faces, offset - 0.5)))
@@ -195,18 +264,18 @@ class Grid:
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "Grid":
         """A grid of its own DMDA. Collective."""
-        return Grid(self.shape, self.lengths, self.dm.comm, self.origin, self._ends)
+        return Grid(self.shape, self.lengths, self.dm.comm, self.origin, self._ends, self.places)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """What is pickled: the numbers, from which as many ranks make the grid again, together."""
-        return _on_ranks, (self.comm.size, self.shape, self.lengths, self.origin, self._ends)
+        return _on_ranks, (self.comm.size, self.shape, self.lengths, self.origin, self._ends, self.places)
 
     def destroy(self) -> None:
         """Free the DMDA. Collective."""
         self._own.free()
 
 
-def _on_ranks(ranks: int, shape: tuple[int, ...], lengths: tuple[float, ...], origin: Any, ends: Any) -> Grid:
+def _on_ranks(ranks: int, shape: tuple[int, ...], lengths: tuple[float, ...], origin: Any, ends: Any, places: Any) -> Grid:
     """A pickled grid, on one rank or all of them. Collective.
 
     Raises
@@ -216,4 +285,4 @@ def _on_ranks(ranks: int, shape: tuple[int, ...], lengths: tuple[float, ...], or
     comm = PETSc.COMM_SELF if ranks == 1 else PETSc.COMM_WORLD
     if comm.getSize() != ranks:
         raise InputError(f"pickled on {ranks} ranks, each with its part: {comm.getSize()} ranks cannot take it up")
-    return Grid(shape, lengths, comm, origin, ends)
+    return Grid(shape, lengths, comm, origin, ends, places)

@@ -10,6 +10,8 @@ from ..base.owned import Owned
 from ..base.parallel import Array
 from .grid import Grid
 
+NESTED = 1e-9  # of a coarse spacing: a point so near a coarse one is that one
+
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
@@ -71,13 +73,14 @@ def _weights(points: np.ndarray, coarse: Grid, fine: Grid, side: int, nearest: b
     from scipy.sparse import csr_matrix
 
     n_coarse = coarse.shape[side]
-    # Fine point i lies left + part / meshes coarse spacings behind the first coarse point: integers (offsets are multiples of
-    # 1/2), so that nested points get one weight, 1.
-    offset, offset_coarse, meshes, meshes_coarse = (
-        round(2 * a) for a in (fine.offset[side], coarse.offset[side], fine.meshes[side], coarse.meshes[side])
-    )
-    left, part = np.divmod((2 * points + offset) * meshes_coarse - offset_coarse * meshes, 2 * meshes)
-    right = part / (2 * meshes)
+    if coarse.places[side] is None and fine.places[side] is None:
+        left, right = _even_weights(points, coarse, fine, side)
+    else:
+        around, at = coarse.with_neighbours(side), fine.lines[side][points]
+        left = np.clip(np.searchsorted(around, at, side="right") - 1, 0, n_coarse)
+        right = (at - around[left]) / (around[left + 1] - around[left])
+        left = left - 1  # `around` begins with what lies before the first point
+        right = np.where(np.abs(right - np.rint(right)) < NESTED, np.rint(right), right)
     if nearest:
         right = np.rint(right)
     rows = np.concatenate([np.arange(points.size)] * 2)
@@ -91,6 +94,19 @@ def _weights(points: np.ndarray, coarse: Grid, fine: Grid, side: int, nearest: b
         columns = columns % n_coarse if fine.periodic[side] else np.clip(columns, 0, n_coarse - 1)
         used = values > 0
     return csr_matrix((values[used], (rows[used], columns[used])), shape=(points.size, n_coarse))
+
+
+def _even_weights(points: np.ndarray, coarse: Grid, fine: Grid, side: int) -> tuple[np.ndarray, np.ndarray]:
+    """Number of the coarse point before each fine one, and the weight of the one behind, of evenly spaced lines.
+
+    Fine point i lies left + part / meshes coarse spacings behind the first coarse point: integers (offsets are multiples of
+    1/2), so that nested points get one weight, 1.
+    """
+    offset, offset_coarse, meshes, meshes_coarse = (
+        round(2 * a) for a in (fine.offset[side], coarse.offset[side], fine.meshes[side], coarse.meshes[side])
+    )
+    left, part = np.divmod((2 * points + offset) * meshes_coarse - offset_coarse * meshes, 2 * meshes)
+    return left, part / (2 * meshes)
 
 
 def numbers(grid: Grid) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

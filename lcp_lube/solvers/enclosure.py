@@ -12,6 +12,7 @@ from ..base.parallel import Array
 from ..base.stages import Stages
 from ..linear.krylov import LinearSolverError
 from ..linear.system import make_system
+from ..problems.film.flows import point_weights
 from ..problems.film.forces import ambient
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Enclosure, Fields
@@ -189,10 +190,11 @@ def _bounds(problem: LubricationProblem, fields: Fields, lower: Fields, upper: F
     p_max, low, high = (reduce.max(a) for a in (p, lower["p"], upper["p"]))
     largest = max(abs(p_max), high, *(side / unit for side in problem.p_sides)) + abs(problem.p_c) / unit
     above = ambient(problem) / unit
-    load_rounding = (problem.size + 32) * UNIT * reduce.sum(np.abs(p) + off_p + above)  # a sum of n numbers, in any order
+    weight = point_weights(problem.grid)
+    load_rounding = (problem.size + 32) * UNIT * reduce.sum(weight * (np.abs(p) + off_p + above))  # n numbers, in any order
     return {
         "band_p": (reduce.max(off_p) + 8 * UNIT * largest) * unit,
         "band_p_max": (max(high - p_max, p_max - low) + 8 * UNIT * largest) * unit,
-        "band_load": (reduce.sum(off_p) + load_rounding) * problem.grid.cell * unit,
+        "band_load": (reduce.sum(weight * off_p) + load_rounding) * problem.grid.cell * unit,
         "band_r": reduce.max(off_r) * (1 + 8 * UNIT),
     }

@@ -54,10 +54,10 @@ def bars(image: Any) -> tuple[float, float]:
 def image_of(figure: Any, name: str) -> Any:
     """The image whose colour bar or title has this name."""
     for axes in figure.findobj(Axes):
-        if axes.images and axes.images[0].colorbar is not None:
-            bar = axes.images[0].colorbar.ax
-            if any(name in text for text in (bar.get_xlabel(), bar.get_ylabel(), axes.get_title())):
-                return axes.images[0]
+        for image in (*axes.images, *axes.collections):
+            bar = image.colorbar.ax if image.colorbar is not None else None
+            if bar is not None and any(name in text for text in (bar.get_xlabel(), bar.get_ylabel(), axes.get_title())):
+                return image
     raise AssertionError(name)
 
 

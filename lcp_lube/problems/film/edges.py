@@ -28,14 +28,15 @@ def face_film(
     lines: Array,
     jumps: Sequence[float],
     jumps_across: Sequence[float],
-    width: float,
+    steps: Array,
 ) -> tuple[Array, Array]:
     """C and H of all faces along t, of the lines at s; shape (lines, faces).
 
     Parameters
     ----------
     film : h(t, s) in m for arrays that broadcast. nodes, faces : t of the points (one more than faces) and of the faces, m.
-    lines : s of the lines of points, each `width` m wide. jumps, jumps_across : t and s of the film's edges, m.
+    lines : s of the lines of points. steps : distances before, between and behind them, half-way along which cells end.
+    jumps, jumps_across : t and s of the film's edges, m.
     """
     columns, pieces = _pieces(nodes[:-1], nodes[1:], jumps)
 
@@ -54,11 +55,11 @@ def face_film(
         return cubes, films
 
     cubes, films = along(lines)
-    rows, strips = _pieces(lines - 0.5 * width, lines + 0.5 * width, jumps_across)
+    rows, strips = _pieces(lines - 0.5 * steps[:-1], lines + 0.5 * steps[1:], jumps_across)
     if rows.size:
         cubes[rows] = films[rows] = 0.0
         for a, b in pairwise(strips):
-            share = ((b - a) / width)[:, None]
+            share = ((b - a) / (0.5 * (steps[:-1] + steps[1:])[rows]))[:, None]
             part_cubes, part_films = along(0.5 * (a + b))
             cubes[rows] += share * part_cubes
             films[rows] += share * part_films

@@ -18,9 +18,13 @@ SIDES = ("west", "east", "south", "north")
 
 
 def point_weights(grid: Grid) -> Array:
-    """Share of a cell that belongs to each owned point: 1, and 1/2 on a mirror line."""
-    *_, north = sides(grid, ("mirror",))
-    return np.broadcast_to(np.where(north, 0.5, 1.0), grid.box).ravel()
+    """What belongs to each owned point, in mean cells: 1, and 1/2 on a mirror line; of uneven lines its cell's own size."""
+    return np.broadcast_to(line_weights(grid) * grid.widths(0), grid.box).ravel()
+
+
+def line_weights(grid: Grid) -> Array:
+    """Widths of the owned lines of cells, in mean spacings, shape (ny_local, 1); 1 in 1D."""
+    return grid.widths(1)[:, None] if grid.dim == 2 else np.ones((1, 1))
 
 
 def side_flows(problem: LubricationProblem, p: Array, r: Array) -> dict[str, float]:
@@ -34,7 +38,7 @@ def side_flows(problem: LubricationProblem, p: Array, r: Array) -> dict[str, flo
     if (moving := getattr(problem, "moving", None)) is not None:  # a TurnedProblem
         flow = side_flows(moving, *problem.there({"p": p, "r": r}).values())  # type: ignore[attr-defined]
         return {**flow, "west": flow["east"], "east": flow["west"]}
-    grid, s = problem.grid, problem.scheme
+    grid, s, lines = problem.grid, problem.scheme, line_weights(problem.grid)
     west, east, south, north = problem.boundary_flows(p, r)
     if grid.dim == 1:
         return {"west": -0.5 * west, "east": 0.5 * east}
@@ -42,8 +46,11 @@ def side_flows(problem: LubricationProblem, p: Array, r: Array) -> dict[str, flo
     leaving = s.couette_E + s.b_C * r.reshape(grid.box)
     total = lambda flows: s.flow_unit * problem.reduce.sum(flows)  # noqa: E731
     strips = [  # enters at the west, leaves at the east
-        (0.5 * total(np.where(at_west & end, s.couette_W, 0.0)), 0.5 * total(np.where(at_east & end, leaving, 0.0)))
-        for end in at_ends
+        (
+            0.5 * rim * total(np.where(at_west & end, s.couette_W / lines, 0.0)),
+            0.5 * rim * total(np.where(at_east & end, leaving / lines, 0.0)),
+        )
+        for end, rim in zip(at_ends, grid.rims(1), strict=True)
     ]
     half = 0.5 * grid.spacing[1]
     return {
@@ -66,18 +73,20 @@ def friction(problem: LubricationProblem, p_pa: Array, r: Array) -> float:
     p_pa : pressure in Pa above the cavitation pressure, r : void fraction; owned points.
     """
     grid, s, film = problem.grid, problem.scheme, problem.film
-    dx, muU, weight = grid.spacing[0], problem.mu * problem.U, point_weights(grid).reshape(grid.box)
+    before, behind = grid.steps(0)[:-1], grid.steps(0)[1:]
+    muU, weight, rims = problem.mu * problem.U, line_weights(grid), grid.rims(1) if grid.dim == 2 else (0.0, 0.0)
     full = (cavity_sign(problem.reduce, p_pa, r) >= 0).reshape(grid.box)
     p, r = p_pa.reshape(grid.box), r.reshape(grid.box)
     first, last, south, north = sides(grid)
     walls = sides(grid, ("closed",))[:2]
     p_east = np.where(last, problem.p_sides[1], grid.ghosted(p_pa)[1:-1, 2:])
-    h_west, h_east = (np.broadcast_to(film(grid.x + step, grid.y), grid.box) for step in (-dx / 2, dx / 2))
+    h_west, h_east = (np.broadcast_to(film(grid.x + step, grid.y), grid.box) for step in (-before / 2, behind / 2))
     passes = ~np.broadcast_to(walls[1], grid.box)  # the east face
     liquid = 1.0 + s.b_C * r / np.where(passes & (s.couette_E != 0.0), s.couette_E, np.inf)
-    shear = np.where(passes, liquid / h_east, 0.0) + np.where(first, 1.0 / h_west, 0.0)
-    for wall in walls:
-        shear = shear + np.where(wall, 0.5 * np.where(full, 4.0, 1.0 - r) / s.h, 0.0)
+    shear = np.where(passes, liquid / h_east, 0.0) + np.where(first, before / behind / h_west, 0.0)
+    for wall, share in zip(walls, (0.5 * before / behind, 0.5), strict=True):
+        shear = shear + np.where(wall, share * np.where(full, 4.0, 1.0 - r) / s.h, 0.0)
     push = np.where(passes, 0.5 * h_east * (p_east - p), 0.0) + np.where(first, 0.5 * h_west * (p - problem.p_sides[0]), 0.0)
-    per_row = muU * dx * shear * (1.0 + 0.5 * south + 0.5 * north) + push
+    strips = 1.0 + 0.5 * (rims[0] * south + rims[1] * north) / weight
+    per_row = muU * behind * shear * strips + push
     return problem.reduce.sum(per_row * weight) * (grid.spacing[1] if grid.dim == 2 else 1.0)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...base.parallel import Array
-from .flows import point_weights
+from .flows import line_weights, point_weights
 from .reynolds import sides
 
 if TYPE_CHECKING:
@@ -89,24 +89,22 @@ def _integral(problem: LubricationProblem, p_pa: Array, above: float, weight: Ca
     inside = (p_pa - above) * np.broadcast_to(weight(grid.x, grid.y), grid.box).ravel()
     total = problem.reduce.sum(inside * point_weights(grid))
     pressures = open_pressures(problem)
-    coordinates = [  # of all points, on every rank
-        a + (np.arange(n) + offset) * step
-        for a, n, offset, step in zip(grid.origin, grid.shape, grid.offset, grid.spacing, strict=False)
-    ]
+    coordinates = grid.lines  # of all points, on every rank
     for k, p_side in enumerate(pressures):
         if p_side is None:
             continue
         axis, across = k // 2, 1 - k // 2
         at = grid.origin[axis] + (k % 2) * grid.lengths[axis]
+        strip = 0.5 * grid.rims(axis)[k % 2]
         if grid.dim == 1:
-            total += 0.5 * (p_side - above) * weight(np.array([at]), np.zeros(1))[0]
+            total += strip * (p_side - above) * weight(np.array([at]), np.zeros(1))[0]
             continue
         along = coordinates[across]
-        share = np.full(along.size, 0.5)
-        if "mirror" in grid.ends[across]:
-            share[-1] = 0.25
-        ends = [grid.origin[across] + j * grid.lengths[across] for j in (0, 1) if pressures[2 * across + j] is not None]
-        places, shares = np.concatenate([along, ends]), np.concatenate([share, np.full(len(ends), 0.125)])
+        share = strip * grid.widths(across, everywhere=True)
+        corners = [j for j in (0, 1) if pressures[2 * across + j] is not None]
+        ends = [grid.origin[across] + j * grid.lengths[across] for j in corners]
+        corner_shares = [0.5 * strip * 0.5 * grid.rims(across)[j] for j in corners]
+        places, shares = np.concatenate([along, ends]), np.concatenate([share, corner_shares])
         x, y = (np.full_like(places, at), places) if axis == 0 else (places, np.full_like(places, at))
         total += (p_side - above) * float(np.sum(shares * weight(x, y)))
     return float(grid.cell * total)
@@ -129,7 +127,8 @@ def corner_flows(problem: LubricationProblem) -> dict[str, float] | None:
             p_i, p_j = pressures[i], pressures[j]
             if p_i is None or p_j is None or p_i == p_j:
                 continue
-            k = (s.k_W, s.k_E)[i] * (0.5 * grid.spacing[0] / problem.p_unit)  # h^3/(12 mu)
+            k = (s.k_W, s.k_E)[i] * (0.5 * grid.rims(0)[i] * grid.spacing[0] / problem.p_unit)  # h^3/(12 mu)
+            k = k / line_weights(grid)
             passing = problem.reduce.sum(np.where(at[i] & at[j], k, 0.0)) * 2.0 * np.log(2.0) / np.pi * (p_i - p_j)
             growth[names[j]] += passing
             growth[names[i]] -= passing

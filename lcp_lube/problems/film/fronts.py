@@ -9,7 +9,7 @@ import numpy as np
 from ...base.parallel import Array
 from ..grid import Grid
 from .cavity import cavity_sign
-from .flows import point_weights
+from .flows import line_weights
 from .reynolds import Film
 
 if TYPE_CHECKING:
@@ -27,7 +27,8 @@ def fronts(problem: LubricationProblem, p: Array, r: Array) -> tuple[list[float]
     if not problem.U:
         return [], []  # at rest a film does not cavitate
     grid, film, scheme = problem.grid, problem.film, problem.scheme
-    dx, start, L = grid.spacing[0], grid.origin[0], grid.lengths[0]
+    start, L, steps = grid.origin[0], grid.lengths[0], grid.steps(0)
+    behind, ahead = steps[:-1], steps[1:]
     x, row = grid.x[0], middle_row(problem) - grid.y_start
     here = 0 <= row < grid.box[0]
     row = row if here else 0
@@ -41,11 +42,11 @@ def fronts(problem: LubricationProblem, p: Array, r: Array) -> tuple[list[float]
         Q = np.full_like(x, problem.boundary_flows(p, r)[0])
     else:
         leaves = scheme.couette_E + scheme.b_C * r.reshape(grid.box)
-        Q = scheme.flow_unit * leaves[row] / point_weights(grid).reshape(grid.box)[row]
+        Q = scheme.flow_unit * leaves[row] / line_weights(grid)[row]
     front = cavity[1:-1] & ~cavity[:-2] & here
-    before = x[front] - 2.0 * dx
+    before = (x - 2.0 * behind)[front]
     before = before if grid.periodic[0] else np.maximum(before, start)
-    ruptures = _rises_through(film, Q[front] / problem.U, before, x[front] + dx, y[front])
+    ruptures = _rises_through(film, Q[front] / problem.U, before, (x + ahead)[front], y[front])
     p_line = grid.ghosted(p)[row + 1]
     last = grid.x_end == grid.shape[0] and opens[1]
     if last:
@@ -53,9 +54,9 @@ def fronts(problem: LubricationProblem, p: Array, r: Array) -> tuple[list[float]
     rise = p_line[2:] - p_line[1:-1]
     back = np.where(rise > 0, np.clip(p_line[1:-1] / np.where(rise > 0, rise, 1.0), 0.0, 1.0), 0.5)
     full_again = ~cavity[1:-1] & cavity[:-2] & here
-    reformations = (x - back * dx)[full_again]
+    reformations = (x - back * behind)[full_again]
     if last and here and cavity[-2] and problem.p_sides[1] > 0:
-        reformations = np.append(reformations, start + L - 0.5 * dx)  # before a side above the cavitation pressure
+        reformations = np.append(reformations, start + L - 0.5 * steps[-1])  # before a side above the cavitation pressure
     parts = grid.comm.allgather((ruptures.tolist(), reformations.tolist()))
     found = ([place for part in parts for place in part[k]] for k in (0, 1))
     if grid.periodic[0]:

@@ -10,11 +10,12 @@ from petsc4py import PETSc
 from ...base.parallel import Array
 from ...errors import InputError
 from ..facts import Facts
-from ..grid import Grid
+from ..grid import EVEN, Grid, Places
 from .exact import ExactSolution
 from .fluid import Law
 from .forces import Shaft
 from .grooves import Groove, GroovedProblem, Pad, pads_between
+from .lines import on_edges
 from .lubrication import LubricationProblem
 from .reynolds import Film, box_scheme
 from .turned import MirroredFilm, TurnedProblem
@@ -64,6 +65,7 @@ class Model:
     grooves: tuple[Groove, ...] = ()  # of a film that is periodic in x
     shaft: Shaft | None = None  # of a film that is wrapped round one
     law: Law | None = None  # a fluid that depends on the pressure; `build` makes the problem of the constant one
+    places: Places | None = None  # of the lines of points; None: on the film's straight edges, if it has any
 
     def __post_init__(self) -> None:
         used = dict(zip(NAMES, self.sides, strict=True) if len(self.lengths) == 2 else zip(NAMES[:2], self.sides, strict=False))
@@ -99,8 +101,23 @@ class Model:
     def mirrored(self) -> "Model":
         """The mirror image in x, whose wall moves the other way."""
         west, east, *ends = self.sides
-        gap = MirroredFilm(self.gap, self.lengths[0])
-        return replace(self, gap=gap, U=-self.U, sides=(east, west, *ends), exact=None)  # type: ignore[arg-type]
+        gap, places = MirroredFilm(self.gap, self.lengths[0]), self.places
+        if places is not None and places[0] is not None:
+            places = (self.lengths[0] - places[0][::-1], places[1])
+        return replace(self, gap=gap, U=-self.U, sides=(east, west, *ends), exact=None, places=places)  # type: ignore[arg-type]
+
+    def lines(self, shape: Sequence[int]) -> Places:
+        """Where the lines of points of a grid lie (`Grid.places`): on edges, where scheme 'face' can make use of it in 2D."""
+        if self.places is not None:
+            return self.places
+        edges = getattr(self.gap, "jumps", None)
+        if edges is None or self.scheme != "face" or self.mean_cubes or len(shape) == 1:
+            return EVEN
+        x, y = (
+            on_edges(n, length, [side.kind for side in self.sides[2 * k : 2 * k + 2]], edges("xy"[k]))
+            for k, (n, length) in enumerate(zip(shape, self.lengths, strict=True))
+        )
+        return (None if self.grooves else x), y  # grooves are columns of an even grid
 
     def build(self, shape: Sequence[int], comm: PETSc.Comm | None = None) -> LubricationProblem:
         """The discrete problem on (nx,) or (nx, ny) points. Collective.
@@ -113,7 +130,9 @@ class Model:
         if self.U < 0:
             return TurnedProblem(self.mirrored.build(shape, comm), self.exact)
         west, east, south, north = self.sides
-        grid = Grid(shape, self.lengths, comm, ends=((west.kind, east.kind), (south.kind, north.kind)))
+        grid = Grid(
+            shape, self.lengths, comm, ends=((west.kind, east.kind), (south.kind, north.kind)), places=self.lines(shape)
+        )
         p_sides = tuple(side.p if side.kind == "open" else 0.0 for side in self.sides)
         film = self.film
         scheme = box_scheme(
@@ -147,13 +166,13 @@ class Model:
     def pads(self, shape: Sequence[int]) -> list[tuple[Pad, "Model"]]:
         """The films between the grooves on a ring of nx columns, whose points they keep."""
         dx = self.lengths[0] / shape[0]
-        films = []
+        films, places = [], (None, self.lines(shape)[1]) if len(shape) == 2 else None
         for pad in pads_between(shape[0], self.grooves):
             lengths = ((pad.n + 1) * dx, *self.lengths[1:])
             sides = (Side(p=pad.west), Side(p=pad.east), *self.sides[2:])
             # Its x = 0 is the last column of the groove before it.
             gap = _Moved(self.gap, (pad.first - 0.5) * dx)
-            films.append((pad, replace(self, lengths=lengths, sides=sides, gap=gap, exact=None, grooves=())))
+            films.append((pad, replace(self, lengths=lengths, sides=sides, gap=gap, exact=None, grooves=(), places=places)))
         return films
 
 

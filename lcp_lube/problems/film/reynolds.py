@@ -23,11 +23,13 @@ LARGE = 1e100  # coefficients whose squares still have a norm
 class BoxScheme:
     """Coefficients on the owned points, each of shape (ny_local, nx_local); a row is a balance per unit width.
 
-    The flow balance of point i, with p in units of p_unit, is
+    The flow balance of point i, with p in units of p_unit and dy the mean spacing of the lines, is
 
         sum over faces of k_face (p_i - p_neighbour) + b_C r_i + b_W r_west = c_i        [m2/s]
 
     k_W, k_E = p_unit h^3/(6 mu dx);  k_S, k_N = p_unit h^3 dx/(6 mu dy2) (absent in 1D).
+    On uneven lines dx and one dy of these are distances of points, the others the cell's own: a row is the whole balance of a
+    cell over the mean dy, and what leaves a cell is what enters the next one.
     Dirichlet neighbours are in c; `k_*` keeps their conductance, for A's diagonal and the boundary fluxes.
     """
 
@@ -141,7 +143,8 @@ def _coefficients(
     mean_cubes: bool,
     r_in: float,
 ) -> BoxScheme:
-    dx, (ny, nx) = grid.spacing[0], grid.box
+    dx, (ny, nx) = grid.steps(0), grid.box
+    x_share, y_share = grid.widths(0), grid.widths(1)[:, None] if grid.dim == 2 else np.ones((1, 1))
     x_nodes, x_faces = grid.nodes_and_faces(0)
     x, y = x_nodes[None, 1:-1], grid.y
     h_x = np.broadcast_to(film(x_nodes[None, :], y), (ny, nx + 2))
@@ -159,14 +162,13 @@ def _coefficients(
     edges = (lambda axis: ()) if mean_cubes else getattr(film, "jumps", lambda axis: ())
     x_jumps, y_jumps = edges("x"), edges("y")
     if x_jumps or y_jumps:
-        across = grid.spacing[1] if grid.dim == 2 else 1.0
+        across = grid.steps(1) if grid.dim == 2 else np.ones(2)
         cubes_x, h_face = face_film(film, x_nodes, x_faces, y[:, 0], x_jumps, y_jumps, across)
     else:
         cubes_x = cubes(h_face.T, h_x.T).T
-    k_x = (k * cubes_x.T / dx).T
+    k_x = k * cubes_x / dx * y_share
     k_W, k_E = k_x[:, :-1], k_x[:, 1:]  # a face's conductance is stored once
     if grid.dim == 2:
-        dy = grid.spacing[1]
         y_nodes, y_faces = grid.nodes_and_faces(1)
         h_y = np.broadcast_to(film(x, y_nodes[:, None]), (ny + 2, nx))
         at_y_faces = np.broadcast_to(film(x, y_faces[:, None]), (ny + 1, nx))
@@ -174,7 +176,7 @@ def _coefficients(
             cubes_y = face_film(lambda t, s: film(s, t), y_nodes, y_faces, x[0], y_jumps, x_jumps, dx)[0].T
         else:
             cubes_y = cubes(at_y_faces, h_y)
-        k_y = k * cubes_y * dx / (dy * dy)
+        k_y = k * cubes_y * (grid.spacing[0] * x_share) / (grid.steps(1) * grid.spacing[1])[:, None]
         k_S, k_N = k_y[:-1], k_y[1:]
     else:
         k_S = k_N = np.zeros(grid.box)
@@ -194,6 +196,7 @@ def _coefficients(
         b_C, b_W = -U_r * h_face[:, 1:], U_r * h_face[:, :-1]
     else:
         b_C, b_W = -U_r * h, U_r * h_W
+    couette_W, couette_E, b_C, b_W = (y_share * a for a in (couette_W, couette_E, b_C, b_W))
     open_west, *_ = sides(grid)
     if r_in:
         couette_W = couette_W - np.where(open_west, b_W * r_in, 0.0)
@@ -206,8 +209,6 @@ def _coefficients(
         k_W, k_E = np.where(west, 0.0, k_W), np.where(east, 0.0, k_E)
         k_S, k_N = np.where(south, 0.0, k_S), np.where(north, 0.0, k_N)
         couette_W, couette_E = np.where(west, 0.0, couette_W), np.where(east, 0.0, couette_E)
-        half = np.where(sides(grid, ("mirror",))[3], 0.5, 1.0)  # the cells of the line on the mirror
-        k_W, k_E, b_C, b_W, couette_W, couette_E = (half * a for a in (k_W, k_E, b_C, b_W, couette_W, couette_E))
 
     c = couette_W - couette_E
     for conductance, points, p_side in zip((k_W, k_E, k_S, k_N), side_points(grid), p_sides, strict=True):

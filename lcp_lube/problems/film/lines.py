@@ -1,0 +1,94 @@
+"""Grid lines on the straight edges of a film: even between two edges, as many cells there as its length asks for.
+
+A point on an edge sees the film of either side in its two halves: no cell face, and no strip of one, has an edge inside, so
+that the box scheme keeps its second order (docs/accuracy.md). Lines are moved, none is added. Where the number of meshes is a
+multiple of 2^k and the spacings hardly suffer (UNEVEN), every stretch has a multiple of 2^k cells: coarser grids of a
+multigrid method, and the grids of a refinement by halves, then have lines on the edges too.
+"""
+
+import heapq
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.parallel import Array
+from ..grid import OFFSET
+
+SAME = 1e-9  # of the length: edges so near each other, or a side, are one
+UNEVEN = 1.1  # largest spacing over the mean, up to which a grid is made from a coarser one by halves
+
+
+def on_edges(n: int, length: float, ends: Sequence[str], edges: Sequence[float]) -> Array | None:
+    """Coordinates of n points of a line with one on each edge, m; None where evenly spaced ones will do or are all there is.
+
+    Parameters
+    ----------
+    ends : kinds of the two ends (`grid.OFFSET`). edges : coordinates from the line's start, m; those off the line count for
+        nothing.
+    """
+    periodic = "periodic" in ends
+    places, slack = np.asarray(edges, dtype=float), SAME * length
+    inside = places[(places > slack) & (places < length - slack)]
+    at_ends = (np.abs(places) <= slack) | (np.abs(places - length) <= slack)
+    places = np.unique(np.concatenate([[0.0] if periodic and at_ends.any() else [], inside]))
+    if not places.size:
+        return None
+    places = places[np.concatenate([[True], np.diff(places) > slack])]
+    knots = np.concatenate([places, [places[0] + length]]) if periodic else np.concatenate([[0.0], places, [length]])
+    stretches = np.diff(knots)
+    # Half a mesh of a closed end lies before its first point.
+    cut = np.zeros(stretches.size)
+    if not periodic:
+        cut[0] += 0.5 * (ends[0] == "closed")
+        cut[-1] += 0.5 * (ends[1] == "closed")
+    meshes = n if periodic else n + OFFSET[ends[0]] + OFFSET[ends[1]] - 1.0
+    counts = _counts(stretches, cut, round(meshes + cut.sum()))
+    if counts is None:
+        return None
+    at = np.concatenate([[0.0], np.cumsum(counts - cut)])  # of the knots, in meshes
+    if periodic:
+        first = int(np.floor(places[0] * counts[-1] / stretches[-1] + SAME))  # points between 0 and the first edge
+        steps = np.arange(n) - first
+        line = np.interp(steps % n, at, knots) + length * (steps // n)
+    else:
+        line = np.interp(np.arange(n) + OFFSET[ends[0]], at, knots)
+    even = (np.arange(n) + OFFSET[ends[0]]) * (length / meshes)
+    return None if np.allclose(line, even, rtol=0.0, atol=slack) else line
+
+
+def _counts(stretches: Array, cut: Array, total: int) -> NDArray[np.int64] | None:
+    """Cells of each stretch, `total` in all; None where they are too few."""
+    alike = bool(np.allclose(stretches, stretches[::-1], rtol=0.0, atol=SAME * stretches.sum()) and cut[0] == cut[-1])
+    halvings = 0 if cut.any() else (total & -total).bit_length() - 1
+    found = []  # (largest spacing over the mean, counts), of the grid itself first
+    for coarse in (total >> k for k in range(halvings + 1) if total >> k >= stretches.size):
+        counts = _shared_out(stretches, cut, coarse, alike and (stretches.size % 2 == 1 or coarse % 2 == 0))
+        largest = float(np.max(stretches / (counts - cut)) * (coarse - cut.sum()) / stretches.sum())
+        found.append((largest, counts * (total // coarse)))
+    if not found:
+        return None
+    allowed = 1.0 + SAME if found[0][0] <= 1.0 + SAME else max(found[0][0], UNEVEN)
+    return next(counts for largest, counts in reversed(found) if largest <= allowed)
+
+
+def _shared_out(stretches: Array, cut: Array, total: int, mirrored: bool) -> NDArray[np.int64]:
+    """Cells for each stretch so that the largest spacing is as small as can be; alike on both sides of the middle."""
+    size = stretches.size
+    half = (size + 1) // 2 if mirrored else size  # those behind the middle follow
+    middle = half - 1 if mirrored and size % 2 else -1
+    price = np.where(np.arange(half) == middle, 1, 2) if mirrored else np.ones(half, dtype=int)
+    step = np.where(np.arange(half) == middle, 2, 1)  # an odd middle stays odd
+    counts = np.maximum(1, (stretches[:half] * (total / stretches.sum())).astype(int) - 2)
+    if middle >= 0:
+        counts[middle] += (total - int(price @ counts)) % 2
+    while int(price @ counts) > total:  # least ones of many small stretches
+        spare = np.where(counts > step, stretches[:half] / np.maximum(counts - step - cut[:half], 0.5), np.inf)
+        counts[np.argmin(spare)] -= step[np.argmin(spare)]
+    heap = [(-stretches[k] / (counts[k] - cut[k]), k) for k in range(half)]
+    heapq.heapify(heap)
+    for _ in range((total - int(price @ counts)) // int(price[0] * step[0])):
+        _, k = heapq.heappop(heap)
+        counts[k] += step[k]
+        heapq.heappush(heap, (-stretches[k] / (counts[k] - cut[k]), k))
+    return np.concatenate([counts, counts[: size - half][::-1]]) if mirrored else counts

@@ -1,0 +1,127 @@
+"""Grid lines on a film's edges: where they lie, what the discrete problem on them keeps, and the order that they restore."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lcp_lube import load_scene, solve
+from lcp_lube.problems.film.lines import UNEVEN, on_edges
+from lcp_lube.problems.film.lubrication import LubricationProblem
+from lcp_lube.problems.grid import OFFSET, Grid
+from lcp_lube.problems.transfer import Transfer
+
+OPEN, RING = ("open", "open"), ("periodic", "periodic")
+KINDS = [OPEN, ("open", "closed"), ("closed", "closed"), ("open", "mirror"), RING]
+
+
+@given(
+    st.integers(3, 200),
+    st.lists(st.floats(0.0, 1.0), min_size=1, max_size=12),
+    st.sampled_from(KINDS),
+)
+def test_a_point_on_every_edge(n, edges, ends):
+    """n points in ascending order, one on each edge, evenly spaced in between."""
+    length = 0.01
+    lines = on_edges(n, length, ends, [length * edge for edge in edges])
+    if lines is None:
+        return
+    assert lines.size == n and (np.diff(lines) > 0).all() and lines[0] >= 0 and lines[-1] <= length
+    inside = np.array([length * edge for edge in edges if 1e-8 < edge < 1 - 1e-8])
+    if inside.size:
+        assert np.abs(lines[:, None] - inside).min(axis=0).max() <= 2e-9 * length
+    if ends == OPEN:
+        around = np.concatenate([[0.0], lines, [length]])
+        knots = np.unique(np.concatenate([[0, n + 1], np.searchsorted(around, inside - 1e-10)]))
+        for a, b in pairwise(knots):
+            steps = np.diff(around[a : b + 1])
+            np.testing.assert_allclose(steps, steps.mean(), rtol=1e-6, atol=4e-9 * length)
+
+
+def test_lines_of_a_symmetric_film_are_symmetric_and_nest():
+    edges = [t for k in range(5) for t in (0.4 + 2 * k, 1.6 + 2 * k)]
+    for n in (78, 79, 80, 159, 319):
+        lines = on_edges(n, 10.0, OPEN, edges)
+        np.testing.assert_allclose(lines, 10.0 - lines[::-1], rtol=0, atol=1e-12)
+    coarse, fine = (on_edges(n, 10.0, OPEN, edges) for n in (159, 319))
+    np.testing.assert_allclose(fine[1::2], coarse, rtol=0, atol=1e-12)
+    steps = np.diff(np.concatenate([[0.0], fine, [10.0]]))
+    assert steps.max() <= UNEVEN * 10.0 / 320
+
+
+def test_no_lines_are_moved_where_edges_lie_on_points_or_are_too_many():
+    assert on_edges(9, 1.0, OPEN, [0.2, 0.7]) is None and on_edges(49, 1.0, OPEN, [0.2, 0.5]) is None
+    assert on_edges(9, 1.0, OPEN, []) is None and on_edges(9, 1.0, OPEN, [-1.0, 0.0, 1.0, 3.0]) is None
+    assert on_edges(3, 1.0, OPEN, [0.11, 0.23, 0.35, 0.47, 0.59]) is None
+
+
+@pytest.mark.parametrize("ends", KINDS)
+def test_grid_of_uneven_lines(ends):
+    """Cells fill the line, steps join the points, and a grid of even lines given as places is the even grid."""
+    n, length = 6, 2.0
+    first, last = (OFFSET[end] for end in ends)
+    even = (np.arange(n) + first) * (length / (n + first + last - 1.0))
+    plain, given_, moved = (
+        Grid((n,), (length,), ends=(ends, OPEN), places=(places, None))
+        for places in (None, even, even + 0.02 * np.sin(5 * even) * (even < 1.9))
+    )
+    for name in ("widths", "steps", "nodes_and_faces"):
+        for one, other in zip(getattr(plain, name)(0), getattr(given_, name)(0), strict=True):
+            apart = np.abs(np.asarray(one) - other)
+            assert np.minimum(apart, np.abs(apart - length)).max() < 1e-12
+    np.testing.assert_allclose(plain.rims(0), given_.rims(0))
+    strips = sum(0.5 * rim for rim, end in zip(moved.rims(0), ends, strict=True) if end == "open")
+    assert (moved.widths(0).sum() + strips) * moved.spacing[0] == pytest.approx(length, rel=1e-12)
+    for grid in (plain, given_, moved):
+        grid.destroy()
+
+
+@pytest.mark.parametrize("ends", KINDS)
+def test_interpolation_is_exact_for_linear_functions(ends):
+    rng = np.random.default_rng(3)
+    grids = []
+    for n in (9, 20):
+        places = np.sort(rng.random(n))
+        places[-1] = 1.0 if ends[1] == "mirror" else places[-1]
+        grids.append(Grid((n, 3), (1.0, 1.0), ends=(ends, OPEN), places=(places, None)))
+    coarse, fine = grids
+    transfer = Transfer(coarse, fine)
+    found = transfer(np.broadcast_to(coarse.x, coarse.box).ravel()).reshape(fine.box)
+    inside = (fine.x[0] >= coarse.x[0, 0]) & (fine.x[0] <= coarse.x[0, -1])
+    np.testing.assert_allclose(found[:, inside], np.broadcast_to(fine.x, fine.box)[:, inside], rtol=0, atol=1e-12)
+    for obj in (transfer, coarse, fine):
+        obj.destroy()
+
+
+def pad(n: int, **changes) -> object:
+    return load_scene("dimpled_pad", {"nx": n, "ny": n, **changes})
+
+
+def test_methods_agree_on_uneven_lines():
+    """Every method solves the same equations: fields agree, certificates hold, half the width is the whole."""
+    scene = load_scene("dimpled_pad", {"nx": 44, "ny": 29, "film.dimples.columns": 2, "film.dimples.rows": 1, "U": 2.0})
+    first = solve(scene, method="active-set")
+    assert isinstance(first.problem, LubricationProblem) and not first.problem.grid.even
+    for how in (
+        {},
+        {"method": "fas"},
+        {"method": "din"},
+        {"method": "fbn-a"},
+        {"method": "monotone"},
+        {"method": "active-set", "nested": True},
+    ):
+        other = solve(scene, **how)
+        assert other.converged and other.certificate.holds, how
+        np.testing.assert_allclose(other.fields["p"], first.fields["p"], rtol=0, atol=1e-6 * first.fields["p"].max())
+        other.destroy()
+    first.destroy()
+
+
+def test_the_square_dimpled_pad():
+    """The load of the 5 x 5 pad of square dimples, 6.1969 N above p_c, to 2 % at 80 points a side and 0.1 % at 160."""
+    for n, error in ((80, 2e-2), (160, 1e-3)):
+        solution = solve(pad(n))
+        assert solution.numbers["pressure_integral"] == pytest.approx(6.1969, rel=error)
+        solution.destroy()
