@@ -10,6 +10,7 @@ from .base.parallel import overflow_is_no_warning
 from .drivers import compose
 from .drivers.ask import Ask
 from .drivers.memory import peak
+from .drivers.supplies import check_backflow
 from .problems.solution import Solution
 from .scenes.doubts import doubts
 from .scenes.scene import Scene, as_scene
@@ -43,6 +44,7 @@ def solve(scene: str | Path | dict[str, Any] | Scene, ask: Ask | None = None, **
         check_same(ask.mpi, f"scene {scene.name} or how to solve it", (scene, ask.choices))
     compose.check(scene, ask)
     solution = compose.solve(scene, ask)
+    check_backflow(solution)
     last = _solved(scene, solution)
     data = last.data_si()
     if "nx" in data:

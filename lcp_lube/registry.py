@@ -224,6 +224,7 @@ DRIVERS: dict[str, Entry] = {
     "attitude": Entry("lcp_lube.drivers.attitude", "the attitude that follows from the load's direction"),
     "time": Entry("lcp_lube.drivers.time", "step by step, where the film moves"),
     "turned": Entry("lcp_lube.drivers.turned", "a wall that moves to smaller x, by the mirror image"),
+    "supplies": Entry("lcp_lube.drivers.supplies", "pressures of supplies behind restrictors, or of given flow"),
     "warm": Entry("lcp_lube.drivers.warm", "from a neighbour's answer, or anew where that leads nowhere"),
     "fluid": Entry("lcp_lube.drivers.fluid", "viscosity and density that depend on the pressure"),
     "grooves": Entry("lcp_lube.drivers.grooves", "films between axial grooves, one by one"),

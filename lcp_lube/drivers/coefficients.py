@@ -17,22 +17,19 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from petsc4py import PETSc
 
-from ..base.options import recipe
 from ..base.parallel import Array
 from ..errors import InputError
-from ..linear.krylov import Krylov
-from ..problems.facts import Facts
 from ..problems.film.cavity import cavity_sign
 from ..problems.film.flows import point_weights
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
+from ..problems.film.supplies import supply_flows
 from ..problems.film.turning import Turning
 from ..problems.solution import Fields, Solution
 from ..scenes.scene import Scene
 from .grooves import pad_films, pick_pad
-from .plan import default_recipe
+from .linearised import Feed, Linear
 
 STEP = 0.125  # of the thinnest film: G is a cubic in the displacement, which four values give exactly whatever the step
 
@@ -84,6 +81,8 @@ def coefficients(scene: Scene, solution: Solution, frequencies: Sequence[float] 
     if turning is None:
         raise InputError(f"scene {scene.name}: coefficients are of journals; it has no part that could be displaced")
     model: Model = scene.model  # type: ignore[attr-defined]
+    if supplies := solution.settings.get("supply_pressures"):
+        model = replace(model, supplies=tuple(replace(one, p=p) for one, p in zip(model.supplies, supplies, strict=True)))
     if model.law is not None:
         raise InputError(f"scene {scene.name}: coefficients are of fluids with constant viscosity and density")
     for nu in frequencies:
@@ -141,19 +140,40 @@ def _of_film(
     weight = -grid.cell * size * problem.p_unit * np.where(cavity, 0.0, 1.0)  # of z' in the force: cavitated cells have no p'
     sides = np.stack([weight * np.cos(theta), weight * np.sin(theta)])
     out = np.zeros((len(frequencies), 2, 2), dtype=complex)
-    solver = _Linear(problem, cavity)
+    solver, held = Linear(problem, cavity), problem.held
+    free = [one.open for one in held.supplies] if held is not None else []
+    feed = Feed(problem, cavity, free) if any(free) else None
+    taken = supply_flows(problem, p, r)
+    sources = np.array([one.misfit(one.p, q)[1:] for one, q in zip(held.supplies if held else (), taken, strict=True)])
+    answers: dict[float, list[Any]] = {}
+
+    def settled(z: Any, raw: Any, nu: float) -> Any:
+        """z with the change of the pressures that follow."""
+        if feed is None:
+            return z
+        if nu not in answers:
+            pushed, none = [feed.pushed(t) for t in feed.free], np.zeros_like(h)
+            answers[nu] = [solver.at(nu, M, b, none) if nu else solver.solve(b) for b in pushed]
+        return feed.corrected(z, raw, answers[nu], sources)
+
     try:
         for column, angle in enumerate((0.0, 0.5 * math.pi)):
             moved = Displaced(model.gap, turning, angle, 0.0, first)
-            dG = _derivative(problem, model, moved, shift, p, r)
+            dG, d_raw = _derivative(problem, model, moved, shift, p, r)
             change = np.broadcast_to(moved.change(x), grid.box).ravel()
             S = storage / h * (1.0 - r) * change
-            z0 = solver.solve(-dG)
+            swept = S if held is None else np.where(held.mask.ravel(), 0.0, S)
+            z0 = settled(solver.solve(-dG), d_raw, 0.0)
             for k, nu in enumerate(frequencies):
-                found = solver.at(nu, M, -dG, -nu * S) if nu else z0 + 1j * solver.solve(-(S + M * z0))
+                if nu:
+                    found = settled(solver.at(nu, M, -dG, -nu * swept), d_raw + 1j * nu * S, nu)
+                else:
+                    found = z0 + 1j * settled(solver.solve(-(swept + M * z0)), S, 0.0)
                 out[k, :, column] = [-_dot(problem, row, found) for row in sides]
     finally:
         solver.destroy()
+        if feed is not None:
+            feed.destroy()
     return out
 
 
@@ -161,82 +181,21 @@ def _dot(problem: LubricationProblem, row: Array, z: Any) -> complex:
     return complex(problem.reduce.dot(row, z.real), problem.reduce.dot(row, z.imag))
 
 
-def _derivative(problem: LubricationProblem, model: Model, moved: Displaced, step: float, p: Array, r: Array) -> Array:
-    """dG/de at fixed fields: exact, as G is a cubic in e (conductances in h^3, Couette terms in h). Collective."""
+def _derivative(
+    problem: LubricationProblem, model: Model, moved: Displaced, step: float, p: Array, r: Array
+) -> tuple[Array, Array]:
+    """dG/de at fixed fields, and that of the cells' own balances, were none held: exact, as G is a cubic in e (conductances in
+    h^3, Couette terms in h). Collective."""
     values = []
     for size in (-2.0, -1.0, 1.0, 2.0):
         gap, places = replace(moved, e=size * step), problem.grid.places
         other = replace(model, gap=gap, exact=None, places=places).build(problem.grid.shape, problem.grid.dm.comm)  # type: ignore[arg-type]
-        values.append(other.flow(p, r))
+        balance = other.flow(p, r)
+        values.append(np.stack([balance, balance if other.held is None else other.face_flows(p, r)]))
         other.destroy()
     a, b, c, d = values
-    return (8.0 * (c - b) - (d - a)) / (12.0 * step)
-
-
-class _Linear:
-    """J = A where the film is full, -B where it is not, factored once; and J + i nu M as a real matrix of twice the size."""
-
-    def __init__(self, problem: LubricationProblem, cavity: Any):
-        self.problem = problem
-        full, void = problem.A.createVecs()
-        full.setArray(np.where(cavity, 0.0, 1.0))
-        void.setArray(np.where(cavity, -1.0, 0.0))
-        self.J = problem.A.copy()
-        self.J.diagonalScale(None, full)
-        B = problem.B.copy()
-        B.diagonalScale(None, void)
-        self.J.axpy(1.0, B, structure=PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
-        for obj in (B, full, void):
-            obj.destroy()
-        self._krylov: Krylov | None = None
-
-    def solve(self, b: Array) -> Array:
-        """J^-1 b. Collective."""
-        if self._krylov is None:
-            self._krylov = self._factored(self.J)
-        return self._solve(self._krylov, self.J, b)
-
-    def at(self, nu: float, M: Array, real: Array, imaginary: Array) -> Any:
-        """(J + i nu M)^-1 (real + i imaginary). Collective."""
-        J, n = self.J, self.problem.grid.local_size
-        diagonal = J.createVecLeft()
-        diagonal.setArray(nu * M)
-        plus = PETSc.Mat().createAIJ(J.getSizes(), nnz=1, comm=J.comm)
-        plus.setDiagonal(diagonal)
-        plus.assemble()
-        minus = plus.copy()
-        minus.scale(-1.0)
-        nest = PETSc.Mat().createNest([[J, minus], [plus, J]], comm=J.comm)
-        big = nest.convert("aij", PETSc.Mat())
-        krylov = self._factored(big)
-        z = self._solve(krylov, big, np.concatenate([real, imaginary]))
-        krylov.destroy()
-        for obj in (nest, big, minus, plus, diagonal):
-            obj.destroy()
-        return z[:n] + 1j * z[n:]
-
-    def _factored(self, mat: PETSc.Mat) -> Krylov:
-        grid = self.problem.grid
-        facts = Facts(self.problem.kind, grid.shape, grid.comm.size)
-        with recipe(default_recipe(facts, "full", large=False)[0]):
-            krylov = Krylov(mat)
-            krylov.set_up()
-        return krylov
-
-    @staticmethod
-    def _solve(krylov: Krylov, mat: PETSc.Mat, b: Array) -> Array:
-        x, rhs = mat.createVecs()
-        rhs.setArray(b)
-        krylov.solve(rhs, x, 1e-12)
-        z = x.array_r.copy()
-        x.destroy()
-        rhs.destroy()
-        return z
-
-    def destroy(self) -> None:
-        if self._krylov is not None:
-            self._krylov.destroy()
-        self.J.destroy()
+    dG, raw = (8.0 * (c - b) - (d - a)) / (12.0 * step)
+    return dG, raw
 
 
 def stability(K: Array, C: Array) -> tuple[float | None, float | None]:

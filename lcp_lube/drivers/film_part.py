@@ -114,6 +114,9 @@ def promising(scene: Solvable) -> bool:
     """Whether some columns and lines of the film look like one of a part: nothing is built for films that do not."""
     model = model_of(scene)
     assert model is not None  # as `applies` found
+    supplied = model.supplies
+    if supplied and (len(scene.shape) == 1 or not all(one.region.symmetric(0.5 * model.lengths[-1]) for one in supplied)):
+        return False
     if _at_rest(model):
         return True
     kinds = [tuple(side.kind for side in model.sides[k : k + 2]) for k in (0, 2)]
@@ -129,7 +132,11 @@ def promising(scene: Solvable) -> bool:
 
 def _at_rest(model: Model) -> bool:
     """Whether neither the wall nor a difference of pressures moves the fluid."""
-    return not model.U and len({side.p for side in model.sides[: 2 * len(model.lengths)] if side.kind == "open"}) == 1
+    return (
+        not model.U
+        and not model.supplies
+        and len({side.p for side in model.sides[: 2 * len(model.lengths)] if side.kind == "open"}) == 1
+    )
 
 
 def part_of(scene: Solvable, problem: Problem) -> Part | None:
@@ -142,11 +149,17 @@ def part_of(scene: Solvable, problem: Problem) -> Part | None:
     pressures = {side.p for side in model.sides[: 2 * grid.dim] if side.kind == "open"}
     if _at_rest(model):
         return Part(scene, "constant")
-    if len(pressures) == 1 and not west.r and "closed" not in (west.kind, east.kind) and _is_constant(problem):
+    if (
+        len(pressures) == 1
+        and not west.r
+        and not model.supplies
+        and "closed" not in (west.kind, east.kind)
+        and _is_constant(problem)
+    ):
         return Part(scene, "constant")
     if grid.dim == 1:
         return None
-    if "open" not in (ends[0].kind, ends[1].kind) and _all_lines_are_one(problem):
+    if "open" not in (ends[0].kind, ends[1].kind) and not model.supplies and _all_lines_are_one(problem):
         return Part(scene, "line")
     faces = not (model.mean_cubes and model.scheme == "upwind")  # whether the discretisation asks for the film there
     if ends[0] == ends[1] and grid.shape[1] // 2 >= grid.comm.size and _is_symmetric(problem, faces):

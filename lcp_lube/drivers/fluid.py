@@ -39,7 +39,8 @@ class Frozen(Derived):
         """The film of the constant fluid, in q."""
         model: Model = self.whole.model  # type: ignore[attr-defined]
         sides = (replace(side, p=float(self.law.reduced(np.array(side.p)))) for side in model.sides)
-        return replace(model, sides=tuple(sides), law=None, exact=None)  # type: ignore[arg-type]
+        supplies = tuple(replace(one, p=float(self.law.reduced(np.array(one.p)))) for one in model.supplies)
+        return replace(model, sides=tuple(sides), supplies=supplies, law=None, exact=None)  # type: ignore[arg-type]
 
     @property
     def model(self) -> Model | None:

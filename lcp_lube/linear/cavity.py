@@ -58,6 +58,8 @@ class CavitySystem:
         grid = problem.grid
         if any(grid.periodic):
             raise InputError("--system cavity: x lines need a beginning and an end, y columns too; take --system reduced")
+        if problem.scheme.held is not None:
+            raise InputError("--system cavity: supplies end the runs of void that it eliminates; take --system reduced")
         if grid.box[1] != grid.shape[0]:
             raise InputError("--system cavity: needs every x line on one rank; take --system reduced or fewer ranks")
         scheme = problem.scheme

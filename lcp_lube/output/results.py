@@ -139,6 +139,10 @@ def _bearing_lines(data: dict[str, Any], one_d: bool) -> list[str]:
     losses = "" if coefficient is None else f"friction coefficient {coefficient:.4g}, "
     flows = ", ".join(f"{side} {value:.4g}" for side, value in data["flow"].items())
     lines.append(f"{losses}power loss {quantity(data['power_loss'], 'W' + per)}; flow out: {flows} {flow_unit}")
+    if data.get("supply_p"):
+        pairs = zip(data["supply_p"], data["supply_flow"], strict=True)
+        supplied = ", ".join(f"{quantity(p, 'Pa', 6)} {flow:.4g}" for p, flow in pairs)
+        lines.append(f"supplies, pressure and flow into the film: {supplied} {flow_unit}")
     if data.get("flow_growth"):
         growth = ", ".join(f"{side} {value:+.2g}" for side, value in data["flow_growth"].items() if value)
         lines.append(f"these flows have no limit: sides of unequal pressure meet; each halving of the spacings adds {growth}")

@@ -15,6 +15,7 @@ class Facts:
     ranks : that share them.
     periodic : whether the domain closes in x, and in y.
     dense : whether the Jacobian is a dense matrix.
+    held : whether supplies hold cells inside at their pressures.
     """
 
     kind: str
@@ -22,6 +23,7 @@ class Facts:
     ranks: int = 1
     periodic: tuple[bool, ...] = (False, False)
     dense: bool = False
+    held: bool = False
 
     @property
     def dim(self) -> int:

@@ -17,10 +17,12 @@ from ..problems.film.forces import Shaft
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import NAMES, OPPOSITE, Model, Side
 from ..problems.film.shapes import Block, Sum
+from ..problems.film.supplies import Supply
 from ..problems.film.turned import exact_either_way
 from .balance import BalanceTable
 from .film import Extent, FilmPart, JournalPart
 from .scene import Count, Finite, Positive, Scene
+from .supply import Place, SupplyTable, supplies_of
 from .units import Measured, is_quantity, measured, metres
 
 SAMPLES = 65  # points a side of the film from which the pressure unit is taken: the same on every grid
@@ -85,6 +87,7 @@ class BearingScene(Scene):
     film: list[FilmPart] = Field(..., min_length=1, description="shapes, which are added up")
     h_floor: Positive | None = metres(None, "smallest film: the sum is cut there; default no cut")
     sides: SidesTable = Field(SidesTable(), description="condition at each side")
+    supply: list[SupplyTable] = Field([], description="supplies inside the film")
     scheme: Literal["nodal", "face", "upwind"] = Field("face", description="form of the Couette flux")
     mean_cubes: bool = Field(False, description="h^3 at a face as the mean of the nodal values")
     p_unit: Positive | None = measured("Pa", None, "pressure unit of the equations; default from mu U L/h^2")
@@ -118,7 +121,17 @@ class BearingScene(Scene):
                 )
             if getattr(self.sides, name).kind == "periodic" and getattr(self.sides, OPPOSITE[name]).kind != "periodic":
                 raise ValueError(f"sides.{name} is periodic, sides.{OPPOSITE[name]} is not: both of them or none")
+        self._supplies()
         return self
+
+    def _supplies(self) -> tuple[Supply, ...]:
+        """The supplies inside the film; angles are counted from x = 0 of a film with a journal."""
+        names = [name for name in NAMES[: 2 * self.dimension] if getattr(self.sides, name).kind == "pressure"]
+        least = min((self._pressure(name) for name in names), default=self.fluid.p_c)
+        journal = any(isinstance(table, JournalPart) for table in self.film)
+        radius = self.L / (2.0 * math.pi) if journal else None
+        place = Place(self.side_lengths, self.sides.west.kind == "periodic", self.fluid.p_c, radius, 0.0, least)
+        return supplies_of(self.supply, place)
 
     def _pressure(self, name: str) -> float:
         """Absolute pressure of a side, Pa."""
@@ -186,6 +199,7 @@ class BearingScene(Scene):
             mean_cubes=self.mean_cubes,
             exact=self.exact,
             shaft=self._shaft,
+            supplies=self._supplies(),
             law=self._law,
         )
 
@@ -214,12 +228,19 @@ class BearingScene(Scene):
         if not positive.size:
             return 1e6  # the discretisation says where the film is not positive
         drag = self.fluid.mu * abs(self.U) * self.L / float(positive.min()) ** 2
-        unit = max(drag, *(side.p for side in self._sides()))
+        unit = max(drag, *(side.p for side in self._sides()), *(max(one.p, one.p_s) for one in self._supplies()))
         return 10.0 ** round(math.log10(unit)) if 1e-90 < unit < 1e90 else 1e6
 
     def exact(self) -> ExactSolution | None:
         gap, (west, east, *_) = self.gap, self._sides()
-        if self.dimension == 2 or {west.kind, east.kind} != {"open"} or west.r or not gap.smooth_between or self._law:
+        if (
+            self.dimension == 2
+            or {west.kind, east.kind} != {"open"}
+            or west.r
+            or not gap.smooth_between
+            or self._law
+            or self.supply
+        ):
             return None
         return exact_either_way(gap, self.L, self.fluid.mu, self.U, west.p, east.p)
 

@@ -13,9 +13,11 @@ from ..problems.film.forces import Shaft
 from ..problems.film.grooves import Groove
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model, Side
+from ..problems.film.supplies import Patch, Supply
 from ..problems.film.turning import Turning
 from .balance import BalanceTable
 from .scene import Count, Finite, NotNegative, Positive, Scene
+from .supply import Place, SupplyTable, supplies_of
 from .units import measured, metres
 
 
@@ -46,6 +48,7 @@ class GroovedJournalScene(Scene):
     p_groove: NotNegative = measured("Pa", 0.0, "pressure in the grooves, above p_c")
     p_end: NotNegative = measured("Pa", 0.0, "pressure at both ends, above p_c")
     p_c: Finite = measured("Pa", 0.0, "cavitation pressure")
+    supply: list[SupplyTable] = Field([], description="supplies inside the film, beside the grooves; pressures are absolute")
     balance: BalanceTable | None = Field(None, description="load to carry; eccentricity and attitude are found for it")
     scheme: str | None = Field("face", description="form of the Couette flux: face")
     n: Count = Field(360, description="points around, and an odd number near a sixteenth of them across")
@@ -64,11 +67,23 @@ class GroovedJournalScene(Scene):
             raise ValueError("balance: eccentricity and attitude follow from the load: neither attitude_deg nor another vary")
         if self.preload and len(places) < 2:
             raise ValueError(f"preload = {self.preload:g}: lobes lie between at least two grooves")
-        if not places and not self.p_end > 0:
+        if not places and not self.p_end > 0 and not self.supply:
             raise ValueError(f"p_end = {self.p_end:g}: without grooves the ends feed the film: p_end > 0 is needed")
         if self.shape[0] < 12 * max(1, len(places)):
             raise ValueError(f"nx = {self.shape[0]}: at least {12 * max(1, len(places))} points around are needed")
+        self._supplies()
         return self
+
+    def _supplies(self) -> tuple[Supply, ...]:
+        """The tables' supplies, and behind them the grooves, where there are both: cells held on the whole ring."""
+        if not self.supply:
+            return ()
+        turning, L = self.turning, math.pi * self.D
+        place = Place((L, turning.B), True, self.p_c, turning.R, turning.start, self.p_end + self.p_c)
+        half = math.radians(0.5 * self.groove_deg) * turning.R
+        middles = [(math.radians(at) - turning.start) * turning.R for at in self.grooves_deg]
+        grooves = [Supply(Patch(x, 0.0, half, math.inf, period=L), p=self.p_groove) for x in middles]
+        return (*supplies_of(self.supply, place), *grooves)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -132,7 +147,8 @@ class GroovedJournalScene(Scene):
             shaft=Shaft(
                 turning.R, math.radians(self.attitude_deg or 0.0) + math.pi if self.eccentricity else None, turning.start
             ),
-            grooves=self.grooves,
+            grooves=() if self.supply else self.grooves,
+            supplies=self._supplies(),
         )
 
     def facts(self, comm: PETSc.Comm | None = None) -> Facts:

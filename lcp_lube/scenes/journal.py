@@ -11,9 +11,11 @@ from ..problems.film.forces import Shaft
 from ..problems.film.gaps import JournalGap, Raised
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model, Side
+from ..problems.film.supplies import Supply
 from ..problems.film.turning import Turning
 from .published import LubricationScene
 from .scene import Positive
+from .supply import Place, SupplyTable, supplies_of
 from .units import measured, metres
 
 
@@ -34,6 +36,7 @@ class JournalScene(LubricationScene):
     psi: Annotated[float, Field(gt=0, lt=1, description="relative clearance c/(D/2)")] = 1e-3
     omega: Positive = measured("rad/s", 100.0, "angular velocity")
     mu: Positive = 0.02
+    supply: list[SupplyTable] = Field([], description="supplies inside the film; pressures are absolute")
     L: Positive = Field(1.0, description="follows from D")
     U: Positive = Field(1.0, description="follows from D and omega")
 
@@ -57,12 +60,20 @@ class JournalScene(LubricationScene):
     @model_validator(mode="after")
     def _fed(self) -> "JournalScene":
         if self.round == "periodic":
-            if self.dimension == 1 or not self.p_side > 0:
+            if self.dimension == 1 or not (self.p_side > 0 or self.supply):
                 found = "dimension = 1" if self.dimension == 1 else f"p_side = {self.p_side:g}"
                 raise ValueError(f"{found}: without a groove (round = periodic) the ends feed the film: 2D, p_side > 0")
             if self.p_a or self.p_b:
                 raise ValueError(f"p_a = {self.p_a:g}, p_b = {self.p_b:g}: there is no groove (round = periodic)")
+        self._supplies()
         return self
+
+    def _supplies(self) -> tuple[Supply, ...]:
+        """The supplies inside the film, angles counted from the widest gap."""
+        lengths = (self.L,) if self.dimension == 1 else (self.L, self.width or self.L)
+        used = [self.p_side] if self.round == "periodic" else [self.p_a, self.p_b, *[self.p_side] * (self.dimension - 1)]
+        place = Place(lengths, self.round == "periodic", self.p_c, 0.5 * self.D, 0.0, min(used) + self.p_c)
+        return supplies_of(self.supply, place)
 
     @property
     def sides(self) -> tuple[Side, Side, Side, Side]:
@@ -81,7 +92,7 @@ class JournalScene(LubricationScene):
         return JournalGap(0.5 * self.psi * self.D, self.eccentricity, self.L)
 
     def exact(self) -> ExactSolution | None:
-        if self.dimension == 2:
+        if self.dimension == 2 or self.supply:
             return None
         return exact_solution(Raised(self.gap, self.h_offset), self.L, self.mu, self.U, self.p_a, self.p_b)
 
@@ -92,7 +103,8 @@ class JournalScene(LubricationScene):
 
     @property
     def model(self) -> Model:
-        return replace(super().model, shaft=Shaft(0.5 * self.D, 0.0 if self.eccentricity else None))
+        shaft = Shaft(0.5 * self.D, 0.0 if self.eccentricity else None)
+        return replace(super().model, shaft=shaft, supplies=self._supplies())
 
     def _bearing_numbers(self, values: dict[str, Any]) -> dict[str, Any]:
         """Sommerfeld number W psi^2/(B D mu omega), and in 2D the side leakage as Q/((D/2)^3 psi omega)."""

@@ -4,7 +4,7 @@ import os
 import textwrap
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, get_args, get_origin
 
 from mpi4py import MPI
 from pydantic import BaseModel
@@ -130,6 +130,12 @@ def _key(
 def _inner(field: FieldInfo, model: type[BaseModel], name: str, given: Any) -> list[str]:
     """A table inside the table; where it is not given and cannot be empty, a comment."""
     text = f"# {field.description}" if field.description else f"# {_sentence(model)}"
+    if get_origin(field.annotation) is list:
+        tables = given if isinstance(given, list) else [{}]
+        body = [_table(model, table, f"{name}.") for table in tables]
+        if given is None:
+            body = [[line if line.startswith("#") or not line else f"# {line}" for line in lines] for lines in body]
+        return [text, *(line for lines in body for line in (f"{'# ' * (given is None)}[[{name}]]", *lines))]
     lines = _table(model, given if isinstance(given, dict) else {}, f"{name}.")
     needed = any(inner.is_required() for inner in model.model_fields.values())
     if given is None and needed:

@@ -37,15 +37,18 @@ def balance(problem: LubricationProblem, fields: Fields) -> tuple[Array, Array]:
     s, box = problem.scheme, problem.grid.box
     frame_p, frame_r = (problem.grid.ghosted(fields[name], outside=0.0) for name in "pr")
     p, r = (fields[name].reshape(box) for name in "pr")
+    around = [frame_p[1:-1, :-2], frame_p[1:-1, 2:], frame_p[:-2, 1:-1], frame_p[2:, 1:-1]]
+    if s.held is not None:
+        around = [np.where(s.held, 0.0, beside) for beside in around]
     terms = [
-        s.k_W * (p - frame_p[1:-1, :-2]),
-        s.k_E * (p - frame_p[1:-1, 2:]),
+        s.k_W * (p - around[0]),
+        s.k_E * (p - around[1]),
         s.b_C * r,
-        s.b_W * frame_r[1:-1, :-2],
+        s.entering * frame_r[1:-1, :-2],
         -s.c,
     ]
     if problem.grid.dim == 2:
-        terms += [s.k_S * (p - frame_p[:-2, 1:-1]), s.k_N * (p - frame_p[2:, 1:-1])]
+        terms += [s.k_S * (p - around[2]), s.k_N * (p - around[3])]
     total, moduli = np.zeros(box), np.zeros(box)
     for term in terms:
         total += term

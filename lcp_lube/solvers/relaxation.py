@@ -27,16 +27,16 @@ class Relaxation:
     def __init__(self, problem: LubricationProblem):
         self.problem = problem
         s = problem.scheme
-        self._over_a, self._over_b = 1.0 / (s.k_W + s.k_E + s.k_S + s.k_N), 1.0 / s.b_C
+        self._over_a, self._over_b = 1.0 / s.diagonal, 1.0 / s.b_C
 
     def __call__(self, fields: Fields, sweeps: int) -> Fields:
         """p and r after so many sweeps, to and fro in y. Collective."""
         grid, s, p, r = self.problem.grid, self.problem.scheme, fields["p"], fields["r"]
+        coefficients = (*s.coupling, s.entering, s.c, self._over_a, self._over_b)
         alone = grid.comm.size == 1 and not any(grid.periodic)
         for k in range(sweeps):
             if k == 0 or not alone:
                 framed_p, framed_r = (np.nan_to_num(grid.ghosted(field), nan=0.0) for field in (p, r))
-            coefficients = (s.k_W, s.k_E, s.k_S, s.k_N, s.b_W, s.c, self._over_a, self._over_b)
             compiled(_sweep)(framed_p, framed_r, *coefficients, k % 2 == 1)
             if not alone or k == sweeps - 1:
                 p, r = (framed[1:-1, 1:-1].ravel() for framed in (framed_p, framed_r))

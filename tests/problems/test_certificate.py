@@ -1,5 +1,7 @@
 """The certificate: from the problem's data alone, it holds for solutions and for nothing else."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from films import make_problem
@@ -146,9 +148,10 @@ def test_loops_and_arrays_measure_the_same():
     r[r < 500] = 0.0
     scheme = random.uniform(1e-3, 1, (4, 7, 10))
     carried, c = -random.uniform(0, 1, (2, 7, 10)), random.uniform(-1, 1, (7, 10))
-    for p_max in (1e3, 1e-3):
-        loops = compiled(cell_misfits)(p, r, *scheme, *carried, c, p_max)
-        np.testing.assert_allclose(loops, array_misfits(p, r, *scheme, *carried, c, p_max), rtol=1e-10)
+    masks = (np.zeros((0, 0), dtype=bool), random.uniform(0, 1, (7, 10)) < 0.2)
+    for p_max, held in product((1e3, 1e-3), masks):
+        loops = compiled(cell_misfits)(p, r, *scheme, *carried, c, held, p_max)
+        np.testing.assert_allclose(loops, array_misfits(p, r, *scheme, *carried, c, held, p_max), rtol=1e-10)
         assert loops[-1] > 0
 
 

@@ -4,11 +4,13 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...base.compiled import compiled
 from ...base.parallel import Array
 from ..certificate import Certificate, certificate_tol
 from .reynolds import side_points
+from .supplies import supply_defect, supply_flows
 
 if TYPE_CHECKING:
     from .lubrication import LubricationProblem
@@ -24,7 +26,8 @@ def certify(problem: "LubricationProblem", p: Array, r: Array, eps1: float) -> C
     """Certificate of p (in p_unit) and r for a run whose tolerance was eps1. Collective.
 
     residual: ||A p + B r - c||, beyond what rounding of p and c makes of it, over ||A p|| + ||B r|| + ||c||; or, where that is
-    more, the largest balance of one cell in parts of what would move its own pressure by max|p|, or its void by 1 (`worst`);
+    more, the largest balance of one cell in parts of what would move its own pressure by max|p|, or its void by 1 (`worst`), or
+    what a supply's restrictor and its film disagree by (`supply_defect`);
     complementarity: max_i |min(p_i / max|p|, r_i)|, which bounds negative p, negative r and products alike; where the wall
     drags more than the pressures could push, r counts as the pressure that would push as much (`void_scale`);
     mass_defect: |flow in - flow out| / flow, over the open sides (`mass_defect`).
@@ -43,7 +46,7 @@ def certify(problem: "LubricationProblem", p: Array, r: Array, eps1: float) -> C
     over_all = np.maximum(residual - rounding, 0.0) / scale if scale != 0 else 0.0  # NaN stays NaN
     return Certificate(
         measures={
-            "residual": float(np.maximum(over_all, worst)),
+            "residual": float(np.max([over_all, worst, supply_defect(problem, p, r)])),
             "complementarity": red.max(np.abs(np.minimum(p / (p_max or 1.0), r / void_scale(problem, p_max)))),
             "mass_defect": mass_defect(problem, p, r),
         },
@@ -73,13 +76,24 @@ def misfits(problem: "LubricationProblem", p: Array, r: Array, p_max: float) -> 
     framed = [problem.grid.ghosted(field, outside=0.0) for field in (p, r)]
     many = problem.grid.size >= MANY and find_spec("numba")
     loop: Any = compiled(cell_misfits) if many else array_misfits
-    *squares, worst = loop(*framed, s.k_W, s.k_E, s.k_S, s.k_N, s.b_C, s.b_W, s.c, p_max)
+    held = s.held if s.held is not None else np.zeros((0, 0), dtype=bool)
+    *squares, worst = loop(*framed, s.k_W, s.k_E, s.k_S, s.k_N, s.b_C, s.entering, s.c, held, p_max)
     norms = [float(np.sqrt(reduce.sum(np.array([square])))) for square in squares]
     return *norms, reduce.max(np.array([worst]))  # type: ignore[return-value]
 
 
 def cell_misfits(
-    p: Array, r: Array, k_W: Array, k_E: Array, k_S: Array, k_N: Array, b_C: Array, b_W: Array, c: Array, p_max: float
+    p: Array,
+    r: Array,
+    k_W: Array,
+    k_E: Array,
+    k_S: Array,
+    k_N: Array,
+    b_C: Array,
+    b_W: Array,
+    c: Array,
+    held: NDArray[np.bool_],
+    p_max: float,
 ) -> tuple[float, float, float, float, float]:
     """Sums of the squares of A p, B r, A p + B r - c and diag(A) p over this rank's points, and the worst cell; `compiled`.
 
@@ -93,6 +107,8 @@ def cell_misfits(
         for i in range(nx):
             here, west, east, south, north = p[j + 1, i + 1], p[j + 1, i], p[j + 1, i + 2], p[j, i + 1], p[j + 2, i + 1]
             w, e, s, n = k_W[j, i], k_E[j, i], k_S[j, i], k_N[j, i]
+            if held.size and held[j, i]:
+                west = east = south = north = 0.0
             x, y = w * (here - west) + e * (here - east), s * (here - south) + n * (here - north)
             own, entering = b_C[j, i] * r[j + 1, i + 1], b_W[j, i] * r[j + 1, i]
             a, b, k = x + y, own + entering, w + e + s + n
@@ -112,11 +128,24 @@ def cell_misfits(
 
 
 def array_misfits(
-    p: Array, r: Array, k_W: Array, k_E: Array, k_S: Array, k_N: Array, b_C: Array, b_W: Array, c: Array, p_max: float
+    p: Array,
+    r: Array,
+    k_W: Array,
+    k_E: Array,
+    k_S: Array,
+    k_N: Array,
+    b_C: Array,
+    b_W: Array,
+    c: Array,
+    held: NDArray[np.bool_],
+    p_max: float,
 ) -> tuple[float, float, float, float, float]:
     """`cell_misfits` by array arithmetic, where points are few or numba is missing."""
     here, void_here, entering = p[1:-1, 1:-1], r[1:-1, 1:-1], b_W * r[1:-1, :-2]
-    pairs = ((k_W, p[1:-1, :-2]), (k_E, p[1:-1, 2:]), (k_S, p[:-2, 1:-1]), (k_N, p[2:, 1:-1]))
+    around = (p[1:-1, :-2], p[1:-1, 2:], p[:-2, 1:-1], p[2:, 1:-1])
+    if held.size:
+        around = tuple(np.where(held, 0.0, beside) for beside in around)  # type: ignore[assignment]
+    pairs = tuple(zip((k_W, k_E, k_S, k_N), around, strict=True))
     a, k, own = sum(k * (here - beside) for k, beside in pairs), k_W + k_E + k_S + k_N, b_C * void_here
     b, left = own + entering, a + own + entering - c
     terms = k * np.abs(here) + sum(k * np.abs(beside) for k, beside in pairs)
@@ -138,8 +167,10 @@ def mass_defect(problem: "LubricationProblem", p: Array, r: Array) -> float:
     """
     s, reduce, grid = problem.scheme, problem.reduce, problem.grid
     flows = west, east, south, north = problem.boundary_flows(p, r)
-    net = abs(west - east + south - north)
-    inflow = max(west, 0.0) + max(-east, 0.0) + max(south, 0.0) + max(-north, 0.0)
+    # Halves of these in m3/s, as are the supplies' flows.
+    supplied = [2.0 * flow / (grid.spacing[1] if grid.dim == 2 else 1.0) for flow in supply_flows(problem, p, r)]
+    net = abs(west - east + south - north + sum(supplied))
+    inflow = max(west, 0.0) + max(-east, 0.0) + max(south, 0.0) + max(-north, 0.0) + sum(max(q, 0.0) for q in supplied)
     dragged = s.flow_unit * (reduce.min(-s.b_C) if problem.U else 0.0) * (grid.shape[1] if grid.dim == 2 else 1)
     at = np.abs(p).reshape(grid.box)
     driven = reduce.norm(problem.c) > 0  # or else p = 0, and p_unit measures what is left of it
@@ -148,7 +179,9 @@ def mass_defect(problem: "LubricationProblem", p: Array, r: Array) -> float:
     for k, points, side in zip((s.k_W, s.k_E, s.k_S, s.k_N), side_points(grid), problem.p_sides, strict=True):
         pressed += s.flow_unit * reduce.sum(k[points] * (at[points] + side / problem.p_unit))
     flow = max(inflow, dragged, IDLE * pressed if driven else pressed)
+    if s.held is not None:
+        pressed += s.flow_unit * reduce.sum(np.where(s.held, s.diagonal * at, 0.0))
     inside = UNIT * s.flow_unit * reduce.sum((s.k_W + s.k_E + s.k_S + s.k_N) * at)
-    rounding = 8 * UNIT * (pressed + sum(map(abs, flows))) + min(inside, UNEVEN * flow)
+    rounding = 8 * UNIT * (pressed + sum(map(abs, [*flows, *supplied]))) + min(inside, UNEVEN * flow)
     excess = net - rounding  # NaN stays NaN
     return 0.0 if excess <= 0 else excess / flow if flow != 0 else np.inf

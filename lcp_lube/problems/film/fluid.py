@@ -19,6 +19,7 @@ from ...base.parallel import Array
 from ..grid import Grid
 from .lubrication import LubricationProblem
 from .reynolds import sides
+from .supplies import Held, pressed
 
 BULK, SLOPE = 2.22e9, 1.66
 
@@ -57,7 +58,7 @@ class Law:
 def with_density(problem: LubricationProblem, law: Law, p: Array) -> LubricationProblem:
     """The problem in q of a film whose density is that of p (owned points, Pa); its grid is the problem's own. Collective."""
     framed = law.density(_framed(problem.grid, p, [float(law.pressure(np.array(q))) for q in problem.p_sides]))
-    return _scaled(problem, _means(framed), problem.p_sides, problem.mu)
+    return _scaled(problem, _means(framed), problem.p_sides, problem.mu, held=problem.held)
 
 
 def effective(
@@ -75,7 +76,11 @@ def effective(
     around = (framed[1:-1, :-2], framed[1:-1, 2:], framed[:-2, 1:-1], framed[2:, 1:-1])
     mobilities = [law.mobility(here, np.nan_to_num(other)) for other in around]
     at_faces = law.viscosity(0.5 * (here + np.nan_to_num(framed[1:-1, 2:])))  # drag is summed over the east faces
-    return _scaled(problem, means, p_sides, problem.mu * at_faces, mobilities)
+    held = problem.held
+    if held is not None:  # back from q
+        supplies = (replace(one, p=float(law.pressure(np.array(one.p)))) for one in held.supplies)
+        held = replace(held, supplies=tuple(supplies))
+    return _scaled(problem, means, p_sides, problem.mu * at_faces, mobilities, held)
 
 
 def _scaled(
@@ -84,6 +89,7 @@ def _scaled(
     p_sides: tuple[float, float, float, float],
     mu: float | Array,
     mobility: list[Array] | None = None,
+    held: Held | None = None,
 ) -> LubricationProblem:
     """The problem with densities at its west, east, south and north faces, and conductances times mobilities."""
     s, grid = problem.scheme, problem.grid
@@ -96,6 +102,8 @@ def _scaled(
     names = dict(zip(("k_W", "k_E", "k_S", "k_N"), k, strict=True))
     b = {"b_C": s.b_C * density[1], "b_W": s.b_W * density[0]}
     scheme = replace(s, **names, **b, couette_W=couette_W, couette_E=couette_E, c=c)  # type: ignore[arg-type]
+    if held is not None:
+        scheme = pressed(scheme, held, problem.p_unit)
     return LubricationProblem(
         grid,
         scheme,
@@ -107,6 +115,7 @@ def _scaled(
         film=problem.film,
         shaft=problem.shaft,
         r_in=problem.r_in,
+        held=held,
     )
 
 

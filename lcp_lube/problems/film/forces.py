@@ -36,8 +36,9 @@ def open_pressures(problem: LubricationProblem) -> list[float | None]:
 
 
 def ambient(problem: LubricationProblem) -> float:
-    """The smallest pressure at a side, Pa above p_c."""
-    return min(p for p in open_pressures(problem) if p is not None)
+    """The smallest pressure at a side, or of a supply where no side has one, Pa above p_c."""
+    at_sides = [p for p in open_pressures(problem) if p is not None]
+    return min(at_sides or [supply.p for supply in problem.held.supplies])  # type: ignore[union-attr]
 
 
 def forces(problem: LubricationProblem, p_pa: Array) -> dict[str, Any]:

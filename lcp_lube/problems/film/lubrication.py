@@ -1,6 +1,7 @@
 """The door between physics and solvers: the data of A p + B r = c, p r = 0, p, r >= 0, and what certifies an answer."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -18,6 +19,7 @@ from .exact import ExactSolution
 from .forces import Shaft
 from .quantities import open_pressures, quantities, units
 from .reynolds import BoxScheme, assemble, side_points, sides
+from .supplies import Held, Supply, pressed
 
 MATRICES = ("A", "B", "_vectors")
 
@@ -40,6 +42,7 @@ class LubricationProblem:
     exact : gives the exact 1D solution, where one is known.
     shaft : what the film is wrapped round; None for a flat one.
     r_in : void fraction that enters at the west.
+    held : the supplies whose cells the scheme holds.
     """
 
     kind = "lubrication"
@@ -58,10 +61,11 @@ class LubricationProblem:
         exact: Callable[[], ExactSolution | None] | None = None,
         shaft: Shaft | None = None,
         r_in: float = 0.0,
+        held: Held | None = None,
     ):
         self.grid, self.scheme, self.film = grid, scheme, film
         self.mu, self.U, self.p_unit, self.p_sides, self.p_c = mu, U, p_unit, p_sides, p_c
-        self.exact, self.shaft, self.r_in = exact, shaft, r_in
+        self.exact, self.shaft, self.r_in, self.held = exact, shaft, r_in, held
         self.extras: Callable[[dict[str, Any]], dict[str, Any]] | None = None
         self.reduce = grid.reduce
         self.c = scheme.c.ravel()
@@ -112,6 +116,13 @@ class LubricationProblem:
         What leaves a cell enters the next one to the last bit, which A p + B r - c cannot say: where conductances differ by
         1e9 and more the rounding of A's diagonal is a leak, and where little flows through a ring the rounding of c is one.
         """
+        s, flows = self.scheme, self.face_flows(p, r)
+        if s.held is None:
+            return flows
+        return np.where(s.held.ravel(), s.diagonal.ravel() * p - self.c, flows)
+
+    def face_flows(self, p: Array, r: Array) -> Array:
+        """What leaves each point's cell through its faces, and its sources: its balance, were it not held. Collective."""
         s, box, at_sides = self.scheme, self.grid.box, self._at_sides
         frame_p, frame_r = (self.grid.ghosted(a, outside=0.0) for a in (p, r))
         p, r = p.reshape(box), r.reshape(box)
@@ -139,7 +150,14 @@ class LubricationProblem:
         c = s.couette_W - s.couette_E
         for k, at_side, p_side in zip((s.k_W, s.k_E, s.k_S, s.k_N), sides(self.grid), self.p_sides, strict=True):
             c += np.where(at_side, k * (p_side / self.p_unit), 0.0)
-        return s.c - c
+        return s.c - c if s.held is None else np.where(s.held, 0.0, s.c - c)
+
+    def hold_at(self, supplies: Sequence[Supply]) -> None:
+        """Other pressures and sources for its supplies."""
+        assert self.held is not None  # for the type checker: it has supplies
+        self.held = replace(self.held, supplies=tuple(supplies))
+        self.scheme = pressed(self.scheme, self.held, self.p_unit)
+        self.c = self.scheme.c.ravel()
 
     def certify(self, fields: Fields, eps1: float) -> Certificate:
         """Certificate of the fields p and r for a run whose tolerance was eps1 (`film.certify`). Collective."""

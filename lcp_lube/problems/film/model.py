@@ -18,6 +18,7 @@ from .grooves import Groove, GroovedProblem, Pad, pads_between
 from .lines import on_edges
 from .lubrication import LubricationProblem
 from .reynolds import Film, box_scheme
+from .supplies import Supply, hold
 from .turned import MirroredFilm, TurnedProblem
 
 NAMES = ("west", "east", "south", "north")
@@ -64,6 +65,7 @@ class Model:
     exact: Callable[[], ExactSolution | None] | None = None
     grooves: tuple[Groove, ...] = ()  # of a film that is periodic in x
     shaft: Shaft | None = None  # of a film that is wrapped round one
+    supplies: tuple[Supply, ...] = ()
     law: Law | None = None  # a fluid that depends on the pressure; `build` makes the problem of the constant one
     places: Places | None = None  # of the lines of points; None: on the film's straight edges, if it has any
 
@@ -75,7 +77,7 @@ class Model:
             inlet = "west" if self.U >= 0 else "east"
             if side.r and (name != inlet or side.p):
                 raise InputError(f"sides.{name}.r = {side.r:g}: void enters by the {inlet} side alone, and there at p = p_c")
-        pressures = [side.p for side in used.values() if side.kind == "open"]
+        pressures = [side.p for side in used.values() if side.kind == "open"] + [s.p_s or s.p or 1.0 for s in self.supplies]
         if not pressures:
             raise InputError("no side has a pressure: without one the level of p is open; give at least one side a p")
         if self.U < 0 and self.grooves:
@@ -95,7 +97,7 @@ class Model:
     def facts(self, shape: Sequence[int], comm: PETSc.Comm | None = None) -> Facts:
         """The problem on (nx,) or (nx, ny) points, in numbers."""
         periodic = tuple(self.sides[2 * k].kind == "periodic" for k in range(len(self.lengths)))
-        return Facts("lubrication", tuple(shape), (comm or PETSc.COMM_WORLD).getSize(), periodic)
+        return Facts("lubrication", tuple(shape), (comm or PETSc.COMM_WORLD).getSize(), periodic, held=bool(self.supplies))
 
     @property
     def mirrored(self) -> "Model":
@@ -104,17 +106,20 @@ class Model:
         gap, places = MirroredFilm(self.gap, self.lengths[0]), self.places
         if places is not None and places[0] is not None:
             places = (self.lengths[0] - places[0][::-1], places[1])
-        return replace(self, gap=gap, U=-self.U, sides=(east, west, *ends), exact=None, places=places)  # type: ignore[arg-type]
+        supplies = tuple(replace(one, region=one.region.mirrored(self.lengths[0])) for one in self.supplies)
+        changed = {"sides": (east, west, *ends), "supplies": supplies, "places": places}
+        return replace(self, gap=gap, U=-self.U, exact=None, **changed)  # type: ignore[arg-type]
 
     def lines(self, shape: Sequence[int]) -> Places:
         """Where the lines of points of a grid lie (`Grid.places`): on edges, where scheme 'face' can make use of it in 2D."""
         if self.places is not None:
             return self.places
-        edges = getattr(self.gap, "jumps", None)
-        if edges is None or self.scheme != "face" or self.mean_cubes or len(shape) == 1:
+        of_film = getattr(self.gap, "jumps", lambda axis: ())
+        if self.scheme != "face" or self.mean_cubes or len(shape) == 1:
             return EVEN
+        edges = [[*of_film(axis), *(t for one in self.supplies for t in one.region.edges(axis))] for axis in "xy"]
         x, y = (
-            on_edges(n, length, [side.kind for side in self.sides[2 * k : 2 * k + 2]], edges("xy"[k]))
+            on_edges(n, length, [side.kind for side in self.sides[2 * k : 2 * k + 2]], edges[k])
             for k, (n, length) in enumerate(zip(shape, self.lengths, strict=True))
         )
         return (None if self.grooves else x), y  # grooves are columns of an even grid
@@ -146,6 +151,7 @@ class Model:
             mean_cubes=self.mean_cubes,
             r_in=west.r,
         )
+        scheme, held = hold(grid, scheme, self.supplies, self.p_unit) if self.supplies else (scheme, None)
         problem = kind(
             grid,
             scheme,
@@ -158,6 +164,7 @@ class Model:
             exact=self.exact,
             shaft=self.shaft,
             r_in=west.r if west.kind == "open" else 0.0,
+            held=held,
         )
         if isinstance(problem, GroovedProblem):
             problem.grooves = self.grooves

@@ -12,18 +12,19 @@ from .cavity import cavity_sign
 from .flows import friction, point_weights, side_flows
 from .forces import ambient, corner_flows, forces, open_pressures
 from .fronts import first_cavity, fronts
+from .supplies import supply_flows
 
 if TYPE_CHECKING:
     from .lubrication import LubricationProblem
 
 # Of a 2D film; what is not named has none. In 1D everything is per metre of width.
 UNITS = {
-    **dict.fromkeys(("p_max", "p_ambient", "p_unit"), "Pa"),
+    **dict.fromkeys(("supply_p", "p_max", "p_ambient", "p_unit"), "Pa"),
     **dict.fromkeys(
         ("load", "pressure_integral", "load_above_ambient", "bearing_load", "load_vector", "force", "friction"), "N"
     ),
     **dict.fromkeys(("p_max_at", "min_h", "min_h_at", "rupture", "reformation", "ruptures", "reformations"), "m"),
-    **dict.fromkeys(("flow", "side_leakage", "flow_growth", "groove_flow"), "m3/s"),
+    **dict.fromkeys(("flow", "side_leakage", "flow_growth", "groove_flow", "supply_flow"), "m3/s"),
     "cavitated_area": "m2",
     "power_loss": "W",
     "moment": "N m",
@@ -59,7 +60,7 @@ def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any
     cavitated_fraction : share of the points (`cavity.cavity_sign`); cavitated_area : theirs, m2.
     ruptures, reformations : x of all of them, m; in 2D on the middle line (`fronts.fronts`). rupture : the first one, None
     where absent. reformation : the first one behind it, or behind the void that enters.
-    p_unit : Pa.
+    p_unit : Pa. supply_p, supply_flow : of each supply, absolute, Pa, and what it gives to the film, m3/s.
     """
     grid, reduce = problem.grid, problem.reduce
     p_pa = p * problem.p_unit
@@ -89,6 +90,9 @@ def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any
     }
     if grid.dim == 2:
         out |= {"side_leakage": flow["south"] + flow["north"], "flow_growth": corner_flows(problem)}
+    if problem.held is not None:
+        out["supply_p"] = [supply.p + problem.p_c for supply in problem.held.supplies]
+        out["supply_flow"] = supply_flows(problem, p, r)
     out["friction_coefficient"] = out["friction"] / out["load"] if out["load"] > 0 else None
     out["power_loss"] = out["friction"] * problem.U
     return out | (problem.extras(out) if problem.extras else {})

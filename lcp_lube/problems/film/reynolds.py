@@ -44,23 +44,40 @@ class BoxScheme:
     couette_E: Array
     h: Array  # film at the points, m
     flow_unit: float = 1.0  # of all of them but h, m2/s: a power of 2
+    held: NDArray[np.bool_] | None = None  # cells at a given pressure (`supplies`): their rows of A have the diagonal alone
 
     @property
     def arrays(self) -> list[str]:
         """Names of the coefficients and of h."""
-        return [field.name for field in fields(self) if field.name != "flow_unit"]
+        return [field.name for field in fields(self) if field.name not in ("flow_unit", "held")]
+
+    @property
+    def diagonal(self) -> Array:
+        """A's."""
+        return self.k_W + self.k_E + self.k_S + self.k_N
+
+    @property
+    def coupling(self) -> tuple[Array, Array, Array, Array]:
+        """The conductances to west, east, south and north as A's rows have them: none of a cell that is held."""
+        k = (self.k_W, self.k_E, self.k_S, self.k_N)
+        return k if self.held is None else tuple(np.where(self.held, 0.0, a) for a in k)  # type: ignore[return-value]
+
+    @property
+    def entering(self) -> Array:
+        """B's entry for the void from the west: a cell that is held swallows it."""
+        return self.b_W if self.held is None else np.where(self.held, 0.0, self.b_W)
 
     def pressure_entries(self) -> list[tuple[int, int, Array]]:
         """Row entries of A as (dj, di, value)."""
-        centre = self.k_W + self.k_E + self.k_S + self.k_N
-        entries = [(0, 0, centre), (0, -1, -self.k_W), (0, 1, -self.k_E)]
+        west, east, south, north = self.coupling
+        entries = [(0, 0, self.diagonal), (0, -1, -west), (0, 1, -east)]
         if self.k_S.any() or self.k_N.any():
-            entries += [(-1, 0, -self.k_S), (1, 0, -self.k_N)]
+            entries += [(-1, 0, -south), (1, 0, -north)]
         return entries
 
     def void_entries(self) -> list[tuple[int, int, Array]]:
         """Row entries of B as (dj, di, value)."""
-        return [(0, 0, self.b_C), (0, -1, self.b_W)]
+        return [(0, 0, self.b_C), (0, -1, self.entering)]
 
 
 def box_scheme(

@@ -74,7 +74,7 @@ class TurnedProblem(LubricationProblem):
         film = moving.film.film if isinstance(moving.film, MirroredFilm) else MirroredFilm(moving.film, grid.lengths[0])
         super().__init__(
             own,
-            replace(s, **turned),  # type: ignore[arg-type]
+            replace(s, **turned, held=None),  # type: ignore[arg-type]
             mu=moving.mu,
             U=-moving.U,
             p_unit=moving.p_unit,

@@ -125,6 +125,8 @@ def finest(problem: LubricationProblem) -> Level:
     InputError : the void that leaves a cell is not what enters the next one, which no scheme of this package does.
     """
     grid, s = problem.grid, problem.scheme
+    if s.held is not None:
+        raise InputError("--method fas: the cells of supplies are held, on which its grids have no word; use active-set")
     lost, carried = kernels.lost_void(s.b_C, s.b_W)
     if grid.reduce.max(np.array([lost])) > 1e-12 * grid.reduce.max(np.array([carried])):
         raise InputError("--method fas: what leaves a cell of this scheme does not enter the next one; use active-set")

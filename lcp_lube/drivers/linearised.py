@@ -1,0 +1,136 @@
+"""The discrete film, linearised at the signs of a solution: solves with its Jacobian, and what supplies make of them."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from petsc4py import PETSc
+
+from ..base.options import recipe
+from ..base.parallel import Array
+from ..linear.krylov import Krylov
+from ..problems.facts import Facts
+from ..problems.film.lubrication import LubricationProblem
+from ..problems.film.reynolds import assemble
+from .plan import default_recipe
+
+
+class Linear:
+    """J = A where the film is full, -B where it is not, factored once; and J + i nu M as a real matrix of twice the size."""
+
+    def __init__(self, problem: LubricationProblem, cavity: Any):
+        self.problem = problem
+        full, void = problem.A.createVecs()
+        full.setArray(np.where(cavity, 0.0, 1.0))
+        void.setArray(np.where(cavity, -1.0, 0.0))
+        self.J = problem.A.copy()
+        self.J.diagonalScale(None, full)
+        B = problem.B.copy()
+        B.diagonalScale(None, void)
+        self.J.axpy(1.0, B, structure=PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+        for obj in (B, full, void):
+            obj.destroy()
+        self._krylov: Krylov | None = None
+
+    def solve(self, b: Array) -> Array:
+        """J^-1 b. Collective."""
+        if self._krylov is None:
+            self._krylov = self._factored(self.J)
+        return self._solve(self._krylov, self.J, b)
+
+    def at(self, nu: float, M: Array, real: Array, imaginary: Array) -> Any:
+        """(J + i nu M)^-1 (real + i imaginary). Collective."""
+        J, n = self.J, self.problem.grid.local_size
+        diagonal = J.createVecLeft()
+        diagonal.setArray(nu * M)
+        plus = PETSc.Mat().createAIJ(J.getSizes(), nnz=1, comm=J.comm)
+        plus.setDiagonal(diagonal)
+        plus.assemble()
+        minus = plus.copy()
+        minus.scale(-1.0)
+        nest = PETSc.Mat().createNest([[J, minus], [plus, J]], comm=J.comm)
+        big = nest.convert("aij", PETSc.Mat())
+        krylov = self._factored(big)
+        z = self._solve(krylov, big, np.concatenate([real, imaginary]))
+        krylov.destroy()
+        for obj in (nest, big, minus, plus, diagonal):
+            obj.destroy()
+        return z[:n] + 1j * z[n:]
+
+    def _factored(self, mat: PETSc.Mat) -> Krylov:
+        grid = self.problem.grid
+        facts = Facts(self.problem.kind, grid.shape, grid.comm.size)
+        with recipe(default_recipe(facts, "full", large=False)[0]):
+            krylov = Krylov(mat)
+            krylov.set_up()
+        return krylov
+
+    @staticmethod
+    def _solve(krylov: Krylov, mat: PETSc.Mat, b: Array) -> Array:
+        x, rhs = mat.createVecs()
+        rhs.setArray(b)
+        krylov.solve(rhs, x, 1e-12)
+        z = x.array_r.copy()
+        x.destroy()
+        rhs.destroy()
+        return z
+
+    def destroy(self) -> None:
+        if self._krylov is not None:
+            self._krylov.destroy()
+        self.J.destroy()
+
+
+class Feed:
+    """Supplies whose pressures follow: what they add to a change z of the film at given pressures.
+
+    With Z_t the film's answer to a pressure P_t, f_s(z) what supply s gives more for a change z, and the derivatives a_s and
+    b_s of `Supply.misfit` by pressure and flow:
+
+        b_s (f_s(z) + raw_s + sum over t of f_s(Z_t) P_t) + a_s P_s = 0,     z -> z + sum over t of Z_t P_t
+
+    raw_s is what the cells of supply s take by themselves: the change of their balance at fixed fields.
+    """
+
+    def __init__(self, problem: LubricationProblem, cavity: Any, free: Any):
+        held, whole = problem.held, replace(problem.scheme, held=None)
+        assert held is not None  # for the type checker: it has supplies
+        self.problem, self.cavity, self.held, self.free = problem, cavity, held, np.flatnonzero(free)
+        self._A, self._B = assemble(problem.grid, whole.pressure_entries()), assemble(problem.grid, whole.void_entries())
+        grid = problem.grid
+        self._unit = 0.5 * problem.scheme.flow_unit * (grid.spacing[1] if grid.dim == 2 else 1.0)
+
+    def pushed(self, t: int) -> Array:
+        """Right-hand side of a pressure of 1 Pa in supply t."""
+        d = self.problem.scheme.diagonal / self.problem.p_unit
+        return np.where(self.held.owner == t, d, 0.0).ravel()
+
+    def taken(self, z: Any, raw: Any = 0.0) -> Any:
+        """f_s(z) + raw_s of all supplies, m3/s. Collective."""
+        multiply = self.problem.multiply
+        flows = raw + 0.0 * z
+        for part, turn in ((z.real, 1.0), (z.imag, 1j)) if np.iscomplexobj(z) else ((z, 1.0),):
+            full, void = np.where(self.cavity, 0.0, part), np.where(self.cavity, -part, 0.0)
+            flows = flows + turn * (multiply(self._A, full) + multiply(self._B, void))
+        total = self.problem.reduce.sum
+        found = []
+        for k in range(len(self.held.supplies)):
+            mine = np.where(self.held.owner.ravel() == k, flows, 0.0)
+            found.append(complex(total(mine.real), total(mine.imag)) if np.iscomplexobj(mine) else total(mine))
+        return self._unit * np.array(found)
+
+    def slopes(self, answers: Any) -> Any:
+        """dQ_s/dP_t of the supplies that are free, m3/s/Pa, from the film's answers Z_t. Collective."""
+        n = len(self.held.supplies)
+        return np.stack([self.taken(z)[self.free] for z in answers], axis=1) if len(answers) else np.zeros((n, 0))
+
+    def corrected(self, z: Any, raw: Any, answers: Any, sources: Array) -> Any:
+        """z with the pressures that follow; sources : a and b of all supplies, shape (supplies, 2). Collective."""
+        by_p, by_flow = sources[self.free].T
+        matrix = by_flow[:, None] * self.slopes(answers) + np.diag(by_p)
+        P = np.linalg.solve(matrix, -by_flow * self.taken(z, raw)[self.free])
+        return z + sum(p * answer for p, answer in zip(P, answers, strict=True))
+
+    def destroy(self) -> None:
+        self._A.destroy()
+        self._B.destroy()

@@ -1,0 +1,150 @@
+"""Supplies whose pressures are not given: Newton's method for the pressures at which sources and film agree on the flow.
+
+With its pressures P given the film is a problem of its own, which every method solves. What supply s gives to the film, Q_s(P),
+grows with P_s and falls with the others' pressures (an M-function: the film's response to a pressure is one), and its source
+gives R_s(P_s), which never grows. Newton's method on Q - R, with the exact derivative of the discrete film at its signs, ends
+after a handful of solves, each started from the last. That leaves A, B, c and every method as they are; sharing one unknown
+among a supply's cells would put a dense row into each of their matrices, grids and kernels.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from petsc4py import PETSc
+
+from ..base.parallel import Array
+from ..errors import InputError
+from ..problems.facts import Facts
+from ..problems.film.cavity import cavity_sign
+from ..problems.film.lubrication import LubricationProblem
+from ..problems.film.model import Model
+from ..problems.film.supplies import Supply, supply_flows
+from ..problems.solution import Outcome, Solution
+from ..scenes.scene import Derived, Solvable
+from .ask import Ask
+from .compose import Inner
+from .linearised import Feed, Linear
+
+MOST_SOLVES = 40
+TOLERANCE = 1e-10  # of the largest flow: by how much what a source gives may differ from what the film takes
+FIRST = 0.5  # part of p_s behind a restrictor, to begin with
+
+
+@dataclass(frozen=True)
+class Fed(Derived):
+    """A scene with its supplies held at pressures, whatever feeds them."""
+
+    supplies: tuple[Supply, ...]
+
+    @property
+    def model(self) -> Model:
+        return replace(self.whole.model, supplies=self.supplies, exact=None)
+
+    def with_shape(self, shape: tuple[int, ...]) -> "Fed":
+        return Fed(self.whole.with_shape(shape), self.supplies)
+
+    def facts(self, comm: PETSc.Comm | None = None) -> Facts:
+        return self.whole.facts(comm)
+
+    def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
+        problem: LubricationProblem = self.whole.build(comm)
+        problem.hold_at(self.supplies)
+        return problem
+
+
+def applies(scene: Solvable, ask: Ask) -> bool:
+    """Whether the film has a supply whose pressure has to be found."""
+    model = getattr(scene, "model", None)
+    return not isinstance(scene, Fed) and isinstance(model, Model) and any(one.open for one in model.supplies)
+
+
+def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
+    """The solution at the pressures at which every source gives what its supply takes. Collective.
+
+    Returns
+    -------
+    Solution : outcome NO_SOLUTION where the film draws more than a supply gives even at the cavitation pressure.
+    """
+    model: Model = scene.model  # type: ignore[attr-defined]
+    supplies = model.supplies
+    known = ask.start.settings.get("supply_pressures") if ask.start is not None else None
+    P = np.array(known if known is not None and len(known) == len(supplies) else _first(model))
+    free = np.array([one.open for one in supplies])
+    solution: Solution | None = None
+    times: dict[str, float] = {}
+    steps: list[Any] = []
+    for count in range(1, MOST_SOLVES + 1):
+        held = tuple(Supply(one.region, float(p)) for one, p in zip(supplies, P, strict=True))
+        new = inner(Fed(scene, held), replace(ask, start=solution or ask.start))
+        if solution is not None:
+            solution.destroy()
+        solution = new
+        steps += solution.steps
+        times = {name: times.get(name, 0.0) + solution.times.get(name, 0.0) for name in {**times, **solution.times}}
+        problem: Any = solution.problem
+        if not solution.converged:
+            break
+        flows = np.array(supply_flows(problem, solution.fields["p"], solution.fields["r"]))
+        sought = [(one, float(p), float(flow)) for one, p, flow in zip(supplies, P, flows, strict=True)]
+        largest = max(map(abs, [*flows, *(one.flow or 0.0 for one in supplies)]))
+        off = np.array([one.defect(p, flow, largest) if one.open else 0.0 for one, p, flow in sought])
+        misfit = np.array([one.misfit(p, flow) if one.open else (0.0, 0.0, 0.0) for one, p, flow in sought])
+        starved = (off > TOLERANCE) & (misfit[:, 0] > 0.0) & (P <= 0.0)
+        if np.max(off) <= TOLERANCE or starved.any() or count == MOST_SOLVES:
+            break
+        slope = misfit[free, 2:] * _slopes(problem, solution.fields, free) + np.diag(misfit[free, 1])
+        P[free] = np.maximum(P[free] + np.linalg.solve(slope, -misfit[free, 0]), 0.0)
+    assert solution is not None
+    if solution.converged and np.max(off) > TOLERANCE:
+        worst = int(np.argmax(np.where(starved, off, 0.0) if starved.any() else off))
+        if starved.any():
+            message = f"supply {worst + 1}: at p_c the film draws {flows[worst]:.6g} m3/s already, more than its source gives"
+            solution.outcome, solution.message = Outcome.NO_SOLUTION, message
+        else:
+            message = f"supply {worst + 1}: film and source differ by {off[worst]:.1e} of the flow after {count} solves"
+            solution.outcome, solution.message = Outcome.MAX_ITERATIONS, message
+    solution.steps, solution.times = steps, times
+    problem.hold_at([replace(one, p=float(p)) for one, p in zip(supplies, P, strict=True)])
+    solution.certificate = problem.certify(solution.fields, solution.settings["eps1"])
+    found = ", ".join(f"{p + model.p_c:.6g}" for p in P)
+    solution.settings |= {
+        "supply_pressures": [float(p) for p in P],
+        "why": [f"supplies: pressures {found} Pa, found in {count} solves", *solution.settings["why"]],
+    }
+    return solution.judged()
+
+
+def _first(model: Model) -> list[float]:
+    """Pressures to begin with: given ones, a part of a restrictor's p_s, the sides' largest behind a given flow."""
+    sides = max((side.p for side in model.sides if side.kind == "open"), default=0.0)
+    return [one.p if not one.open else FIRST * one.p_s if one.law else sides + 1e-3 * model.p_unit for one in model.supplies]
+
+
+def check_backflow(solution: Solution) -> None:
+    """Refuse an answer in which oil flows back through a restrictor that was not said to let it.
+
+    Raises
+    ------
+    InputError : names the supply and both pressures.
+    """
+    held = getattr(solution.problem, "held", None)
+    for number, one in enumerate(held.supplies if held is not None and solution.converged else (), start=1):
+        if one.law and not one.backflow and one.p > one.p_s:
+            raise InputError(
+                f"{solution.settings['scene']}: supply.{number}.p_s is {one.p_s:g} Pa above p_c, the film's pressure there "
+                f"would be {one.p:g}, and oil flow back through the restrictor; a larger p_s is needed, or backflow = true"
+            )
+
+
+def _slopes(problem: LubricationProblem, fields: Any, free: Any) -> Array:
+    """dQ_s/dP_t of the film at its signs for the supplies that are free, m3/s/Pa. Collective."""
+    held = problem.held
+    assert held is not None  # as `applies` found
+    cavity = (cavity_sign(problem.reduce, fields["p"], fields["r"]) < 0) & ~held.mask.ravel()
+    linear, feed = Linear(problem, cavity), Feed(problem, cavity, free)
+    try:
+        return feed.slopes([linear.solve(feed.pushed(t)) for t in feed.free])
+    finally:
+        linear.destroy()
+        feed.destroy()

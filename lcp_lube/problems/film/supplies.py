@@ -1,0 +1,269 @@
+"""Supplies inside a film: holes, grooves and recesses whose cells hold one pressure, and what leaves them.
+
+A cell whose point lies in a supply is full, p = P and r = 0. Its row of A p + B r = c becomes d (p - P) = 0 with A's own
+diagonal d, and void that reaches it is swallowed, b_W = 0. A and -B stay column diagonally dominant M-matrices: rows lose
+off-diagonal entries, no column grows. What the supply gives to the film is the balance that its cells would have had. The edge
+of a supply may lie anywhere between two points: the face between a held point and a free one resists over the length up to the
+edge alone.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from ...base.parallel import Array
+from ...errors import InputError
+from ..grid import Grid
+from .reynolds import BoxScheme
+
+if TYPE_CHECKING:
+    from .lubrication import LubricationProblem
+
+MARGIN = 1e-9  # of a shape's extent: a point so near an edge is on it, and belongs to the supply
+NEAREST = 1e-4  # part of a spacing: a face to an edge that is nearer resists over this
+HALVINGS = 26  # of the interval in which an edge is looked for: coarse enough that both cells of a face find the same
+
+
+class Region(Protocol):
+    """Where a supply lies."""
+
+    def inside(self, x: Array, y: Array) -> NDArray[np.bool_]:
+        """Whether points (m, they broadcast) are in it."""
+
+    @property
+    def middle(self) -> tuple[float, float]:
+        """x and y of its middle, m."""
+
+    def moved(self, start: float) -> Region:
+        """The same place, where x is counted from `start`."""
+
+    def mirrored(self, L: float) -> Region:
+        """Its mirror image in a film of length L."""
+
+    def symmetric(self, y: float) -> bool:
+        """Whether it is its own mirror image in the line at y."""
+
+    def edges(self, axis: str) -> tuple[float, ...]:
+        """x or y of its straight edges, m."""
+
+
+@dataclass(frozen=True)
+class Patch:
+    """A rectangle or an ellipse about (x, y), of extents 2 half_x and 2 half_y, m; `period` in x, where the film closes."""
+
+    x: float
+    y: float
+    half_x: float
+    half_y: float
+    round: bool = False
+    period: float | None = None
+
+    def inside(self, x: Array, y: Array) -> NDArray[np.bool_]:
+        dx, dy = x - self.x, y - self.y
+        if self.period is not None:
+            dx = np.remainder(dx + 0.5 * self.period, self.period) - 0.5 * self.period
+        a, b = np.abs(dx) / self.half_x, np.abs(dy) / self.half_y  # 0 for a half without bound
+        return (a**2 + b**2 if self.round else np.maximum(a, b)) <= 1.0 + MARGIN
+
+    @property
+    def middle(self) -> tuple[float, float]:
+        return self.x, self.y
+
+    def moved(self, start: float) -> Patch:
+        return replace(self, x=self.x - start)
+
+    def mirrored(self, L: float) -> Patch:
+        return replace(self, x=L - self.x)
+
+    def symmetric(self, y: float) -> bool:
+        return self.half_y == math.inf or abs(self.y - y) <= MARGIN * self.half_y
+
+    def edges(self, axis: str) -> tuple[float, ...]:
+        middle, half = (self.x, self.half_x) if axis == "x" else (self.y, self.half_y)
+        if self.round or half == math.inf:
+            return ()
+        ends = (middle - half, middle + half)
+        return tuple(t % self.period for t in ends) if axis == "x" and self.period is not None else ends
+
+
+@dataclass(frozen=True)
+class Where:
+    """Where a function of x and y (m) is positive, x counted from `start`, forwards or, from `end` back, backwards."""
+
+    function: Callable[[Array, Array], Array]
+    centre: tuple[float, float]
+    start: float = 0.0
+    end: float | None = None
+
+    def inside(self, x: Array, y: Array) -> NDArray[np.bool_]:
+        return self.function(x + self.start if self.end is None else self.end - x, y) > 0
+
+    @property
+    def middle(self) -> tuple[float, float]:
+        x, y = self.centre
+        return (x - self.start if self.end is None else self.end - x), y
+
+    def moved(self, start: float) -> Where:
+        return replace(self, start=self.start + start)
+
+    def mirrored(self, L: float) -> Where:
+        return replace(self, end=L + self.start)
+
+    def symmetric(self, y: float) -> bool:
+        return False
+
+    def edges(self, axis: str) -> tuple[float, ...]:
+        return ()
+
+
+@dataclass(frozen=True)
+class Supply:
+    """A region that one source feeds.
+
+    region : where it lies. p : its pressure, Pa above p_c: given, or the last one found. flow : volume flow that it gives, m3/s
+    (1D: m2/s). law, K, p_s : or a restrictor before it, 'capillary', flow = K (p_s - p), or 'orifice', flow = K sqrt(p_s - p),
+    back again where p > p_s; p_s in Pa above p_c. backflow : whether that may happen.
+    """
+
+    region: Region
+    p: float = 0.0
+    flow: float | None = None
+    law: str | None = None
+    K: float = 0.0
+    p_s: float = 0.0
+    backflow: bool = False
+
+    @property
+    def open(self) -> bool:
+        """Whether its pressure has to be found."""
+        return self.flow is not None or self.law is not None
+
+    def misfit(self, p: float, flow: float) -> tuple[float, float, float]:
+        """What source and film disagree by where the film takes `flow` at the pressure p, and its derivatives by both.
+
+        A flow (m3/s), or behind an orifice a pressure (Pa), p - p_s + (flow/K)^2: the root has no derivative where none flows.
+        """
+        if self.flow is not None:
+            return flow - self.flow, 0.0, 1.0
+        if self.law == "capillary":
+            return flow - self.K * (self.p_s - p), self.K, 1.0
+        return p - self.p_s + flow * abs(flow) / self.K**2, 1.0, 2.0 * abs(flow) / self.K**2
+
+    def defect(self, p: float, flow: float, largest: float) -> float:
+        """The misfit in parts of the largest flow; behind an orifice, of its pressures."""
+        return abs(self.misfit(p, flow)[0]) / ((max(abs(p), abs(self.p_s)) if self.law == "orifice" else largest) or 1.0)
+
+
+@dataclass(frozen=True)
+class Held:
+    """The supplies of a problem: `owner` has the number of the supply at each owned point, -1 outside, shape (ny, nx)."""
+
+    supplies: tuple[Supply, ...]
+    owner: NDArray[np.int64]
+
+    @property
+    def mask(self) -> NDArray[np.bool_]:
+        return self.owner >= 0
+
+    def pressures(self, p_unit: float) -> Array:
+        """P at every owned point, in p_unit; 0 outside."""
+        return np.append([supply.p / p_unit for supply in self.supplies], 0.0)[self.owner]
+
+
+def hold(grid: Grid, scheme: BoxScheme, supplies: Sequence[Supply], p_unit: float) -> tuple[BoxScheme, Held]:
+    """The scheme with the supplies' cells held at their pressures. Collective.
+
+    A supply in which no point lies has the point nearest to its middle.
+
+    Raises
+    ------
+    InputError : two supplies have a point in common.
+    """
+    owner = np.full(grid.box, -1, dtype=np.int64)
+    for number, supply in enumerate(supplies):
+        mine = np.broadcast_to(supply.region.inside(grid.x, grid.y), grid.box)
+        if not grid.reduce.sum(mine.astype(float)):
+            mine = _nearest(grid, supply.region.middle)
+        taken = owner[mine & (owner >= 0)]
+        other = grid.comm.allreduce(int(taken[0]) if taken.size else -1, MPI.MAX)
+        if other >= 0 and (supply.open or supplies[other].open or supply.p != supplies[other].p):
+            raise InputError(f"supply {other + 1} and supply {number + 1} overlap: allowed where both hold the same p")
+        owner = np.where(mine & (owner < 0), number, owner)
+    held = Held(tuple(supplies), owner)
+    factors = [1.0 / _share(grid, held, dj, di) for dj, di in ((0, -1), (0, 1), (-1, 0), (1, 0))]
+    names = ("k_W", "k_E", "k_S", "k_N")
+    k = {name: getattr(scheme, name) * factor for name, factor in zip(names, factors, strict=True)}
+    return pressed(replace(scheme, **k, held=held.mask), held, p_unit), held
+
+
+def pressed(scheme: BoxScheme, held: Held, p_unit: float) -> BoxScheme:
+    """The scheme with the supplies' pressures in c."""
+    return replace(scheme, c=np.where(held.mask, scheme.diagonal * held.pressures(p_unit), scheme.c))
+
+
+def _nearest(grid: Grid, place: tuple[float, float]) -> NDArray[np.bool_]:
+    """The point nearest to a place. Collective."""
+    far = np.hypot(grid.x - place[0], grid.y - place[1] if grid.dim == 2 else 0.0)
+    j, i = np.unravel_index(np.argmin(far), far.shape)
+    best = (round(float(far[j, i]) / (MARGIN * grid.spacing[0])), grid.comm.rank, int(j), int(i))
+    _, rank, j, i = grid.comm.allreduce(best, MPI.MIN)
+    mine = np.zeros(grid.box, dtype=bool)
+    mine[j, i] = rank == grid.comm.rank
+    return mine
+
+
+def _share(grid: Grid, held: Held, dj: int, di: int) -> Array:
+    """Part of the way to the neighbour (dj, di) over which a face resists: to the edge between a held point and a free one."""
+    (ny, nx), share, outside = grid.box, np.ones(grid.box), -2
+    framed = grid.ghosted(held.owner.astype(float).ravel(), outside=outside).astype(np.int64)
+    beside = framed[1 + dj : 1 + dj + ny, 1 + di : 1 + di + nx]
+    j, i = np.nonzero(((held.owner < 0) != (beside < 0)) & ((beside != outside) | (held.owner >= 0)))
+    if not j.size:
+        return share
+    numbers = np.maximum(held.owner[j, i], beside[j, i])
+    at_x, at_y = grid.with_neighbours(0), grid.with_neighbours(1) if grid.dim == 2 else np.zeros(3)
+    x, y = at_x[grid.x_start + i + 1], at_y[grid.y_start + j + 1]
+    to_x, to_y = at_x[grid.x_start + i + 1 + di], at_y[grid.y_start + j + 1 + dj]
+    starts_held = held.owner[j, i] >= 0
+    found = np.ones(j.size)
+    for number in np.unique(numbers):
+        at = numbers == number
+        inside = held.supplies[number].region.inside
+        free = [np.where(starts_held, b, a)[at] for a, b in ((x, to_x), (y, to_y))]
+        full = [np.where(starts_held, a, b)[at] for a, b in ((x, to_x), (y, to_y))]
+        low, high = np.zeros(int(at.sum())), np.ones(int(at.sum()))
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            there = inside(free[0] + middle * (full[0] - free[0]), free[1] + middle * (full[1] - free[1]))
+            low, high = np.where(there, low, middle), np.where(there, middle, high)
+        found[at] = np.maximum(high, NEAREST)
+    found[(beside[j, i] == outside) & (found == NEAREST)] = 1.0  # a supply that reaches the side
+    share[j, i] = found
+    return share
+
+
+def supply_flows(problem: LubricationProblem, p: Array, r: Array) -> list[float]:
+    """Volume flow that each supply gives to the film, m3/s (1D: m2/s). Collective."""
+    held, grid = problem.held, problem.grid
+    if held is None:
+        return []
+    given = problem.face_flows(p, r).reshape(grid.box)
+    unit = 0.5 * problem.scheme.flow_unit * (grid.spacing[1] if grid.dim == 2 else 1.0)
+    return [unit * problem.reduce.sum(np.where(held.owner == k, given, 0.0)) for k in range(len(held.supplies))]
+
+
+def supply_defect(problem: LubricationProblem, p: Array, r: Array) -> float:
+    """The largest difference between what a source gives and the film takes, in parts of the largest flow. Collective."""
+    held = problem.held
+    if held is None or not any(supply.open for supply in held.supplies):
+        return 0.0
+    flows = supply_flows(problem, p, r)
+    largest = max(map(abs, [*flows, *(one.flow or 0.0 for one in held.supplies)]))
+    return max(one.defect(one.p, flow, largest) for one, flow in zip(held.supplies, flows, strict=True) if one.open)
