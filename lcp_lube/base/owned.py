@@ -1,6 +1,7 @@
 """Who frees PETSc objects: a list of them for the Python object that they were made for, freed in a fixed order."""
 
 import weakref
+from functools import cached_property
 from typing import Any, TypeVar
 
 from petsc4py import PETSc
@@ -22,6 +23,7 @@ class Owned:
 
     def __init__(self, owner: object, comm: PETSc.Comm):
         self._made: list[Any] = []
+        self._owner, self.names = weakref.ref(owner), set[str]()  # names: of `made` attributes
         if comm.getSize() == 1:
             weakref.finalize(owner, _free, self._made).atexit = False  # PETSc ends before the interpreter does
 
@@ -30,8 +32,27 @@ class Owned:
         return made
 
     def free(self) -> None:
-        """Free all of them; a second time does nothing. Collective."""
+        """Free all of them; a second time does nothing. Those that are `made` come again at their next use. Collective."""
         _free(self._made)
+        if (owner := self._owner()) is not None:
+            for name in self.names:
+                owner.__dict__.pop(name, None)
+
+
+class made(cached_property):
+    """A PETSc object (or a tuple) of an owner with an `Owned` in `_own`: made at first use, and again once it was freed.
+
+    What is asked of a solution after its PETSc objects were freed works by that: to use a freed one ends the process.
+    """
+
+    def __get__(self, owner: Any, kind: Any = None) -> Any:  # type: ignore[override]
+        if owner is None:
+            return self
+        value = super().__get__(owner, kind)
+        for one in value if isinstance(value, tuple) else (value,):
+            owner._own(one)
+        owner._own.names.add(self.attrname)
+        return value
 
 
 def collect(comm: PETSc.Comm) -> None:

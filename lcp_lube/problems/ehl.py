@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from ..base.owned import Owned
+from ..base.owned import Owned, made
 from ..base.parallel import Array
 from .box import BoxProblem
 from .certificate import Certificate, certificate_tol
@@ -49,10 +49,14 @@ class LineContact:
         # dh_j/dp_m but for the ends' weights: column m of the own faces is a stretch of these, from the end.
         self._differences = (self._kernel[:-2] - self._kernel[2:])[::-1].copy()
         self._rows = np.arange(count - self.has_k)
-        size = (count, n)
         self._own = Owned(self, grid.dm.comm)
-        self.mat = self._own(PETSc.Mat().createDense((size, size), comm=grid.dm.comm))
-        self.mat.setUp()
+
+    @made
+    def mat(self) -> PETSc.Mat:
+        size = (self.grid.local_size, self.grid.size)
+        mat = PETSc.Mat().createDense((size, size), comm=self.grid.dm.comm)
+        mat.setUp()
+        return mat
 
     def split(self, v: Array) -> tuple[Array, float]:
         """All of p, p_0 and p_n included, and k, on every rank: a dense problem needs no less. Collective."""

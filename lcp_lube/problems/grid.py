@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from ..base.owned import Owned, collect
+from ..base.owned import Owned, collect, made
 from ..base.parallel import Array, Reduce
 from ..errors import InputError
 
@@ -81,27 +81,8 @@ class Grid:
         comm = PETSc.Comm(comm or PETSc.COMM_WORLD)  # mpi4py's will do too
         self._check_size(comm)
         collect(comm)  # what earlier solves have left behind
-        self._own = Owned(self, comm)
-        # Lines of the flow direction stay whole where there are enough of them: what the void does is told along them.
-        whole_lines = self.dim == 2 and self.shape[1] >= comm.size
-        proc_sizes = (1, comm.size) if whole_lines else None
-        try:
-            dm = PETSc.DMDA().create(
-                dim=self.dim,
-                sizes=self.shape,
-                proc_sizes=proc_sizes,
-                dof=1,
-                stencil_width=1,
-                stencil_type=PETSc.DMDA.StencilType.STAR,
-                boundary_type=tuple("periodic" if periodic else "none" for periodic in self.periodic),
-                comm=comm,
-            )
-        except PETSc.Error:
-            raise InputError(
-                f"grid {'x'.join(map(str, self.shape))}: too few points for {comm.size} ranks; use fewer ranks or a finer grid"
-            ) from None
-        self.dm = self._own(dm)
-        self.comm = self.dm.comm.tompi4py()
+        self._own, self._comm = Owned(self, comm), comm
+        self.comm = comm.tompi4py()  # not the DM's own: that ends with it, and a solution is asked for more when it is freed
         self.reduce = Reduce(self.comm)
         ranges = self.dm.getRanges()
         self.x_start, self.x_end = (int(i) for i in ranges[0])
@@ -109,6 +90,27 @@ class Grid:
         self.box = (self.y_end - self.y_start, self.x_end - self.x_start)
         # Rank k owns the global (PETSc) numbers starts[k] to starts[k + 1].
         self.starts = np.concatenate([[0], np.cumsum(self.comm.allgather(self.local_size))])
+
+    @made
+    def dm(self) -> PETSc.DMDA:
+        """Deals the points to the ranks."""
+        # Lines of the flow direction stay whole where there are enough of them: what the void does is told along them.
+        ranks = self._comm.size
+        try:
+            return PETSc.DMDA().create(
+                dim=self.dim,
+                sizes=self.shape,
+                proc_sizes=(1, ranks) if self.dim == 2 and self.shape[1] >= ranks else None,
+                dof=1,
+                stencil_width=1,
+                stencil_type=PETSc.DMDA.StencilType.STAR,
+                boundary_type=tuple("periodic" if periodic else "none" for periodic in self.periodic),
+                comm=self._comm,
+            )
+        except PETSc.Error:
+            raise InputError(
+                f"grid {'x'.join(map(str, self.shape))}: too few points for {ranks} ranks; use fewer ranks or a finer grid"
+            ) from None
 
     def _check_size(self, comm: PETSc.Comm) -> None:
         """Refuse before anything is allocated what PETSc's integers or this machine's memory cannot hold."""

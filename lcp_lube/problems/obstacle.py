@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from ..base.owned import Owned
+from ..base.owned import Owned, made
 from ..base.parallel import Array
 from .box import BoxProblem
 from .fold import folded_axes, part_grid, part_shape, whole_lengths, whole_shape
@@ -29,10 +29,17 @@ class ObstacleEquations:
     def __init__(self, semilinear: SemilinearProblem):
         self.semilinear, self.b = semilinear, semilinear.b
         self._own = Owned(self, semilinear.grid.dm.comm)
-        self._jacobian = self._own(semilinear.A.duplicate(copy=True))
+
+    @made
+    def _jacobian(self) -> PETSc.Mat:
+        mat = self.semilinear.A.duplicate(copy=True)
         for option in (PETSc.Mat.Option.SYMMETRIC, PETSc.Mat.Option.SYMMETRY_ETERNAL):
-            self._jacobian.setOption(option, True)
-        self._diagonal = self._own(self._jacobian.createVecLeft())
+            mat.setOption(option, True)
+        return mat
+
+    @made
+    def _diagonal(self) -> PETSc.Vec:
+        return self._jacobian.createVecLeft()
 
     def residual(self, v: Array) -> Array:
         return self.semilinear.residual(v)

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
+from petsc4py import PETSc
 
-from ..base.owned import Owned
+from ..base.owned import Owned, made
 from ..base.parallel import Array, Reduce
 from ..errors import InputError
 from .certificate import Certificate, certificate_tol
@@ -156,12 +157,19 @@ class SemilinearProblem:
         west_east, south_north = (self.faces[k] + self.faces[k + 1] for k in (0, 2))
         self.diagonal = np.broadcast_to(west_east + south_north, grid.box).ravel()
         self.largest_diagonal = 2.0 * (dy / dx + dx / dy)
-        beside = zip(((0, -1), (0, 1), (-1, 0), (1, 0)), self.faces, strict=True)
-        entries = [(0, 0, self.diagonal.reshape(grid.box)), *((*at, np.broadcast_to(-k, grid.box)) for at, k in beside)]
         self._own = Owned(self, grid.dm.comm)
-        self.A = self._own(assemble(grid, entries))
-        self._in, self._out = map(self._own, self.A.createVecs())
         self.b = np.zeros(grid.local_size) if boundary is None else _boundary_terms(grid, boundary)
+
+    @made
+    def A(self) -> PETSc.Mat:
+        """The five-point formula, times dx dy."""
+        grid, beside = self.grid, zip(((0, -1), (0, 1), (-1, 0), (1, 0)), self.faces, strict=True)
+        diagonal = (0, 0, self.diagonal.reshape(grid.box))
+        return assemble(grid, [diagonal, *((*at, np.broadcast_to(-k, grid.box)) for at, k in beside)])
+
+    @made
+    def _vectors(self) -> tuple[PETSc.Vec, PETSc.Vec]:
+        return self.A.createVecs()
 
     @property
     def unknowns(self) -> int:
@@ -174,9 +182,10 @@ class SemilinearProblem:
 
     def flow(self, v: Array) -> Array:
         """A v - b, what flows out of each cell. Collective."""
-        self._in.setArray(v)
-        self.A.mult(self._in, self._out)
-        return self._out.array_r - self.b
+        into, out = self._vectors
+        into.setArray(v)
+        self.A.mult(into, out)
+        return out.array_r - self.b
 
     def supply(self, v: Array) -> Array:
         """dx dy g(v), what the source gives each cell."""

@@ -190,3 +190,23 @@ def test_without_destroy_petsc_objects_go_with_the_solution() -> None:
     del solution
     gc.collect()
     assert not held
+
+
+@pytest.mark.parametrize("name", ["problem1", "problem4", "ring_journal", "ehl_line", "obstacle_ball", "bratu", "squeeze"])
+def test_freed_solutions_still_answer(name, tmp_path):
+    """PETSc's handles are gone after `with`: what needs one makes it again, and nothing ends the process."""
+    with solve(name, n=15) as s:
+        expected = s.quantities
+    assert s.quantities == expected and repr(s) and dir(s)
+    with pytest.raises(AttributeError, match="no such_thing"):
+        s.such_thing  # noqa: B018
+    s.save(tmp_path / "s.npz")
+    s.save(tmp_path / "s.vts")
+    s.plot(tmp_path / "s.png")
+    assert np.isfinite(s.field("x")).all() and s.to_xarray() is not None
+    if name != "squeeze":  # every step of which is certified by itself
+        assert s.problem.certify(s.fields, 1e-8).holds
+    again = pickle.loads(pickle.dumps(s))
+    assert again.quantities["outcome"] == "converged"
+    with solve(name, n=15, start=s) as warm:
+        assert warm.converged

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from ...base.owned import Owned
+from ...base.owned import Owned, made
 from ...base.parallel import Array
 from ..certificate import Certificate
 from ..grid import Grid
@@ -20,8 +20,6 @@ from .forces import Shaft
 from .quantities import open_pressures, quantities, units
 from .reynolds import BoxScheme, assemble, side_points, sides
 from .supplies import Held, Supply, pressed
-
-MATRICES = ("A", "B", "_vectors")
 
 
 class LubricationProblem:
@@ -71,20 +69,19 @@ class LubricationProblem:
         self.c = scheme.c.ravel()
         self._own = Owned(self, grid.dm.comm)
 
-    @cached_property
+    @made
     def A(self) -> PETSc.Mat:
         """Assembled at first use, as B is: a method that works on the stencil alone is spared their time and memory."""
-        return self._own(assemble(self.grid, self.scheme.pressure_entries()))
+        return assemble(self.grid, self.scheme.pressure_entries())
 
-    @cached_property
+    @made
     def B(self) -> PETSc.Mat:
-        return self._own(assemble(self.grid, self.scheme.void_entries()))
+        return assemble(self.grid, self.scheme.void_entries())
 
-    @cached_property
+    @made
     def _vectors(self) -> tuple[PETSc.Vec, PETSc.Vec]:
         """`multiply` lends them its arrays."""
-        x, y = self.A.createVecs()
-        return self._own(x), self._own(y)
+        return self.A.createVecs()
 
     @property
     def unknowns(self) -> int:
@@ -237,8 +234,6 @@ class LubricationProblem:
     def free_matrices(self) -> None:
         """Free A and B, which are assembled again at need. Collective."""
         self._own.free()
-        for name in MATRICES:
-            self.__dict__.pop(name, None)
 
     def destroy(self) -> None:
         """Free the PETSc objects. Collective."""
@@ -246,7 +241,7 @@ class LubricationProblem:
         self.grid.destroy()
 
     def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in self.__dict__.items() if name not in (*MATRICES, "_own")}
+        return {name: value for name, value in self.__dict__.items() if name not in (*self._own.names, "_own")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
