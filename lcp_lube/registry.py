@@ -210,6 +210,7 @@ SHAPES: dict[str, Entry] = {
     "step": Entry("lcp_lube.scenes.film:Step", "one height before a place, another behind it"),
     "pocket": Entry("lcp_lube.scenes.film:Pocket", "a rectangular recess"),
     "dimples": Entry("lcp_lube.scenes.film:Dimples", "an array of equal recesses: square, round, domes"),
+    "herringbone": Entry("lcp_lube.scenes.film:HerringbonePart", "inclined grooves that pump towards the middle of the width"),
     "journal": Entry("lcp_lube.scenes.film:JournalPart", "the gap of a journal in its bush, unwrapped"),
     "roughness": Entry("lcp_lube.scenes.film:Roughness", "a random surface, the same for a seed on every grid"),
     "formula": Entry("lcp_lube.scenes.film:FormulaPart", "a formula in x and y"),

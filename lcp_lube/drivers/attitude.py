@@ -3,7 +3,7 @@
 import math
 from dataclasses import replace
 
-from ..problems.solution import Solution
+from ..problems.solution import Outcome, Solution
 from ..scenes.grooved import GroovedJournalScene
 from ..scenes.scene import Solvable
 from .ask import Ask
@@ -50,6 +50,12 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         before = (attitude, off)
         attitude -= off / slope
     assert solution is not None
+    if solution.converged and abs(off) > TOLERANCE:
+        solution.outcome = Outcome.LOAD_NOT_CARRIED
+        solution.message = (
+            f"at eccentricity {scene.eccentricity:g} no attitude was found at which the film pushes against the load: the last "
+            f"force, at {math.degrees(attitude) % 360.0:.4g} degrees, is {math.degrees(abs(off)):.3g} degrees off"
+        )
     solution.settings |= {"attitude_deg": math.degrees(attitude)}
     solution.settings["why"] = [
         f"attitude {math.degrees(attitude):.6g} degrees, at which the film's force is opposite to the load",

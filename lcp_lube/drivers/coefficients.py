@@ -63,6 +63,10 @@ class Displaced:
     def __call__(self, x: ArrayLike, y: ArrayLike | None = None, /) -> Array:
         return self.film(x, y) + self.e * self.change(x)
 
+    def jumps(self, axis: str) -> tuple[float, ...]:
+        """Where the film jumps, as it does without the displacement."""
+        return getattr(self.film, "jumps", lambda axis: ())(axis)
+
 
 def coefficients(scene: Scene, solution: Solution, frequencies: Sequence[float] = (0.0,)) -> list[Coefficients]:
     """K and C of a converged solution of a journal. Collective.

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import reduce
-from math import inf
+from math import inf, radians
 from operator import or_
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import Field, model_validator
 
 from ..problems.film.profile import read_profile
-from ..problems.film.shapes import Along, Block, DimpleArray, Journal, RandomSurface, Scaled, Shape
+from ..problems.film.shapes import Along, Block, DimpleArray, Herringbone, Journal, RandomSurface, Scaled, Shape
 from ..registry import SHAPES
 from .formula import Formula
 from .units import Measured, metres
@@ -157,6 +157,28 @@ class JournalPart(Part):
 
     def part(self, extent: Extent) -> Shape:
         return Journal(self.c, self.eccentricity, extent.lengths[0], self.widest)
+
+
+class HerringbonePart(Part):
+    """Herringbone grooves right round, or along, that pump towards the middle of the width."""
+
+    shape: Literal["herringbone"]
+    depth: Annotated[Finite, Field(gt=0)] = metres(..., "depth of the grooves")
+    count: Annotated[int, Field(strict=True, ge=1, le=10_000)] = Field(..., description="grooves along the length")
+    angle_deg: Annotated[Finite, Field(gt=-90, lt=90)] = Field(
+        30.0, description="against the direction of motion, degrees; negative: they pump outwards"
+    )
+    ratio: Annotated[Finite, Field(gt=0, lt=1)] = Field(0.5, description="width of a groove over groove and land")
+    land: Annotated[Finite, Field(ge=0, lt=1)] = Field(0.0, description="share of the width in the middle without grooves")
+
+    @model_validator(mode="after")
+    def _inclined(self) -> "HerringbonePart":
+        if not self.angle_deg:
+            raise ValueError("angle_deg = 0: grooves along the motion never meet; an angle above or below 0 is needed")
+        return self
+
+    def part(self, extent: Extent) -> Shape:
+        return Herringbone(self.depth, self.count, radians(self.angle_deg), self.ratio, self.land, extent.both)
 
 
 class Roughness(Part):

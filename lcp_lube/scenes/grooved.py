@@ -1,14 +1,14 @@
 """Journals with axial grooves across the whole width, under a load of given direction; or without any groove."""
 
 import math
+from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 from petsc4py import PETSc
 from pydantic import Field, model_validator
 
-from ..base.parallel import Array
 from ..problems.facts import Facts
+from ..problems.film.bore import Bore, Dam
 from ..problems.film.forces import Shaft
 from ..problems.film.grooves import Groove
 from ..problems.film.lubrication import LubricationProblem
@@ -16,6 +16,7 @@ from ..problems.film.model import Model, Side
 from ..problems.film.supplies import Patch, Supply
 from ..problems.film.turning import Turning
 from .balance import BalanceTable
+from .film import Extent, FilmPart
 from .scene import Count, Finite, NotNegative, Positive, Scene
 from .supply import Place, SupplyTable, supplies_of
 from .units import measured, metres
@@ -30,7 +31,8 @@ class GroovedJournalScene(Scene):
 
     preload m moves the middle of each lobe between two grooves inwards by m c: its film is less by m c cos(theta - theta_lobe).
     tilt and tilt_across turn the shaft's axis in the plane of the load and across: the far end (y = B) comes nearer to
-    theta = 0, and to theta = 90 degrees, by tilt times B/2, the other end moves away as much.
+    theta = 0, and to theta = 90 degrees, by tilt times B/2, the other end moves away as much. dam_deg, dam_depth and dam_width
+    say where the bore has a pressure dam, a recess about the middle of the width that ends in a step.
     """
 
     D: Positive = metres(0.1, "diameter")
@@ -45,6 +47,13 @@ class GroovedJournalScene(Scene):
     preload: Annotated[float, Field(ge=0, lt=1, description="of the lobes between the grooves; 0: a round bush")] = 0.0
     tilt: Finite = Field(0.0, description="slope of the shaft in the plane of the load, rad")
     tilt_across: Finite = Field(0.0, description="slope of the shaft across the load, rad")
+    barrel: Finite = metres(0.0, "by how much the film is larger at both ends: a barrel-shaped journal")
+    dam_deg: tuple[Finite, Finite] | None = Field(
+        None, description="where a pressure dam begins and ends, degrees from the load"
+    )
+    dam_depth: NotNegative = metres(0.0, "depth of the pressure dam")
+    dam_width: Annotated[float, Field(gt=0, le=1)] = Field(0.75, description="width of the dam over the bearing's")
+    film: list[FilmPart] = Field([], description="shapes that are added to the film; x from the first groove's edge")
     p_groove: NotNegative = measured("Pa", 0.0, "pressure in the grooves, above p_c")
     p_end: NotNegative = measured("Pa", 0.0, "pressure at both ends, above p_c")
     p_c: Finite = measured("Pa", 0.0, "cavitation pressure")
@@ -71,6 +80,10 @@ class GroovedJournalScene(Scene):
             raise ValueError(f"p_end = {self.p_end:g}: without grooves the ends feed the film: p_end > 0 is needed")
         if self.shape[0] < 12 * max(1, len(places)):
             raise ValueError(f"nx = {self.shape[0]}: at least {12 * max(1, len(places))} points around are needed")
+        if (self.dam_deg is None) != (not self.dam_depth):
+            raise ValueError(f"dam_deg = {self.dam_deg}, dam_depth = {self.dam_depth:g}: a pressure dam has both")
+        if self.dam_deg is not None and not 0 < self.dam_deg[1] - self.dam_deg[0] < 360:
+            raise ValueError(f"dam_deg = {list(self.dam_deg)}: start < end < start + 360 is needed")
         self._supplies()
         return self
 
@@ -101,19 +114,26 @@ class GroovedJournalScene(Scene):
         start = first - math.pi / self.shape[0]
         return Turning(0.5 * self.D, self.clearance, self.L_over_D * self.D, self.omega, start)
 
-    def gap(self, x: Array, y: Array | None = None) -> Array:
-        """The film, m. The round bush by a square, which keeps its digits where it is thin."""
-        turning = self.turning
-        theta = turning.theta(np.asarray(x, dtype=float))
-        half = 0.5 * (theta - math.radians(self.attitude_deg or 0.0))
-        h = self.clearance * ((1.0 - self.eccentricity) + 2.0 * self.eccentricity * np.sin(half) ** 2)
-        if self.preload:
-            middles = np.radians(self.lobes_deg)
-            from_middle = np.remainder(theta[..., None] - middles + math.pi, 2.0 * math.pi) - math.pi
-            h = h - self.preload * self.clearance * np.cos(np.abs(from_middle).min(axis=-1))
-        if y is None or not (self.tilt or self.tilt_across):
-            return np.array(np.broadcast_arrays(h, 0.0 if y is None else y)[0])
-        return h - (np.asarray(y) - 0.5 * turning.B) * (self.tilt * np.cos(theta) + self.tilt_across * np.sin(theta))
+    @property
+    def gap(self) -> Bore:
+        """The film h(x, y), m."""
+        turning, dam = self.turning, None
+        if self.dam_depth and self.dam_deg is not None:
+            start, end = map(math.radians, self.dam_deg)
+            dam = Dam(start, end, self.dam_width * turning.B, self.dam_depth)
+        extent = Extent((turning.length, turning.B), self._folder or Path())
+        return Bore(
+            turning,
+            self.eccentricity,
+            math.radians(self.attitude_deg or 0.0),
+            self.preload,
+            tuple(math.radians(angle) for angle in self.lobes_deg),
+            self.tilt,
+            self.tilt_across,
+            self.barrel,
+            dam,
+            tuple(table.part(extent) for table in self.film),
+        )
 
     @property
     def lobes_deg(self) -> list[float]:
@@ -138,7 +158,7 @@ class GroovedJournalScene(Scene):
         return Model(
             lengths=(math.pi * self.D, turning.B),
             sides=(Side("periodic"), Side("periodic"), ends, ends),
-            gap=self.gap,  # type: ignore[arg-type]
+            gap=self.gap,
             mu=self.mu,
             U=turning.R * turning.omega,
             p_c=self.p_c,

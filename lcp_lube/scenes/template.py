@@ -105,7 +105,7 @@ def _table(model: type[BaseModel], data: dict[str, Any], prefix: str) -> list[st
         elif len(inner) == 1:
             below += _inner(field, inner[0], f"{prefix}{key}", data.get(key))
         else:
-            below += _parts(inner, f"{prefix}{key}", data[key])
+            below += _parts(inner, f"{prefix}{key}", data.get(key, []))
     return lines + below
 
 

@@ -178,20 +178,25 @@ class Model:
             lengths = ((pad.n + 1) * dx, *self.lengths[1:])
             sides = (Side(p=pad.west), Side(p=pad.east), *self.sides[2:])
             # Its x = 0 is the last column of the groove before it.
-            gap = _Moved(self.gap, (pad.first - 0.5) * dx)
+            gap = _Moved(self.gap, (pad.first - 0.5) * dx, self.lengths[0])
             films.append((pad, replace(self, lengths=lengths, sides=sides, gap=gap, exact=None, grooves=(), places=places)))
         return films
 
 
 @dataclass(frozen=True)
 class _Moved:
-    """A film that begins elsewhere."""
+    """A film round a ring of this length that begins elsewhere."""
 
     gap: Film
     start: float
+    period: float
 
     def __call__(self, x: ArrayLike, y: ArrayLike | None = None, /) -> Array:
         return self.gap(np.asarray(x, dtype=float) + self.start, np.asarray(0.0 if y is None else y))
+
+    def jumps(self, axis: str) -> tuple[float, ...]:
+        found = getattr(self.gap, "jumps", lambda axis: ())(axis)
+        return tuple((t - self.start) % self.period for t in found) if axis == "x" else found
 
 
 @dataclass(frozen=True)

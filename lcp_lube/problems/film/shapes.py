@@ -122,6 +122,28 @@ class Journal:
 
 
 @dataclass(frozen=True)
+class Herringbone:
+    """`count` grooves of a depth, inclined by `angle` (rad) against the motion, that meet in the middle of the width.
+
+    ratio : width of a groove over groove and land. land : share of the width in the middle that has none. The grooves pump
+    towards the middle where the wall runs from the ends of their V to its point; a negative angle turns them round.
+    """
+
+    depth: float
+    count: int
+    angle: float
+    ratio: float
+    land: float
+    lengths: tuple[float, float]
+
+    def __call__(self, x: Array, y: Array) -> Array:
+        L, width = self.lengths
+        off = np.abs(y - 0.5 * width)
+        phase = np.remainder((x + off / np.tan(self.angle)) * (self.count / L), 1.0)
+        return np.where((phase < self.ratio) & (off >= 0.5 * self.land * width), self.depth, 0.0)
+
+
+@dataclass(frozen=True)
 class RandomSurface:
     """Cubic B-spline through normal numbers on a lattice of `cells` meshes a side: the same surface on every grid.
 

@@ -25,6 +25,11 @@ class Turning:
     omega: float
     start: float
 
+    @property
+    def length(self) -> float:
+        """Of the unwrapped film, m."""
+        return 2.0 * math.pi * self.R
+
     def theta(self, x: Array) -> Array:
         """Angle of the places x (m) of the unwrapped film."""
         return self.start + x / self.R
