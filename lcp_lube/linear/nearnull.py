@@ -11,7 +11,9 @@ from petsc4py import PETSc
 
 from ..base.parallel import Array
 
-COARSEST = 200
+# benchmarks/constants.py sweeps them: all flat around these values.
+COARSEST = 200  # unknowns of the coarsest level
+COARSEST_SWEEPS = 20  # there
 LEAK = 1e-4  # right-hand side, in parts of diag(S): larger ones let the boundary's distance show, which spoils w
 SWEEPS = 3  # symmetric Gauss-Seidel sweeps before and after
 
@@ -27,7 +29,6 @@ class NearNull:
 
     def __init__(self, S: PETSc.Mat, i: np.ndarray, j: np.ndarray):
         self._S = S
-        self._owned: list = []
         self._prolongations: list[PETSc.Mat] = []
         size = S.getSize()[0]
         while size > COARSEST:
@@ -40,11 +41,8 @@ class NearNull:
             blocks = np.flatnonzero(used)
             i, j = blocks % width, blocks // width
             P = _aggregation(aggregate, int(used.sum()), S.comm)
-            coarse = P.getSize()[1]
             self._prolongations.append(P)
-            if coarse >= 0.7 * size:
-                break
-            size = coarse
+            size = P.getSize()[1]
 
     def improve(self, w: Array, cycles: int) -> Array:
         """w after some cycles; every entry stays positive. Collective."""
@@ -63,7 +61,7 @@ class NearNull:
     def _cycle(self, S: PETSc.Mat, x: PETSc.Vec, f: PETSc.Vec, level: int) -> None:
         symmetric = PETSc.Mat.SORType.LOCAL_SYMMETRIC_SWEEP
         if level == len(self._prolongations):
-            S.SOR(f, x, sortype=symmetric, its=20)
+            S.SOR(f, x, sortype=symmetric, its=COARSEST_SWEEPS)
             return
         S.SOR(f, x, sortype=symmetric, its=SWEEPS)
         P = self._prolongations[level]

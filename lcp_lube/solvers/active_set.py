@@ -31,6 +31,9 @@ from .relaxation import Relaxation, relaxation
 from .zform import EPS, ZForm
 
 RESCUE_SWEEPS, MOST_SWEEPS = 16, 2**14  # once stalled: at first, and at most
+# Inner tolerances: the first steps need signs, not digits; later ones a part of ||G||; the last one is to bring ||G|| below eps1,
+# and no further (benchmarks/constants.py sweeps the three).
+FIRST, FORCING, LAST = 1e-2, 0.1, 0.4
 LEAST = 1e-15  # p_unit: a largest pressure below this is rounding
 
 
@@ -108,8 +111,8 @@ class ActiveSet(Method):
         self._taken += 1
         full = self._branch()
         cavity = (~full).astype(float)
-        # Early steps need signs, not digits; the last one is to bring ||G|| below eps1, and no further.
-        rtol = max(self.options.rtol, min(1e-2, max(0.1 * self.norm, 0.4 * self.eps1 / self.norm if self.norm else 1.0)))
+        last = LAST * self.eps1 / self.norm if self.norm else 1.0
+        rtol = max(self.options.rtol, min(FIRST, max(FORCING * self.norm, last)))
         dp, dr, linear_iterations = self.system.solve(cavity, 1.0 - cavity, -self.G, np.zeros_like(self.G), rtol)
         with self.system.stages("step length"):
             d = np.where(full, dp, -dr / self.form.s)
