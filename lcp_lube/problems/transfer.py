@@ -24,7 +24,6 @@ class Transfer:
 
     Parameters
     ----------
-    nearest : take the nearest coarse point's value instead (for fields with jumps).
     zero_boundary : the field is zero on the boundary: interpolate to that, but at ends through which nothing flows.
 
     Attributes
@@ -33,7 +32,7 @@ class Transfer:
     coarse_meshes : spacings of the coarse grid from side to side.
     """
 
-    def __init__(self, coarse: Grid, fine: Grid, nearest: bool = False, zero_boundary: bool = False):
+    def __init__(self, coarse: Grid, fine: Grid, zero_boundary: bool = False):
         from scipy.sparse import csr_matrix, kron  # here: a solve on one grid is spared its import
 
         self.coarse_meshes = coarse.meshes
@@ -41,7 +40,7 @@ class Transfer:
         weights = csr_matrix([[1.0]])
         for side in range(fine.dim):
             points = np.arange(*ranges[side])
-            along = _weights(points, coarse, fine, side, nearest, zero_boundary)
+            along = _weights(points, coarse, fine, side, zero_boundary)
             weights = kron(along, weights, format="csr")
         weights.indices = coarse.dm.getAO().app2petsc(weights.indices.astype(PETSc.IntType))
         weights.has_sorted_indices = False
@@ -68,7 +67,7 @@ class Transfer:
         self._own.free()
 
 
-def _weights(points: np.ndarray, coarse: Grid, fine: Grid, side: int, nearest: bool, zero_boundary: bool) -> "csr_matrix":
+def _weights(points: np.ndarray, coarse: Grid, fine: Grid, side: int, zero_boundary: bool) -> "csr_matrix":
     """Linear interpolation along one side as a matrix, a row for each of the fine points, a column for each coarse one."""
     from scipy.sparse import csr_matrix
 
@@ -81,8 +80,6 @@ def _weights(points: np.ndarray, coarse: Grid, fine: Grid, side: int, nearest: b
         right = (at - around[left]) / (around[left + 1] - around[left])
         left = left - 1  # `around` begins with what lies before the first point
         right = np.where(np.abs(right - np.rint(right)) < NESTED, np.rint(right), right)
-    if nearest:
-        right = np.rint(right)
     rows = np.concatenate([np.arange(points.size)] * 2)
     columns = np.concatenate([left, left + 1])
     values = np.concatenate([1.0 - right, right])

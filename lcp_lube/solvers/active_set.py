@@ -31,7 +31,7 @@ from .relaxation import Relaxation, relaxation
 from .zform import EPS, ZForm
 
 RESCUE_SWEEPS, MOST_SWEEPS = 16, 2**14  # once stalled: at first, and at most
-# Inner tolerances: the first steps need signs, not digits; later ones a part of ||G||; the last one is to bring ||G|| below eps1,
+# Inner tolerances: the first steps need signs, not digits; later ones a part of ||G||; the last one brings ||G|| below eps1
 # and no further (benchmarks/constants.py sweeps the three).
 FIRST, FORCING, LAST = 1e-2, 0.1, 0.4
 LEAST = 1e-15  # p_unit: a largest pressure below this is rounding
