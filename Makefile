@@ -11,7 +11,7 @@ export PRTE_MCA_rmaps_default_mapping_policy := :oversubscribe
 # The ranks are the parallelism; threads inside each would only compete.
 export OMP_NUM_THREADS := 1
 
-.PHONY: help setup demo test test-rounding test-petsc-new boundscheck mutations lint format charts pictures clean
+.PHONY: help setup demo test test-rounding test-petsc-new boundscheck mutations lint format charts pictures docs links man clean
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | expand -t 16
@@ -58,6 +58,23 @@ charts: $(READY) ## make the runs that benchmarks/results lacks, then draw all c
 
 pictures: $(READY) ## draw the pictures of README.md and docs/ anew
 	$(BIN)/python tools/pictures.py
+
+# Tools of the documentation only; the package itself does not need them.
+.venv/.docs: pyproject.toml $(READY)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	touch $@
+
+docs: .venv/.docs ## the documentation site in build/site, strictly; its notebooks run
+	$(BIN)/python -m sphinx -W --keep-going -q -b html -c docs . build/site
+	$(BIN)/python tools/links.py build/site
+
+links: .venv/.docs ## whether links to other sites lead somewhere; needs the network
+	$(BIN)/python -m sphinx -q -b linkcheck -c docs . build/links
+
+man: .venv/.docs ## a man page, build/lcp-lube.1
+	mkdir -p build
+	$(BIN)/argparse-manpage --module lcp_lube.cli.arguments --function parser_of_all --prog lcp-lube --project-name lcp_lube \
+	  --description "cavitation in lubricated bearings as a complementarity problem" --output build/lcp-lube.1
 
 clean: ## remove caches and build products; .venv stays
 	rm -rf build dist *.egg-info .coverage .hypothesis .mypy_cache .pytest_cache .ruff_cache problem4.png

@@ -1,8 +1,9 @@
-"""What README.md and docs/comparison.md say of the stability maps, from their csv.
+"""What docs/results.md and docs/comparison.md say of the stability maps, from their csv.
 
     python benchmarks/map_table.py
 
-Prints a line of docs/comparison.md's table for each map, and README.md's words on din-pc; tests/docs/test_readme.py compares.
+Prints a line of docs/comparison.md's table for each map, and docs/results.md's words on din-pc; tests/docs/test_readme.py
+compares.
 """
 
 import csv

@@ -16,6 +16,8 @@ _PUBLIC = {
     "load_scene": "lcp_lube.scenes.scene",
     "solve": "lcp_lube.api",
     "Solution": "lcp_lube.problems.solution",
+    "save_series": "lcp_lube.output.series",
+    "to_pandas": "lcp_lube.output.rows",
 }
 __all__ = [*_PUBLIC, "__version__"]
 

@@ -15,7 +15,7 @@ packages=(
 )
 python=/usr/bin/python3 # not the first on PATH: only the system's own sees the system's packages
 
-command -v apt-get > /dev/null || fail "needs Debian or Ubuntu; elsewhere see 'conda-forge and PyPI' in README.md"
+command -v apt-get > /dev/null || fail "needs Debian or Ubuntu; elsewhere see docs/install.md"
 
 missing=()
 for package in "${packages[@]}"; do
@@ -24,7 +24,7 @@ done
 if ((${#missing[@]})); then
   root=(env)
   if ((EUID != 0)); then
-    command -v sudo > /dev/null || fail "needs root or sudo to install ${missing[*]}; else see 'conda-forge and PyPI' in README.md"
+    command -v sudo > /dev/null || fail "needs root or sudo to install ${missing[*]}; else see docs/install.md"
     root=(sudo env)
   fi
   # A fresh Ubuntu updates itself after boot and holds apt's lock meanwhile: wait for it.

@@ -43,7 +43,7 @@ def start(arguments: list[str]) -> None:
         with _alone():
             from mpi4py import MPI  # noqa: F401  (starts MPI: what it says if it cannot is not caught below)
     except ImportError as error:
-        raise InputError(f"PETSc for Python is needed, see 'Installation' in README.md: {error}") from None
+        raise InputError(f"PETSc for Python is needed, see docs/install.md: {error}") from None
     sys.stderr.flush()
     before = os.dup(2)
     with tempfile.TemporaryFile() as said:

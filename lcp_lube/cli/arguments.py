@@ -82,7 +82,7 @@ def parser_of_all() -> Parser:
         help="finer and finer grids until the load's estimated relative error is below TOL; --n, --nx, --ny: no finer ones",
     )
     solve.add_argument("--quantity", metavar="NAME", help="what --accuracy is about: load (default), p_max, friction, ...")
-    solve.add_argument("--output", action="append", default=[], metavar="FILE", help=".npz, .vts (ParaView) or .h5")
+    solve.add_argument("--output", action="append", default=[], metavar="FILE", help=".npz, .nc, .vts or .pvd (ParaView), .h5")
     solve.add_argument("--boundary", action="store_true", help="--output writes the points of the sides as well")
     solve.add_argument("--plot", metavar="FILE.png", help="picture of p, r and h")
     solve.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")

@@ -20,7 +20,8 @@ from ..base.options import check_unread
 from ..base.resumable import ResumableCsv
 from ..errors import InputError
 from ..output.console import say
-from ..output.results import as_dict, finite
+from ..output.results import as_dict
+from ..output.rows import flat
 from ..problems.solution import Outcome, Solution, Step
 from ..scenes.scene import Scene
 from .asked import ask_of, scene_of
@@ -28,8 +29,6 @@ from .axes import Axis, as_read, chains, checked, parse_axis
 from .sweep_jobs import jobs_for, serve, side_by_side
 
 REFUSED = "refused"  # an outcome beside those of `Outcome`: bad input that only the solve could notice
-PLACES = {"p_max_at": "p_max", "min_h_at": "min_h", "force": "force", "moment": "moment"}
-PARTS = {key: (f"{name}_x", f"{name}_y") for key, name in PLACES.items()}
 
 
 def solved(
@@ -161,19 +160,6 @@ def _data(scene: Scene) -> dict[str, Any]:
         return {f"scene{path} [{unit}]" if unit else f"scene{path}": value}
 
     return columns(scene.data_si(), "")
-
-
-def flat(data: dict[str, Any]) -> dict[str, Any]:
-    """The JSON's keys as columns: places by coordinate, flows by side, the total of the seconds."""
-    row: dict[str, Any] = {}
-    for key, value in finite(data).items():
-        if key in PARTS and not isinstance(value, float):  # in 1D a moment is one number
-            row |= dict(zip(PARTS[key], [*(value or []), None][: len(value or []) or 2], strict=False))
-        elif key in ("flow", "balance") and isinstance(value, dict):
-            row |= {f"{key}_{name}": part for name, part in value.items()}
-        elif not isinstance(value, (dict, list)):
-            row[key] = value
-    return row | {"time_s": data["time_s"]["total"]}
 
 
 def run(args: argparse.Namespace) -> int:

@@ -1,4 +1,4 @@
-"""Fields in files: NumPy (.npz), ParaView (.vts, .vtr), HDF5 (.h5). SI units throughout."""
+"""Fields in files: NumPy (.npz), NetCDF (.nc), ParaView (.vts, .vtr, .pvd), HDF5 (.h5). SI units throughout."""
 
 import ctypes
 import json
@@ -22,7 +22,7 @@ from ..problems.grid import Grid
 from ..problems.solution import Solution
 from .results import as_dict, finite
 
-FIELD_FILES = (".npz", ".vts", ".vtr", ".h5")
+FIELD_FILES = (".npz", ".nc", ".vts", ".vtr", ".pvd", ".h5")
 PETSC_STRING = 13  # of PETSc's PetscDataType
 PICTURES = (".png", ".pdf", ".svg")
 
@@ -53,6 +53,9 @@ def save(solution: Solution, path: str | Path, boundary: bool = False) -> None:
 
     - .npz: the fields, x of shape (nx,), y of shape (ny,) in 2D, and two JSON strings: `units` by field, and `result`, the
       object that --json prints. Rank 0 gathers it all: take .h5 or .vts where that is too much for it.
+    - .nc: NetCDF with the names and units of the CF conventions, the numbers of the answer among them, for xarray and many
+      others; by rank 0 too.
+    - .pvd: a collection of ParaView's of this one answer, with its .vts beside it; `save_series` writes one of many.
     - .vts, .vtr: ParaView's structured and rectilinear grid by PETSc's viewer; rank 0 writes, one rank's part at a time.
     - .h5: the fields, x and y as datasets by PETSc's viewer, all ranks writing, each with an attribute `units`; `Vec.load`
       with the field's name reads one back on any number of ranks.
@@ -72,9 +75,20 @@ def save(solution: Solution, path: str | Path, boundary: bool = False) -> None:
     points = Frame(grid) if boundary else grid
     units = solution.units
     fields = {name: solution.field(name, boundary) for name in solution.problem.physical(solution.fields)}
+    if suffix == ".pvd":
+        from .series import save_series
+
+        save_series({0.0: solution}, path, boundary)
+        return
     with replacing(path, grid.comm) as temporary:
         if suffix == ".npz":
             _save_npz(solution, points, fields, units, temporary)
+        elif suffix == ".nc":
+            whole = {name: gather(points, values) for name, values in fields.items()}
+            if grid.comm.rank == 0:
+                from .netcdf import write_netcdf
+
+                write_netcdf(solution, dict(zip("xy", coordinates(points), strict=False)), whole, temporary)
         else:
             _save_by_viewer(points, fields, units, temporary)
 

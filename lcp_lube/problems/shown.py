@@ -99,7 +99,7 @@ class Shown:
         OUTPUT["plot"].load()(self, path)
 
     def save(self, path: str | Path, boundary: bool = False) -> None:
-        """Write the fields to a .npz, .vts, .vtr or .h5; boundary: with the points of the sides. Collective.
+        """Write the fields to a .npz, .nc, .vts, .vtr, .pvd or .h5; boundary: with the points of the sides. Collective.
 
         Raises
         ------

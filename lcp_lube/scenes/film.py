@@ -213,8 +213,10 @@ class ProfilePart(Part):
     """A measured profile from a file."""
 
     shape: Literal["profile"]
-    file: str = Field(..., description=".csv with rows x, h or x, y, h, or .npy with h from side to side")
-    unit: Unit = Field("um", description="the file's unit of h")
+    file: str = Field(
+        ..., description=".csv with rows x, h or x, y, h; .npy or .tif with h from side to side; .x3p, .sur and others"
+    )
+    unit: Unit = Field("um", description="the file's unit of h (.csv, .npy, .tif)")
     unit_x: Unit = Field("mm", description="the file's unit of x and y (.csv)")
     interpolation: Literal["linear", "cubic", "nearest"] = Field("linear", description="between its points")
     uneven: bool = Field(False, description="the x of a .csv are meant to lie at uneven distances")

@@ -401,7 +401,7 @@ def test_profile_files_refused(tmp_path):
         "torn.npy": "no array of numbers",
         "binary.csv": "not a text file",
         "missing.csv": "No such file",
-        "h.txt": "allowed are .csv and .npy",
+        "h.txt": "allowed are .csv, .npy, .tif",
     }.items():
         with pytest.raises(InputError, match=message):
             bearing(film={"shape": "profile", "file": str(tmp_path / name)}).build()

@@ -1,4 +1,4 @@
-"""A measured film: a table of heights from a CSV or NPY file, checked when it is read, interpolated between its points."""
+"""A measured film: a table of heights from a file, checked when it is read, interpolated between its points."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,6 +9,7 @@ import numpy as np
 
 from ...base.parallel import Array
 from ...errors import InputError
+from .surface import METROLOGY, TIF, metrology, tif_heights
 
 SHORT = 0.05  # of the pad, at most
 SLACK = 1.01  # of the largest step: a profile may end so much before the pad
@@ -61,7 +62,8 @@ def read_profile(
     Parameters
     ----------
     path : .csv with rows x, h (1D, or 2D where h does not depend on y) or x, y, h in any order, or .npy with h at
-        equidistant points from side to side: (nx,) or (ny, nx). A .csv may have lines that begin with #, and one head line.
+        equidistant points from side to side: (nx,) or (ny, nx), or such points as the grey values of a .tif; or a surface in
+        one of the formats of `surface.METROLOGY`, with its own units. A .csv may have comments (#) and one head line.
     method : 'linear', 'cubic' or 'nearest'.
     height_unit, length_unit : metres in the file's unit of h, and of x and y (.csv).
     uneven : the x of a .csv may lie at uneven distances.
@@ -71,12 +73,18 @@ def read_profile(
     InputError : an unreadable file, a missing row or value, a value that is no number, a profile that does not reach the sides.
     """
     try:
-        if path.suffix.lower() == ".npy":
+        suffix = path.suffix.lower()
+        if suffix == ".npy" or suffix in TIF:
             x, y, z = _from_array(path, lengths)
-        elif path.suffix.lower() == ".csv":
+        elif suffix == ".csv":
             x, y, z = _from_rows(path, length_unit, uneven)
+        elif suffix in METROLOGY:
+            x, y, z = metrology(path)
+            height_unit = 1.0
+            if len(lengths) == 1:
+                raise InputError(f"profile {path}: a surface h(x, y); a scene of dimension = 2 is needed")
         else:
-            raise InputError(f"profile {path}: allowed are .csv and .npy")
+            raise InputError(f"profile {path}: allowed are {', '.join(('.csv', '.npy', *TIF, *METROLOGY))}")
     except OSError as error:
         raise InputError(f"profile {path}: {error.strerror or error}") from None
     except ValueError as error:
@@ -99,7 +107,9 @@ def read_profile(
 
 def _from_array(path: Path, lengths: tuple[float, ...]) -> tuple[Array, Array, Array]:
     try:
-        z = np.load(path, allow_pickle=False)
+        z = tif_heights(path) if path.suffix.lower() in TIF else np.load(path, allow_pickle=False)
+    except InputError:
+        raise
     except ValueError:
         raise InputError(f"profile {path}: no array of numbers in NumPy's format") from None
     if not (isinstance(z, np.ndarray) and z.ndim in (1, 2) and z.ndim <= len(lengths) and min(z.shape) > 1):

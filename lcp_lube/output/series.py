@@ -1,0 +1,46 @@
+"""Many answers as one animation of ParaView: a .pvd that names a .vts for each."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+from ..base.together import on_all_ranks
+from ..errors import InputError
+from ..problems.solution import Solution
+from . import files
+
+
+def save_series(solutions: Mapping[float, Solution], path: str | Path, boundary: bool = False) -> None:
+    """Write `path`, a .pvd, and beside it path_0000.vts, path_0001.vts ... Collective.
+
+    Parameters
+    ----------
+    solutions : answers by what ParaView calls the time: seconds, or the value that was varied.
+    boundary : with the points of the sides.
+
+    Raises
+    ------
+    InputError : another extension, no solutions, a file that cannot be written.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".pvd" or not solutions:
+        raise InputError(f"{path}: a name that ends in .pvd, and one solution at least, are needed")
+    lines = []
+    for k, (time, solution) in enumerate(solutions.items()):
+        name = f"{path.stem}_{k:04d}.vts"
+        files.save(solution, path.with_name(name), boundary)
+        lines.append(f'    <DataSet timestep="{float(time)!r}" part="0" file={quoteattr(name)}/>')
+    text = "\n".join(
+        [
+            '<?xml version="1.0"?>',
+            '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">',
+            "  <Collection>",
+            *lines,
+            "  </Collection>",
+            "</VTKFile>\n",
+        ]
+    )
+    comm = next(iter(solutions.values())).problem.grid.comm
+    with files.replacing(path, comm) as temporary, on_all_ranks(comm, str(path)):
+        if comm.rank == 0:
+            Path(temporary).write_text(text, encoding="utf-8")
