@@ -198,7 +198,7 @@ def test_an_interrupt_removes_the_temporary_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "as_plot", "message"),
     [
-        ("a.vtk", False, r"extension \.vtk; allowed are \.npz, \.vts, \.vtr, \.h5; nearest is \.vts"),
+        ("a.vtk", False, r"extension \.vtk; allowed are \.npz, \.nc, .*; nearest is \.vts"),
         ("a", False, r"no extension; allowed are"),
         ("a.png", False, r"\.png is for --plot"),
         ("a.h5", True, r"allowed are \.png, \.pdf, \.svg; \.h5 is for --output"),
@@ -243,7 +243,8 @@ def test_missing_libraries_are_named(line: Solution, tmp_path: Path, monkeypatch
 def test_the_command_line_refuses_before_it_solves(cli: Callable[..., Run]) -> None:
     done = cli("solve", "problem4", "--n", 2000, "--output", "a.vtk", timeout=20)  # too large to be solved in this time
     assert done.status == 2
-    assert done.lines == ["lcp-lube: --output a.vtk: extension .vtk; allowed are .npz, .vts, .vtr, .h5; nearest is .vts"]
+    (line,) = done.lines
+    assert line.startswith("lcp-lube: --output a.vtk: extension .vtk; allowed are .npz, ") and line.endswith("nearest is .vts")
 
 
 @pytest.mark.parametrize(("suffix", "magic"), [(".png", b"\x89PNG"), (".pdf", b"%PDF"), (".svg", b"<?xml")])
