@@ -190,6 +190,7 @@ FAMILIES: dict[str, Entry] = {
     "textured": Entry("lcp_lube.scenes.textured:TexturedScene", "flat slider with square dimples"),
     "journal": Entry("lcp_lube.scenes.journal:JournalScene", "journal bearing with an axial groove at the widest gap"),
     "grooved_journal": Entry("lcp_lube.scenes.grooved:GroovedJournalScene", "journal with axial grooves under a vertical load"),
+    "thrust": Entry("lcp_lube.scenes.thrust:ThrustScene", "thrust bearing: equal sectors with tapered lands, steps or spirals"),
     "rough": Entry("lcp_lube.scenes.textured:RoughScene", "slider with one wave and a random surface"),
     "bearing": Entry("lcp_lube.scenes.bearing:BearingScene", "a bearing of any kind: film shapes added up, a condition a side"),
     "squeeze": Entry("lcp_lube.scenes.squeeze:SqueezeScene", "parallel plates that approach and part, in time"),

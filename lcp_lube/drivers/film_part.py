@@ -115,6 +115,8 @@ def promising(scene: Solvable) -> bool:
     model = model_of(scene)
     assert model is not None  # as `applies` found
     supplied = model.supplies
+    if model.polar is not None:  # arcs differ from line to line
+        return False
     if supplied and (len(scene.shape) == 1 or not all(one.region.symmetric(0.5 * model.lengths[-1]) for one in supplied)):
         return False
     if _at_rest(model):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.parallel import Array
-from ..problems.film.flows import line_weights
+from ..problems.film.flows import stream_weights
 from ..problems.film.lubrication import LubricationProblem
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ def ahead(problem: LubricationProblem) -> Array:
 
     Of all columns, on every rank. Collective.
     """
-    s, weight = problem.scheme, line_weights(problem.grid)
+    s, weight = problem.scheme, stream_weights(problem.grid)
     apart = np.where(s.couette_E == 0.0, 0.0, s.couette_E / weight - problem.U / s.flow_unit * s.h)
     around = problem.grid.with_neighbours(0)
     half = 0.5 * np.diff(around)
@@ -48,7 +48,7 @@ def void_at_faces(problem: LubricationProblem, r: Array, sign: Array) -> Array:
     way = ahead(problem)
     at, downstream = way[grid.x_start : grid.x_end], way.max() > 0.0
     h = np.broadcast_to(problem.film(grid.x + at, grid.y), grid.box)
-    speed = problem.U / s.flow_unit * line_weights(grid) * h
+    speed = problem.U / s.flow_unit * stream_weights(grid) * h
     layer = (s.couette_E + s.b_C * r) / np.where(moves, speed, 1.0)
     framed = grid.ghosted(sign.ravel())[1:-1]
     beyond = (framed[:, 2:] if downstream else framed[:, :-2]) if way.any() else sign

@@ -22,6 +22,7 @@ OFFSET = {"open": 1.0, "closed": 0.5, "mirror": 0.0, "periodic": 0.5}
 OPEN = ("open", "open")
 Places = tuple[Array | None, Array | None]  # of the lines of points in x and y, m from the corner; None: evenly spaced
 EVEN: Places = (None, None)
+Polar = tuple[float, float]  # radius at y = 0, and the radius on which x is measured, m
 
 
 def some_places(n: int, length: float, ends: Sequence[str], most: int) -> Array:
@@ -47,6 +48,7 @@ class Grid:
     origin : coordinates of the corner x = y = 0 of the description above, in metres.
     ends : kinds (`OFFSET`) of the two ends in x and in y; spacings and first points as above are those of open ends.
     places : coordinates of the lines of points in x and in y from that corner, ascending, m; None: evenly spaced.
+    polar : of a sector: the lines of points are arcs, y is a radius beyond the first of these, x the arc on the second.
 
     Raises
     ------
@@ -61,6 +63,7 @@ class Grid:
         origin: tuple[float, float] = (0.0, 0.0),
         ends: tuple[tuple[str, str], tuple[str, str]] = (OPEN, OPEN),
         places: Places = EVEN,
+        polar: Polar | None = None,
     ):
         if any(n < 1 for n in shape):
             raise InputError(f"grid {'x'.join(map(str, shape))}: at least 1 interior point a side is needed")
@@ -75,7 +78,7 @@ class Grid:
         # Spacings from side to side.
         self.meshes = tuple(n + OFFSET[a] + OFFSET[b] - 1.0 for n, (a, b) in zip(self.shape, self.ends, strict=True))
         self.spacing = tuple(length / meshes for length, meshes in zip(self.lengths, self.meshes, strict=True))
-        self.origin, self.places = origin, places
+        self.origin, self.places, self.polar = origin, places, polar
         self._around = tuple(self._with_neighbours(side) for side in range(self.dim))
         self.size = math.prod(self.shape)
         comm = PETSc.Comm(comm or PETSc.COMM_WORLD)  # mpi4py's will do too
@@ -183,6 +186,10 @@ class Grid:
         behind = {"open": L, "closed": 2.0 * L - places[-1], "mirror": 2.0 * L - last_but_one, "periodic": places[0] + L}[last]
         return np.concatenate([[before], places, [behind]])
 
+    def stretch(self, y: Array) -> Array:
+        """Length of an arc at y over its x: 1 in the plane, in a sector the radius over the one on which x is measured."""
+        return np.ones_like(y) if self.polar is None else (self.polar[0] + y) / self.polar[1]
+
     def _owned(self, side: int) -> tuple[int, int]:
         return ((self.x_start, self.x_end), (self.y_start, self.y_end))[side]
 
@@ -266,18 +273,18 @@ class Grid:
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "Grid":
         """A grid of its own DMDA. Collective."""
-        return Grid(self.shape, self.lengths, self.dm.comm, self.origin, self._ends, self.places)
+        return Grid(self.shape, self.lengths, self.dm.comm, self.origin, self._ends, self.places, self.polar)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """What is pickled: the numbers, from which as many ranks make the grid again, together."""
-        return _on_ranks, (self.comm.size, self.shape, self.lengths, self.origin, self._ends, self.places)
+        return _on_ranks, (self.comm.size, self.shape, self.lengths, self.origin, self._ends, self.places, self.polar)
 
     def destroy(self) -> None:
         """Free the DMDA. Collective."""
         self._own.free()
 
 
-def _on_ranks(ranks: int, shape: tuple[int, ...], lengths: tuple[float, ...], origin: Any, ends: Any, places: Any) -> Grid:
+def _on_ranks(ranks: int, shape: tuple[int, ...], lengths: tuple[float, ...], *how: Any) -> Grid:
     """A pickled grid, on one rank or all of them. Collective.
 
     Raises
@@ -287,4 +294,4 @@ def _on_ranks(ranks: int, shape: tuple[int, ...], lengths: tuple[float, ...], or
     comm = PETSc.COMM_SELF if ranks == 1 else PETSc.COMM_WORLD
     if comm.getSize() != ranks:
         raise InputError(f"pickled on {ranks} ranks, each with its part: {comm.getSize()} ranks cannot take it up")
-    return Grid(shape, lengths, comm, origin, ends, places)
+    return Grid(shape, lengths, comm, *how)

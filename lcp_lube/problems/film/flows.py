@@ -19,12 +19,17 @@ SIDES = ("west", "east", "south", "north")
 
 def point_weights(grid: Grid) -> Array:
     """What belongs to each owned point, in mean cells: 1, and 1/2 on a mirror line; of uneven lines its cell's own size."""
-    return np.broadcast_to(line_weights(grid) * grid.widths(0), grid.box).ravel()
+    return np.broadcast_to(stream_weights(grid) * grid.widths(0), grid.box).ravel()
 
 
 def line_weights(grid: Grid) -> Array:
     """Widths of the owned lines of cells, in mean spacings, shape (ny_local, 1); 1 in 1D."""
     return grid.widths(1)[:, None] if grid.dim == 2 else np.ones((1, 1))
+
+
+def stream_weights(grid: Grid) -> Array:
+    """What the wall of the owned lines carries, in parts of U h on a mean line: their widths, in a sector times the stretch."""
+    return line_weights(grid) * grid.stretch(grid.y)
 
 
 def side_flows(problem: LubricationProblem, p: Array, r: Array) -> dict[str, float]:
@@ -61,7 +66,7 @@ def side_flows(problem: LubricationProblem, p: Array, r: Array) -> dict[str, flo
     }
 
 
-def friction(problem: LubricationProblem, p_pa: Array, r: Array) -> float:
+def friction(problem: LubricationProblem, p_pa: Array, r: Array, lever: Array | float = 1.0) -> float:
     """Drag on the moving wall, N (1D: N/m): integral of mu U (1 - r)/h + (h/2) dp/dx, the void carrying no shear. Collective.
 
     By the midpoint rule over the x faces, where the box scheme knows the liquid's share of the film: it is that of the Couette
@@ -70,7 +75,7 @@ def friction(problem: LubricationProblem, p_pa: Array, r: Array) -> float:
 
     Parameters
     ----------
-    p_pa : pressure in Pa above the cavitation pressure, r : void fraction; owned points.
+    p_pa : pressure in Pa above the cavitation pressure, r : void fraction; owned points. lever : of each line, for a torque, m.
     """
     grid, s, film = problem.grid, problem.scheme, problem.film
     before, behind = grid.steps(0)[:-1], grid.steps(0)[1:]
@@ -88,5 +93,5 @@ def friction(problem: LubricationProblem, p_pa: Array, r: Array) -> float:
         shear = shear + np.where(wall, share * np.where(full, 4.0, 1.0 - r) / s.h, 0.0)
     push = np.where(passes, 0.5 * h_east * (p_east - p), 0.0) + np.where(first, 0.5 * h_west * (p - problem.p_sides[0]), 0.0)
     strips = 1.0 + 0.5 * (rims[0] * south + rims[1] * north) / weight
-    per_row = muU * behind * shear * strips + push
-    return problem.reduce.sum(per_row * weight) * (grid.spacing[1] if grid.dim == 2 else 1.0)
+    per_row = muU * grid.stretch(grid.y) ** 2 * behind * shear * strips + push
+    return problem.reduce.sum(per_row * weight * lever) * (grid.spacing[1] if grid.dim == 2 else 1.0)

@@ -48,7 +48,8 @@ def forces(problem: LubricationProblem, p_pa: Array) -> dict[str, Any]:
     pressure on the wall (the force points to +z). One round a shaft: `force` of the film on the shaft, minus the
     integral of (p - p_ambient) (cos phi, sin phi), `load` its magnitude, `attitude_deg` the angle from the load, which is
     its opposite, to the narrowest gap, positive in the sense of rotation, `moment` of the force about the middle of the width:
-    its two parts times the distance along the axis (2D), 0 where the shaft lies straight between alike ends.
+    its two parts times the distance along the axis (2D), 0 where the shaft lies straight between alike ends. A sector: `load`,
+    `moment` about the axes through the centre, and `pressure_centre` (`_of_sector`).
 
     Parameters
     ----------
@@ -61,6 +62,8 @@ def forces(problem: LubricationProblem, p_pa: Array) -> dict[str, Any]:
         return _integral(problem, p_pa, above, weight)
 
     out: dict[str, Any] = {"pressure_integral": integral(lambda x, y: np.ones(1), 0.0)}
+    if shaft is None and grid.polar is not None:
+        return out | _of_sector(grid.polar, integral)
     if shaft is None:
         out["load"] = integral(lambda x, y: np.ones(1))
         about_y = -integral(lambda x, y: x - middle[0])
@@ -81,6 +84,18 @@ def forces(problem: LubricationProblem, p_pa: Array) -> dict[str, Any]:
             -integral(lambda x, y: (y - middle[1]) * np.sin(phi(x))),
         ]
     return out
+
+
+def _of_sector(polar: tuple[float, float], integral: Callable[..., float]) -> dict[str, Any]:
+    """Load of a sector, its moment about the axes through the centre, x along the edge where it begins, y a quarter of a turn
+    ahead, and the radius and angle at which the load acts."""
+    inner, on = polar
+    load = integral(lambda x, y: np.ones(1))
+    moment = [integral(lambda x, y: (inner + y) * np.sin(x / on)), -integral(lambda x, y: (inner + y) * np.cos(x / on))]
+    centre = None
+    if load > 0:
+        centre = [hypot(*moment) / load, float(np.degrees(np.arctan2(moment[0], -moment[1])))]
+    return {"load": load, "moment": moment, "pressure_centre": centre}
 
 
 def _integral(problem: LubricationProblem, p_pa: Array, above: float, weight: Callable[[Array, Array], Array]) -> float:
@@ -107,7 +122,7 @@ def _integral(problem: LubricationProblem, p_pa: Array, above: float, weight: Ca
         corner_shares = [0.5 * strip * 0.5 * grid.rims(across)[j] for j in corners]
         places, shares = np.concatenate([along, ends]), np.concatenate([share, corner_shares])
         x, y = (np.full_like(places, at), places) if axis == 0 else (places, np.full_like(places, at))
-        total += (p_side - above) * float(np.sum(shares * weight(x, y)))
+        total += (p_side - above) * float(np.sum(shares * grid.stretch(y) * weight(x, y)))
     return float(grid.cell * total)
 
 
@@ -129,7 +144,7 @@ def corner_flows(problem: LubricationProblem) -> dict[str, float] | None:
             if p_i is None or p_j is None or p_i == p_j:
                 continue
             k = (s.k_W, s.k_E)[i] * (0.5 * grid.rims(0)[i] * grid.spacing[0] / problem.p_unit)  # h^3/(12 mu)
-            k = k / line_weights(grid)
+            k = k / line_weights(grid) * grid.stretch(grid.y)
             passing = problem.reduce.sum(np.where(at[i] & at[j], k, 0.0)) * 2.0 * np.log(2.0) / np.pi * (p_i - p_j)
             growth[names[j]] += passing
             growth[names[i]] -= passing

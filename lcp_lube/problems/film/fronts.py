@@ -9,7 +9,7 @@ import numpy as np
 from ...base.parallel import Array
 from ..grid import Grid
 from .cavity import cavity_sign
-from .flows import line_weights
+from .flows import stream_weights
 from .reynolds import Film
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def fronts(problem: LubricationProblem, p: Array, r: Array) -> tuple[list[float]
         Q = np.full_like(x, problem.boundary_flows(p, r)[0])
     else:
         leaves = scheme.couette_E + scheme.b_C * r.reshape(grid.box)
-        Q = scheme.flow_unit * leaves[row] / line_weights(grid)[row]
+        Q = scheme.flow_unit * leaves[row] / stream_weights(grid)[row]
     front = cavity[1:-1] & ~cavity[:-2] & here
     before = (x - 2.0 * behind)[front]
     before = before if grid.periodic[0] else np.maximum(before, start)

@@ -10,7 +10,7 @@ from petsc4py import PETSc
 from ...base.parallel import Array
 from ...errors import InputError
 from ..facts import Facts
-from ..grid import EVEN, Grid, Places
+from ..grid import EVEN, Grid, Places, Polar
 from .exact import ExactSolution
 from .fluid import Law
 from .forces import Shaft
@@ -67,6 +67,7 @@ class Model:
     shaft: Shaft | None = None  # of a film that is wrapped round one
     supplies: tuple[Supply, ...] = ()
     law: Law | None = None  # a fluid that depends on the pressure; `build` makes the problem of the constant one
+    polar: Polar | None = None  # of a sector (`Grid.polar`)
     places: Places | None = None  # of the lines of points; None: on the film's straight edges, if it has any
 
     def __post_init__(self) -> None:
@@ -135,9 +136,8 @@ class Model:
         if self.U < 0:
             return TurnedProblem(self.mirrored.build(shape, comm), self.exact)
         west, east, south, north = self.sides
-        grid = Grid(
-            shape, self.lengths, comm, ends=((west.kind, east.kind), (south.kind, north.kind)), places=self.lines(shape)
-        )
+        ends = ((west.kind, east.kind), (south.kind, north.kind))
+        grid = Grid(shape, self.lengths, comm, ends=ends, places=self.lines(shape), polar=self.polar)
         p_sides = tuple(side.p if side.kind == "open" else 0.0 for side in self.sides)
         film = self.film
         scheme = box_scheme(

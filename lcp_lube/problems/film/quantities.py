@@ -27,7 +27,10 @@ UNITS = {
     **dict.fromkeys(("flow", "side_leakage", "flow_growth", "groove_flow", "supply_flow"), "m3/s"),
     "cavitated_area": "m2",
     "power_loss": "W",
-    "moment": "N m",
+    **dict.fromkeys(("moment", "friction_torque"), "N m"),
+    "pad_load": "N",
+    **dict.fromkeys(("inner_flow", "outer_flow"), "m3/s"),
+    "pressure_centre": "m, deg",
     "attitude_deg": "deg",
 }
 PER_WIDTH = {"N": "N/m", "W": "W/m", "m3/s": "m2/s", "m2": "m"}
@@ -61,6 +64,7 @@ def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any
     ruptures, reformations : x of all of them, m; in 2D on the middle line (`fronts.fronts`). rupture : the first one, None
     where absent. reformation : the first one behind it, or behind the void that enters.
     p_unit : Pa. supply_p, supply_flow : of each supply, absolute, Pa, and what it gives to the film, m3/s.
+    friction_torque : of a sector, about its centre, N m.
     """
     grid, reduce = problem.grid, problem.reduce
     p_pa = p * problem.p_unit
@@ -90,6 +94,8 @@ def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any
     }
     if grid.dim == 2:
         out |= {"side_leakage": flow["south"] + flow["north"], "flow_growth": corner_flows(problem)}
+    if grid.polar is not None:
+        out["friction_torque"] = friction(problem, p_pa, r, grid.polar[0] + grid.y)
     if problem.held is not None:
         out["supply_p"] = [supply.p + problem.p_c for supply in problem.held.supplies]
         out["supply_flow"] = supply_flows(problem, p, r)

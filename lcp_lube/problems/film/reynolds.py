@@ -29,7 +29,8 @@ class BoxScheme:
 
     k_W, k_E = p_unit h^3/(6 mu dx);  k_S, k_N = p_unit h^3 dx/(6 mu dy2) (absent in 1D).
     On uneven lines dx and one dy of these are distances of points, the others the cell's own: a row is the whole balance of a
-    cell over the mean dy, and what leaves a cell is what enters the next one.
+    cell over the mean dy, and what leaves a cell is what enters the next one. In a sector (`Grid.polar`) arcs are longer than
+    dx by the stretch m, and the wall faster: k_W, k_E over m, k_S, k_N and U times m.
     Dirichlet neighbours are in c; `k_*` keeps their conductance, for A's diagonal and the boundary fluxes.
     """
 
@@ -183,7 +184,8 @@ def _coefficients(
         cubes_x, h_face = face_film(film, x_nodes, x_faces, y[:, 0], x_jumps, y_jumps, across)
     else:
         cubes_x = cubes(h_face.T, h_x.T).T
-    k_x = k * cubes_x / dx * y_share
+    m = grid.stretch(y)
+    k_x = k * cubes_x / dx * (y_share / m)
     k_W, k_E = k_x[:, :-1], k_x[:, 1:]  # a face's conductance is stored once
     if grid.dim == 2:
         y_nodes, y_faces = grid.nodes_and_faces(1)
@@ -193,7 +195,8 @@ def _coefficients(
             cubes_y = face_film(lambda t, s: film(s, t), y_nodes, y_faces, x[0], y_jumps, x_jumps, dx)[0].T
         else:
             cubes_y = cubes(at_y_faces, h_y)
-        k_y = k * cubes_y * (grid.spacing[0] * x_share) / (grid.steps(1) * grid.spacing[1])[:, None]
+        arcs = grid.spacing[0] * x_share * grid.stretch(y_faces)[:, None]
+        k_y = k * cubes_y * arcs / (grid.steps(1) * grid.spacing[1])[:, None]
         k_S, k_N = k_y[:-1], k_y[1:]
     else:
         k_S = k_N = np.zeros(grid.box)
@@ -213,7 +216,7 @@ def _coefficients(
         b_C, b_W = -U_r * h_face[:, 1:], U_r * h_face[:, :-1]
     else:
         b_C, b_W = -U_r * h, U_r * h_W
-    couette_W, couette_E, b_C, b_W = (y_share * a for a in (couette_W, couette_E, b_C, b_W))
+    couette_W, couette_E, b_C, b_W = (y_share * m * a for a in (couette_W, couette_E, b_C, b_W))
     open_west, *_ = sides(grid)
     if r_in:
         couette_W = couette_W - np.where(open_west, b_W * r_in, 0.0)

@@ -144,6 +144,29 @@ class Herringbone:
 
 
 @dataclass(frozen=True)
+class SpiralGrooves:
+    """`count` logarithmic spirals on a full turn, of a depth, between two radii; inclined by `angle` (rad) against the motion.
+
+    They pump inwards, and outwards where the angle is negative. polar : radius at y = 0, and that on which x is measured, m.
+    """
+
+    depth: float
+    count: int
+    angle: float
+    ratio: float
+    between: tuple[float, float]
+    polar: tuple[float, float]
+
+    def __call__(self, x: Array, y: Array) -> Array:
+        theta, r = x / self.polar[1], self.polar[0] + y
+        phase = np.remainder((theta + np.log(r) / np.tan(self.angle)) * (self.count / (2.0 * np.pi)), 1.0)
+        return np.where((phase < self.ratio) & _within(r, *self.between), self.depth, 0.0)
+
+    def jumps(self, axis: str) -> tuple[float, ...]:
+        return tuple(r - self.polar[0] for r in self.between) if axis == "y" else ()
+
+
+@dataclass(frozen=True)
 class RandomSurface:
     """Cubic B-spline through normal numbers on a lattice of `cells` meshes a side: the same surface on every grid.
 
