@@ -249,9 +249,7 @@ STABILITY: dict[str, Entry] = {
     "conditions": Entry("lcp_lube.studies.conditions:chart", "all subsets of the step-length conditions F, R, C, B (DIN)"),
     "film_ratio": Entry("lcp_lube.studies.film_ratio:chart", "film ratio 1.1 to 1e4 by grid, every method"),
     "supply_speed": Entry("lcp_lube.studies.supply_speed:chart", "supply pressure by speed, every method"),
-    "inner_tolerance": Entry(
-        "lcp_lube.studies.inner_tolerance:chart", "loose inner solves by recipe, and what (31) says of them"
-    ),
+    "inner_tolerance": Entry("lcp_lube.studies.inner_tolerance:chart", "loose inner solves by recipe, and what (31) says"),
     "roughness": Entry("lcp_lube.studies.roughness:chart", "amplitude of a random surface by grid, every method"),
     "turning_point": Entry("lcp_lube.studies.turning_point:chart", "lambda around the turning point of Bratu's equation"),
 }
