@@ -290,7 +290,7 @@ def read_recipe(name: str) -> dict[str, str]:
     return options
 
 
-# First by eye: what reads these files properly takes longer to import than all the rest.
+# First a search for the name: the module that parses these files takes longer to import than all the rest.
 _files = (file for folder in sys.path for file in Path(folder).glob("*-info/entry_points.txt"))
 if any(os.access(file, os.R_OK) and b"[lcp_lube]" in file.read_bytes() for file in _files):
     from importlib import metadata

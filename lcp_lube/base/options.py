@@ -14,7 +14,7 @@ from ..registry import read_recipe, recipe_names
 LATE = {"log_view", "options_left", "options_view", "malloc_dump", "malloc_view", "memory_view", "objects_dump", "citations"}
 # Options that mean nothing without a value: PETSc takes its default in silence.
 VALUED = re.compile(r"(_type|_[ard]tol|divtol|_max_it|_levels|_restart|_overlap|_omega|_its|_blocks|_icntl_\d+|_pcs)$")
-# Options that only a linear solver heeds: they are a wish for one.
+# Options that only a linear solver reads: giving one selects a method that has one.
 LINEAR = re.compile(r"ksp_|pc_|sub_|mg_|fieldsplit_|redundant_|mat_(type|mumps_|superlu|umfpack_|solver)")
 # What PETSc says of a word that it does not know.
 KINDS = (
@@ -36,7 +36,7 @@ def names_solver() -> bool:
 
 
 def wants_ksp() -> bool:
-    """Whether an option is set that only a KSP, its preconditioner or its matrix can heed: -ksp_monitor, -mat_type dense."""
+    """Whether an option is set that only a KSP, its preconditioner or its matrix reads: -ksp_monitor, -mat_type dense."""
     return any(LINEAR.match(name) for name in set_names())
 
 

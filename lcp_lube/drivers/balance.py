@@ -24,7 +24,7 @@ from .root import Search
 MOST_SOLVES = 30  # on a grid
 RANGE = {"eccentricity": 1e4, "h_offset": 100.0}  # unless one is given: of e/(1 - e) about 1, of the film about the scene's
 COARSE_TOL = 1e-3  # a coarse grid's load is no better
-ONE_GRID = 1_000  # points up to which no coarser grid is worth its while
+ONE_GRID = 1_000  # points up to which a coarser grid saves no time
 
 
 def carried(values: dict[str, Any]) -> float:

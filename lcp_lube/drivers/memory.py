@@ -56,7 +56,7 @@ MEASURED: dict[tuple[str, str, str], tuple[float, float]] = {
     ("equations 2D", "jacobian", "multigrid"): (550, 0),
     ("equations 2D", "jacobian", "umfpack"): (1310, 0),
 }
-LITTLE = 32 * MB  # a run that needs no more is not held up to see whether there is as much
+LITTLE = 32 * MB  # a run that needs no more starts without a look at what is free
 LARGE = 1_000_000  # points from which building the problem is itself worth a look ahead
 MULTIGRID = ("hypre", "ml", "gamg", "mg")
 

@@ -12,11 +12,11 @@ from ..problems.facts import Facts
 from ..registry import DEFAULT_METHOD, METHODS, SMALL, SMALL_BOX
 from .ask import Ask
 
-# Points up to which a film in 2D is sooner solved directly than multigrid's compiled loops are loaded, and right to the last
+# Points up to which a film in 2D is solved directly in less time than it takes to load multigrid's compiled loops, and right to the last
 # digits at any film ratio. By the points alone, not by what the process has loaded: a scene takes the same way always.
 FEW = 10_000
 SMALL_RING = 200_000  # the same for a film that is periodic along the flow
-DIN_ONLY = {"r0", "mu", "conditions"}  # flags that only an interior method can heed
+DIN_ONLY = {"r0", "mu", "conditions"}  # flags that only an interior method has a use for
 
 
 @dataclass(frozen=True)

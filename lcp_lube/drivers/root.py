@@ -1,4 +1,4 @@
-"""Roots of functions of one variable that are dear to evaluate."""
+"""Roots of functions of one variable that are expensive to evaluate."""
 
 from dataclasses import dataclass, field
 from itertools import pairwise

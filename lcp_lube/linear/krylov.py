@@ -1,4 +1,4 @@
-"""One KSP, configured by options alone: tolerances, counts, and failures that are heard of."""
+"""One KSP, configured by options alone: tolerances, counts, and failures that are reported."""
 
 import atexit
 import gc

@@ -20,7 +20,7 @@ class Transfer:
     """Interpolates fields of `coarse` to the points of `fine`, two grids of the same sides.
 
     Points between the boundary and the first coarse point take that point's value: for a field whose sign tells full film
-    from cavity, what happens at the boundary is the nearest cell's affair.
+    from cavity, the state at the boundary is that of the nearest cell.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class Transfer:
     """
 
     def __init__(self, coarse: Grid, fine: Grid, zero_boundary: bool = False):
-        from scipy.sparse import csr_matrix, kron  # here: a solve on one grid is spared its import
+        from scipy.sparse import csr_matrix, kron  # here: a solve on one grid does without its import
 
         self.coarse_meshes = coarse.meshes
         ranges = ((fine.x_start, fine.x_end), (fine.y_start, fine.y_end))

@@ -167,7 +167,7 @@ class _Band:
         """The pair of z + sign e, its e enlarged where needed, if G has that sign there; None if this cannot be shown.
 
         Where the sign fails, the cell's own e is raised by what is lacking; that only takes from its neighbours, so the rest
-        stays proved or is repaired in the next round (Gauss-Seidel in spirit, for an M-function). By no more than that, as a
+        stays proved or is repaired in the next round (a Gauss-Seidel step, for an M-function). By no more than that, as a
         cavitated cell hands all of it on downstream.
         """
         most = 16 * self.problem.reduce.max(e)

@@ -101,7 +101,7 @@ class PlainNewton(Method):
                     raise self._no_solution() from None
                 raise
         d = self._x.array_r.copy()
-        # A KSP that stopped early has no d to prove anything by, whatever it says.
+        # A KSP that stopped early gives no d that proves anything, even if it reports success.
         self.climbing = self.climbing and self.krylov.ksp.getConvergedReason() > 0 and self._solves(d)
         if self.climbing and min(self._curvature(d), self._curvature(self._bump)) < 0:
             raise self._no_solution()

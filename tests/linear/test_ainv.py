@@ -1,4 +1,4 @@
-"""AINV: the exact inverse without dropping, compiled or not, failures that are heard of, counts in Newton's method."""
+"""AINV: the exact inverse without dropping, compiled or not, failures that are reported, counts in Newton's method."""
 
 import sys
 

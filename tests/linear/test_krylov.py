@@ -1,4 +1,4 @@
-"""The KSP behind every step: configured by options alone, and heard of when it fails."""
+"""The KSP behind every step: configured by options alone, and its failures reported."""
 
 import numpy as np
 import pytest

@@ -71,7 +71,7 @@ class LubricationProblem:
 
     @made
     def A(self) -> PETSc.Mat:
-        """Assembled at first use, as B is: a method that works on the stencil alone is spared their time and memory."""
+        """Assembled at first use, as B is: a method that works on the stencil alone saves their time and memory."""
         return assemble(self.grid, self.scheme.pressure_entries())
 
     @made
