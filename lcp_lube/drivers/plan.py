@@ -12,8 +12,9 @@ from ..problems.facts import Facts
 from ..registry import DEFAULT_METHOD, METHODS, SMALL, SMALL_BOX
 from .ask import Ask
 
-# Points up to which a film in 2D is solved directly in less time than it takes to load multigrid's compiled loops, and right to the last
-# digits at any film ratio. By the points alone, not by what the process has loaded: a scene takes the same way always.
+# Points up to which a film in 2D is solved directly in less time than it takes to load multigrid's compiled loops, and right to
+# the last digits at any film ratio. The rule looks at the points alone, not at what the process has loaded: a scene is always
+# solved in the same way.
 FEW = 10_000
 SMALL_RING = 200_000  # the same for a film that is periodic along the flow
 DIN_ONLY = {"r0", "mu", "conditions"}  # flags that only an interior method has a use for
