@@ -6,6 +6,7 @@ import sys
 import traceback
 
 from .base import petsc as petsc_start
+from .base.ranks import run_on
 from .cli.arguments import parse, parser_of_all
 from .cli.completion import complete
 from .cli.words import split
@@ -22,6 +23,8 @@ def main(argv: list[str] | None = None) -> int:
         args = None if "-help" in petsc_arguments and not own else parse(own)
         if args is not None:
             args.words = words  # PETSc's among them
+            if (ranks := getattr(args, "ranks", None)) is not None:
+                return run_on(ranks, words)
     except InputError as error:
         return _refuse(error)
     if getattr(args, "json", False) or getattr(args, "worker", False):

@@ -89,6 +89,7 @@ def parser_of_all() -> Parser:
     solve.add_argument("--explain", action="store_true", help="say on stderr what was chosen, and why")
     solve.add_argument("--monitor", action="store_true", help="a line an iteration on stderr")
 
+    solve.add_argument("--ranks", type=whole, metavar="N", help="as an MPI job of N processes on this machine's cores")
     solve.add_argument("--checkpoint", metavar="FILE", help="save the iterate here, in one piece, so that --resume can go on")
     solve.add_argument("--every", type=whole, metavar="N", help="a checkpoint after every N steps, default 1")
     solve.add_argument("--resume", metavar="FILE", help="go on from a checkpoint of this scene, on any number of ranks")
