@@ -73,22 +73,31 @@ def _counts(stretches: Array, cut: Array, total: int) -> NDArray[np.int64] | Non
 
 
 def _shared_out(stretches: Array, cut: Array, total: int, mirrored: bool) -> NDArray[np.int64]:
-    """Cells for each stretch so that the largest spacing is as small as can be; alike on both sides of the middle."""
+    """Cells for each stretch so that sum l d^2, l their lengths and d their spacings, is least; alike about the middle.
+
+    One cell after the other goes where that falls most for its price: the least of a sum of convex terms.
+    """
     size = stretches.size
     half = (size + 1) // 2 if mirrored else size  # those behind the middle follow
-    middle = half - 1 if mirrored and size % 2 else -1
-    price = np.where(np.arange(half) == middle, 1, 2) if mirrored else np.ones(half, dtype=int)
-    step = np.where(np.arange(half) == middle, 2, 1)  # an odd middle stays odd
-    counts = np.maximum(1, (stretches[:half] * (total / stretches.sum())).astype(int) - 2)
-    if middle >= 0:
-        counts[middle] += (total - int(price @ counts)) % 2
+    lone = np.arange(half) == half - 1 if mirrored and size % 2 else np.full(half, not mirrored)
+    price = np.where(lone, 1, 2)
+    step = 2 // price if mirrored else price  # the number of cells in the middle keeps its parity
+    counts = np.maximum(1, (stretches[:half] * (total / stretches.sum())).astype(int) - 3)
+    if mirrored and size % 2:
+        counts[-1] += (total - int(price @ counts)) % 2
+
+    def gain(k: int, more: int) -> float:
+        """By how much the sum falls when a stretch has so many cells more."""
+        meshes = counts[k] - cut[k]
+        return float(stretches[k] ** 3 * (1.0 / meshes**2 - 1.0 / (meshes + more) ** 2)) * price[k]
+
     while int(price @ counts) > total:  # least ones of many small stretches
-        spare = np.where(counts > step, stretches[:half] / np.maximum(counts - step - cut[:half], 0.5), np.inf)
-        counts[np.argmin(spare)] -= step[np.argmin(spare)]
-    heap = [(-stretches[k] / (counts[k] - cut[k]), k) for k in range(half)]
+        k = min((k for k in range(half) if counts[k] > step[k]), key=lambda k: -gain(k, -step[k]))
+        counts[k] -= step[k]
+    heap = [(-gain(k, step[k]), k) for k in range(half)]
     heapq.heapify(heap)
     for _ in range((total - int(price @ counts)) // int(price[0] * step[0])):
         _, k = heapq.heappop(heap)
         counts[k] += step[k]
-        heapq.heappush(heap, (-stretches[k] / (counts[k] - cut[k]), k))
+        heapq.heappush(heap, (-gain(k, step[k]), k))
     return np.concatenate([counts, counts[: size - half][::-1]]) if mirrored else counts
