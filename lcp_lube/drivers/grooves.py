@@ -60,6 +60,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         fields["p"][inside] = groove.p / ring.p_unit
     near = ask.start if ask.start is not None and ask.start.problem.grid.shape == ring.grid.shape else None
     done: list[Solution] = []
+    dry = np.zeros(n)
     times: dict[str, float] = {}
     for pad, film in pad_films(scene):
         start = None
@@ -73,8 +74,12 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         spread, within = place_pad(solution.problem.grid, ring.grid, pad)
         for name, values in solution.fields.items():
             fields[name] = np.where(within, spread(values), fields[name])
+        if (of_pad := getattr(solution.problem, "dry", None)) is not None:
+            dry = np.where(within, spread(of_pad), dry)
         times = {name: times.get(name, 0.0) + seconds for name, seconds in solution.times.items()}
         done.append(solution)
+    if dry.any():
+        ring = ring.revised(dry)  # type: ignore[assignment]
     failed = next((one for one in done if not one.converged), done[0])
     steps = [step for one in done for step in one.steps]
     message = f"{len(done)} films between grooves; {failed.message}"

@@ -136,6 +136,8 @@ def solve_part(part: Part, problem: Problem, ask: Ask, inner: Inner) -> Solution
     small_problem = solution.problem
     spread = Pick(small_problem.grid, problem.grid, *part.places(problem.grid))
     fields = {name: spread(values) for name, values in solution.fields.items()}
+    if (dry := getattr(small_problem, "dry", None)) is not None:
+        problem = problem.revised(spread(dry))  # type: ignore[attr-defined]
     spread.destroy()
     small_problem.destroy()
     settings = {

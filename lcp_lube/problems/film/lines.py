@@ -92,12 +92,12 @@ def _shared_out(stretches: Array, cut: Array, total: int, mirrored: bool) -> NDA
         return float(stretches[k] ** 3 * (1.0 / meshes**2 - 1.0 / (meshes + more) ** 2)) * price[k]
 
     while int(price @ counts) > total:  # least ones of many small stretches
-        k = min((k for k in range(half) if counts[k] > step[k]), key=lambda k: -gain(k, -step[k]))
+        k = min((k for k in range(half) if counts[k] > step[k]), key=lambda k: -gain(k, -int(step[k])))
         counts[k] -= step[k]
-    heap = [(-gain(k, step[k]), k) for k in range(half)]
+    heap = [(-gain(k, int(step[k])), k) for k in range(half)]
     heapq.heapify(heap)
     for _ in range((total - int(price @ counts)) // int(price[0] * step[0])):
         _, k = heapq.heappop(heap)
         counts[k] += step[k]
-        heapq.heappush(heap, (-gain(k, step[k]), k))
+        heapq.heappush(heap, (-gain(k, int(step[k])), k))
     return np.concatenate([counts, counts[: size - half][::-1]]) if mirrored else counts

@@ -1,6 +1,7 @@
 """The door between physics and solvers: the data of A p + B r = c, p r = 0, p, r >= 0, and what certifies an answer."""
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -64,6 +65,8 @@ class LubricationProblem:
         self.grid, self.scheme, self.film = grid, scheme, film
         self.mu, self.U, self.p_unit, self.p_sides, self.p_c = mu, U, p_unit, p_sides, p_c
         self.exact, self.shaft, self.r_in, self.held = exact, shaft, r_in, held
+        self.coefficients_for: Callable[..., BoxScheme] | None = None  # of a film with rims: by which points are cavitated
+        self.dry: Array | None = None  # the points for which they have been made, 1 or 0; None: no revision yet
         self.extras: Callable[[dict[str, Any]], dict[str, Any]] | None = None
         self.reduce = grid.reduce
         self.c = scheme.c.ravel()
@@ -230,6 +233,16 @@ class LubricationProblem:
         m = min(1e-3, 10.0 / max(coarse.grid.shape) ** 3)
         root = np.sqrt(z * z + 4.0 * m) if interior else np.abs(z)
         return {"p": 0.5 * P * (root + z), "r": 0.5 * R * (root - z)}
+
+    def revised(self, dry: Array) -> "LubricationProblem":
+        """The same film with the faces that round edges cut (`rims`) made for these points, 1 where cavitated. Collective."""
+        assert self.coefficients_for is not None
+        other = copy(self)
+        for name in ("_at_sides", "_sources"):
+            other.__dict__.pop(name, None)
+        other.dry, other.scheme = dry, self.coefficients_for(cavity=dry)
+        other.c = other.scheme.c.ravel()
+        return other
 
     def free_matrices(self) -> None:
         """Free A and B, which are assembled again at need. Collective."""

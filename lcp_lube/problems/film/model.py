@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -140,7 +141,8 @@ class Model:
         grid = Grid(shape, self.lengths, comm, ends=ends, places=self.lines(shape), polar=self.polar)
         p_sides = tuple(side.p if side.kind == "open" else 0.0 for side in self.sides)
         film = self.film
-        scheme = box_scheme(
+        coefficients = partial(
+            box_scheme,
             grid,
             self.gap,
             mu=self.mu,
@@ -151,6 +153,7 @@ class Model:
             mean_cubes=self.mean_cubes,
             r_in=west.r,
         )
+        scheme = coefficients()
         scheme, held = hold(grid, scheme, self.supplies, self.p_unit) if self.supplies else (scheme, None)
         problem = kind(
             grid,
@@ -168,6 +171,8 @@ class Model:
         )
         if isinstance(problem, GroovedProblem):
             problem.grooves = self.grooves
+        if getattr(self.gap, "rims", ()) and not self.supplies and self.law is None:
+            problem.coefficients_for = coefficients
         return problem
 
     def pads(self, shape: Sequence[int]) -> list[tuple[Pad, "Model"]]:
@@ -197,6 +202,10 @@ class _Moved:
     def jumps(self, axis: str) -> tuple[float, ...]:
         found = getattr(self.gap, "jumps", lambda axis: ())(axis)
         return tuple((t - self.start) % self.period for t in found) if axis == "x" else found
+
+    @property
+    def rims(self) -> tuple[Film, ...]:
+        return tuple(_Moved(rim, self.start, self.period) for rim in getattr(self.gap, "rims", ()))
 
 
 @dataclass(frozen=True)

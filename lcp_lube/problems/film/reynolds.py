@@ -12,6 +12,7 @@ from ...base.parallel import Array
 from ...errors import InputError
 from ..grid import Grid
 from .edges import face_film
+from .rims import cut_faces
 
 SCHEMES = ("nodal", "face", "upwind")
 Film = Callable[[Array, Array], Array]
@@ -92,6 +93,7 @@ def box_scheme(
     p_unit: float,
     mean_cubes: bool = False,
     r_in: float = 0.0,
+    cavity: Array | None = None,
 ) -> BoxScheme:
     """Coefficients of the box scheme on the owned points; the grid's ends say what its sides are.
 
@@ -107,13 +109,14 @@ def box_scheme(
     p_unit : pressure unit in Pa; p in the equations is measured in it.
     mean_cubes : take h^3 at a face as the mean of the nodal values (scene 5) instead of the film at the face.
     r_in : void fraction that enters at an open west side.
+    cavity : 1 at the owned points that are taken to be cavitated where round edges cut a face (`rims`), else 0; default 0.
 
     Raises
     ------
     InputError : a film that is not positive, or data so large or small that a coefficient overflows or vanishes.
     """
     with np.errstate(all="ignore"):
-        box = _coefficients(grid, film, mu, U, scheme, p_sides, p_unit, mean_cubes, r_in)
+        box = _coefficients(grid, film, mu, U, scheme, p_sides, p_unit, mean_cubes, r_in, cavity)
     reduce = grid.reduce
     faces = [box.k_W, box.k_E] + ([box.k_S, box.k_N] if grid.dim == 2 else [])
     walls = zip(sides(grid, ("closed", "mirror")), faces, strict=False)
@@ -160,6 +163,7 @@ def _coefficients(
     p_unit: float,
     mean_cubes: bool,
     r_in: float,
+    cavity: Array | None,
 ) -> BoxScheme:
     dx, (ny, nx) = grid.steps(0), grid.box
     x_share, y_share = grid.widths(0), grid.widths(1)[:, None] if grid.dim == 2 else np.ones((1, 1))
@@ -184,6 +188,12 @@ def _coefficients(
         cubes_x, h_face = face_film(film, x_nodes, x_faces, y[:, 0], x_jumps, y_jumps, across)
     else:
         cubes_x = cubes(h_face.T, h_x.T).T
+    rims = () if mean_cubes or scheme != "face" or grid.dim == 1 else getattr(film, "rims", ())
+    if rims:
+        dry = grid.ghosted(np.zeros(grid.local_size) if cavity is None else cavity, outside=0.0) > 0.0
+        cut, cut_cubes, cut_films = cut_faces(film, rims, x_nodes, y[:, 0], grid.steps(1), dry[1:-1], True)
+        cubes_x, h_face = np.array(cubes_x), np.array(h_face)
+        cubes_x[cut], h_face[cut] = cut_cubes, cut_films
     m = grid.stretch(y)
     k_x = k * cubes_x / dx * (y_share / m)
     k_W, k_E = k_x[:, :-1], k_x[:, 1:]  # a face's conductance is stored once
@@ -195,6 +205,11 @@ def _coefficients(
             cubes_y = face_film(lambda t, s: film(s, t), y_nodes, y_faces, x[0], y_jumps, x_jumps, dx)[0].T
         else:
             cubes_y = cubes(at_y_faces, h_y)
+        if rims:
+            turned = [lambda t, s, rim=rim: rim(s, t) for rim in rims]
+            cut, cut_cubes, _ = cut_faces(lambda t, s: film(s, t), turned, y_nodes, x[0], dx, dry[:, 1:-1].T, False)
+            cubes_y = np.array(cubes_y)
+            cubes_y.T[cut] = cut_cubes
         arcs = grid.spacing[0] * x_share * grid.stretch(y_faces)[:, None]
         k_y = k * cubes_y * arcs / (grid.steps(1) * grid.spacing[1])[:, None]
         k_S, k_N = k_y[:-1], k_y[1:]

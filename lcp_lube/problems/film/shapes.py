@@ -96,6 +96,11 @@ class DimpleArray:
         centres = start + (end - start) * (np.arange(self.columns) + 0.5) / self.columns
         return tuple(np.concatenate([centres + k * self.size for k in (-0.5, 0.0, 0.5)]))
 
+    def rim(self, x: Array, y: Array) -> Array:
+        """Distance (m) from the rim of the nearest round recess, negative inside it."""
+        across, along = _distance(x, *self.x, self.columns), _distance(y, *self.y, self.rows)
+        return np.hypot(across, along) - 0.5 * self.size
+
     def jumps(self, axis: str) -> tuple[float, ...]:
         (start, end), count = (self.x, self.columns) if axis == "x" else (self.y, self.rows)
         if self.form != "square" or not np.isfinite([start, end]).all():
@@ -225,6 +230,12 @@ class Sum:
     def jumps(self, axis: str) -> tuple[float, ...]:
         """x or y (m) of the straight lines across which the film jumps."""
         return tuple(t for part in self.parts if hasattr(part, "jumps") for t in part.jumps(axis))
+
+    @property
+    def rims(self) -> tuple[Shape, ...]:
+        """Distances (m) from the curved edges of round dimples and domes, as functions of x and y; negative inside."""
+        found = (part for part in self.parts if isinstance(part, DimpleArray) and part.form != "square")
+        return tuple(part.rim for part in found if np.isfinite(part.y).all())
 
     def breakpoints(self) -> tuple[float, ...]:
         """x (m) of all jumps, kinks and extrema at y = 0; those extrema that no part has by itself are searched for."""

@@ -39,6 +39,8 @@ class MirroredFilm:
         return tuple(sorted(self.L - x for x in self.film.breakpoints()))
 
     def __getattr__(self, name: str) -> Any:
+        if name == "rims":
+            return tuple(MirroredFilm(rim, self.L) for rim in getattr(self.film, "rims", ()))
         if name != "jumps":  # a film without them has no such attribute
             raise AttributeError(name)
         jumps = self.film.jumps

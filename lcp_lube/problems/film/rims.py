@@ -1,0 +1,74 @@
+"""Faces that a curved edge of the film cuts: round dimples, whose rims no straight grid line can follow.
+
+Between two points the film is told by lines side by side, SIDE_BY_SIDE of them across the width of a face, each with
+resistances in series (`edges`). That is right where the film is full. Where a dimple is cavitated its rim is where the pressure
+ends: only the film before it resists, and carries, and what lies behind would be a length that varies with the rim's place in
+the cell, an error of first order. A fixed coefficient cannot know; the answer does. So a problem with such faces is solved, its
+cavities are looked at, and it is solved once more, from the answer on, with the cut faces made for them
+(`LubricationProblem.revised`). Either problem is of the one form, with positive conductances that both cells share and Couette
+flows that leave one cell and enter the next: its solution is unique, and certificate and bands hold as ever (docs/accuracy.md).
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.parallel import Array
+
+Flags = NDArray[np.bool_]
+Shape = Callable[[Array, Array], Array]
+SIDE_BY_SIDE, IN_SERIES = 16, 32  # looks across a face and between its two points
+THIN = 1 / 3  # of the way from the thinnest to the thickest film of a face: what is below is the film outside a recess
+
+
+def cut_faces(
+    film: Shape,
+    rims: Sequence[Shape],
+    nodes: Array,
+    lines: Array,
+    steps: Array,
+    cavity: Flags,
+    along_flow: bool,
+) -> tuple[Flags, Array, Array]:
+    """Which faces along t a rim cuts, shape (lines, faces), and C and H of those (`edges.face_film`).
+
+    Parameters
+    ----------
+    film : h(t, s) in m. rims : distances to edges at (t, s), m, negative inside. nodes : t of the points, one more than faces.
+    lines, steps : s of the lines of points, and the distances before, between and behind them.
+    cavity : whether the points are cavitated, shape (lines, nodes). along_flow : whether the flow goes to larger t.
+    """
+    a, d = nodes[:-1], np.diff(nodes)
+    low, width = lines - 0.5 * steps[:-1], 0.5 * (steps[:-1] + steps[1:])
+    middle, across = (a + 0.5 * d)[None, :], (low + 0.5 * width)[:, None]
+    reach = 0.5 * np.hypot(d[None, :], width[:, None])
+    cut = np.zeros(reach.shape, dtype=bool)
+    for rim in rims:
+        cut |= np.abs(rim(middle, across)) <= reach
+    cut &= d[None, :] > 0.0  # round a ring the last point lies before the first
+    j, i = np.nonzero(cut)
+    t = a[i, None] + d[i, None] * ((np.arange(IN_SERIES) + 0.5) / IN_SERIES)
+    looks = ((np.arange(SIDE_BY_SIDE) + 0.5) / SIDE_BY_SIDE)[:, None] * width[j] + low[j]
+    thinnest, thickest = np.full(i.size, np.inf), np.zeros(i.size)
+    for s in looks:
+        h = film(t, s[:, None])
+        thinnest, thickest = np.minimum(thinnest, h.min(axis=1)), np.maximum(thickest, h.max(axis=1))
+    between = thinnest + THIN * (thickest - thinnest)
+    first, last = (film(nodes[i + k], lines[j]) > between for k in (0, 1))  # whether the points lie in the recess
+    dry_first, dry_last = cavity[j, i], cavity[j, i + 1]
+    void = np.where(first == last, dry_first & dry_last, np.where(last, dry_last, dry_first & np.bool_(not along_flow)))
+    cubes, films = np.zeros(i.size), np.zeros(i.size)
+    for s in looks:
+        h = film(t, s[:, None])
+        thin = h <= between[:, None]
+        if along_flow:  # the film before the first place where it becomes thick
+            thin = np.logical_and.accumulate(thin, axis=1)
+            alone = void & thin[:, 0] & (h[:, -1] > between)
+        else:
+            alone = void & thin.any(axis=1)
+        resists = thin | ~alone[:, None]
+        resistance, drag = (np.mean(np.where(resists, h**-power, 0.0), axis=1) for power in (3.0, 2.0))
+        cubes += 1.0 / resistance / SIDE_BY_SIDE
+        films += drag / resistance / SIDE_BY_SIDE
+    return cut, cubes, films

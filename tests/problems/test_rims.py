@@ -1,0 +1,98 @@
+"""Round edges: faces that they cut, for full and for cavitated dimples."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lcp_lube import load_scene, solve
+from lcp_lube.problems.film.lubrication import LubricationProblem
+from lcp_lube.problems.film.rims import cut_faces
+from lcp_lube.problems.film.shapes import DimpleArray
+
+
+def half_plane(x0: float):
+    """A film of 1, beyond x0 (along t) of 2, and the distance from that edge, negative in the thick part."""
+    return (lambda t, s: np.where(t + 0.0 * s < x0, 1.0, 2.0)), (lambda t, s: x0 - t + 0.0 * s)
+
+
+@pytest.mark.parametrize("cavity, C, H", [(0.0, 1 / (0.25 + 0.75 / 8), (0.25 + 0.75 / 4) / (0.25 + 0.75 / 8)), (1.0, 4.0, 1.0)])
+def test_series_where_full_the_thin_part_alone_before_a_cavity(cavity, C, H):
+    film, rim = half_plane(0.25)
+    dry = np.array([[False, bool(cavity)]])
+    cut, cubes, films = cut_faces(film, [rim], np.array([0.0, 1.0]), np.zeros(1), np.ones(2), dry, True)
+    assert cut.all()
+    np.testing.assert_allclose(cubes, [C], rtol=1e-12)
+    np.testing.assert_allclose(films, [H], rtol=1e-12)
+
+
+def test_where_the_film_thins_again_both_parts_resist():
+    """Behind a cavity the film is full before it thins: resistances in series, whatever lies before."""
+    film, rim = half_plane(0.25)
+    back = (lambda t, s: film(1.0 - t, s)), (lambda t, s: rim(1.0 - t, s))
+    dry = np.array([[True, False]])
+    _, cubes, _ = cut_faces(back[0], [back[1]], np.array([0.0, 1.0]), np.zeros(1), np.ones(2), dry, True)
+    np.testing.assert_allclose(cubes, [1 / (0.25 + 0.75 / 8)], rtol=1e-12)
+
+
+def test_distance_from_the_rim():
+    dimples = DimpleArray("round", 1e-6, 1.2, 2, 1, (0.0, 4.0), (0.0, 2.0))
+    found = dimples.rim(np.array([1.0, 1.6, 3.0, 2.0]), np.array([1.0, 1.0, 0.0, 1.0]))
+    np.testing.assert_allclose(found, [-0.6, 0.0, 0.4, 0.4], rtol=0, atol=1e-12)
+
+
+def pad(n: int, form: str = "round", **changes) -> object:
+    return load_scene("dimpled_pad", {"nx": n, "ny": n, "film.dimples.form": form, **changes})
+
+
+@pytest.mark.parametrize("form, value", [("round", 7.0695), ("dome", 7.2375)])
+def test_round_dimples(form, value):
+    """The load above p_c, N, to 1 % at 80 points a side; the values are those of 640 to 1280 points."""
+    for n in (79, 80, 95):
+        solution = solve(pad(n, form))
+        assert solution.converged and solution.numbers["pressure_integral"] == pytest.approx(value, rel=1e-2), n
+        assert isinstance(solution.problem, LubricationProblem) and solution.problem.dry is not None
+        solution.destroy()
+
+
+def test_a_full_film_is_left_as_it_is():
+    """Below the speed at which it cavitates the pad of symmetric dimples carries the ambient pressure alone, exactly."""
+    solution = solve(pad(50, U=0.05))
+    assert solution.numbers["load"] == pytest.approx(0.0, abs=1e-8) and solution.problem.dry is None  # type: ignore[union-attr]
+    solution.destroy()
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.floats(0.1, 1e3), st.sampled_from([-1.0, 0.03, 1.0, 50.0]))
+def test_coefficients_keep_the_form_for_any_cavities(seed, depth_um, U):
+    """A symmetric M-matrix, -B with column sums >= 0, and a band, whatever points the faces are made for."""
+    changes = {"nx": 13, "ny": 11, "film.dimples.columns": 2, "film.dimples.rows": 1, "film.dimples.size_mm": 4.0}
+    scene = load_scene("dimpled_pad", {**changes, "film.dimples.form": "round", "film.dimples.depth_um": depth_um, "U": abs(U)})
+    problem = scene.build()
+    assert isinstance(problem, LubricationProblem)
+    rng = np.random.default_rng(seed)
+    other = problem.revised((rng.random(problem.size) < 0.5).astype(float))
+    s = other.scheme
+    np.testing.assert_array_equal(s.k_E[:, :-1], s.k_W[:, 1:])
+    np.testing.assert_array_equal(s.k_N[:-1], s.k_S[1:])
+    np.testing.assert_array_equal(-s.b_C[:, :-1], s.b_W[:, 1:])
+    assert (np.stack([s.k_W, s.k_E, s.k_S, s.k_N, -s.b_C]) > 0).all()
+    other.free_matrices()
+    problem.destroy()
+    solution = solve(scene, certify=True)
+    assert solution.converged and solution.certificate.holds and solution.enclosure is not None and solution.enclosure.certified
+    solution.destroy()
+
+
+def test_methods_and_halves_agree():
+    scene = load_scene("dimpled_pad", {"nx": 30, "ny": 21, "film.dimples.form": "round", "film.dimples.columns": 2, "U": 2.0})
+    first = solve(scene, method="active-set")
+    for how in ({}, {"method": "fas"}, {"method": "din"}, {"method": "fbn-a"}):
+        other = solve(scene, **how)
+        assert other.converged, how
+        assert other.numbers["load"] == pytest.approx(first.numbers["load"], rel=1e-5), how
+        other.destroy()
+    turned = solve(scene.model_copy(update={"U": -2.0}))
+    assert turned.numbers["load"] == pytest.approx(first.numbers["load"], rel=1e-8)
+    turned.destroy()
+    first.destroy()
