@@ -34,6 +34,7 @@ def answers():
         "accuracy": printed(solve("problem1", accuracy=1e-2)),
         "fas": printed(solve("problem4", n=20, method="fas")),
         "certify": printed(solve(load_scene("problem1", {"n": 20}), certify=True)),
+        "round": printed(solve(load_scene("dimpled_pad", {"nx": 30, "ny": 30, "film.dimples.form": "round"}))),
         "balance": printed(solve(load_scene("pocketed_pad", {**film, "balance.load": 3e4}))),
     }
     return {

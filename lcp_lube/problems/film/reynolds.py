@@ -12,7 +12,7 @@ from ...base.parallel import Array
 from ...errors import InputError
 from ..grid import Grid
 from .edges import face_film
-from .rims import cut_faces
+from .rims import rims_across_x, rims_across_y
 
 SCHEMES = ("nodal", "face", "upwind")
 Film = Callable[[Array, Array], Array]
@@ -29,9 +29,8 @@ class BoxScheme:
         sum over faces of k_face (p_i - p_neighbour) + b_C r_i + b_W r_west = c_i        [m2/s]
 
     k_W, k_E = p_unit h^3/(6 mu dx);  k_S, k_N = p_unit h^3 dx/(6 mu dy2) (absent in 1D).
-    On uneven lines dx and one dy of these are distances of points, the others the cell's own: a row is the whole balance of a
-    cell over the mean dy, and what leaves a cell is what enters the next one. In a sector (`Grid.polar`) arcs are longer than
-    dx by the stretch m, and the wall faster: k_W, k_E over m, k_S, k_N and U times m.
+    On uneven lines a row is the whole balance of a cell over the mean dy: what leaves a cell is what enters the next one. In a
+    sector (`Grid.polar`) arcs are longer than dx by the stretch m, the wall faster: k_W, k_E over m, k_S, k_N and U times m.
     Dirichlet neighbours are in c; `k_*` keeps their conductance, for A's diagonal and the boundary fluxes.
     """
 
@@ -182,18 +181,14 @@ def _coefficients(
 
     k = p_unit / (6.0 * mu)
     edges = (lambda axis: ()) if mean_cubes else getattr(film, "jumps", lambda axis: ())
-    x_jumps, y_jumps = edges("x"), edges("y")
+    x_jumps, y_jumps, across = edges("x"), edges("y"), grid.steps(1) if grid.dim == 2 else np.ones(2)
     if x_jumps or y_jumps:
-        across = grid.steps(1) if grid.dim == 2 else np.ones(2)
         cubes_x, h_face = face_film(film, x_nodes, x_faces, y[:, 0], x_jumps, y_jumps, across)
     else:
         cubes_x = cubes(h_face.T, h_x.T).T
-    rims = () if mean_cubes or scheme != "face" or grid.dim == 1 else getattr(film, "rims", ())
+    rims = [] if mean_cubes or scheme != "face" or grid.dim == 1 else getattr(film, "rims", [])
     if rims:
-        dry = grid.ghosted(np.zeros(grid.local_size) if cavity is None else cavity, outside=0.0) > 0.0
-        cut, cut_cubes, cut_films = cut_faces(film, rims, x_nodes, y[:, 0], grid.steps(1), dry[1:-1], True)
-        cubes_x, h_face = np.array(cubes_x), np.array(h_face)
-        cubes_x[cut], h_face[cut] = cut_cubes, cut_films
+        cubes_x, h_face = rims_across_x(grid, film, rims, cavity, cubes_x, h_face)
     m = grid.stretch(y)
     k_x = k * cubes_x / dx * (y_share / m)
     k_W, k_E = k_x[:, :-1], k_x[:, 1:]  # a face's conductance is stored once
@@ -206,10 +201,7 @@ def _coefficients(
         else:
             cubes_y = cubes(at_y_faces, h_y)
         if rims:
-            turned = [lambda t, s, rim=rim: rim(s, t) for rim in rims]
-            cut, cut_cubes, _ = cut_faces(lambda t, s: film(s, t), turned, y_nodes, x[0], dx, dry[:, 1:-1].T, False)
-            cubes_y = np.array(cubes_y)
-            cubes_y.T[cut] = cut_cubes
+            cubes_y = rims_across_y(grid, film, rims, cavity, cubes_y)
         arcs = grid.spacing[0] * x_share * grid.stretch(y_faces)[:, None]
         k_y = k * cubes_y * arcs / (grid.steps(1) * grid.spacing[1])[:, None]
         k_S, k_N = k_y[:-1], k_y[1:]

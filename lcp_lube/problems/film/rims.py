@@ -10,11 +10,13 @@ flows that leave one cell and enter the next: its solution is unique, and certif
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...base.parallel import Array
+from ..grid import Grid
 
 Flags = NDArray[np.bool_]
 Shape = Callable[[Array, Array], Array]
@@ -72,3 +74,36 @@ def cut_faces(
         cubes += 1.0 / resistance / SIDE_BY_SIDE
         films += drag / resistance / SIDE_BY_SIDE
     return cut, cubes, films
+
+
+def rims_across_x(
+    grid: Grid, film: Shape, rims: Sequence[Shape], cavity: Array | None, cubes: Array, films: Array
+) -> tuple[Array, Array]:
+    """C and H of the x faces, those that rims cut made anew; cavity: 1 at the owned points that are cavitated. Collective."""
+    nodes, _ = grid.nodes_and_faces(0)
+    cut, cut_cubes, cut_films = cut_faces(
+        film, rims, nodes, grid.y[:, 0], grid.steps(1), _dry(grid, cavity)[1:-1], along_flow=True
+    )
+    cubes, films = np.array(cubes), np.array(films)
+    cubes[cut], films[cut] = cut_cubes, cut_films
+    return cubes, films
+
+
+def rims_across_y(grid: Grid, film: Shape, rims: Sequence[Shape], cavity: Array | None, cubes: Array) -> Array:
+    """The same for C of the y faces. Collective."""
+    nodes, _ = grid.nodes_and_faces(1)
+    turned = [partial(_swapped, rim) for rim in (film, *rims)]
+    cut, cut_cubes, _ = cut_faces(
+        turned[0], turned[1:], nodes, grid.x[0], grid.steps(0), _dry(grid, cavity)[:, 1:-1].T, along_flow=False
+    )
+    cubes = np.array(cubes)
+    cubes.T[cut] = cut_cubes
+    return cubes
+
+
+def _swapped(shape: Shape, t: Array, s: Array) -> Array:
+    return shape(s, t)
+
+
+def _dry(grid: Grid, cavity: Array | None) -> Flags:
+    return grid.ghosted(np.zeros(grid.local_size) if cavity is None else cavity, outside=0.0) > 0.0
