@@ -45,7 +45,7 @@ def solve(scene: str | Path | dict[str, Any] | Scene, ask: Ask | None = None, **
     compose.check(scene, ask)
     solution = compose.solve(scene, ask)
     check_backflow(solution)
-    last = _solved(scene, solution)
+    last = solution.solved_scene = _solved(scene, solution)
     data = last.data_si()
     if "nx" in data:
         data.pop("n", None)  # which these have replaced

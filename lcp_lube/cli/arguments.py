@@ -9,6 +9,7 @@ from .. import __version__
 from ..base.quantity import in_si
 from ..errors import InputError, nearest
 from ..registry import STABILITY
+from . import design_arguments
 from .examples import EXAMPLES
 from .explore.options import explore_options
 
@@ -159,6 +160,8 @@ def parser_of_all() -> Parser:
     )
     coefficients.add_argument("--output", type=Path, metavar="FILE.csv", help="of --speeds; default standard output")
     coefficients.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")
+
+    design_arguments.add(command, _scene_options, number, whole)
 
     explore = command("explore", "a local page with the scene's numbers as sliders; pressure, film and numbers follow")
     _scene_options(explore)

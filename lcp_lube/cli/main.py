@@ -141,6 +141,12 @@ def run_coefficients(args: argparse.Namespace) -> int:
     return run(args)
 
 
+def run_sensitivity(args: argparse.Namespace) -> int:
+    from .sensitivity import run
+
+    return run(args)
+
+
 def run_explore(args: argparse.Namespace) -> int:
     from .explore.command import run
 
@@ -179,6 +185,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "compare": run_compare,
     "sweep": run_sweep,
     "coefficients": run_coefficients,
+    "sensitivity": run_sensitivity,
     "explore": run_explore,
     "table": run_table,
     "chart": run_chart,

@@ -1,5 +1,6 @@
 """The discrete film, linearised at the signs of a solution: solves with its Jacobian, and what supplies make of them."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -14,20 +15,26 @@ from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.reynolds import assemble
 from .plan import default_recipe
 
+Entries = list[tuple[int, int, Array]]
+
 
 class Linear:
     """J = A where the film is full, -B where it is not, factored once; and J + i nu M as a real matrix of twice the size."""
 
-    def __init__(self, problem: LubricationProblem, cavity: Any):
+    def __init__(self, problem: LubricationProblem, cavity: Any, entries: Entries | None = None, given: Any = None):
+        """entries : of dG/dp, where that is not A (of a fluid with a law). given : points in a groove, whose rows are those of
+        the identity."""
         self.problem = problem
         full, void = problem.A.createVecs()
         full.setArray(np.where(cavity, 0.0, 1.0))
         void.setArray(np.where(cavity, -1.0, 0.0))
-        self.J = problem.A.copy()
+        self.J = problem.A.copy() if entries is None else assemble(problem.grid, entries).copy()
         self.J.diagonalScale(None, full)
         B = problem.B.copy()
         B.diagonalScale(None, void)
         self.J.axpy(1.0, B, structure=PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+        if given is not None:
+            self.J.zeroRows((problem.grid.first + np.flatnonzero(given)).astype(PETSc.IntType), 1.0)
         for obj in (B, full, void):
             obj.destroy()
         self._krylov: Krylov | None = None
@@ -37,6 +44,12 @@ class Linear:
         if self._krylov is None:
             self._krylov = self._factored(self.J)
         return self._solve(self._krylov, self.J, b)
+
+    def solve_transposed(self, rows: Sequence[Array]) -> list[Array]:
+        """J'^-1 b for each b. Collective."""
+        if self._krylov is None:
+            self._krylov = self._factored(self.J)
+        return [self._solve(self._krylov, self.J, b, transposed=True) for b in rows]
 
     def at(self, nu: float, M: Array, real: Array, imaginary: Array) -> Any:
         """(J + i nu M)^-1 (real + i imaginary). Collective."""
@@ -66,10 +79,10 @@ class Linear:
         return krylov
 
     @staticmethod
-    def _solve(krylov: Krylov, mat: PETSc.Mat, b: Array) -> Array:
+    def _solve(krylov: Krylov, mat: PETSc.Mat, b: Array, transposed: bool = False) -> Array:
         x, rhs = mat.createVecs()
         rhs.setArray(b)
-        krylov.solve(rhs, x, 1e-12)
+        krylov.solve(rhs, x, 1e-12, transposed)
         z = x.array_r.copy()
         x.destroy()
         rhs.destroy()

@@ -127,8 +127,12 @@ class Krylov:
             raise InputError(explain_error(error)) from None
         self._ready = True
 
-    def solve(self, b: PETSc.Vec, x: PETSc.Vec, rtol: float) -> int:
+    def solve(self, b: PETSc.Vec, x: PETSc.Vec, rtol: float, transposed: bool = False) -> int:
         """Solve for the matrix's present values; returns the number of iterations (0 for a direct solver). Collective.
+
+        Parameters
+        ----------
+        transposed : solve with the transposed matrix, whose factors the direct solvers have as well.
 
         Raises
         ------
@@ -138,20 +142,20 @@ class Krylov:
         if not self.direct and not self._fixed_rtol:
             self.ksp.setTolerances(rtol=rtol)
         self.set_up()
-        reason = self._run(b, x)
+        reason = self._run(b, x, transposed)
         while reason == PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED and self._enlarge_mumps():
-            reason = self._run(b, x)
+            reason = self._run(b, x, transposed)
         if reason < 0 and reason != PETSc.KSP.ConvergedReason.DIVERGED_MAX_IT:
             raise LinearSolverError(f"KSP {self.ksp_type} with PC {self.pc_type} failed: {reason_name(reason)}")
         if not np.isfinite(x.norm()):
             raise LinearSolverError(f"KSP {self.ksp_type} with PC {self.pc_type} gave a vector that is not finite")
         return 0 if self.direct else self.ksp.getIterationNumber()
 
-    def _run(self, b: PETSc.Vec, x: PETSc.Vec) -> int:
+    def _run(self, b: PETSc.Vec, x: PETSc.Vec, transposed: bool = False) -> int:
         """Solve; returns PETSc's reason."""
         try:
             with own_errors():
-                self.ksp.solve(b, x)
+                (self.ksp.solveTranspose if transposed else self.ksp.solve)(b, x)
         except PETSc.Error as error:
             self._keep()
             raise LinearSolverError(explain_error(error)) from None

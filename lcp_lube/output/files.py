@@ -5,7 +5,7 @@ import json
 import os
 import tempfile
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
@@ -45,7 +45,9 @@ def check_target(path: str | Path, plot: bool = False, comm: MPI.Comm = MPI.COMM
         raise InputError(f"{'--plot' if plot else '--output'} {path}: {fault}")
 
 
-def save(solution: Solution, path: str | Path, boundary: bool = False) -> None:
+def save(
+    solution: Solution, path: str | Path, boundary: bool = False, more: Mapping[str, tuple[Array, str]] | None = None
+) -> None:
     """Write the fields of `Problem.physical` at the interior points, or with those of the sides. Collective.
 
     All in SI: for a lubrication problem p in Pa (absolute), r (void fraction), h in m; coordinates x, y in m. Arrays have
@@ -63,6 +65,7 @@ def save(solution: Solution, path: str | Path, boundary: bool = False) -> None:
     Parameters
     ----------
     boundary : with the points of the sides: nx + 2 in x, ny + 2 in y (`Solution.field`).
+    more : other fields at the interior points, and their units, by name.
 
     Raises
     ------
@@ -73,8 +76,10 @@ def save(solution: Solution, path: str | Path, boundary: bool = False) -> None:
     if wrong := _wrong_extension(suffix, plot=False):
         raise InputError(f"{path}: {wrong}")
     points = Frame(grid) if boundary else grid
-    units = solution.units
+    more = more or {}
+    units = {**solution.units, **{name: unit for name, (_, unit) in more.items()}}
     fields = {name: solution.field(name, boundary) for name in solution.problem.physical(solution.fields)}
+    fields |= {name: values for name, (values, _) in more.items()}
     if suffix == ".pvd":
         from .series import save_series
 

@@ -1,5 +1,6 @@
 """What a solution shows of itself: numbers, fields in SI, units, and by way of the registry its record, pictures and files."""
 
+from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -106,6 +107,17 @@ class Shown:
         InputError : another extension, or the file cannot be written.
         """
         OUTPUT["save"].load()(self, path, boundary)
+
+    def gradient(self, quantity: str, keys: Sequence[str]) -> dict[str, float]:
+        """Derivatives of one of the numbers by numbers of the scene, SI: dQ/da by key, as --set takes them. Collective.
+
+        One transposed solve for the quantity, whatever the number of keys (docs/gradients.md).
+
+        Raises
+        ------
+        InputError : a quantity or a key without a derivative, a solution that did not converge.
+        """
+        return OUTPUT["gradient"].load()(self, quantity, keys)
 
     def to_xarray(self, boundary: bool = False) -> Any:
         """The fields as an xarray.Dataset with their units, over x and y. On several ranks: the rank's own part.

@@ -159,6 +159,7 @@ class Solution(Shown):
     times : seconds by stage: setup, assembly, linear, total.
     levels : nested iteration's grids, coarse to fine: nx, ny, iterations, linear_iterations, time_s; the last is this one.
     enclosure : the band that `certify` asked for.
+    solved_scene : the scene as it was solved, on the last grid and with the value that a balance found.
     """
 
     problem: Problem
@@ -171,6 +172,7 @@ class Solution(Shown):
     times: dict[str, float] = field(default_factory=dict)
     levels: list[dict[str, Any]] = field(default_factory=list)
     enclosure: Enclosure | None = None
+    solved_scene: Any = None
 
     @property
     def method(self) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from ...base.parallel import Array
 from ..grid import Grid
 from .cavity import cavity_sign
-from .reynolds import sides
+from .reynolds import BoxScheme, sides
 
 if TYPE_CHECKING:
     from .lubrication import LubricationProblem
@@ -77,7 +77,17 @@ def friction(problem: LubricationProblem, p_pa: Array, r: Array, lever: Array | 
     ----------
     p_pa : pressure in Pa above the cavitation pressure, r : void fraction; owned points. lever : of each line, for a torque, m.
     """
-    grid, s, film = problem.grid, problem.scheme, problem.film
+    return problem.reduce.sum(sum(drag(problem, problem.scheme, p_pa, r)) * lever)  # type: ignore[arg-type]
+
+
+def drag(problem: LubricationProblem, scheme: BoxScheme, p_pa: Array, r: Array, lifted: complex = 0.0) -> tuple[Array, Array]:
+    """What `friction` is the sum of: the parts at each point's east face, and those at the point or before it. Collective.
+
+    Parameters
+    ----------
+    lifted : added to the film, of which `scheme` has the coefficients then.
+    """
+    grid, s, film = problem.grid, scheme, problem.film
     before, behind = grid.steps(0)[:-1], grid.steps(0)[1:]
     muU, weight, rims = problem.mu * problem.U, line_weights(grid), grid.rims(1) if grid.dim == 2 else (0.0, 0.0)
     full = (cavity_sign(problem.reduce, p_pa, r) >= 0).reshape(grid.box)
@@ -85,13 +95,13 @@ def friction(problem: LubricationProblem, p_pa: Array, r: Array, lever: Array | 
     first, last, south, north = sides(grid)
     walls = sides(grid, ("closed",))[:2]
     p_east = np.where(last, problem.p_sides[1], grid.ghosted(p_pa)[1:-1, 2:])
-    h_west, h_east = (np.broadcast_to(film(grid.x + step, grid.y), grid.box) for step in (-before / 2, behind / 2))
+    h_west, h_east = (np.broadcast_to(film(grid.x + step, grid.y) + lifted, grid.box) for step in (-before / 2, behind / 2))
     passes = ~np.broadcast_to(walls[1], grid.box)  # the east face
     liquid = 1.0 + s.b_C * r / np.where(passes & (s.couette_E != 0.0), s.couette_E, np.inf)
-    shear = np.where(passes, liquid / h_east, 0.0) + np.where(first, before / behind / h_west, 0.0)
+    east, own = np.where(passes, liquid / h_east, 0.0), np.where(first, before / behind / h_west, 0.0)
     for wall, share in zip(walls, (0.5 * before / behind, 0.5), strict=True):
-        shear = shear + np.where(wall, share * np.where(full, 4.0, 1.0 - r) / s.h, 0.0)
-    push = np.where(passes, 0.5 * h_east * (p_east - p), 0.0) + np.where(first, 0.5 * h_west * (p - problem.p_sides[0]), 0.0)
-    strips = 1.0 + 0.5 * (rims[0] * south + rims[1] * north) / weight
-    per_row = muU * grid.stretch(grid.y) ** 2 * behind * shear * strips + push
-    return problem.reduce.sum(per_row * weight * lever) * (grid.spacing[1] if grid.dim == 2 else 1.0)
+        own = own + np.where(wall, share * np.where(full, 4.0, 1.0 - r) / s.h, 0.0)
+    push = np.where(passes, 0.5 * h_east * (p_east - p), 0.0), np.where(first, 0.5 * h_west * (p - problem.p_sides[0]), 0.0)
+    strips = muU * grid.stretch(grid.y) ** 2 * behind * (1.0 + 0.5 * (rims[0] * south + rims[1] * north) / weight)
+    scale = weight * (grid.spacing[1] if grid.dim == 2 else 1.0)
+    return (strips * east + push[0]) * scale, (strips * own + push[1]) * scale

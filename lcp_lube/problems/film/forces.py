@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import hypot, inf
 from typing import TYPE_CHECKING, Any
@@ -71,19 +71,29 @@ def forces(problem: LubricationProblem, p_pa: Array) -> dict[str, Any]:
         return out
 
     def phi(x: Array) -> Array:
-        return shaft.start + (x - grid.origin[0]) / shaft.radius
+        return shaft_angle(problem, shaft, x)
 
     force = [-integral(lambda x, y: np.cos(phi(x))), -integral(lambda x, y: np.sin(phi(x)))]
     out |= {"load": hypot(*force), "force": force, "attitude_deg": None}
     if shaft.widest is not None and 0 < out["load"] < inf:
-        behind = np.exp(1j * shaft.widest) / complex(*force)  # of the opposites of both
-        out["attitude_deg"] = float(np.degrees(np.angle(behind if problem.U >= 0 else np.conj(behind))))
+        out["attitude_deg"] = attitude(shaft.widest, force, problem.U)
     if grid.dim == 2:
         out["moment"] = [
             -integral(lambda x, y: (y - middle[1]) * np.cos(phi(x))),
             -integral(lambda x, y: (y - middle[1]) * np.sin(phi(x))),
         ]
     return out
+
+
+def shaft_angle(problem: LubricationProblem, shaft: Shaft, x: Array) -> Array:
+    """phi (rad) of the places x (m)."""
+    return shaft.start + (x - problem.grid.origin[0]) / shaft.radius
+
+
+def attitude(widest: float, force: Sequence[float], U: float) -> float:
+    """Angle from the load to the narrowest gap, degrees, positive in the sense of rotation."""
+    behind = np.exp(1j * widest) / complex(*force)  # of the opposites of both
+    return float(np.degrees(np.angle(behind if U >= 0 else np.conj(behind))))
 
 
 def _of_sector(polar: tuple[float, float], integral: Callable[..., float]) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,12 +14,13 @@ from ...errors import InputError
 from ..facts import Facts
 from ..grid import EVEN, Grid, Places, Polar
 from .exact import ExactSolution
+from .film_slopes import film_slopes
 from .fluid import Law
 from .forces import Shaft
 from .grooves import Groove, GroovedProblem, Pad, pads_between
 from .lines import on_edges
 from .lubrication import LubricationProblem
-from .reynolds import Film, box_scheme
+from .reynolds import BoxScheme, Film, box_scheme
 from .supplies import Supply, hold
 from .turned import MirroredFilm, TurnedProblem
 
@@ -141,18 +143,7 @@ class Model:
         grid = Grid(shape, self.lengths, comm, ends=ends, places=self.lines(shape), polar=self.polar)
         p_sides = tuple(side.p if side.kind == "open" else 0.0 for side in self.sides)
         film = self.film
-        coefficients = partial(
-            box_scheme,
-            grid,
-            self.gap,
-            mu=self.mu,
-            U=self.U,
-            scheme=self.scheme,
-            p_sides=p_sides,  # type: ignore[arg-type]
-            p_unit=self.p_unit,
-            mean_cubes=self.mean_cubes,
-            r_in=west.r,
-        )
+        coefficients = partial(box_scheme, grid, self.gap, **self._data)
         scheme = coefficients()
         scheme, held = hold(grid, scheme, self.supplies, self.p_unit) if self.supplies else (scheme, None)
         problem = kind(
@@ -174,6 +165,18 @@ class Model:
         if getattr(self.gap, "rims", ()) and not self.supplies and self.law is None:
             problem.coefficients_for = coefficients
         return problem
+
+    @property
+    def _data(self) -> dict[str, Any]:
+        """What the box scheme is told beside grid and film."""
+        p_sides = tuple(side.p if side.kind == "open" else 0.0 for side in self.sides)
+        given = {name: getattr(self, name) for name in ("mu", "U", "scheme", "p_unit", "mean_cubes")}
+        return {**given, "p_sides": p_sides, "r_in": self.sides[0].r}
+
+    def film_slopes(self, problem: LubricationProblem) -> BoxScheme:
+        """Derivatives of the coefficients of a problem that was built from this (U >= 0) by its film. Collective."""
+        slopes = film_slopes(problem.grid, self.gap, self._data, problem.scheme.flow_unit)
+        return hold(problem.grid, slopes, self.supplies, self.p_unit)[0] if self.supplies else slopes
 
     def pads(self, shape: Sequence[int]) -> list[tuple[Pad, "Model"]]:
         """The films between the grooves on a ring of nx columns, whose points they keep."""

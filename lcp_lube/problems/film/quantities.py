@@ -71,8 +71,8 @@ def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any
     cavity = (cavity_sign(reduce, p, r) < 0).astype(float)
     weight = point_weights(grid)
     flow = side_flows(problem, p, r)
-    p_max, p_max_at = _largest_pressure(problem, p_pa)
-    min_h, min_h_at = _thinnest(problem)
+    p_max, p_max_at = largest_pressure(problem, p_pa)
+    min_h, min_h_at = thinnest(problem)
     ruptures, reformations = fronts(problem, p, r)
     rupture, reformation = first_cavity(grid, ruptures, reformations)
     out: dict[str, Any] = {
@@ -104,7 +104,7 @@ def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any
     return out | (problem.extras(out) if problem.extras else {})
 
 
-def _largest_pressure(problem: LubricationProblem, p_pa: Array) -> tuple[float, list[float] | None]:
+def largest_pressure(problem: LubricationProblem, p_pa: Array) -> tuple[float, list[float] | None]:
     """p - p_c in Pa at the points and sides, and where. Collective."""
     grid = problem.grid
     largest, place = _largest(problem, p_pa.reshape(grid.box), grid.x[0], grid.y[:, 0])
@@ -117,7 +117,7 @@ def _largest_pressure(problem: LubricationProblem, p_pa: Array) -> tuple[float, 
     return largest, place
 
 
-def _thinnest(problem: LubricationProblem) -> tuple[float, list[float] | None]:
+def thinnest(problem: LubricationProblem) -> tuple[float, list[float] | None]:
     """Smallest film over the points and the points of the boundary, and where, m. Collective."""
     grid, film = problem.grid, problem.film
     x, y = grid.x[0], grid.y[:, 0]

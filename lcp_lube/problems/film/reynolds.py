@@ -212,7 +212,7 @@ def _coefficients(
     h_W = h_x[:, :-2]
     if U == 0.0:
         # No void is carried, and there is none: any speed keeps B regular.
-        U_r, r_in = grid.reduce.max(k_x) / grid.reduce.max(h), 0.0
+        U_r, r_in = grid.reduce.max(np.real(k_x)) / grid.reduce.max(np.real(h)), 0.0
     else:
         U_r = U
     if scheme == "upwind":

@@ -1,0 +1,77 @@
+"""Derivatives of cheap functions of one variable by differences, to rounding; kinks and jumps are told apart from bends."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from .parallel import Array
+
+STEP, SMALLER, TRIES = 1e-4, 0.1, 4  # of a number, relative; where its effect is not smooth, smaller ones
+SMOOTH = 1e-5  # relative difference between differences of second and fourth order that is left to truncation
+KINK = 1e-2  # relative difference between both sides
+ROUNDING, TINY = 1e-15, 1e-300
+
+
+def differences(f: Callable[[float], Array], a: float, scale: float, sizes: Array) -> tuple[Array, Array]:
+    """df/da of a vector function to rounding, and by how much its derivatives to both sides differ where it has a kink.
+
+    A kink's derivative is the mean of both sides; where f jumps it is NaN, and the difference inf.
+
+    Parameters
+    ----------
+    scale : a change of a that is not small. sizes : of the terms that f is made of, whose rounding is left in it.
+
+    Raises
+    ------
+    InputError : f has values on neither side of a.
+    """
+    known: dict[float, Array | InputError] = {}
+
+    def at(change: float) -> Array | None:
+        if change not in known:
+            try:
+                known[change] = f(a + change)
+            except InputError as error:
+                known[change] = error
+        value = known[change]
+        return None if isinstance(value, InputError) else value
+
+    best: tuple[float, Array] | None = None
+    before, kinks = np.zeros_like(sizes), np.zeros_like(sizes)
+    for k in range(TRIES):
+        d = STEP * SMALLER**k * scale
+        noise = 10.0 * ROUNDING * sizes / d
+        found = _stencil(at, d)
+        if found is None:
+            continue
+        slope, second, jump = found
+        slope = np.where(np.abs(slope) <= noise, 0.0, slope)
+        excess = float(np.max((np.abs(slope - second) - 10.0 * noise) / np.maximum(np.abs(slope), noise + TINY), initial=0.0))
+        if best is None or excess < best[0]:
+            best = (excess, slope)
+        jump = np.where(jump > KINK * np.abs(slope) + 10.0 * noise, jump, 0.0)
+        # What bends falls with the step, a kink stays, and a jump grows.
+        kinks = np.where(jump > 0.3 * before, jump, 0.0) if k else jump
+        kinks = np.where((jump > 3.0 * before) & (before > 0.0), np.inf, kinks)
+        before = jump
+        if (excess <= SMOOTH and not jump.any()) or np.isinf(kinks).any():
+            break
+    if best is None:
+        raise max((change, one) for change, one in known.items() if isinstance(one, InputError))[1]
+    return np.where(np.isinf(kinks), np.nan, best[1]), kinks
+
+
+def _stencil(at: Callable[[float], Array | None], d: float) -> tuple[Array, Array, Array] | None:
+    """Differences of fourth and of second order with step d, and of both sides; to one side where the other has no values."""
+    low2, low, here, high, high2 = (at(m * d) for m in (-2, -1, 0, 1, 2))
+    if low2 is not None and low is not None and high is not None and high2 is not None and here is not None:
+        fourth = (8.0 * (high - low) - (high2 - low2)) / (12.0 * d)
+        return fourth, (high - low) / (2.0 * d), np.abs(high - 2.0 * here + low) / d
+    side = 1.0 if high is not None else -1.0
+    v: list[Any] = [at(side * m * d) for m in range(5)]
+    if any(value is None for value in v):
+        return None
+    fourth = side * (-25.0 * v[0] + 48.0 * v[1] - 36.0 * v[2] + 16.0 * v[3] - 3.0 * v[4]) / (12.0 * d)
+    return fourth, side * (-1.5 * v[0] + 2.0 * v[1] - 0.5 * v[2]) / d, np.zeros_like(fourth)

@@ -1,0 +1,205 @@
+"""The adjoints of a solution's numbers, and of the conditions that what was found for it meets.
+
+With J' lambda = dQ/dz the number L(a) = Q(z, a) - lambda' G(z, a), its fields z held, has the derivative that Q has at the
+solution. Where v was found such that C = 0 holds (an attitude, the eccentricity or level that carries a load),
+
+    dQ/da = L_a - L_v (C_v)^-1 C_a.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..base.differences import differences
+from ..base.parallel import Array
+from ..errors import InputError
+from ..problems.solution import Solution
+from ..scenes.grooved import GroovedJournalScene
+from ..scenes.scene import Scene
+from ..scenes.values import values_of, with_values
+from .coefficients import placed
+from .equations import MISFIT, Equations, cavity_of, check_film, fields_of
+from .linearised import Linear
+
+CANCELLED = 1e-10
+SUPPLY = "supply.{}.p"  # the key of a supply's pressure, Pa above p_c
+
+
+class Adjoint:
+    """A solution with what its derivatives need: equations, adjoints of quantities and of the conditions that were met.
+
+    Collective, as all of its methods.
+
+    Raises
+    ------
+    InputError : no film, no converged solution, a quantity without a derivative.
+    """
+
+    def __init__(self, scene: Scene, solution: Solution, quantities: Sequence[str], flip: bool = False):
+        if not solution.converged:
+            raise InputError(f"{scene.name}: {solution.outcome.sentence}: no solution, no derivatives")
+        check_film(scene)
+        self.scene, self.reported = placed(scene, solution), solution.problem
+        self.p, self.r = fields_of(solution)
+        self.pressures = [float(P) for P in solution.settings.get("supply_pressures", ())]
+        self.equations = Equations(self.scene, solution.problem.grid.dm.comm, self.pressures)
+        if self.equations.grid.shape != solution.problem.grid.shape:
+            raise InputError(f"{scene.name}: the solution is on another grid than the scene")
+        self.found, self.conditions = _found(scene, solution)
+        supplies = self.equations.constant.held.supplies if self.equations.constant.held else ()
+        free = [k for k, one in enumerate(supplies, start=1) if one.open]
+        self.found = [*self.found, *(SUPPLY.format(k) for k in free)]
+        self.conditions = {**self.conditions, **{f"{MISFIT}{k}": 0.0 for k in free}}
+        self.asked = list(quantities)
+        names = [name for name in [*quantities, *self.conditions] if name not in self.found]
+        eq, p, r = self.equations, self.p, self.r
+        self.numbers = eq.numbers(p, r)
+        parts = {name: eq.partials(self.numbers, name) for name in names}
+        self.cavity, switching = cavity_of(eq, p, r)
+        if flip:
+            self.cavity = self.cavity ^ switching
+        self.switching = int(eq.grid.reduce.sum(switching.astype(float)))
+        needed = list(dict.fromkeys(part for weights in parts.values() for part in weights))
+        slopes = {part: eq.slope(p, r, part) for part in needed}
+        self.ties = {name: sum(slopes[part].ties for part in weights) for name, weights in parts.items()}
+        rows = [
+            sum((w * np.where(self.cavity, -slopes[part].r, slopes[part].p) for part, w in weights.items()), np.zeros(p.size))
+            for weights in parts.values()
+        ]
+        self.lambdas = dict(zip(parts, self._solve(rows), strict=True))
+        self.parts = parts
+        self.flow_unit = eq.problem(p).scheme.flow_unit
+        terms = eq.terms(p, r) / self.flow_unit
+        self.sizes = {
+            name: sum(abs(w * self.numbers[part]) for part, w in parts[name].items()) + eq.grid.reduce.dot(np.abs(one), terms)
+            for name, one in self.lambdas.items()
+        }
+
+    def _solve(self, rows: list[Array]) -> list[Array]:
+        eq = self.equations
+        problem = eq.problem(self.p)
+        entries = None if eq.law is None else eq.tangent(self.p, self.r).entries(problem.scheme)
+        linear = Linear(problem, self.cavity, entries, eq.held)
+        try:
+            return linear.solve_transposed(rows)
+        finally:
+            linear.destroy()
+
+    def lagrangians(self, scene: Scene, pressures: Sequence[float] | None = None) -> Array:
+        """L of every quantity and condition at a scene near by, the fields held. Collective.
+
+        Raises
+        ------
+        InputError : no such scene.
+        """
+        same = scene is self.scene and pressures is None
+        eq = self.equations
+        if not same:
+            eq = Equations(scene, eq.grid.dm.comm, pressures or self.pressures, near=eq)
+        try:
+            if eq.grid.shape != self.equations.grid.shape:
+                raise InputError("the grid has another number of points")
+            numbers = eq.numbers(self.p, self.r)
+            report = eq.report(numbers)
+            G = eq.balance(self.p, self.r) / self.flow_unit
+            if (held := eq.held) is not None:
+                G = np.where(held, G * self.flow_unit / eq.constant.p_unit, G)
+            return np.array([report[name] - eq.grid.reduce.dot(one, G) for name, one in self.lambdas.items()])
+        finally:
+            if eq is not self.equations:
+                eq.destroy()
+
+    def slopes(self, key: str) -> tuple[dict[str, float], dict[str, float]]:
+        """dL/da and the difference between both sides, by quantity and condition. Collective.
+
+        Raises
+        ------
+        InputError : no scene on either side.
+        """
+        names = list(self.lambdas)
+        value = self.value(key)
+        sizes = np.array([self.sizes[name] for name in names])
+        if key in self._supplies:
+            which, unit = self._supplies.index(key), self.equations.constant.p_unit
+
+            def at(P: float) -> Array:
+                return self.lagrangians(self.scene, [P if k == which else other for k, other in enumerate(self.pressures)])
+
+            slope, jump = differences(at, value, max(abs(value), 1e-3 * unit), sizes)
+        else:
+            scale = abs(value) or self._scale(key)
+            slope, jump = differences(lambda a: self.lagrangians(with_values(self.scene, {key: a})), value, scale, sizes)
+        return dict(zip(names, slope, strict=True)), dict(zip(names, jump, strict=True))
+
+    @property
+    def _supplies(self) -> list[str]:
+        return [SUPPLY.format(k) for k in range(1, len(self.pressures) + 1)]
+
+    def value(self, key: str) -> float:
+        """Of a number of the scene, or of a supply's pressure that was found."""
+        known = values_of(self.scene)
+        return known[key] if key in known else self.pressures[self._supplies.index(key)]
+
+    def _scale(self, key: str) -> float:
+        """What a change of a number that is zero is small against."""
+        problem, units = self.equations.constant, self.scene.data_units()
+        unit = units.get(key, units.get(key.rpartition(".")[0], ""))
+        p_max = max(problem.reduce.max(self.p), *map(abs, problem.p_sides)) or problem.p_unit
+        thinnest = problem.reduce.min(problem.scheme.h)
+        return {"Pa": p_max, "1/Pa": 1.0 / p_max, "m": thinnest, "rad": thinnest / max(problem.grid.lengths)}.get(unit, 1e-2)
+
+    def destroy(self) -> None:
+        self.equations.destroy()
+
+
+def _found(scene: Scene, solution: Solution) -> tuple[list[str], dict[str, float]]:
+    """The keys whose values were found, and the conditions that they meet: a number and the value that it has."""
+    if isinstance(scene, GroovedJournalScene):
+        if scene.balance is not None:
+            return ["eccentricity", "attitude_deg"], {"load": scene.balance.load, "force_y": 0.0}
+        return (["attitude_deg"], {"force_y": 0.0}) if scene.attitude_deg is None else ([], {})
+    if balance := solution.settings.get("balance"):
+        return [balance["vary"]], {"load": balance["load"]}
+    return [], {}
+
+
+@dataclass(frozen=True)
+class Implicit:
+    """Conditions C = 0 that what was found, v, meets: C_v inverted, and L_v of every quantity."""
+
+    found: list[str]
+    conditions: list[str]
+    inverse: Array
+    by_found: dict[str, Array]  # L_v
+
+    @classmethod
+    def of(cls, adjoint: Adjoint, balance: dict[str, Any] | None) -> "Implicit":
+        """Raises InputError where the conditions do not depend on what was found."""
+        slopes = [adjoint.slopes(key)[0] for key in adjoint.found]
+        conditions = list(adjoint.conditions)
+        C_v = np.array([[one[name] for one in slopes] for name in conditions]).reshape(len(conditions), len(slopes))
+        try:
+            inverse = np.linalg.inv(C_v) if slopes else np.zeros((0, 0))
+        except np.linalg.LinAlgError:
+            raise InputError(f"{', '.join(conditions)} do not depend on {', '.join(adjoint.found)}: no derivatives") from None
+        by_found = {name: np.array([one[name] for one in slopes]) for name in adjoint.lambdas}
+        return cls(adjoint.found, conditions, inverse, by_found)
+
+    def total(self, quantity: str, key: str, slope: dict[str, float]) -> float:
+        """dQ/da from the derivatives of every L by a."""
+        if not self.found:
+            return slope[quantity]
+        C_a = np.array([slope[name] - float(key == "balance.load" and name == "load") for name in self.conditions])
+        change = -self.inverse @ C_a
+        if quantity in self.found:
+            return float(change[self.found.index(quantity)])
+        parts = [slope[quantity], *(self.by_found[quantity] * change)]
+        return _sum(parts)
+
+
+def _sum(parts: Sequence[float]) -> float:
+    """Their sum; 0 where rounding is all that is left of it."""
+    total = float(sum(parts))
+    return total if abs(total) > CANCELLED * sum(map(abs, parts)) else 0.0

@@ -1,0 +1,232 @@
+"""A scene's discrete equations G(p, r) = 0 and numbers Q(p, r) at fields that are held: what its derivatives are made of.
+
+Nothing is solved here. A scene with one of its numbers changed gives other equations at the same fields, p in Pa and r at the
+same points of the grid, which moves where the number moves it.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from ..base.parallel import Array
+from ..errors import InputError, nearest
+from ..problems.film import slopes
+from ..problems.film.cavity import VOID, cavity_sign
+from ..problems.film.fluid import Tangent, effective, tangent
+from ..problems.film.forces import attitude
+from ..problems.film.grooves import GroovedProblem
+from ..problems.film.lubrication import LubricationProblem
+from ..problems.film.model import Model
+from ..problems.film.turned import TurnedProblem
+from ..problems.grid import Grid, Places
+from ..problems.solution import Fields, Solution
+from ..scenes.scene import Scene
+from .fluid import Frozen
+from .turned import Mirrored
+
+FLIPPED = {"flow_west": "flow_east", "flow_east": "flow_west"}
+MISFIT = "supply_misfit_"  # by which a supply's source and film disagree, 0 at the solution
+STEP = 1e-3  # relative, of the numbers that another one is made of: five values give its derivatives to rounding
+
+
+class Equations:
+    """G and Q of one scene at any p (Pa above p_c) and r of its grid's owned points; where U < 0 in the mirror image's frame.
+
+    Parameters
+    ----------
+    pressures : of all supplies, Pa above p_c; heeded where a supply's own is to be found.
+    near : those of a scene near by, whose grid this one has: uneven lines follow the film's edges, none changes sides.
+
+    Raises
+    ------
+    InputError : no film, or one that goes on in time.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        comm: PETSc.Comm | None = None,
+        pressures: Sequence[float] = (),
+        near: "Equations | None" = None,
+    ):
+        model = check_film(scene)
+        self.scene, self.turned = scene, model.U < 0
+        film: Any = Mirrored(scene) if self.turned else scene
+        model = film.model
+        self.law, self._p_sides = model.law, tuple(side.p if side.kind == "open" else 0.0 for side in model.sides)
+        film = Frozen(film, self.law) if self.law else film
+        self._model: Model = film.constant if self.law else model
+        places = None if near is None or near.grid.even else _followed(near.grid, near._model, self._model)
+        if near is None or places is None:
+            self.constant: LubricationProblem = film.build(comm)
+        else:
+            self.constant = replace(self._model, places=places).build(near.grid.shape, comm)
+            self.constant.extras = near.constant.extras and getattr(scene, near.constant.extras.__name__)
+        self.grid: Grid = self.constant.grid
+        if pressures and (held := self.constant.held) is not None:
+            q = [float(self.law.reduced(np.array(P))) if self.law else P for P in pressures]
+            self.constant.hold_at([replace(one, p=P) if one.open else one for one, P in zip(held.supplies, q, strict=True)])
+
+    def problem(self, p: Array) -> LubricationProblem:
+        """The film, with its fluid's coefficients at p."""
+        if self.law is None:
+            return self.constant
+        return effective(self.constant, self.law, p, self._p_sides)  # type: ignore[arg-type]
+
+    def tangent(self, p: Array, r: Array) -> Tangent:
+        problem = self.problem(p)
+        return tangent(problem, self.law, self.constant, p / problem.p_unit, r)
+
+    @property
+    def held(self) -> Any:
+        """Whether an owned point lies in a groove, whose pressure it has; None without grooves."""
+        return np.logical_or.reduce(self.constant.columns) if isinstance(self.constant, GroovedProblem) else None
+
+    @property
+    def given(self) -> Any:
+        """Whether an owned point's pressure is given: a groove's or a supply's. None where there are neither."""
+        held = self.constant.held
+        return self.held if held is None else held.mask.ravel()
+
+    def balance(self, p: Array, r: Array) -> Array:
+        """G in m2/s; in a groove p minus its pressure, in Pa. Collective."""
+        problem = self.problem(p)
+        G = problem.balance(p / problem.p_unit, r) * problem.scheme.flow_unit
+        if isinstance(problem, GroovedProblem):
+            for inside, groove in zip(problem.columns, problem.grooves, strict=True):
+                G = np.where(inside, p - groove.p, G)
+        return G
+
+    def terms(self, p: Array, r: Array) -> Array:
+        """The size of the terms that G is the sum of, m2/s."""
+        s, problem = self.problem(p).scheme, self.constant
+        k = (s.k_W + s.k_E + s.k_S + s.k_N).ravel() * p / problem.p_unit
+        return (np.abs(k) + np.abs(s.couette_W).ravel() + np.abs(s.couette_E).ravel()) * s.flow_unit
+
+    def numbers(self, p: Array, r: Array) -> dict[str, float]:
+        """`slopes.numbers` as the scene has them. Collective."""
+        problem = self.problem(p)
+        found = slopes.numbers(problem, p / problem.p_unit, r)
+        return self._flipped(found) if self.turned else found
+
+    def _flipped(self, found: dict[str, float]) -> dict[str, float]:
+        out = {FLIPPED.get(name, name): value for name, value in found.items()}
+        return {**out, "friction": -out["friction"]}
+
+    def slope(self, p: Array, r: Array, name: str) -> slopes.Slope:
+        """dQ/dp (p in p_unit) and dQ/dr of one of `numbers`. Collective."""
+        problem = self.problem(p)
+        name = FLIPPED.get(name, name) if self.turned else name
+        found = slopes.slope(problem, self.tangent(p, r), p / problem.p_unit, r, name)
+        return slopes.Slope(-found.p, -found.r) if self.turned and name == "friction" else found
+
+    def report(self, numbers: dict[str, float]) -> dict[str, float]:
+        """What else is told of the film, from its `numbers`."""
+        problem, out = self.constant, dict(numbers)
+        if problem.shaft is not None:
+            out["load"] = math.hypot(out["force_x"], out["force_y"])
+            if problem.shaft.widest is not None and out["load"] > 0:
+                out["attitude_deg"] = attitude(problem.shaft.widest, (out["force_x"], out["force_y"]), problem.U)
+        if "flow_south" in out or "flow_north" in out:
+            out["side_leakage"] = out.get("flow_south", 0.0) + out.get("flow_north", 0.0)
+        if out["load"] > 0:
+            out["friction_coefficient"] = out["friction"] / out["load"]
+        for k, one in enumerate(problem.held.supplies if problem.held else (), start=1):
+            P = float(self.law.pressure(np.array(one.p))) if self.law else one.p
+            out[f"supply_p_{k}"] = P + problem.p_c
+            if one.open:
+                out[f"{MISFIT}{k}"] = one.misfit(P, out[f"supply_flow_{k}"])[0]
+        out["power_loss"] = abs(problem.U) * out["friction"] * (-1.0 if self.turned else 1.0)
+        extras = getattr(problem, "extras", None)
+        more = extras(out) if extras else {}
+        return out | {name: value for name, value in more.items() if isinstance(value, float)}
+
+    def partials(self, numbers: dict[str, float], name: str) -> dict[str, float]:
+        """d(name)/d(number) for those of `numbers` that it is made of.
+
+        Raises
+        ------
+        InputError : nothing of this name, or nothing with a derivative.
+        """
+        if name in numbers:
+            return {name: 1.0}
+        known = self.report(numbers)
+        if name not in known:
+            raise InputError(
+                f"quantity {name}: of this scene derivatives are known of {', '.join(known)}{nearest(name, known)}"
+            )
+        out = {}
+        for part, value in numbers.items():
+            step = STEP * (abs(value) or 1.0)
+            f = [self.report({**numbers, part: value + k * step}).get(name, np.nan) for k in (-2, -1, 1, 2)]
+            slope = (8.0 * (f[2] - f[1]) - (f[3] - f[0])) / (12.0 * step)
+            if slope and math.isfinite(slope):
+                out[part] = slope
+        return out
+
+    def destroy(self) -> None:
+        self.constant.destroy()
+
+
+def _followed(grid: Grid, before: Model, after: Model) -> Places | None:
+    """The lines of a grid where the film's edges have moved, as many between two edges; None where edges came or went."""
+    out: list[Array | None] = []
+    for side, places in enumerate(grid.places):
+        if places is None:
+            out.append(None)
+            continue
+        knots = [_knots(model, side, grid.periodic[side]) for model in (before, after)]
+        if knots[0].size != knots[1].size:
+            return None
+        out.append(np.interp(places, knots[0], knots[1]))
+    return out[0], out[1]
+
+
+def _knots(model: Model, side: int, periodic: bool) -> Array:
+    """The edges that lines of a grid follow, and the two ends."""
+    axis, L = "xy"[side], model.lengths[side]
+    edges = [*getattr(model.gap, "jumps", lambda axis: ())(axis), *(t for s in model.supplies for t in s.region.edges(axis))]
+    within = np.unique([t for t in edges if 0.0 < t < L])
+    if not within.size:
+        return np.array([0.0, L])
+    ends = (within[-1] - L, within[0] + L) if periodic else (0.0, L)
+    return np.concatenate([[ends[0]], within, [ends[1]]])
+
+
+def check_film(scene: Scene) -> Model:
+    """The scene's film.
+
+    Raises
+    ------
+    InputError : no film, or one that goes on in time.
+    """
+    model = getattr(scene, "model", None)
+    if not isinstance(model, Model) or scene.transient:
+        raise InputError(f"scene {scene.name}: gradients are of films with cavitation that stand still in time")
+    return model
+
+
+def fields_of(solution: Solution) -> tuple[Array, Array]:
+    """p (Pa above p_c) and r of a film's solution, in the frame of `Equations`."""
+    problem: Any = solution.problem
+    fields: Fields = solution.fields
+    if isinstance(problem, TurnedProblem):
+        fields, problem = problem.there(fields), problem.moving
+    return fields["p"] * problem.p_unit, fields["r"]
+
+
+def cavity_of(equations: Equations, p: Array, r: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Whether a point is cavitated, and whether it is about to change: p and r both vanish there. Collective."""
+    reduce = equations.grid.reduce
+    cavity = cavity_sign(reduce, p, r) < 0
+    p_max = reduce.max(np.abs(p))
+    switching = (np.abs(p) <= VOID * p_max) & (np.abs(r) <= VOID)
+    if equations.given is not None:
+        switching &= ~equations.given
+        cavity &= ~equations.given
+    return cavity, switching

@@ -1,0 +1,168 @@
+"""The derivative of a number by the film at every point, dQ/dh(x, y) per area: where to take material away.
+
+The same lambda as for the scene's numbers (`gradient`), times the derivatives of the scheme's coefficients by the film at their
+faces and points, which a complex step through the code of the scheme gives. What belongs to a face is dealt to its two points:
+the film between them is then understood as their mean, as interpolation between points has it.
+"""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..base.parallel import Array
+from ..problems.film.flows import drag, line_weights
+from ..problems.film.fluid import effective
+from ..problems.film.lubrication import LubricationProblem
+from ..problems.film.reynolds import BoxScheme, sides
+from ..problems.film.slopes import giving
+from ..problems.film.turned import TurnedProblem
+from ..problems.grid import Grid
+from .adjoint import Adjoint, Implicit
+from .equations import FLIPPED
+from .fluid import Frozen
+from .turned import Mirrored
+
+STEP = 1e-30  # relative: complex steps have no differences whose digits could cancel
+
+
+def areas(grid: Grid) -> Array:
+    """What of the film stands for a point: its cell, at an open side with the half cell up to the side, m2 (1D: m)."""
+    masks, size = sides(grid), grid.widths(0)[None, :] * grid.widths(1)[:, None] if grid.dim == 2 else grid.widths(0)[None, :]
+    for side in range(grid.dim):
+        width = grid.widths(side)[None, :] if side == 0 else grid.widths(side)[:, None]
+        for mask, rim in zip(masks[2 * side : 2 * side + 2], grid.rims(side), strict=True):
+            size = size * (1.0 + np.where(mask, 0.5 * rim / width, 0.0))
+    return np.broadcast_to(size, grid.box).ravel() * grid.cell
+
+
+class FilmGradient:
+    """dQ/dh of an adjoint's quantities. Collective, as its method."""
+
+    def __init__(self, adjoint: Adjoint, balance: dict[str, Any] | None):
+        self.adjoint, eq = adjoint, adjoint.equations
+        film: Any = Mirrored(adjoint.scene) if eq.turned else adjoint.scene
+        model = Frozen(film, eq.law).constant if eq.law else film.model
+        self.problem = eq.problem(adjoint.p)
+        slopes = model.film_slopes(eq.constant)
+        if eq.law is not None:
+            changed = LubricationProblem(
+                eq.grid, slopes, mu=1.0, U=0.0, p_unit=eq.constant.p_unit, p_sides=eq.constant.p_sides, p_c=0.0,
+                film=eq.constant.film,
+            )  # fmt: skip
+            slopes = effective(changed, eq.law, adjoint.p, eq._p_sides).scheme  # type: ignore[arg-type]
+        self.slopes: BoxScheme = slopes
+        self.at_faces = model.scheme == "face", model.scheme != "upwind"  # whether void and Couette flow are those of faces
+        self.mean_cubes = model.mean_cubes
+        self.implicit = Implicit.of(adjoint, balance)
+
+    def field(self, quantity: str) -> Array:
+        """dQ/dh at the owned points of the solution's grid, unit of Q per m and m2 (1D: per m and m).
+
+        A change of the film by dh(x, y) changes Q by the sum over the points of dQ/dh dh times their `areas`.
+        """
+        adjoint, eq, implicit = self.adjoint, self.adjoint.equations, self.implicit
+        weights = {quantity: 1.0} if quantity not in adjoint.found else {}
+        if implicit.found:
+            if quantity in adjoint.found:
+                row = -implicit.inverse[implicit.found.index(quantity)]
+            else:
+                row = -implicit.by_found[quantity] @ implicit.inverse
+            for name, factor in zip(implicit.conditions, row, strict=True):
+                weights[name] = weights.get(name, 0.0) + float(factor)
+        total = np.zeros(eq.grid.box)
+        for name, factor in weights.items():
+            total = total + factor * self._lagrangian(name)
+        out = total.ravel() / areas(eq.grid)
+        reported = adjoint.reported
+        return reported.here({"h": out})["h"] if isinstance(reported, TurnedProblem) else out
+
+    def _lagrangian(self, name: str) -> Array:
+        """Of one L by the film at each point: by what the balance has, and by what the number itself has."""
+        adjoint = self.adjoint
+        held = adjoint.equations.given
+        rows = -adjoint.lambdas[name] if held is None else np.where(held, 0.0, -adjoint.lambdas[name])
+        total = np.zeros(adjoint.equations.grid.box)
+        unit = 0.5 * (self.problem.grid.spacing[1] if self.problem.grid.dim == 2 else 1.0) * self.problem.scheme.flow_unit
+        for part, weight in adjoint.parts[name].items():
+            part = FLIPPED.get(part, part) if adjoint.equations.turned else part
+            if part.startswith(("groove_flow_", "supply_flow_")):
+                inside = giving(adjoint.equations.constant, part)
+                rows = rows + weight * unit * inside
+            elif part == "friction":
+                total = total + weight * self._friction() * (-1.0 if adjoint.equations.turned else 1.0)
+            elif part.startswith("flow_"):
+                total = total + weight * self._flow(part.removeprefix("flow_"))
+        return total + self._balance(rows)
+
+    def _balance(self, rows: Array) -> Array:
+        """rows' dG/dh, dealt to the points."""
+        grid, s, adjoint = self.problem.grid, self.slopes, self.adjoint
+        w = rows.reshape(grid.box)
+        frame_p, frame_r = (grid.ghosted(a, outside=0.0) for a in (adjoint.p / self.problem.p_unit, adjoint.r))
+        p, r = frame_p[1:-1, 1:-1], frame_r[1:-1, 1:-1]
+        around = [frame_p[1:-1, :-2], frame_p[1:-1, 2:], frame_p[:-2, 1:-1], frame_p[2:, 1:-1]]
+        pressed = []
+        for k, beside, at, p_side in zip((s.k_W, s.k_E, s.k_S, s.k_N), around, sides(grid), self.problem.p_sides, strict=True):
+            pressed.append(w * k * (p - np.where(at, p_side / self.problem.p_unit, beside)))
+        shares = self._shares() if self.mean_cubes else [0.5] * 4
+        faces = [f * share for f, share in zip(pressed, shares, strict=True)]  # the neighbour's part
+        own = sum(f - part for f, part in zip(pressed, faces, strict=True))
+        void_at_faces, dragged_at_faces = self.at_faces
+        for value, face, at_face in (
+            (-w * s.couette_W, 0, dragged_at_faces),
+            (w * s.couette_E, 1, dragged_at_faces),
+            (w * s.b_W * frame_r[1:-1, :-2], 0, void_at_faces),
+            (w * s.b_C * r, 1, void_at_faces),
+        ):
+            part = 0.5 * value if at_face else (value if face == 0 else 0.0 * value)
+            faces[face] = faces[face] + part
+            own = own + value - part
+        return self._dealt(own, faces)
+
+    def _shares(self) -> list[Array]:
+        """Of the neighbours, in the derivative of a mean of cubes."""
+        h = self.adjoint.equations.grid.ghosted(self.problem.scheme.h.ravel() ** 2)
+        here = h[1:-1, 1:-1]
+        return [np.nan_to_num(other / (other + here)) for other in (h[1:-1, :-2], h[1:-1, 2:], h[:-2, 1:-1], h[2:, 1:-1])]
+
+    def _dealt(self, own: Array, faces: list[Array]) -> Array:
+        """Each face's part to the neighbour behind it; beyond a side to the point itself."""
+        grid = self.problem.grid
+        west, east, south, north = faces
+        frames = [grid.ghosted(a.ravel()) for a in (east, west, north, south)]
+        arrived = [frames[0][1:-1, :-2], frames[1][1:-1, 2:], frames[2][:-2, 1:-1], frames[3][2:, 1:-1]]
+        beyond = [np.isnan(a) for a in arrived]  # this point's own part has nowhere to go
+        kept = [np.where(outside, part, 0.0) for outside, part in zip(beyond, (west, east, south, north), strict=True)]
+        return np.asarray(own + sum(kept) + sum(np.nan_to_num(a) for a in arrived))
+
+    def _friction(self) -> Array:
+        """Of the friction by the film, fields held."""
+        problem, s = self.problem, self.slopes
+        step = STEP * problem.reduce.max(problem.scheme.h)
+        moved = {name: getattr(problem.scheme, name) + 1j * step * getattr(s, name) for name in ("b_C", "couette_E", "h")}
+        parts = drag(problem, replace(problem.scheme, **moved), self.adjoint.p, self.adjoint.r, 1j * step)
+        east, own = (np.broadcast_to(np.imag(part) / step, problem.grid.box) for part in parts)
+        none = np.zeros_like(east)
+        return self._dealt(own + 0.5 * east, [none, 0.5 * east, none, none])
+
+    def _flow(self, side: str) -> Array:
+        """Of the flow through one side by the film of the cells there, fields held."""
+        problem, s, grid = self.problem, self.slopes, self.problem.grid
+        p, r = (self.adjoint.p / problem.p_unit).reshape(grid.box), self.adjoint.r.reshape(grid.box)
+        names = ("west", "east", "south", "north")
+        at, p_sides = dict(zip(names, sides(grid), strict=True)), dict(zip(names, problem.p_sides, strict=True))
+        k = dict(zip(names, (s.k_W, s.k_E, s.k_S, s.k_N), strict=True))
+        leaving, entering = s.couette_E + s.b_C * r, s.couette_W
+        out = k[side] * (p - p_sides[side] / problem.p_unit)
+        out = out + leaving if side == "east" else out - entering if side == "west" else out
+        here = np.where(at[side], out, 0.0)
+        for end, rim in zip(("south", "north"), grid.rims(1), strict=True) if grid.dim == 2 else ():
+            strip = 0.5 * rim / line_weights(grid)
+            if side in ("west", "east"):
+                here = here + np.where(at[side] & at[end], strip * (leaving if side == "east" else -entering), 0.0)
+            elif side == end:
+                here = here + np.where(at[side] & at["west"], strip * entering, 0.0)
+                here = here - np.where(at[side] & at["east"], strip * leaving, 0.0)
+        size = 0.5 * s.flow_unit * (grid.spacing[1] if grid.dim == 2 else 1.0)
+        return size * here

@@ -1,0 +1,145 @@
+"""Derivatives of a solution's numbers by the scene's: one transposed solve a quantity, whatever the number of parameters.
+
+G(z; a) = 0 is the film's balance, z = p in the full film and -r in the cavity, J = dG/dz. With J' lambda = dQ/dz,
+
+    dQ/da = dQ/da|_z - lambda' dG/da = dL/da,     L(a) = Q(z, a) - lambda' G(z, a) at held z.
+
+L is a number; its derivative comes from values of it at scenes with that one number changed by 1e-4 of itself, by differences
+of fourth order: no solve, and an error near 1e-11 (`base.differences`). Where something was found for
+the scene its conditions have adjoints of their own (`adjoint.Implicit`).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from ..errors import InputError
+from ..problems.solution import Solution
+from ..scenes.grooved import GroovedJournalScene
+from ..scenes.scene import Scene
+from ..scenes.values import key_of, values_of
+from .adjoint import Adjoint, Implicit
+from .coefficients import placed
+
+STEPWISE = "the edges of grooves lie on points of the grid: the answer changes by steps"
+FOUND = "it was found for the load"
+
+
+@dataclass(frozen=True)
+class Gradient:
+    """Derivatives of one number of a solution.
+
+    Attributes
+    ----------
+    quantity, value : Q, SI.
+    gradient : dQ/da by key, SI.
+    elasticity : d ln Q/d ln a by key; None where Q or a is zero.
+    held : numbers without a derivative, and why.
+    one_sided : by key, how much the derivatives to both sides differ: an edge on a point of the grid, a floor that is touched.
+    switching : points at which p and r both vanish, or that tie for the largest pressure; the film answers to a growing and to
+        a falling number differently there. switching_gap : the largest relative change of a derivative if they count to the
+        other side.
+    """
+
+    quantity: str
+    value: float
+    gradient: dict[str, float]
+    elasticity: dict[str, float | None]
+    held: dict[str, str] = field(default_factory=dict)
+    one_sided: dict[str, float] = field(default_factory=dict)
+    switching: int = 0
+    switching_gap: float = 0.0
+
+    @property
+    def ranked(self) -> list[str]:
+        """Keys, those that matter most first."""
+
+        def place(key: str) -> tuple[float, float, str]:
+            size, slope = self.elasticity[key] or 0.0, self.gradient[key]
+            return (1.0, 0.0, key) if slope != slope else (-abs(size), -abs(slope), key)
+
+        return sorted(self.gradient, key=place)
+
+
+def gradient_of(solution: Solution, quantity: str, keys: Sequence[str]) -> dict[str, float]:
+    """`Solution.gradient`: dQ/da by the keys as they were given."""
+    found = gradients(_scene(solution), solution, [quantity], keys)[0]
+    scene = placed(_scene(solution), solution)
+    out = {}
+    for text in keys:
+        key = key_of(scene, text)
+        if key in found.held:
+            raise InputError(f"{text}: no derivative: {found.held[key]}")
+        out[text] = found.gradient[key]
+    return out
+
+
+def _scene(solution: Solution) -> Scene:
+    if not isinstance(solution.solved_scene, Scene):
+        raise InputError("gradients are of solutions that solve() has made of a scene")
+    return solution.solved_scene
+
+
+def gradients(scene: Scene, solution: Solution, quantities: Sequence[str], keys: Sequence[str] | None = None) -> list[Gradient]:
+    """Derivatives of numbers of a converged solution by numbers of its scene. Collective.
+
+    Parameters
+    ----------
+    scene : that was solved. quantities : keys of the results; vectors by their parts (force_x, flow_west), or what a balance
+        has found. keys : of the scene, SI; default all of `values_of`.
+
+    Raises
+    ------
+    InputError : a quantity without a derivative, a key that is no number, a solution that is none, a scene without a film.
+    """
+    first = _gradients(scene, solution, quantities, keys)
+    if first[0].switching == 0:
+        return first
+    other = _gradients(scene, solution, quantities, keys, flip=True)
+    out = []
+    for one, two in zip(first, other, strict=True):
+        scale = max((abs(value) for value in map(one.elasticity.get, one.gradient) if value), default=1.0)
+        gaps = [abs((one.elasticity[key] or 0.0) - (two.elasticity[key] or 0.0)) / scale for key in one.gradient]
+        out.append(Gradient(**{**one.__dict__, "switching_gap": max(gaps, default=0.0)}))
+    return out
+
+
+def _gradients(
+    scene: Scene, solution: Solution, quantities: Sequence[str], keys: Sequence[str] | None, flip: bool = False
+) -> list[Gradient]:
+    adjoint = Adjoint(scene, solution, quantities, flip)
+    try:
+        values = values_of(adjoint.scene)
+        balance = solution.settings.get("balance")
+        if keys is not None:
+            asked = ["balance.load" if balance and key == "balance.load" else key_of(adjoint.scene, key) for key in keys]
+        else:
+            asked = [*(["balance.load"] if balance else []), *values]
+        slopes: dict[str, dict[str, float]] = {}
+        jumps: dict[str, dict[str, float]] = {}
+        held: dict[str, str] = {}
+        for key in dict.fromkeys(asked):
+            if key in adjoint.found:
+                held[key] = FOUND
+            elif isinstance(scene, GroovedJournalScene) and key.startswith("groove") and scene.grooves_deg:
+                held[key] = STEPWISE
+            elif key == "balance.load":
+                slopes[key], jumps[key] = dict.fromkeys(adjoint.lambdas, 0.0), {}
+            else:
+                try:
+                    slopes[key], jumps[key] = adjoint.slopes(key)
+                except InputError as error:
+                    held[key] = str(error)
+        implicit = Implicit.of(adjoint, balance)
+        out = []
+        report = adjoint.equations.report(adjoint.numbers)
+        for name in quantities:
+            value = adjoint.value(name) if name in adjoint.found else report[name]
+            found = {key: implicit.total(name, key, slope) for key, slope in slopes.items()}
+            of = {**values, **({"balance.load": balance["load"]} if balance else {})}
+            elasticity = {key: slope * of[key] / value if value and of[key] else None for key, slope in found.items()}
+            sides = {key: jump[name] for key, jump in jumps.items() if jump.get(name)}
+            switching = adjoint.switching + adjoint.ties.get(name, 0)
+            out.append(Gradient(name, value, found, elasticity, held, sides, switching))
+        return out
+    finally:
+        adjoint.destroy()

@@ -1,0 +1,178 @@
+"""Derivatives as the JSON object, as a table to read, and as a picture: bars, and the film's own derivative at every point."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..base.parallel import Array
+from ..base.together import on_all_ranks
+from ..drivers.gradient import Gradient
+from ..problems.solution import Solution
+from .files import gather, replacing
+from .maps import outline
+from .picture import Picture, collect
+from .style import BLUE, RED, STYLE, new_figure
+from .table import table
+from .units import quantity
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+MOST_BARS = 20
+DOTS = 130
+
+
+def unit_of(solution: Solution, name: str) -> str:
+    """Of a number, a part of a vector, or what a balance has found."""
+    units = solution.units
+    words = [name, name.rpartition("_")[0], name.rpartition("_")[0].rpartition("_")[0]]
+    found = next((units[word] for word in words if word in units), None)
+    return scene_units(solution).get(name, "") if found is None else found
+
+
+def scene_units(solution: Solution) -> dict[str, str]:
+    """Of the scene's numbers by key, as `values_of` has them."""
+    by_number: dict[str, str] = solution.settings["scene_units"]
+    data, out = solution.settings["scene_data"], dict(by_number)
+    for key, unit in by_number.items():
+        words = key.split(".")
+        if len(words) > 1 and words[1].isdigit() and isinstance(data.get(words[0]), list):
+            out[".".join([words[0], data[words[0]][int(words[1]) - 1].get("shape", words[1]), *words[2:]])] = unit
+    return out
+
+
+def unit_of_key(units: dict[str, str], key: str) -> str:
+    return units.get(key, units.get(key.rpartition(".")[0], ""))
+
+
+def field_unit(unit: str, dim: int) -> str:
+    """Of d(Q)/dh per area (1D: per length)."""
+    return f"{unit or '1'}/m{dim + 1}"
+
+
+def as_dict(gradient: Gradient, solution: Solution) -> dict[str, Any]:
+    """The keys of the command line's --json that are a gradient's own, docs/gradients.md."""
+    units = scene_units(solution)
+    return {
+        "quantity": gradient.quantity,
+        "value": gradient.value,
+        "unit": unit_of(solution, gradient.quantity),
+        "gradient": {key: gradient.gradient[key] for key in gradient.ranked},
+        "elasticity": {key: gradient.elasticity[key] for key in gradient.ranked},
+        "units": {key: unit_of_key(units, key) for key in gradient.ranked},
+        "held": gradient.held,
+        "one_sided": gradient.one_sided,
+        "switching": {"points": gradient.switching, "gap": gradient.switching_gap},
+    }
+
+
+def text(gradient: Gradient, solution: Solution, values: dict[str, float]) -> str:
+    """A table of all numbers, those that matter most first; then what has no derivative, or one to each side."""
+    units, own = scene_units(solution), unit_of(solution, gradient.quantity)
+    lines = [f"{gradient.quantity} = {gradient.value:.9g} {own}".rstrip()]
+    rows = [("number", "value", "dQ/da", "elasticity")]
+    for key in gradient.ranked:
+        unit = unit_of_key(units, key)
+        per = f"{own or '1'} per {unit}" if unit else own
+        size = gradient.elasticity[key]
+        shown = quantity(values[key], unit, 6).rstrip() if unit else f"{values[key]:.6g}"
+        rows.append((key, shown, f"{gradient.gradient[key]:.6g} {per}".rstrip(), "-" if size is None else f"{size:+.4f}"))
+    lines += table(rows, align="<>>>", gap="  ")
+    for key, gap in gradient.one_sided.items():
+        jumps = "the value jumps there" if np.isinf(gap) else f"its derivatives to both sides differ by {gap:.3g}; their mean"
+        lines.append(f"{key}: {jumps}")
+    if gradient.switching:
+        lines.append(
+            f"{gradient.switching} points are about to change between full and cavitated, or tie for the largest pressure: "
+            f"derivatives differ by up to {gradient.switching_gap:.2g} of the largest to either side"
+        )
+    lines += [f"{key}: none: {reason}" for key, reason in gradient.held.items()]
+    return "\n".join(lines)
+
+
+def plot(gradient: Gradient, solution: Solution, field: Array, path: str | Path) -> None:
+    """Bars of the elasticities, and dQ/dh over the film. Collective; rank 0 draws.
+
+    Raises
+    ------
+    InputError : the file cannot be written; then nothing is left behind.
+    """
+    import matplotlib as mpl
+
+    grid = solution.problem.grid
+    picture = collect(solution)
+    stride = (1, 1) if picture is None else tuple(max(1, -(-n // m.size)) for n, m in _pairs(picture, grid))
+    stride = grid.comm.bcast(stride)
+    values = gather(grid, field, stride)
+    with replacing(Path(path), grid.comm) as temporary, on_all_ranks(grid.comm, str(path)):
+        if picture is not None:
+            with mpl.rc_context(STYLE):
+                keys = [key for key in gradient.ranked if gradient.elasticity[key]][:MOST_BARS]
+                figure = new_figure(10.4, max(3.6, 1.2 + 0.24 * len(keys)))
+                bars, film = figure.subplots(1, 2, width_ratios=[1.0, 1.25])
+                _bars(bars, gradient, keys)
+                own = unit_of(solution, gradient.quantity)
+                _film(figure, film, picture, gradient, values, own)
+                title = f"{solution.settings.get('scene', '')}: {gradient.quantity} {quantity(gradient.value, own)}".rstrip()
+                figure.suptitle(title, fontsize=10, x=0.01, ha="left")
+                figure.savefig(temporary, dpi=DOTS)
+
+
+def _pairs(picture: Picture, grid: Any) -> list[tuple[int, Array]]:
+    return [(grid.shape[0], picture.x), *([(grid.shape[1], picture.y)] if grid.dim == 2 else [(1, np.zeros(1))])]
+
+
+def _bars(axes: Axes, gradient: Gradient, keys: list[str]) -> None:
+    sizes = [gradient.elasticity[key] or 0.0 for key in keys]
+    axes.barh(range(len(keys)), sizes, color=[BLUE if size > 0 else RED for size in sizes], height=0.7)
+    axes.set_yticks(range(len(keys)), keys)
+    axes.invert_yaxis()
+    axes.axvline(0.0, color="black", lw=0.8)
+    axes.set_xlabel(f"% of {gradient.quantity} for 1 % of the number")
+    axes.margins(x=0.18)
+    for k, size in enumerate(sizes):
+        axes.annotate(f"{size:+.3g}", (size, k), (3 if size > 0 else -3, 0), textcoords="offset points", va="center",
+                      ha="left" if size > 0 else "right", fontsize=8)  # fmt: skip
+
+
+def _film(figure: Any, axes: Axes, picture: Picture, gradient: Gradient, values: Array, unit: str) -> None:
+    """The derivative by the film: a line, or a map in red (thinner is more) and blue (thicker is more)."""
+    scale_x, label_x = picture.along
+    line = picture.y.size == 0
+    values = values * (1e-9 if line else 1e-12)
+    finite = values[np.isfinite(values)]
+    largest = float(np.quantile(np.abs(finite), 0.995)) if finite.size else 0.0
+    name = f"d({gradient.quantity})/dh ({unit or '1'} per µm and {'mm' if line else 'mm²'})"
+    axes.set_xlabel(label_x)
+    if line:
+        axes.axhline(0.0, color="black", lw=0.8)
+        axes.plot(scale_x * picture.x, values, color=BLUE, lw=1.6)
+        axes.set_ylabel(name)
+        cavity = picture.sign < 0
+        if cavity.any():
+            axes.fill_between(scale_x * picture.x, 0, 1, where=cavity, color="0.91", transform=axes.get_xaxis_transform(), lw=0)
+            axes.set_title("grey: cavitated", loc="left")
+        return
+    scale_y, label_y = picture.across
+    image = axes.pcolormesh(
+        scale_x * picture.x,
+        scale_y * picture.y,
+        values,
+        cmap="RdBu",
+        vmin=-largest or -1.0,
+        vmax=largest or 1.0,
+        shading="nearest",
+    )
+    axes.set_ylabel(label_y)
+    outline(axes, picture, hatch="0.5")
+    if not picture.is_journal:
+        L, width = picture.solution.problem.grid.lengths
+        axes.set_aspect("equal" if 0.2 < width / L < 5 else "auto")
+    figure.colorbar(image, ax=axes, label=name, extend="both")
+    axes.set_title(
+        f"red: a thinner film gives more {gradient.quantity}" + (" (dotted: cavitated)" * bool((picture.sign < 0).any())),
+        loc="left",
+    )

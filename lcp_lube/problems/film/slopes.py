@@ -1,0 +1,189 @@
+"""Derivatives of what an engineer reads off a film by its fields: dQ/dp and dQ/dr at every point, at the signs of the solution.
+
+Load, force, moments, friction and flows are linear in p and r as long as no cell changes from full to cavitated; the largest
+pressure is that of one point. Whatever else is asked for is a function of these numbers (`drivers.gradient`).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.parallel import Array
+from .cavity import cavity_sign
+from .flows import friction, line_weights, point_weights, side_flows
+from .fluid import Tangent
+from .forces import forces, shaft_angle
+from .grooves import GroovedProblem
+from .lubrication import LubricationProblem
+from .quantities import largest_pressure, thinnest
+from .reynolds import sides
+from .supplies import supply_flows
+
+SIDES = ("west", "east", "south", "north")
+TIE = 1e-9  # relative: pressures so near the largest one are as large
+
+
+@dataclass(frozen=True)
+class Slope:
+    """dQ/dp, p in p_unit, and dQ/dr of a number at the owned points. ties : points that could as well have it."""
+
+    p: Array
+    r: Array
+    ties: int = 0
+
+
+def numbers(problem: LubricationProblem, p: Array, r: Array) -> dict[str, float]:
+    """The numbers that have slopes, SI units; vectors by their parts, force_x, flow_west. Collective."""
+    p_pa = p * problem.p_unit
+    found = forces(problem, p_pa)
+    out = {"pressure_integral": found["pressure_integral"]}
+    if problem.shaft is None:
+        out["load"] = found["load"]
+    else:
+        out |= dict(zip(("force_x", "force_y"), found["force"], strict=True))
+    if isinstance(found.get("moment"), list):
+        out |= dict(zip(("moment_x", "moment_y"), found["moment"], strict=True))
+    elif "moment" in found:
+        out["moment"] = found["moment"]
+    out["friction"] = friction(problem, p_pa, r)
+    out["p_max"] = largest_pressure(problem, p_pa)[0] + problem.p_c
+    out["min_h"] = thinnest(problem)[0]
+    kinds = [kind for pair in problem.grid.ends for kind in pair]
+    flows = side_flows(problem, p, r)
+    out |= {f"flow_{name}": flows[name] for name, kind in zip(SIDES, kinds, strict=False) if kind == "open"}
+    if isinstance(problem, GroovedProblem):
+        out |= {f"groove_flow_{k}": flow for k, flow in enumerate(problem.groove_flows(p, r), start=1)}
+    out |= {f"supply_flow_{k}": flow for k, flow in enumerate(supply_flows(problem, p, r), start=1)}
+    return out
+
+
+def giving(problem: LubricationProblem, name: str) -> NDArray[np.bool_]:
+    """The owned points of the groove or supply whose flow this is."""
+    which = int(name.rpartition("_")[2])
+    if isinstance(problem, GroovedProblem):
+        return problem.columns[which - 1]
+    assert problem.held is not None  # as the name says
+    return (problem.held.owner == which - 1).ravel()
+
+
+def slope(problem: LubricationProblem, tangent: Tangent, p: Array, r: Array, name: str) -> Slope:
+    """dQ/dp and dQ/dr of one of `numbers`. Collective.
+
+    Parameters
+    ----------
+    tangent : the film's equations linearised in p, which know how a fluid's coefficients change with it.
+    """
+    if name == "friction":
+        return _friction(problem, tangent, p, r)
+    if name == "p_max":
+        return _largest(problem, p)
+    if name == "min_h":
+        return Slope(np.zeros(p.size), np.zeros(p.size))
+    if name.startswith("flow_"):
+        return _flow(problem, tangent, name.removeprefix("flow_"))
+    if name.startswith(("groove_flow_", "supply_flow_")):
+        return _given(problem, tangent, giving(problem, name))
+    grid, shaft = problem.grid, problem.shaft
+    middle = [start + 0.5 * length for start, length in zip(grid.origin, grid.lengths, strict=False)]
+    x, y = grid.x, grid.y
+    weights: dict[str, Callable[[], Array]] = {
+        "pressure_integral": lambda: np.ones((1, 1)),
+        "load": lambda: np.ones((1, 1)),
+        "moment": lambda: -(x - middle[0]),
+    }
+    if shaft is not None:
+        angle = shaft_angle(problem, shaft, x)
+        weights |= {"force_x": lambda: -np.cos(angle), "force_y": lambda: -np.sin(angle)}
+        weights |= {"moment_x": lambda: -(y - middle[1]) * np.cos(angle), "moment_y": lambda: -(y - middle[1]) * np.sin(angle)}
+    else:
+        weights |= {"moment_x": lambda: y - middle[1], "moment_y": lambda: -(x - middle[0])}
+    w = np.broadcast_to(weights[name](), grid.box).ravel() * point_weights(grid)
+    return Slope(w * grid.cell * problem.p_unit, np.zeros(w.size))
+
+
+def _friction(problem: LubricationProblem, tangent: Tangent, p: Array, r: Array) -> Slope:
+    """Of `flows.drag`, term by term."""
+    grid, s, film = problem.grid, problem.scheme, problem.film
+    before, behind = grid.steps(0)[:-1], grid.steps(0)[1:]
+    dy, unit = grid.spacing[1] if grid.dim == 2 else 1.0, problem.p_unit
+    weight, rims = line_weights(grid), grid.rims(1) if grid.dim == 2 else (0.0, 0.0)
+    first, last, south, north = sides(grid)
+    walls = sides(grid, ("closed",))[:2]
+    h_west, h_east = (np.broadcast_to(film(grid.x + step, grid.y), grid.box) for step in (-before / 2, behind / 2))
+    full = (cavity_sign(problem.reduce, p, r) >= 0).reshape(grid.box)
+    void = r.reshape(grid.box)
+    passes = ~np.broadcast_to(walls[1], grid.box)
+    share = s.b_C / np.where(passes & (s.couette_E != 0.0), s.couette_E, np.inf)  # the liquid's share of a face is 1 + share r
+    sheared = np.where(passes, share / h_east, 0.0)
+    parts: list[tuple[NDArray[np.bool_], Any]] = list(zip(walls, (0.5 * before / behind, 0.5), strict=True))
+    for wall, part in parts:
+        sheared = sheared - np.where(wall & ~full, part / s.h, 0.0)
+    weight = weight * dy
+    per_row = behind * problem.U * (weight + 0.5 * dy * (rims[0] * south + rims[1] * north))
+    towards = np.where(passes, 0.5 * h_east, 0.0) * weight * unit  # of p_east - p
+    from_west = np.nan_to_num(grid.ghosted(np.where(last, 0.0, towards).ravel())[1:-1, :-2])
+    dp = from_west - towards + np.where(first, 0.5 * h_west, 0.0) * weight * unit
+    if tangent.viscosity is not None:  # that of a face follows the mean of its two points' pressures
+        own, other = tangent.viscosity  # d log(mu)/dp at the west and the east point of the east face
+        shear = np.where(passes, (1.0 + share * void) / h_east, 0.0) + np.where(first, before / behind / h_west, 0.0)
+        for wall, part in parts:
+            shear = shear + np.where(wall, part * np.where(full, 4.0, 1.0 - void) / s.h, 0.0)
+        drag = problem.mu * per_row * shear
+        dp = dp + drag * own + np.nan_to_num(grid.ghosted((drag * other).ravel())[1:-1, :-2])
+    return Slope(dp.ravel(), (problem.mu * per_row * sheared).ravel())
+
+
+def _largest(problem: LubricationProblem, p: Array) -> Slope:
+    """The point with the largest pressure, the first of equals; nothing where a side has it."""
+    grid, reduce = problem.grid, problem.reduce
+    largest = reduce.max(p)
+    at_side = max((q for q in problem.p_sides if q), default=0.0) / problem.p_unit > largest
+    near = p >= largest - TIE * abs(largest)
+    index = grid.first + np.arange(p.size)
+    chosen = -reduce.max(np.where(near, -index.astype(float), -np.inf))
+    ties = int(reduce.sum(near.astype(float))) - 1
+    return Slope(np.where(index == chosen, 0.0 if at_side else problem.p_unit, 0.0), np.zeros(p.size), 0 if at_side else ties)
+
+
+def _flow(problem: LubricationProblem, tangent: Tangent, side: str) -> Slope:
+    """Of `flows.side_flows`: what leaves through the outer faces, and what the strips along the other sides carry."""
+    grid, s = problem.grid, problem.scheme
+    at = {name: np.broadcast_to(mask, grid.box) for name, mask in zip(SIDES, sides(grid), strict=True)}
+    own = dict(zip(SIDES, tangent.own, strict=True))
+    dp, dr = np.where(at[side], own[side], 0.0), np.zeros(grid.box)
+    if side == "east":
+        dr = np.where(at[side], s.b_C, 0.0)
+    if grid.dim == 2:
+        lines = line_weights(grid)
+        for end, rim in zip(("south", "north"), grid.rims(1), strict=True):
+            if side in ("west", "east"):
+                leaves, enters = float(side == "east"), float(side == "west")
+            else:
+                leaves = enters = -1.0 if side == end else 0.0
+            strip = 0.5 * rim / lines
+            carried, entered = (np.where(at[way] & at[end], strip, 0.0) for way in ("east", "west"))
+            dp = dp + leaves * carried * tangent.carried + enters * entered * tangent.entering
+            dr = dr + leaves * carried * s.b_C
+    size = 0.5 * s.flow_unit * (grid.spacing[1] if grid.dim == 2 else 1.0)
+    return Slope((size * dp).ravel(), (size * dr).ravel())
+
+
+def _given(problem: LubricationProblem, tangent: Tangent, cells: NDArray[np.bool_]) -> Slope:
+    """Of what some cells give to the film: the sum of their balances, were they not held."""
+    grid, s = problem.grid, problem.scheme
+    size = 0.5 * s.flow_unit * (grid.spacing[1] if grid.dim == 2 else 1.0)
+    rows = np.where(cells.reshape(grid.box), size, 0.0)
+    dp = rows * sum(tangent.own)
+    places = (
+        (slice(1, -1), slice(2, None)),
+        (slice(1, -1), slice(0, -2)),
+        (slice(2, None), slice(1, -1)),
+        (slice(0, -2), slice(1, -1)),
+    )
+    for other, place in zip(tangent.other, places, strict=True):  # a row's part by its neighbour's p is that neighbour's
+        dp = dp + np.nan_to_num(grid.ghosted((rows * other).ravel())[place])
+    dr = rows * s.b_C + np.nan_to_num(grid.ghosted((rows * s.b_W).ravel())[1:-1, 2:])
+    return Slope(dp.ravel(), dr.ravel())

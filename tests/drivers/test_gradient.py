@@ -1,0 +1,284 @@
+"""Derivatives of every quantity by every number of every bearing scene: differences of solves, laws, ranks, bad input."""
+
+import math
+
+import numpy as np
+import pytest
+
+from lcp_lube import InputError, load_scene, solve
+from lcp_lube.drivers import attitude, supplies
+from lcp_lube.drivers.adjoint import Adjoint
+from lcp_lube.drivers.film_gradient import FilmGradient, areas
+from lcp_lube.drivers.gradient import gradients
+from lcp_lube.scenes.values import key_of, values_of, with_values
+
+# No two alike: lines are dealt to the stretches between edges, and equal stretches would take turns.
+PLACES = zip((43.0, 137.0, 224.0, 316.0), (51.0, 47.0, 44.0, 53.0), (61e-3, 57e-3, 53e-3, 67e-3), strict=True)
+RECESSES = {
+    f"supply.{k}.{key}": value
+    for k, place in enumerate(PLACES, start=1)
+    for key, value in zip(("angle_deg", "extent_deg", "length"), place, strict=True)
+}
+# Grids on which no edge of a film lies on a point or a face.
+SMALL = {
+    "problem1": {"n": 40},
+    "problem2": {"n": 40, "p_b": 1.3e6},
+    "problem3": {"n": 40, "p_b": 1.3e6},
+    "problem4": {"n": 14, "p_side": 1e4},
+    "pocketed_pad": {"n": 42},
+    "parabolic_slider": {"n": 40},
+    "long_journal": {"n": 47},
+    "journal": {"nx": 36, "ny": 9},
+    "two_groove_journal": {"nx": 36, "ny": 5},
+    "ring_journal": {"nx": 36, "ny": 5},
+    "lemon_journal": {"nx": 36, "ny": 5},
+    "misaligned_journal": {"nx": 36, "ny": 5},
+    "hybrid_journal": {"nx": 37, "ny": 7} | RECESSES,
+    "dimpled_pad": {"nx": 25, "ny": 19},
+    "textured_slider": {"K": 1},
+    "rough": {"n": 21},
+    "pocketed_pad_2d": {"nx": 22, "ny": 11},
+}
+TOL, STEP = 1e-6, 2e-5
+FEW = ("mu", "fluid.mu", "U", "L", "D", "h_min", "film.pocket.depth", "film.dimples.size", "fluid.barus", "p_b", "clearance")
+
+
+@pytest.fixture(autouse=True)
+def exact_attitudes(monkeypatch):
+    monkeypatch.setattr(supplies, "TOLERANCE", 1e-13)
+    monkeypatch.setattr(attitude, "TOLERANCE", 1e-12)  # differences of solves are to be good to many digits
+
+
+def solved(name, **changes):
+    scene = load_scene(name, {**SMALL[name], **changes})
+    return scene, answer(scene)
+
+
+def answer(scene, near=None):
+    law = scene.model.law is not None
+    solution = solve(scene, method="active-set", start=near, stopping={"eps1": 1e-12 if law else 1e-8})
+    assert solution.converged, solution.message
+    return solution
+
+
+def numbers(scene, near=None):
+    """All numbers with a derivative, of a solve."""
+    solution = answer(scene, near)
+    adjoint = Adjoint(scene, solution, [])
+    found = adjoint.equations.report(adjoint.numbers) | {key: adjoint.value(key) for key in adjoint.found}
+    adjoint.destroy()
+    solution.destroy()
+    return found
+
+
+def by_solves(scene, near, key, value, step):
+    """Central differences; of third order to one side where the other has no values."""
+
+    def at(k):
+        return numbers(with_values(scene, {key: value + k * step}), near)
+
+    try:
+        low, high = at(-1), at(1)
+        return {q: (high[q] - low[q]) / (2 * step) for q in low}
+    except InputError:
+        pass
+    for side in (1, -1):
+        try:
+            v = [at(side * k) for k in range(4)]
+        except InputError:
+            continue
+        return {q: side * (-11 * v[0][q] + 18 * v[1][q] - 9 * v[2][q] + 2 * v[3][q]) / (6 * step) for q in v[0]}
+    raise AssertionError(f"{key} has no values on either side")
+
+
+def compare(scene, solution, keys=None, step=STEP):
+    """All derivatives but those with two sides, against differences of solves."""
+    adjoint = Adjoint(scene, solution, [])
+    report = adjoint.equations.report(adjoint.numbers)
+    values = {**values_of(adjoint.scene), **({"balance.load": scene.balance.load} if scene.balance is not None else {})}
+    problem = solution.problem
+    # What a difference of solves knows of a number that is small beside the terms it is made of.
+    flow = abs(problem.U) * report["min_h"] * (problem.grid.lengths[-1] if problem.grid.dim == 2 else 1.0)
+    sizes = {name: flow for name in report if "flow" in name or "leakage" in name}
+    sizes |= {
+        name: abs(report["pressure_integral"]) * max(problem.grid.lengths) for name in report if name.startswith("moment")
+    }
+    sizes |= {"force_y": abs(report["pressure_integral"])}
+    found = gradients(scene, solution, [*report, *adjoint.found], keys)
+    off = []
+    for key in found[0].gradient:
+        scale = abs(values[key]) or adjoint._scale(key)
+        slopes = by_solves(scene, solution, key, values[key], step * scale)
+        for one in found:
+            name, ours = one.quantity, one.gradient[key]
+            noise = (
+                5e-12 * max(abs(report[name] if name in report else adjoint.value(name)), sizes.get(name, 0.0)) / (step * scale)
+            )
+            if key not in one.one_sided and not abs(ours - slopes[name]) <= TOL * abs(slopes[name]) + noise:
+                off.append((name, key, ours, slopes[name], noise))
+    adjoint.destroy()
+    assert not off
+    return found
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_every_number_by_every_number(name):
+    scene, solution = solved(name)
+    # An edge of a supply is found to 1e-8 of a spacing: that is much of a small step.
+    few = ("D", "clearance", "mu", "supply.1.extent_deg", "supply.1.K", "supply.1.p_s")
+    found = compare(scene, solution, few, 2e-4) if name == "hybrid_journal" else compare(scene, solution)
+    assert found[0].switching == 0
+    values = solution.numbers
+    for one in found:
+        if values.get(one.quantity) is not None:
+            assert one.value == pytest.approx(values[one.quantity], rel=1e-9, abs=1e-9 * abs(values["pressure_integral"]))
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("pocketed_pad", {"balance.load": 30000.0, "balance.tol": 1e-11}),
+        ("problem1", {"balance.load": 2e5, "balance.vary": "mu", "balance.range": [1e-3, 1.0], "balance.tol": 1e-11}),
+        ("two_groove_journal", {"balance.load": 2000.0, "balance.tol": 1e-11}),
+        ("problem2", {"U": -5.0}),
+        ("pocketed_pad", {"fluid.barus": 1e-8, "fluid.density": "dowson-higginson", "U": -0.7}),
+        ("dimpled_pad", {"sides.north": "symmetry", "sides.east": "closed"}),
+        ("problem1", {"scheme": "upwind"}),
+        ("problem2", {"scheme": "face", "mean_cubes": True, "U": 0.0}),
+    ],
+)
+def test_through_what_was_found_and_what_stands_around_it(name, changes):
+    """Balances, the implicit function theorem; turned films; fluids with laws; walls; other schemes."""
+    scene = load_scene(name, {**SMALL[name], **changes})
+    solution = answer(scene)
+    few = [key for key in FEW if key in values_of(scene) and (scene.balance is None or key != scene.balance.vary)]
+    found = compare(scene, solution, [*few, *(["balance.load"] if scene.balance else [])])
+    if scene.balance is not None:
+        load = next(one for one in found if one.quantity == "load")
+        assert load.gradient["balance.load"] == pytest.approx(1.0) and not any(
+            v for k, v in load.gradient.items() if k != "balance.load"
+        )
+    solution.destroy()
+
+
+@pytest.mark.parametrize("name", ["problem1", "pocketed_pad", "journal", "dimpled_pad", "pocketed_pad_2d", "textured_slider"])
+def test_the_films_own_derivative(name):
+    """A film lifted everywhere by the same is h_offset; one lifted by a bump is met to second order (Taylor's test)."""
+    scene, solution = solved(name)
+    report = ["load", "friction", "p_max", "flow_west"]
+    adjoint = Adjoint(scene, solution, report)
+    film = FilmGradient(adjoint, None)
+    grid = adjoint.equations.grid
+    for name, one in zip(report, gradients(scene, solution, report, ["h_offset"]), strict=True):
+        lifted = grid.reduce.dot(film.field(name), areas(grid))
+        assert lifted == pytest.approx(one.gradient["h_offset"], rel=1e-8, abs=1e-9 * abs(one.value) / 1e-6)
+    adjoint.destroy()
+
+
+def test_taylor():
+    """The error of the linear forecast falls by four when the step is halved."""
+    scene, solution = solved("pocketed_pad")
+    key, value = "film.linear.h_end", scene.film[0].h_end
+    slope = solution.gradient("load", [key])[key]
+    here = numbers(scene)["load"]
+    errors = []
+    for step in (4e-4, 2e-4, 1e-4):
+        errors.append(numbers(with_values(scene, {key: value * (1 + step)}))["load"] - here - slope * value * step)
+    assert np.log2(np.abs(errors[:-1]) / np.abs(errors[1:])) == pytest.approx([2.0, 2.0], abs=0.05)
+
+
+@pytest.mark.parametrize("name", ["problem1", "problem4", "long_journal"])
+def test_the_scaling_law(name):
+    """Without pressures at the sides p goes with mu U L/h^2: the sum of h dQ/dh is -2 loads, by keys and in the field."""
+    scene, solution = solved(name, **({"p_side": 0.0, "n": 60} if name == "problem4" else {}))
+    adjoint = Adjoint(scene, solution, ["load"])
+    field, grid = FilmGradient(adjoint, None).field("load"), adjoint.equations.grid
+    total = grid.reduce.sum(field * areas(grid) * solution.problem.scheme.h.ravel())
+    assert total == pytest.approx(-2.0 * solution.load, rel=1e-2)
+    (one,) = gradients(scene, solution, ["load"])
+    keys = ["h_min", "h_max"] if name.startswith("problem") else ["psi"]
+    assert sum(one.elasticity[key] for key in keys) == pytest.approx(-2.0, rel=1e-9)
+    assert one.elasticity["mu"] == pytest.approx(1.0, rel=1e-9)
+    adjoint.destroy()
+    solution.destroy()
+
+
+def test_edges_on_points_have_a_derivative_to_each_side():
+    scene = load_scene("pocketed_pad", n=49)  # its first edge on a point, the second on another
+    solution = solve(scene)
+    load, friction = gradients(scene, solution, ["load", "friction"], ["film.pocket.x.1", "fluid.mu"])
+    assert load.one_sided["film.pocket.x.1"] > 0 and "fluid.mu" not in load.one_sided
+    assert math.isfinite(friction.gradient["fluid.mu"])
+    solution.destroy()
+
+
+def test_cells_about_to_change_are_counted():
+    """A film at rest without pressures: p = r = 0 everywhere; and two points that tie for the largest pressure."""
+    scene = load_scene("problem1", n=21, U=0.0)
+    solution = solve(scene)
+    (one,) = gradients(scene, solution, ["pressure_integral"], ["p_a", "mu"])
+    assert one.switching == 21 and one.gradient["mu"] == 0.0
+    solution.destroy()
+    symmetric = load_scene("problem4", n=14)
+    tied = solve(symmetric, method="active-set")
+    (one,) = gradients(symmetric, tied, ["p_max"], ["mu"])
+    assert one.switching == 1 and one.elasticity["mu"] == pytest.approx(1.0, rel=1e-9)
+    tied.destroy()
+
+
+def test_keys():
+    scene = load_scene("pocketed_pad")
+    assert key_of(scene, "film.2.depth") == key_of(scene, "depth") == "film.pocket.depth"
+    moved = with_values(scene, {"film.pocket.x.1": 2.5e-3, "film.pocket.x.2": 5.5e-3, "fluid.mu": 0.02})
+    assert moved.film[1].x == (2.5e-3, 5.5e-3) and moved.fluid.mu == 0.02
+    for text, message in (
+        ("n", "a count"),
+        ("film.pocket.x", "say which"),
+        ("scheme", "no number"),
+        ("fluid.nu", "nearest is fluid.mu"),
+    ):
+        with pytest.raises(InputError, match=message):
+            key_of(scene, text)
+
+
+@pytest.mark.parametrize(
+    ("ranks", "words"),
+    [
+        (2, ("two_groove_journal", "--set", "nx=36", "--set", "ny=11", "--by", "mu,D,p_end")),
+        (3, ("dimpled_pad", "--nx", 31, "--ny", 29)),
+    ],
+)
+def test_ranks(cli, ranks, words):
+    words = ("sensitivity", *words, "--quantity", "load,friction", "--json")
+    alone, together = cli(*words), cli(*words, ranks=ranks)
+    assert alone.status == together.status == 0, together.err
+    for key, value in alone.json["gradient"].items():
+        assert together.json["gradient"][key] == pytest.approx(value, rel=1e-7), key
+
+
+def test_the_command(cli, tmp_path):
+    done = cli("sensitivity", "pocketed_pad_2d", "--nx", 33, "--ny", 15, "--plot", "a.png", "--output", "a.npz", "--json")
+    assert done.status == 0, done.err
+    data = done.json
+    assert {"quantity", "value", "gradient", "elasticity"} <= set(data) and (tmp_path / "a.png").stat().st_size > 10_000
+    assert np.load(tmp_path / "a.npz")["dload_dh"].shape == (15, 33)
+    assert next(iter(data["elasticity"])) == max(data["elasticity"], key=lambda key: abs(data["elasticity"][key] or 0.0))
+    done = cli("sensitivity", "journal", "--nx", 36, "--ny", 9, "--quantity", "friction_coefficient", "--plot", "b.png")
+    assert done.status == 0 and "eccentricity" in done.out and (tmp_path / "b.png").is_file()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("pocketed_pad", "--by", "n"), "a count, which has no derivative"),
+        (("pocketed_pad", "--by", "film.pocket.depht"), "nearest is"),
+        (("pocketed_pad", "--quantity", "iterations"), "derivatives are known of"),
+        (("pocketed_pad", "--quantity", "fricton"), "nearest is friction"),
+        (("bratu",), "gradients are of films"),
+        (("squeeze",), "gradients are of films"),
+        (("pocketed_pad", "--plot", "a.npz"), "--plot"),
+    ],
+)
+def test_bad_input(cli, words, message):
+    done = cli("sensitivity", *words)
+    assert done.status == 2 and message in done.lines[0] and len(done.lines) == 1
