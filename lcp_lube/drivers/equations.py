@@ -30,6 +30,7 @@ from .fluid import Frozen
 from .turned import Mirrored
 
 FLIPPED = {"flow_west": "flow_east", "flow_east": "flow_west"}
+DRAGS = ("friction", "friction_torque")
 MISFIT = "supply_misfit_"  # by which a supply's source and film disagree, 0 at the solution
 STEP = 1e-3  # relative, of the numbers that another one is made of: five values give its derivatives to rounding
 
@@ -66,7 +67,7 @@ class Equations:
             self.constant: LubricationProblem = film.build(comm)
         else:
             self.constant = replace(self._model, places=places).build(near.grid.shape, comm)
-            self.constant.extras = near.constant.extras and getattr(scene, near.constant.extras.__name__)
+            self.constant.extras = near.constant.extras and getattr(scene, near.constant.extras.__name__)  # of this scene
         self.grid: Grid = self.constant.grid
         if pressures and (held := self.constant.held) is not None:
             q = [float(self.law.reduced(np.array(P))) if self.law else P for P in pressures]
@@ -116,14 +117,14 @@ class Equations:
 
     def _flipped(self, found: dict[str, float]) -> dict[str, float]:
         out = {FLIPPED.get(name, name): value for name, value in found.items()}
-        return {**out, "friction": -out["friction"]}
+        return {**out, **{name: -out[name] for name in DRAGS if name in out}}
 
     def slope(self, p: Array, r: Array, name: str) -> slopes.Slope:
         """dQ/dp (p in p_unit) and dQ/dr of one of `numbers`. Collective."""
         problem = self.problem(p)
         name = FLIPPED.get(name, name) if self.turned else name
         found = slopes.slope(problem, self.tangent(p, r), p / problem.p_unit, r, name)
-        return slopes.Slope(-found.p, -found.r) if self.turned and name == "friction" else found
+        return slopes.Slope(-found.p, -found.r) if self.turned and name in DRAGS else found
 
     def report(self, numbers: dict[str, float]) -> dict[str, float]:
         """What else is told of the film, from its `numbers`."""
@@ -142,9 +143,19 @@ class Equations:
             if one.open:
                 out[f"{MISFIT}{k}"] = one.misfit(P, out[f"supply_flow_{k}"])[0]
         out["power_loss"] = abs(problem.U) * out["friction"] * (-1.0 if self.turned else 1.0)
-        extras = getattr(problem, "extras", None)
-        more = extras(out) if extras else {}
-        return out | {name: value for name, value in more.items() if isinstance(value, float)}
+        return out | self._extras(out)
+
+    def _extras(self, out: dict[str, float]) -> dict[str, float]:
+        """What the scene itself tells beyond that; some tell of several alike films by one."""
+        extras = getattr(self.constant, "extras", None)
+        if not extras:
+            return {}
+        flow = {name: out.get(f"flow_{name}", 0.0) for name in slopes.SIDES}
+        supplied = [value for name, value in out.items() if name.startswith("supply_flow_")]
+        more = extras({**out, "flow": flow, "cavitated_area": 0.0, **({"supply_flow": supplied} if supplied else {})})
+        found = {name: value for name, value in more.items() if isinstance(value, float) and name != "cavitated_area"}
+        found |= {f"flow_{name}": value for name, value in more.get("flow", {}).items() if f"flow_{name}" in out}
+        return found | {f"supply_flow_{k}": value for k, value in enumerate(more.get("supply_flow", ()), start=1)}
 
     def partials(self, numbers: dict[str, float], name: str) -> dict[str, float]:
         """d(name)/d(number) for those of `numbers` that it is made of.
@@ -153,8 +164,6 @@ class Equations:
         ------
         InputError : nothing of this name, or nothing with a derivative.
         """
-        if name in numbers:
-            return {name: 1.0}
         known = self.report(numbers)
         if name not in known:
             raise InputError(
@@ -164,6 +173,8 @@ class Equations:
         for part, value in numbers.items():
             step = STEP * (abs(value) or 1.0)
             f = [self.report({**numbers, part: value + k * step}).get(name, np.nan) for k in (-2, -1, 1, 2)]
+            if f[0] == f[1] == f[2] == f[3]:
+                continue
             slope = (8.0 * (f[2] - f[1]) - (f[3] - f[0])) / (12.0 * step)
             if slope and math.isfinite(slope):
                 out[part] = slope

@@ -19,7 +19,7 @@ from ..problems.film.slopes import giving
 from ..problems.film.turned import TurnedProblem
 from ..problems.grid import Grid
 from .adjoint import Adjoint, Implicit
-from .equations import FLIPPED
+from .equations import DRAGS, FLIPPED
 from .fluid import Frozen
 from .turned import Mirrored
 
@@ -33,7 +33,7 @@ def areas(grid: Grid) -> Array:
         width = grid.widths(side)[None, :] if side == 0 else grid.widths(side)[:, None]
         for mask, rim in zip(masks[2 * side : 2 * side + 2], grid.rims(side), strict=True):
             size = size * (1.0 + np.where(mask, 0.5 * rim / width, 0.0))
-    return np.broadcast_to(size, grid.box).ravel() * grid.cell
+    return np.broadcast_to(size * grid.stretch(grid.y), grid.box).ravel() * grid.cell
 
 
 class FilmGradient:
@@ -89,8 +89,10 @@ class FilmGradient:
             if part.startswith(("groove_flow_", "supply_flow_")):
                 inside = giving(adjoint.equations.constant, part)
                 rows = rows + weight * unit * inside
-            elif part == "friction":
-                total = total + weight * self._friction() * (-1.0 if adjoint.equations.turned else 1.0)
+            elif part in DRAGS:
+                polar = self.problem.grid.polar
+                lever = polar[0] + self.problem.grid.y if part == "friction_torque" and polar else 1.0
+                total = total + weight * self._friction(lever) * (-1.0 if adjoint.equations.turned else 1.0)
             elif part.startswith("flow_"):
                 total = total + weight * self._flow(part.removeprefix("flow_"))
         return total + self._balance(rows)
@@ -136,13 +138,13 @@ class FilmGradient:
         kept = [np.where(outside, part, 0.0) for outside, part in zip(beyond, (west, east, south, north), strict=True)]
         return np.asarray(own + sum(kept) + sum(np.nan_to_num(a) for a in arrived))
 
-    def _friction(self) -> Array:
+    def _friction(self, lever: Any) -> Array:
         """Of the friction by the film, fields held."""
         problem, s = self.problem, self.slopes
         step = STEP * problem.reduce.max(problem.scheme.h)
         moved = {name: getattr(problem.scheme, name) + 1j * step * getattr(s, name) for name in ("b_C", "couette_E", "h")}
         parts = drag(problem, replace(problem.scheme, **moved), self.adjoint.p, self.adjoint.r, 1j * step)
-        east, own = (np.broadcast_to(np.imag(part) / step, problem.grid.box) for part in parts)
+        east, own = (np.broadcast_to(lever * np.imag(part) / step, problem.grid.box) for part in parts)
         none = np.zeros_like(east)
         return self._dealt(own + 0.5 * east, [none, 0.5 * east, none, none])
 

@@ -49,6 +49,8 @@ def numbers(problem: LubricationProblem, p: Array, r: Array) -> dict[str, float]
     elif "moment" in found:
         out["moment"] = found["moment"]
     out["friction"] = friction(problem, p_pa, r)
+    if problem.grid.polar is not None:
+        out["friction_torque"] = friction(problem, p_pa, r, problem.grid.polar[0] + problem.grid.y)
     out["p_max"] = largest_pressure(problem, p_pa)[0] + problem.p_c
     out["min_h"] = thinnest(problem)[0]
     kinds = [kind for pair in problem.grid.ends for kind in pair]
@@ -76,8 +78,9 @@ def slope(problem: LubricationProblem, tangent: Tangent, p: Array, r: Array, nam
     ----------
     tangent : the film's equations linearised in p, which know how a fluid's coefficients change with it.
     """
-    if name == "friction":
-        return _friction(problem, tangent, p, r)
+    if name in ("friction", "friction_torque"):
+        lever = problem.grid.polar[0] + problem.grid.y if name == "friction_torque" and problem.grid.polar else 1.0
+        return _friction(problem, tangent, p, r, lever)
     if name == "p_max":
         return _largest(problem, p)
     if name == "min_h":
@@ -98,13 +101,16 @@ def slope(problem: LubricationProblem, tangent: Tangent, p: Array, r: Array, nam
         angle = shaft_angle(problem, shaft, x)
         weights |= {"force_x": lambda: -np.cos(angle), "force_y": lambda: -np.sin(angle)}
         weights |= {"moment_x": lambda: -(y - middle[1]) * np.cos(angle), "moment_y": lambda: -(y - middle[1]) * np.sin(angle)}
+    elif grid.polar is not None:
+        inner, on = grid.polar
+        weights |= {"moment_x": lambda: (inner + y) * np.sin(x / on), "moment_y": lambda: -(inner + y) * np.cos(x / on)}
     else:
         weights |= {"moment_x": lambda: y - middle[1], "moment_y": lambda: -(x - middle[0])}
     w = np.broadcast_to(weights[name](), grid.box).ravel() * point_weights(grid)
     return Slope(w * grid.cell * problem.p_unit, np.zeros(w.size))
 
 
-def _friction(problem: LubricationProblem, tangent: Tangent, p: Array, r: Array) -> Slope:
+def _friction(problem: LubricationProblem, tangent: Tangent, p: Array, r: Array, lever: Any) -> Slope:
     """Of `flows.drag`, term by term."""
     grid, s, film = problem.grid, problem.scheme, problem.film
     before, behind = grid.steps(0)[:-1], grid.steps(0)[1:]
@@ -121,8 +127,9 @@ def _friction(problem: LubricationProblem, tangent: Tangent, p: Array, r: Array)
     parts: list[tuple[NDArray[np.bool_], Any]] = list(zip(walls, (0.5 * before / behind, 0.5), strict=True))
     for wall, part in parts:
         sheared = sheared - np.where(wall & ~full, part / s.h, 0.0)
-    weight = weight * dy
-    per_row = behind * problem.U * (weight + 0.5 * dy * (rims[0] * south + rims[1] * north))
+    arcs = grid.stretch(grid.y) ** 2 * lever
+    per_row = behind * problem.U * arcs * (weight + 0.5 * (rims[0] * south + rims[1] * north)) * dy
+    weight = weight * lever * dy
     towards = np.where(passes, 0.5 * h_east, 0.0) * weight * unit  # of p_east - p
     from_west = np.nan_to_num(grid.ghosted(np.where(last, 0.0, towards).ravel())[1:-1, :-2])
     dp = from_west - towards + np.where(first, 0.5 * h_west, 0.0) * weight * unit
