@@ -11,13 +11,15 @@ from .parallel import Array
 STEP, SMALLER, TRIES = 1e-4, 0.1, 4  # of a number, relative; where its effect is not smooth, smaller ones
 SMOOTH = 1e-5  # relative difference between differences of second and fourth order that is left to truncation
 KINK = 1e-2  # relative difference between both sides
+CHORD, SLIGHT = 1e-2, 1e-2  # relative: width and least slope of a function that changes by steps
 ROUNDING, TINY = 1e-15, 1e-300
 
 
 def differences(f: Callable[[float], Array], a: float, scale: float, sizes: Array) -> tuple[Array, Array]:
     """df/da of a vector function to rounding, and by how much its derivatives to both sides differ where it has a kink.
 
-    A kink's derivative is the mean of both sides; where f jumps it is NaN, and the difference inf.
+    A kink's derivative is the mean of both sides. Where f changes by steps (it jumps at a, or nothing changes but over a wider
+    range), it is the slope of its chord over a hundredth to both sides, and the difference inf.
 
     Parameters
     ----------
@@ -60,7 +62,24 @@ def differences(f: Callable[[float], Array], a: float, scale: float, sizes: Arra
             break
     if best is None:
         raise max((change, one) for change, one in known.items() if isinstance(one, InputError))[1]
-    return np.where(np.isinf(kinks), np.nan, best[1]), kinks
+    slope, wide = best[1], CHORD * scale
+    steps = np.isinf(kinks)
+    if steps.any() or not slope.all():
+        chord = _chord(at, wide)
+        value = np.abs(np.nan_to_num(f(a))) + SLIGHT * sizes
+        steps = steps | ((slope == 0.0) & (np.abs(chord) * scale > SLIGHT * value))  # less is what bends
+        slope, kinks = np.where(steps, chord, slope), np.where(steps, np.inf, kinks)
+    return slope, kinks
+
+
+def _chord(at: Callable[[float], Array | None], d: float) -> Array:
+    """Slope between a - d and a + d, or from a on where one of them has no value; NaN where neither has."""
+    low, here, high = at(-d), at(0.0), at(d)
+    if low is not None and high is not None:
+        return (high - low) / (2.0 * d)
+    if here is None or (low is None and high is None):
+        return np.asarray(np.nan)
+    return (high - here) / d if high is not None else (here - low) / d  # type: ignore[operator]
 
 
 def _stencil(at: Callable[[float], Array | None], d: float) -> tuple[Array, Array, Array] | None:
@@ -74,4 +93,5 @@ def _stencil(at: Callable[[float], Array | None], d: float) -> tuple[Array, Arra
     if any(value is None for value in v):
         return None
     fourth = side * (-25.0 * v[0] + 48.0 * v[1] - 36.0 * v[2] + 16.0 * v[3] - 3.0 * v[4]) / (12.0 * d)
-    return fourth, side * (-1.5 * v[0] + 2.0 * v[1] - 0.5 * v[2]) / d, np.zeros_like(fourth)
+    second = side * (-1.5 * v[0] + 2.0 * v[1] - 0.5 * v[2]) / d
+    return fourth, second, np.abs(4.0 * v[1] - 6.0 * v[2] + 4.0 * v[3] - v[4] - v[0]) / d  # what the others foretell of v_0

@@ -44,7 +44,9 @@ class Adjoint:
         self.scene, self.reported = placed(scene, solution), solution.problem
         self.p, self.r = fields_of(solution)
         self.pressures = [float(P) for P in solution.settings.get("supply_pressures", ())]
-        self.equations = Equations(self.scene, solution.problem.grid.dm.comm, self.pressures)
+        solved: Any = getattr(solution.problem, "moving", solution.problem)
+        self.dry = getattr(solved, "dry", None)
+        self.equations = Equations(self.scene, solution.problem.grid.dm.comm, self.pressures, dry=self.dry)
         if self.equations.grid.shape != solution.problem.grid.shape:
             raise InputError(f"{scene.name}: the solution is on another grid than the scene")
         self.found, self.conditions = _found(scene, solution)
@@ -97,7 +99,7 @@ class Adjoint:
         same = scene is self.scene and pressures is None
         eq = self.equations
         if not same:
-            eq = Equations(scene, eq.grid.dm.comm, pressures or self.pressures, near=eq)
+            eq = Equations(scene, eq.grid.dm.comm, pressures or self.pressures, eq, self.dry)
         try:
             if eq.grid.shape != self.equations.grid.shape:
                 raise InputError("the grid has another number of points")

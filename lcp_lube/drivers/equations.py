@@ -41,6 +41,7 @@ class Equations:
     Parameters
     ----------
     pressures : of all supplies, Pa above p_c; heeded where a supply's own is to be found.
+    dry : the points for whose cavities round edges have been made (`LubricationProblem.dry`).
     near : those of a scene near by, whose grid this one has: uneven lines follow the film's edges, none changes sides.
 
     Raises
@@ -54,6 +55,7 @@ class Equations:
         comm: PETSc.Comm | None = None,
         pressures: Sequence[float] = (),
         near: "Equations | None" = None,
+        dry: Array | None = None,
     ):
         model = check_film(scene)
         self.scene, self.turned = scene, model.U < 0
@@ -68,6 +70,8 @@ class Equations:
         else:
             self.constant = replace(self._model, places=places).build(near.grid.shape, comm)
             self.constant.extras = near.constant.extras and getattr(scene, near.constant.extras.__name__)  # of this scene
+        if dry is not None and self.constant.coefficients_for is not None:
+            self.constant = self.constant.revised(dry)
         self.grid: Grid = self.constant.grid
         if pressures and (held := self.constant.held) is not None:
             q = [float(self.law.reduced(np.array(P))) if self.law else P for P in pressures]

@@ -82,7 +82,11 @@ def text(gradient: Gradient, solution: Solution, values: dict[str, float]) -> st
         rows.append((key, shown, f"{gradient.gradient[key]:.6g} {per}".rstrip(), "-" if size is None else f"{size:+.4f}"))
     lines += table(rows, align="<>>>", gap="  ")
     for key, gap in gradient.one_sided.items():
-        jumps = "the value jumps there" if np.isinf(gap) else f"its derivatives to both sides differ by {gap:.3g}; their mean"
+        jumps = (
+            "changes by steps: the slope over 1 % to both sides"
+            if np.isinf(gap)
+            else f"its derivatives to both sides differ by {gap:.3g}; their mean"
+        )
         lines.append(f"{key}: {jumps}")
     if gradient.switching:
         lines.append(

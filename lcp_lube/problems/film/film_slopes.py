@@ -13,7 +13,7 @@ from .reynolds import BoxScheme, Film, _coefficients
 STEP = 1e-30  # relative: nothing is subtracted, so no digits are lost however small it is
 
 
-def film_slopes(grid: Grid, film: Film, data: dict[str, Any], flow_unit: float) -> BoxScheme:
+def film_slopes(grid: Grid, film: Film, data: dict[str, Any], flow_unit: float, cavity: Array | None = None) -> BoxScheme:
     """Derivatives of `box_scheme`'s coefficients by the film, everywhere at once: by a complex step through the same code.
 
     A coefficient depends on the film at its own face or point alone (`mean_cubes`: at both points), so each has its own
@@ -22,11 +22,12 @@ def film_slopes(grid: Grid, film: Film, data: dict[str, Any], flow_unit: float) 
     Parameters
     ----------
     data : what `box_scheme` is told beside grid and film. flow_unit : of the coefficients that they are derivatives of.
+    cavity : as `box_scheme` has it.
     """
     step = STEP * grid.reduce.max(np.abs(np.asarray(film(grid.x, grid.y))))
     moved = Lifted(film, 1j * step)
     names = ("mu", "U", "scheme", "p_sides", "p_unit", "mean_cubes", "r_in")
-    box = _coefficients(grid, moved, *(data[name] for name in names))  # type: ignore[arg-type]
+    box = _coefficients(grid, moved, *(data[name] for name in names), cavity)  # type: ignore[arg-type, call-arg]
     changes = {name: np.imag(getattr(box, name)) / step for name in box.arrays}
     return BoxScheme(**{name: a if name == "h" else a / flow_unit for name, a in changes.items()}, flow_unit=flow_unit)
 
@@ -40,6 +41,10 @@ class Lifted:
 
     def __call__(self, x: Array, y: Array) -> Array:
         return self.film(x, y) + self.step  # type: ignore[return-value]
+
+    @property
+    def rims(self) -> Sequence[Any]:
+        return getattr(self.film, "rims", ())
 
     def jumps(self, axis: str) -> Sequence[float]:
         return getattr(self.film, "jumps", lambda axis: ())(axis)

@@ -175,7 +175,7 @@ class Model:
 
     def film_slopes(self, problem: LubricationProblem) -> BoxScheme:
         """Derivatives of the coefficients of a problem that was built from this (U >= 0) by its film. Collective."""
-        slopes = film_slopes(problem.grid, self.gap, self._data, problem.scheme.flow_unit)
+        slopes = film_slopes(problem.grid, self.gap, self._data, problem.scheme.flow_unit, problem.dry)
         return hold(problem.grid, slopes, self.supplies, self.p_unit)[0] if self.supplies else slopes
 
     def pads(self, shape: Sequence[int]) -> list[tuple[Pad, "Model"]]:

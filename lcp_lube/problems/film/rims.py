@@ -54,25 +54,24 @@ def cut_faces(
     looks = ((np.arange(SIDE_BY_SIDE) + 0.5) / SIDE_BY_SIDE)[:, None] * width[j] + low[j]
     thinnest, thickest = np.full(i.size, np.inf), np.zeros(i.size)
     for s in looks:
-        h = film(t, s[:, None])
+        h = np.real(film(t, s[:, None]))
         thinnest, thickest = np.minimum(thinnest, h.min(axis=1)), np.maximum(thickest, h.max(axis=1))
     between = thinnest + THIN * (thickest - thinnest)
-    first, last = (film(nodes[i + k], lines[j]) > between for k in (0, 1))  # whether the points lie in the recess
+    first, last = (np.real(film(nodes[i + k], lines[j])) > between for k in (0, 1))  # whether the points lie in the recess
     dry_first, dry_last = cavity[j, i], cavity[j, i + 1]
     void = np.where(first == last, dry_first & dry_last, np.where(last, dry_last, dry_first & np.bool_(not along_flow)))
     cubes, films = np.zeros(i.size), np.zeros(i.size)
     for s in looks:
-        h = film(t, s[:, None])
-        thin = h <= between[:, None]
+        h = film(t, s[:, None])  # complex, where its derivative is asked for
+        thin = np.real(h) <= between[:, None]
         if along_flow:  # the film before the first place where it becomes thick
             thin = np.logical_and.accumulate(thin, axis=1)
-            alone = void & thin[:, 0] & (h[:, -1] > between)
+            alone = void & thin[:, 0] & (np.real(h[:, -1]) > between)
         else:
             alone = void & thin.any(axis=1)
         resists = thin | ~alone[:, None]
         resistance, drag = (np.mean(np.where(resists, h**-power, 0.0), axis=1) for power in (3.0, 2.0))
-        cubes += 1.0 / resistance / SIDE_BY_SIDE
-        films += drag / resistance / SIDE_BY_SIDE
+        cubes, films = cubes + 1.0 / resistance / SIDE_BY_SIDE, films + drag / resistance / SIDE_BY_SIDE
     return cut, cubes, films
 
 
