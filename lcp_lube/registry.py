@@ -218,8 +218,20 @@ SHAPES: dict[str, Entry] = {
     "profile": Entry("lcp_lube.scenes.film:ProfilePart", "a measured profile from a file"),
 }
 
+# Effects beyond the rigid, isoviscous film: by the name of their data in a scene, in the order in which they act.
+RUNGS: dict[str, Entry] = {
+    "barus": Entry("lcp_lube.scenes.bearing:Fluid", "viscosity with pressure"),
+    "density": Entry("lcp_lube.scenes.bearing:Fluid", "density"),
+    "viscosity": Entry("lcp_lube.scenes.effects.viscosity:ViscosityMap", "viscosity by place"),
+    "temperature": Entry("lcp_lube.scenes.effects.temperature:Temperature", "temperature"),
+    "shear": Entry("lcp_lube.scenes.effects.shear:Shear", "shear thinning"),
+    "elastic": Entry("lcp_lube.scenes.effects.elastic:Elastic", "elasticity"),
+    "roughness": Entry("lcp_lube.scenes.effects.roughness:SurfaceRoughness", "roughness"),
+}
+
 # A scene's way to an answer, outermost first; `drivers.compose` says what each of these modules offers.
 DRIVERS: dict[str, Entry] = {
+    "decision": Entry("lcp_lube.drivers.decision", "effects that do not count are left out"),
     "accuracy": Entry("lcp_lube.drivers.accuracy", "finer and finer grids until a quantity is as good as asked for"),
     "balance": Entry("lcp_lube.drivers.balance", "the film that carries the load asked for"),
     "position": Entry("lcp_lube.drivers.position", "where a journal lies under a load, by Newton's method"),
@@ -228,7 +240,7 @@ DRIVERS: dict[str, Entry] = {
     "turned": Entry("lcp_lube.drivers.turned", "a wall that moves to smaller x, by the mirror image"),
     "supplies": Entry("lcp_lube.drivers.supplies", "pressures of supplies behind restrictors, or of given flow"),
     "warm": Entry("lcp_lube.drivers.warm", "from a neighbour's answer, or anew where that leads nowhere"),
-    "fluid": Entry("lcp_lube.drivers.fluid", "viscosity and density that depend on the pressure"),
+    "coupling": Entry("lcp_lube.drivers.coupling", "effects: coefficients that depend on the answer, in one loop"),
     "grooves": Entry("lcp_lube.drivers.grooves", "films between axial grooves, one by one"),
     "symmetry": Entry("lcp_lube.drivers.symmetry", "no more than symmetry leaves"),
     "direct": Entry("lcp_lube.drivers.direct", "one problem: nested grids, and methods that take over where one fails"),

@@ -9,53 +9,60 @@ from fractions import Fraction
 
 from ..errors import InputError, nearest
 
-Dimension = tuple[int, int, int, int]  # powers of m, kg, s, rad
-BASE = ("m", "kg", "s", "rad")
-NUMBER: Dimension = (0, 0, 0, 0)
+Dimension = tuple[int, int, int, int, int]  # powers of m, kg, s, rad, K
+BASE = ("m", "kg", "s", "rad", "K")
+CELSIUS = 273.15  # K; of a temperature alone, never of a difference or inside another unit
+NUMBER: Dimension = (0, 0, 0, 0, 0)
 WORDS = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*)", re.ASCII)
 FACTOR = re.compile(r"(1|%|[^\W\d_]+)(?:\^?([+-]?\d))?")
 PREFIXES = {"n": -9, "u": -6, "\u00b5": -6, "\u03bc": -6, "m": -3, "c": -2, "k": 3, "M": 6, "G": 9}
-PASCAL: Dimension = (-1, 1, -2, 0)
+PASCAL: Dimension = (-1, 1, -2, 0, 0)
+KELVIN: Dimension = (0, 0, 0, 0, 1)
 # Symbol: factor to SI, dimension. Those of the first table take prefixes.
 SYMBOLS: dict[str, tuple[Fraction, Dimension]] = {
-    "m": (Fraction(1), (1, 0, 0, 0)),
-    "g": (Fraction(1, 1000), (0, 1, 0, 0)),
-    "s": (Fraction(1), (0, 0, 1, 0)),
-    "rad": (Fraction(1), (0, 0, 0, 1)),
-    "N": (Fraction(1), (1, 1, -2, 0)),
+    "m": (Fraction(1), (1, 0, 0, 0, 0)),
+    "g": (Fraction(1, 1000), (0, 1, 0, 0, 0)),
+    "s": (Fraction(1), (0, 0, 1, 0, 0)),
+    "rad": (Fraction(1), (0, 0, 0, 1, 0)),
+    "N": (Fraction(1), (1, 1, -2, 0, 0)),
     "Pa": (Fraction(1), PASCAL),
-    "Pas": (Fraction(1), (-1, 1, -1, 0)),
-    "P": (Fraction(1, 10), (-1, 1, -1, 0)),
+    "Pas": (Fraction(1), (-1, 1, -1, 0, 0)),
+    "P": (Fraction(1, 10), (-1, 1, -1, 0, 0)),
     "bar": (Fraction(100_000), PASCAL),
-    "l": (Fraction(1, 1000), (3, 0, 0, 0)),
-    "J": (Fraction(1), (2, 1, -2, 0)),
-    "W": (Fraction(1), (2, 1, -3, 0)),
+    "l": (Fraction(1, 1000), (3, 0, 0, 0, 0)),
+    "J": (Fraction(1), (2, 1, -2, 0, 0)),
+    "K": (Fraction(1), (0, 0, 0, 0, 1)),
+    "W": (Fraction(1), (2, 1, -3, 0, 0)),
 }
 PLAIN: dict[str, tuple[Fraction, Dimension]] = {
     "1": (Fraction(1), NUMBER),
     "%": (Fraction(1, 100), NUMBER),
-    "min": (Fraction(60), (0, 0, 1, 0)),
-    "h": (Fraction(3600), (0, 0, 1, 0)),
-    "rpm": (Fraction(math.pi) / 30, (0, 0, -1, 1)),
-    "rev": (Fraction(math.pi) * 2, (0, 0, 0, 1)),
-    "deg": (Fraction(math.pi) / 180, (0, 0, 0, 1)),
+    "min": (Fraction(60), (0, 0, 1, 0, 0)),
+    "h": (Fraction(3600), (0, 0, 1, 0, 0)),
+    "rpm": (Fraction(math.pi) / 30, (0, 0, -1, 1, 0)),
+    "rev": (Fraction(math.pi) * 2, (0, 0, 0, 1, 0)),
+    "deg": (Fraction(math.pi) / 180, (0, 0, 0, 1, 0)),
     "atm": (Fraction(101_325), PASCAL),
     "psi": (Fraction("6894.757293168361"), PASCAL),
-    "in": (Fraction(254, 10_000), (1, 0, 0, 0)),
+    "in": (Fraction(254, 10_000), (1, 0, 0, 0, 0)),
 }
 # What a dimension is called, and what one may write for it.
 NAMES: dict[Dimension, tuple[str, str]] = {
     NUMBER: ("a number without a unit", ""),
-    (1, 0, 0, 0): ("a length", "m, mm, um, nm"),
+    (1, 0, 0, 0, 0): ("a length", "m, mm, um, nm"),
     PASCAL: ("a pressure", "Pa, kPa, MPa, GPa, bar"),
-    (-1, 1, -1, 0): ("a viscosity", "Pa s, mPa s, cP"),
-    (1, 0, -1, 0): ("a speed", "m/s, mm/s, km/h"),
-    (0, 0, -1, 1): ("an angular velocity", "rad/s, rpm"),
-    (0, 0, 0, 1): ("an angle", "rad, deg"),
-    (1, -1, 2, 0): ("an inverse pressure", "1/Pa, 1/GPa"),
-    (1, 1, -2, 0): ("a force", "N, kN"),
-    (0, 1, -2, 0): ("a force per width", "N/m, kN/m"),
-    (0, 0, 1, 0): ("a time", "s, ms, min"),
+    (-1, 1, -1, 0, 0): ("a viscosity", "Pa s, mPa s, cP"),
+    (1, 0, -1, 0, 0): ("a speed", "m/s, mm/s, km/h"),
+    (0, 0, -1, 1, 0): ("an angular velocity", "rad/s, rpm"),
+    (0, 0, 0, 1, 0): ("an angle", "rad, deg"),
+    (1, -1, 2, 0, 0): ("an inverse pressure", "1/Pa, 1/GPa"),
+    (1, 1, -2, 0, 0): ("a force", "N, kN"),
+    (0, 1, -2, 0, 0): ("a force per width", "N/m, kN/m"),
+    (0, 0, 1, 0, 0): ("a time", "s, ms, min"),
+    KELVIN: ("a temperature", "K, degC"),
+    (-3, 1, 0, 0, 0): ("a density", "kg/m^3"),
+    (2, 0, -2, 0, -1): ("a specific heat", "J/kg/K, kJ/kg/K"),
+    (0, 1, -3, 0, -1): ("a heat transfer coefficient", "W/m^2/K"),
 }
 
 
@@ -86,6 +93,8 @@ def quantity(text: str) -> Quantity | None:
     words = WORDS.fullmatch(text.strip())
     if words is None:
         return None
+    if words[2] in ("degC", "\u00b0C"):
+        return Quantity(float(Decimal(words[1]) + Decimal(str(CELSIUS))), KELVIN, True)
     factor, dimension = _unit(words[2]) if words[2] else (Fraction(1), NUMBER)
     value = float(words[1])
     if value and math.isfinite(value):  # else its exact value may fill the memory
@@ -132,7 +141,7 @@ def _unit(text: str) -> tuple[Fraction, Dimension]:
     ------
     InputError : a symbol that is unknown.
     """
-    factor, powers = Fraction(1), [0, 0, 0, 0]
+    factor, powers = Fraction(1), [0] * len(BASE)
     for k, part in enumerate(text.split("/")):
         for j, word in enumerate(re.split(r"[\s*\u00b7.]+", part.strip())):
             match = FACTOR.fullmatch(word.replace("\u00b2", "2").replace("\u00b3", "3"))

@@ -236,6 +236,13 @@ def _scene_options(parser: argparse.ArgumentParser) -> None:
         help="start from the answers on coarser grids; default: where it pays",
     )
     parser.add_argument(
+        "--model",
+        default="auto",
+        metavar="auto|full|least|NAMES",
+        help="effects (see 'lcp-lube list') to solve for of those that the scene names: auto (default) leaves out what changes "
+        "the quantity asked by less than a tenth of the tolerance",
+    )
+    parser.add_argument(
         "--no-rescue", action="store_true", help="if the method fails, say so; by default another takes over, and is named"
     )
     parser.add_argument("--eps1", type=number, help="stop when ||F|| <= eps1, default 1e-8 (fas: 1e-11, interior: 8e-8)")

@@ -81,6 +81,7 @@ def ask_of(args: argparse.Namespace, monitor: Monitor | None = None) -> Ask:
         stopping=stopping_of(args),
         options=options_of(args, args.method),
         nested=args.nested,
+        model=args.model,
         rescue=not args.no_rescue,
         monitor=monitor,
     )

@@ -13,7 +13,7 @@ from ..output.console import say
 from ..output.results import as_dict, finite, summary
 from ..output.table import table as text_table
 from ..problems.solution import Step
-from ..registry import METHODS, SHAPES, STABILITY, SYSTEMS, recipe_line, recipe_names
+from ..registry import METHODS, RUNGS, SHAPES, STABILITY, SYSTEMS, recipe_line, recipe_names
 from ..scenes.scene import scene_line, scene_names
 from .asked import options_of, scene_of, solution_of, stopping_of
 
@@ -172,6 +172,7 @@ def run_list(args: argparse.Namespace) -> int:
         "systems": {name: entry.line for name, entry in SYSTEMS.items()},
         "recipes": {name: recipe_line(name) for name in recipe_names()},
         "film shapes": {name: entry.line for name, entry in SHAPES.items()},
+        "effects": {name: entry.line for name, entry in RUNGS.items()},
         "maps of chart stability": {name: entry.line for name, entry in STABILITY.items()},
     }
     for title, lines in groups.items():

@@ -86,7 +86,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
             found = {balance["vary"]: balance["value"], **found}
             quantity = quantity or balance["vary"]
         quantity = quantity or next((name for name in DEFAULT_QUANTITY if name in found), "")
-        values.append(_value(found, quantity, scene) if solution.converged else np.nan)
+        values.append(find_value(found, quantity, scene) if solution.converged else np.nan)
         misplaced.append(misplaced_film(problem))
         estimate = relative_error(values, misplaced)
         levels.append(
@@ -171,7 +171,7 @@ def _start(before: Solution | None, points: int) -> Solution | None:
     return before if entry.nested else None
 
 
-def _value(found: dict[str, Any], quantity: str, scene: Solvable) -> float:
+def find_value(found: dict[str, Any], quantity: str, scene: Solvable) -> float:
     """The quantity among those found; NaN where it has no value on this grid, a front that is not there, say."""
     numbers = [name for name, value in found.items() if isinstance(value, int | float) and not isinstance(value, bool)]
     if quantity not in found or not (found[quantity] is None or quantity in numbers):

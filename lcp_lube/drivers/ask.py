@@ -46,6 +46,7 @@ class Ask:
     resume : go on from such a file, as if the run had not been stopped. What is not given anew is as it was begun with.
     start : a neighbouring scene's `Solution`, from which this one's own start is interpolated. It takes the coarser grids'
         place, unless `nested` asks for these; where it leads nowhere, the run begins again without it.
+    model : effects to solve for, of those the scene names: 'auto' (those that count, `decision`), 'full', 'least', or names.
     rescue : whether other methods may take over where the one asked for fails: `Solution.method` says which.
     reduction : solve no more than symmetry leaves (`symmetry`).
     memory_check : refuse a run that needs more memory than there is, by an estimate (`memory`).
@@ -67,6 +68,7 @@ class Ask:
     every: int = 1
     resume: str | Path | None = None
     start: Solution | Start | None = None
+    model: str = "auto"
     rescue: bool = True
     reduction: bool = True
     memory_check: bool = True
@@ -95,7 +97,16 @@ class Ask:
     def choices(self) -> tuple[Any, ...]:
         """What must be the same on all ranks."""
         how = (self.method, self.system, self.recipe, self.accuracy, self.quantity, self.finest, self.stopping)
-        return (*how, dict(self.options), self.nested, self.certify, self.start is None, self.rescue, self.reduction)
+        return (
+            *how,
+            dict(self.options),
+            self.nested,
+            self.certify,
+            self.start is None,
+            self.rescue,
+            self.reduction,
+            self.model,
+        )
 
     def stopping_for(self, eps: tuple[float, float]) -> Stopping:
         """The tolerances asked for, a method's own where none are."""

@@ -27,6 +27,7 @@ from ..problems.film.model import Model
 from ..problems.film.supplies import supply_flows
 from ..problems.film.turning import Turning
 from ..problems.solution import Fields, Solution
+from ..scenes.effects.table import without
 from ..scenes.scene import Scene
 from .grooves import pad_films, pick_pad
 from .linearised import Feed, Linear
@@ -87,7 +88,7 @@ def coefficients(scene: Scene, solution: Solution, frequencies: Sequence[float] 
     model: Model = scene.model  # type: ignore[attr-defined]
     if supplies := solution.settings.get("supply_pressures"):
         model = replace(model, supplies=tuple(replace(one, p=p) for one, p in zip(model.supplies, supplies, strict=True)))
-    if model.law is not None:
+    if model.law is not None or model.effects:
         raise InputError(f"scene {scene.name}: coefficients are of fluids with constant viscosity and density")
     for nu in frequencies:
         if not (math.isfinite(nu) and nu >= 0):
@@ -116,7 +117,9 @@ def coefficients(scene: Scene, solution: Solution, frequencies: Sequence[float] 
 
 
 def placed(scene: Scene, solution: Solution) -> Scene:
-    """The scene with the journal where the solution found it."""
+    """The scene with the journal where the solution found it, without the effects that were left out."""
+    if gone := solution.settings.get("model", {}).get("left_out"):
+        scene = without(scene, gone)
     found = {"attitude_deg": solution.settings["attitude_deg"]} if "attitude_deg" in solution.settings else {}
     if balance := solution.settings.get("balance"):
         found |= {balance["vary"]: balance["value"]}

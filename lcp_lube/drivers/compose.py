@@ -62,9 +62,9 @@ CANNOT = (
     ("supplies", "certify", "a band is proved at given pressures of supplies; give those that were found"),
     ("turned", "checkpoint", "U < 0 is solved as its mirror image; give that, with -U"),
     ("turned", "resume", "U < 0 is solved as its mirror image; give that, with -U"),
-    ("fluid", "checkpoint", "the density's iterations hold several answers at once"),
-    ("fluid", "resume", "the density's iterations hold several answers at once"),
-    ("fluid", "certify", "the theorem holds where viscosity and density do not depend on the pressure"),
+    ("coupling", "checkpoint", "the coupling's iterations hold several answers at once"),
+    ("coupling", "resume", "the coupling's iterations hold several answers at once"),
+    ("coupling", "certify", "the theorem holds where the film's coefficients do not depend on its answer"),
 )
 
 

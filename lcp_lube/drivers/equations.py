@@ -17,16 +17,16 @@ from ..base.parallel import Array
 from ..errors import InputError, nearest
 from ..problems.film import slopes
 from ..problems.film.cavity import VOID, cavity_sign
-from ..problems.film.fluid import Tangent, effective, tangent
 from ..problems.film.forces import attitude
 from ..problems.film.grooves import GroovedProblem
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
+from ..problems.film.tangent import Tangent, effective, tangent
 from ..problems.film.turned import TurnedProblem
 from ..problems.grid import Grid, Places
 from ..problems.solution import Fields, Solution
 from ..scenes.scene import Scene
-from .fluid import Frozen
+from .loop import Frozen
 from .turned import Mirrored
 
 FLIPPED = {"flow_west": "flow_east", "flow_east": "flow_west"}
@@ -58,6 +58,8 @@ class Equations:
         dry: Array | None = None,
     ):
         model = check_film(scene)
+        if model.effects:
+            raise InputError(f"{scene.name}: derivatives are of films whose fluid depends on the pressure alone; see --model")
         self.scene, self.turned = scene, model.U < 0
         film: Any = Mirrored(scene) if self.turned else scene
         model = film.model

@@ -12,15 +12,15 @@ import numpy as np
 
 from ..base.parallel import Array
 from ..problems.film.flows import drag, line_weights
-from ..problems.film.fluid import effective
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.reynolds import BoxScheme, sides
 from ..problems.film.slopes import giving
+from ..problems.film.tangent import effective
 from ..problems.film.turned import TurnedProblem
 from ..problems.grid import Grid
 from .adjoint import Adjoint, Implicit
 from .equations import DRAGS, FLIPPED
-from .fluid import Frozen
+from .loop import Frozen
 from .turned import Mirrored
 
 STEP = 1e-30  # relative: complex steps have no differences whose digits could cancel

@@ -19,6 +19,7 @@ from petsc4py import PETSc
 
 from ..base.parallel import Array
 from ..problems.facts import Facts
+from ..problems.film.effects import FaceFactors
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model, Side
 from ..problems.grid import EVEN, Grid, some_places
@@ -47,7 +48,7 @@ def applies(scene: Solvable) -> bool:
 def model_of(scene: Solvable) -> Model | None:
     """The film behind a scene, where it is one of a fluid with constant viscosity and density."""
     model = getattr(scene, "model", None)
-    return model if isinstance(model, Model) and model.law is None else None
+    return model if isinstance(model, Model) and model.law is None and not model.effects else None
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,11 @@ class Part(Derived):
     def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
         """The discrete problem of the part. Collective."""
         model, shape = self._model()
-        return model.build(shape, comm)
+        problem = model.build(shape, comm)
+        if hasattr(self.whole, "by"):  # of effects, which the faces at round edges are not made for
+            problem.coefficients_for = None
+        by: FaceFactors | None = getattr(self.whole, "by", None)
+        return problem if by is None else by.on(problem.grid, *numbers(problem.grid)).film(problem)
 
     def answer(self, problem: Problem) -> Fields | None:
         """The whole problem's fields, where there is nothing to solve."""

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ..problems.facts import Facts
+from ..problems.film.effects import FaceFactors
 from ..problems.film.grooves import GroovedProblem, Pad
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
@@ -24,6 +25,7 @@ class PadFilm(Derived):
 
     model: Model
     points: tuple[int, ...]
+    first: int  # column of the ring where it begins
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -36,7 +38,14 @@ class PadFilm(Derived):
         return self.model.facts(self.shape, comm)
 
     def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
-        return self.model.build(self.shape, comm)
+        problem = self.model.build(self.shape, comm)
+        if hasattr(self.whole, "by"):  # of effects, which the faces at round edges are not made for
+            problem.coefficients_for = None
+        by: FaceFactors | None = getattr(self.whole, "by", None)
+        if by is None or self.shape[1:] != by.grid.shape[1:]:  # a coarse grid, for a start
+            return problem
+        j, i = numbers(problem.grid)
+        return by.on(problem.grid, j, (self.first + i) % by.grid.shape[0]).film(problem)
 
 
 def applies(scene: Solvable, ask: Ask) -> bool:
@@ -47,7 +56,7 @@ def applies(scene: Solvable, ask: Ask) -> bool:
 def pad_films(scene: Solvable) -> list[tuple[Pad, PadFilm]]:
     """The films between the grooves, and where they lie."""
     model: Model = scene.model  # type: ignore[attr-defined]
-    return [(pad, PadFilm(scene, film, (pad.n, *scene.shape[1:]))) for pad, film in model.pads(scene.shape)]
+    return [(pad, PadFilm(scene, film, (pad.n, *scene.shape[1:]), pad.first)) for pad, film in model.pads(scene.shape)]
 
 
 def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..problems.solution import Outcome, Solution
+from ..scenes.effects.table import named, without
 from ..scenes.grooved import GroovedJournalScene
 from ..scenes.scene import Solvable
 from .ask import Ask
@@ -81,6 +82,7 @@ def _on_grid(
 ) -> tuple[Solution, float, float, int, bool]:
     """Newton's method on one grid: solution, t, attitude, number of solves, whether the place was found. Collective."""
     solution: Solution | None = None
+    inverse, before = None, None  # of effects: the place's secant method, and (residual, step) before
     for count in range(1, MOST_SOLVES + 1):
         e = 1.0 / (1.0 + math.exp(-t))
         at = scene.model_copy(update={"eccentricity": e, "attitude_deg": math.degrees(phi)})
@@ -98,16 +100,49 @@ def _on_grid(
             return solution, t, phi, count, True
         if count == MOST_SOLVES or (abs(t) >= WIDEST and short * t < 0):
             return solution, t, phi, count, False
-        step = _newton(at, solution, force, (short, off), e, phi) if W > 0 else (LONGEST[0], 0.0)
-        t = min(max(t + min(max(step[0], -LONGEST[0]), LONGEST[0]), -WIDEST), WIDEST)
-        phi += min(max(step[1], -LONGEST[1]), LONGEST[1])
+        if not W > 0:
+            step = np.array([LONGEST[0], 0.0])
+        elif not at.model.effects:
+            step = _newton(at, solution, force, (short, off), e, phi)
+        else:
+            inverse = (
+                _secant(inverse, before, np.array([short, off]))
+                if before is not None
+                else _first(at, solution, force, off, e, phi)
+            )
+            step = -inverse @ [short, off]
+        step = np.clip(step, [-LONGEST[0], -LONGEST[1]], LONGEST)
+        before = (np.array([short, off]), step)
+        t = min(max(t + float(step[0]), -WIDEST), WIDEST)
+        phi += float(step[1])
     raise AssertionError("the loop returns")
+
+
+def _first(at: Any, solution: Solution, force: Any, off: float, e: float, phi: float) -> Any:
+    """The inverse derivative where effects act, to begin with: that of the film without them. Collective."""
+    jacobian = _jacobian(without(at, named(at)), solution, force, off, e, phi)
+    return np.linalg.inv(jacobian) if abs(np.linalg.det(jacobian)) > 1e-12 else np.diag([1.0 / max(1.0 + e, 1.0), 1.0])
+
+
+def _secant(inverse: Any, before: Any, residual: Any) -> Any:
+    """Broyden's update of the inverse derivative with what the last step changed."""
+    old, step = before
+    moved = inverse @ (residual - old)
+    along = step @ moved
+    return inverse if not abs(along) > 1e-30 else inverse + np.outer(step - moved, step @ inverse) / along
 
 
 def _newton(at: Any, solution: Solution, force: Any, residual: tuple[float, float], e: float, phi: float) -> Any:
     """Steps in t and in the attitude, from the exact derivative of the force. Collective."""
+    try:
+        return np.linalg.solve(_jacobian(at, solution, force, residual[1], e, phi), [-residual[0], -residual[1]])
+    except np.linalg.LinAlgError:
+        return np.array([math.copysign(0.5, -residual[0]), 0.0])
+
+
+def _jacobian(at: Any, solution: Solution, force: Any, along: float, e: float, phi: float) -> Any:
+    """Derivatives of log W and of the force's angle (its rows) in t and in the attitude. Collective."""
     (one,) = coefficients(at, solution)
-    along = residual[1]
     turn = np.array([[math.cos(along), -math.sin(along)], [math.sin(along), math.cos(along)]])
     K = turn @ one.K @ turn.T  # back from the axes along the force
     c = at.clearance
@@ -115,8 +150,4 @@ def _newton(at: Any, solution: Solution, force: Any, residual: tuple[float, floa
     moves = np.stack([c * e * (1.0 - e) * towards, c * e * across], axis=1)  # of the journal with t and with the attitude
     change = -K @ moves
     square = float(force @ force)
-    jacobian = np.stack([force @ change, force[0] * change[1] - force[1] * change[0]]) / square
-    try:
-        return np.linalg.solve(jacobian, [-residual[0], -residual[1]])
-    except np.linalg.LinAlgError:
-        return np.array([math.copysign(0.5, -residual[0]), 0.0])
+    return np.stack([force @ change, force[0] * change[1] - force[1] * change[0]]) / square

@@ -11,6 +11,7 @@ import petsc4py
 from petsc4py import PETSc
 
 from .. import __version__
+from ..drivers.decision import sentence
 from ..problems.solution import Solution
 from ..scenes.doubts import too_high
 from .units import place, quantity
@@ -47,7 +48,7 @@ def as_dict(solution: Solution) -> dict[str, Any]:
         "certificate_tol": certificate.tol,
         **(solution.enclosure.as_dict() if solution.enclosure else {}),
         **{key: settings[key] for key in ("accuracy", "accuracy_quantity", "accuracy_estimate") if key in settings},
-        **({"balance": settings["balance"]} if "balance" in settings else {}),
+        **{key: settings[key] for key in ("balance", "model") if key in settings},
         **settings.get("details", {}),
         **({"levels": solution.levels} if solution.levels else {}),
         "warnings": [*settings.get("warnings", []), *too_high(quantities)],
@@ -111,7 +112,10 @@ QUANTITIES = (
     *("max_v", "sum_v", "max_error", "contact_lower", "contact_upper", "k", "x_b", "h_min", "p_max"),
     *("rupture_time", "sigma", "sigma_time", "front", "reformation_time"),  # squeeze films
 )
-MEASURES = ("residual", "natural_residual", "complementarity", "mass_defect", "balance", "min_p", "min_r")
+MEASURES = (
+    *("residual", "natural_residual", "complementarity", "mass_defect", "balance"),
+    *("coupling", "energy_residual", "heat_defect", "min_p", "min_r"),
+)
 UNITS = {"min_p": " Pa"}
 MOST_FRONTS = 4  # that are told one by one
 
@@ -143,6 +147,10 @@ def _bearing_lines(data: dict[str, Any], one_d: bool) -> list[str]:
         pairs = zip(data["supply_p"], data["supply_flow"], strict=True)
         supplied = ", ".join(f"{quantity(p, 'Pa', 6)} {flow:.4g}" for p, flow in pairs)
         lines.append(f"supplies, pressure and flow into the film: {supplied} {flow_unit}")
+    if data.get("temperature_max") is not None:
+        hot = ", ".join(f"{name} {data[f'temperature_{name}']:.5g}" for name in ("max", "effective", "out"))
+        into, out = (quantity(data[key], "W" + per) for key in ("heat_power", "heat_out"))
+        lines.append(f"temperature {hot} K; heat in {into}, out {out}")
     if data.get("flow_growth"):
         growth = ", ".join(f"{side} {value:+.2g}" for side, value in data["flow_growth"].items() if value)
         lines.append(f"these flows have no limit: sides of unequal pressure meet; each halving of the spacings adds {growth}")
@@ -189,6 +197,8 @@ def summary(data: dict[str, Any]) -> str:
     ]
     if "load" in data:
         lines[3:3] = _bearing_lines(data, one_d)
+    if "model" in data:
+        lines.append(f"model: {sentence(data['model'])}")
     if "accuracy_estimate" in data:
         lines.append(
             f"{data['accuracy_quantity']}: estimated relative error {data['accuracy_estimate']:.1e} "

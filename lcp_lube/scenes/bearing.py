@@ -20,8 +20,9 @@ from ..problems.film.shapes import Block, Sum
 from ..problems.film.supplies import Supply
 from ..problems.film.turned import exact_either_way
 from .balance import BalanceTable
+from .effects.table import WithEffects, effects_of
 from .film import Extent, FilmPart, JournalPart
-from .scene import Count, Finite, Positive, Scene
+from .scene import Count, Finite, Positive
 from .supply import Place, SupplyTable, supplies_of
 from .units import Measured, is_quantity, measured, metres
 
@@ -31,7 +32,7 @@ SAMPLES = 65  # points a side of the film from which the pressure unit is taken:
 class Fluid(Measured):
     """The lubricant; pressures are absolute, as everywhere in a bearing's file."""
 
-    mu: Positive = measured("Pa s", ..., "viscosity")
+    mu: Positive | None = measured("Pa s", None, "viscosity")
     p_c: Finite = measured("Pa", 0.0, "cavitation pressure")
     barus: Annotated[Finite, Field(ge=0, lt=1e-3)] = measured("1/Pa", 0.0, "viscosity is mu exp(barus (p - p_c))")
     density: Literal["constant", "dowson-higginson"] = Field("constant", description="how the density depends on the pressure")
@@ -73,7 +74,7 @@ class SidesTable(Measured):
     north: SideTable = Field(SideTable(), description="y = width (2D)")
 
 
-class BearingScene(Scene):
+class BearingScene(WithEffects):
     """A bearing under a wall that moves in x: its film is the sum of the [[film]] shapes. SI units, pressures absolute."""
 
     family: Literal["bearing"] = "bearing"
@@ -133,6 +134,24 @@ class BearingScene(Scene):
         place = Place(self.side_lengths, self.sides.west.kind == "periodic", self.fluid.p_c, radius, 0.0, least)
         return supplies_of(self.supply, place)
 
+    @model_validator(mode="after")
+    def _viscosity_once(self) -> "BearingScene":
+        own = self.temperature.own_mu if self.temperature is not None else None
+        if self.fluid.mu is None and own is None:
+            raise ValueError("fluid.mu is missing")
+        if self.fluid.mu is not None and own is not None:
+            raise ValueError(f"fluid.mu = {self.fluid.mu:g} and the viscosities of [temperature] are both given: one of them")
+        return self
+
+    @property
+    def mu_0(self) -> float:
+        """mu, Pa s; at T_in where it depends on the temperature."""
+        return self.fluid.mu or self.temperature.own_mu
+
+    def isothermal(self) -> dict[str, Any]:
+        """What changes where the temperature is left out."""
+        return {"fluid": self.fluid.model_copy(update={"mu": self.mu_0})}
+
     def _pressure(self, name: str) -> float:
         """Absolute pressure of a side, Pa."""
         given = {"west": self.p_in, "east": self.p_out}.get(name)
@@ -191,7 +210,7 @@ class BearingScene(Scene):
             lengths=self.side_lengths,
             sides=self._sides(),
             gap=gap,
-            mu=self.fluid.mu,
+            mu=self.mu_0,
             U=self.U,
             p_c=self.fluid.p_c,
             p_unit=self.p_unit or self._pressure_unit(gap),
@@ -201,6 +220,7 @@ class BearingScene(Scene):
             shaft=self._shaft,
             supplies=self._supplies(),
             law=self._law,
+            effects=effects_of(self),
         )
 
     @property
@@ -227,7 +247,7 @@ class BearingScene(Scene):
         positive = h[np.isfinite(h) & (h > 0)]
         if not positive.size:
             return 1e6  # the discretisation says where the film is not positive
-        drag = self.fluid.mu * abs(self.U) * self.L / float(positive.min()) ** 2
+        drag = self.mu_0 * abs(self.U) * self.L / float(positive.min()) ** 2
         unit = max(drag, *(side.p for side in self._sides()), *(max(one.p, one.p_s) for one in self._supplies()))
         return 10.0 ** round(math.log10(unit)) if 1e-90 < unit < 1e90 else 1e6
 
@@ -240,9 +260,10 @@ class BearingScene(Scene):
             or not gap.smooth_between
             or self._law
             or self.supply
+            or effects_of(self)
         ):
             return None
-        return exact_either_way(gap, self.L, self.fluid.mu, self.U, west.p, east.p)
+        return exact_either_way(gap, self.L, self.mu_0, self.U, west.p, east.p)
 
     def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
         """The discrete problem on this scene's grid. Collective.

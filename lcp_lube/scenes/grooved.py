@@ -16,13 +16,14 @@ from ..problems.film.model import Model, Side
 from ..problems.film.supplies import Patch, Supply
 from ..problems.film.turning import Turning
 from .balance import BalanceTable
+from .effects.table import WithEffects, effects_of
 from .film import Extent, FilmPart
-from .scene import Count, Finite, NotNegative, Positive, Scene
+from .scene import Count, Finite, NotNegative, Positive
 from .supply import Place, SupplyTable, supplies_of
 from .units import measured, metres
 
 
-class GroovedJournalScene(Scene):
+class GroovedJournalScene(WithEffects):
     """A journal under a vertical load, its film cut by axial grooves that hold a pressure; 2D.
 
     Angles are counted from the line of the load, in the sense of rotation. The film is h = c (1 - eccentricity cos(theta -
@@ -74,6 +75,9 @@ class GroovedJournalScene(Scene):
             raise ValueError(f"grooves_deg = {self.grooves_deg}: grooves of {self.groove_deg:g} degrees overlap there")
         if self.balance is not None and (self.attitude_deg is not None or self.balance.vary not in (None, "eccentricity")):
             raise ValueError("balance: eccentricity and attitude follow from the load: neither attitude_deg nor another vary")
+        default = type(self).model_fields["mu"].default
+        if self.mu != default and self.temperature is not None and self.temperature.own_mu:
+            raise ValueError(f"mu = {self.mu:g} and the viscosities of [temperature] are both given: one of them")
         if self.preload and len(places) < 2:
             raise ValueError(f"preload = {self.preload:g}: lobes lie between at least two grooves")
         if not places and not self.p_end > 0 and not self.supply:
@@ -101,6 +105,16 @@ class GroovedJournalScene(Scene):
     @property
     def shape(self) -> tuple[int, ...]:
         return self.nx or self.n, self.ny or max(3, self.n // 16 | 1)
+
+    @property
+    def mu_0(self) -> float:
+        """mu, Pa s; at T_in where it depends on the temperature."""
+        own = self.temperature.own_mu if self.temperature is not None else None
+        return float(own or self.mu)
+
+    def isothermal(self) -> dict[str, Any]:
+        """What changes where the temperature is left out."""
+        return {"mu": self.mu_0}
 
     @property
     def omega(self) -> float:
@@ -159,10 +173,11 @@ class GroovedJournalScene(Scene):
             lengths=(math.pi * self.D, turning.B),
             sides=(Side("periodic"), Side("periodic"), ends, ends),
             gap=self.gap,
-            mu=self.mu,
+            mu=self.mu_0,
+            effects=effects_of(self),
             U=turning.R * turning.omega,
             p_c=self.p_c,
-            p_unit=self.mu * self.omega * (turning.R / self.clearance) ** 2,
+            p_unit=self.mu_0 * self.omega * (turning.R / self.clearance) ** 2,
             scheme="face",
             shaft=Shaft(
                 turning.R, math.radians(self.attitude_deg or 0.0) + math.pi if self.eccentricity else None, turning.start
@@ -186,4 +201,4 @@ class GroovedJournalScene(Scene):
         return problem
 
     def _bearing_numbers(self, values: dict[str, Any]) -> dict[str, Any]:
-        return self.turning.numbers(values["load"], self.mu, self.eccentricity)
+        return self.turning.numbers(values["load"], self.mu_0, self.eccentricity)

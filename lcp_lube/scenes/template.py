@@ -137,7 +137,7 @@ def _inner(field: FieldInfo, model: type[BaseModel], name: str, given: Any) -> l
             body = [[line if line.startswith("#") or not line else f"# {line}" for line in lines] for lines in body]
         return [text, *(line for lines in body for line in (f"{'# ' * (given is None)}[[{name}]]", *lines))]
     lines = _table(model, given if isinstance(given, dict) else {}, f"{name}.")
-    needed = any(inner.is_required() for inner in model.model_fields.values())
+    needed = field.default is None or any(inner.is_required() for inner in model.model_fields.values())
     if given is None and needed:
         lines = [line if line.startswith("#") or not line else f"# {line}" for line in lines]
         return [text, f"# [{name}]", *lines]

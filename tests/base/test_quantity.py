@@ -90,7 +90,7 @@ def test_any_text_is_a_quantity_or_refused(text):
         except InputError as error:
             assert "\n" not in str(error)
         else:
-            assert found is None or len(found.dimension) == 4
+            assert found is None or len(found.dimension) == 5
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,10 @@ WEDGE = {"film": [{"shape": "parabola", "h_min_um": 1, "h_max_um": 3}]}
 # What is asked of a scene: changes of the scene, or of how it is solved. A test adds the files.
 SCENE = {
     "balance": {"balance": {"load": 3000.0}},
-    "fluid": {"fluid": {"mu": 0.01, "p_supply": 1e5, "barus": 1e-8, "density": "dowson-higginson"}},
+    "coupling": {
+        "fluid": {"mu": 0.01, "p_supply": 1e5, "barus": 1e-8, "density": "dowson-higginson"},
+        "temperature": {"beta": 0.03, "T_in": 320.0},
+    },
     "symmetry": {"dimension": 2, "width_mm": 8, "nx": 23, "ny": 11},
 }
 ASK = {

@@ -6,8 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lcp_lube import InputError, load_scene, solve
+from lcp_lube.problems.film.effects import factors, scaled
 from lcp_lube.problems.film.exact import exact_solution
-from lcp_lube.problems.film.fluid import Law, effective
+from lcp_lube.problems.film.fluid import Law
 
 BOTH = Law(2e-8, True)
 pressures = st.floats(0, 1e9)
@@ -94,7 +95,7 @@ def test_a_law_without_effect_changes_nothing():
     plain, tiny = (solve(load_scene("pocketed_pad", {"fluid.barus": b, "n": 60})) for b in (0.0, 1e-20))
     assert "fluid_solves" not in plain.settings["details"] and tiny.settings["details"]["fluid_solves"] == 1
     np.testing.assert_allclose(tiny.fields["p"], plain.fields["p"], rtol=1e-9)
-    problem = effective(plain.problem, Law(), plain.fields["p"] * plain.problem.p_unit, plain.problem.p_sides)
+    problem = scaled(plain.problem, factors(plain.problem, {}))
     for name in ("k_W", "k_E", "b_C", "b_W", "c"):
         np.testing.assert_allclose(getattr(problem.scheme, name), getattr(plain.problem.scheme, name), rtol=1e-14)
     for one in (plain, tiny):

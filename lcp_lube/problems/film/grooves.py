@@ -90,6 +90,7 @@ class GroovedProblem(LubricationProblem):
                 "residual": red.norm(F) / scale if scale != 0 else 0.0,
                 "complementarity": max(gaps, off),
                 "mass_defect": abs(red.sum(F)) / dragged if dragged > 0 else 0.0,
+                **self.more_measures,
             },
             tol=certificate_tol(eps1),
             extremes={"min_p": red.min(p) * self.p_unit, "min_r": red.min(r)},

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from petsc4py import PETSc
@@ -18,6 +18,7 @@ from ..transfer import Transfer
 from .certify import certify
 from .exact import ExactSolution
 from .forces import Shaft
+from .lifted import LiftedFilm
 from .quantities import open_pressures, quantities, units
 from .reynolds import BoxScheme, assemble, side_points, sides
 from .supplies import Held, Supply, pressed
@@ -68,6 +69,10 @@ class LubricationProblem:
         self.coefficients_for: Callable[..., BoxScheme] | None = None  # of a film with rims: by which points are cavitated
         self.dry: Array | None = None  # the points for which they have been made, 1 or 0; None: no revision yet
         self.extras: Callable[[dict[str, Any]], dict[str, Any]] | None = None
+        self.more: dict[str, Any] = {}  # numbers and fields (values, unit) of what is solved beside p and r
+        self.more_fields: dict[str, tuple[Array, str]] = {}
+        self.more_measures: dict[str, float] = {}  # of its equations, for the certificate
+        self.cells: dict[str, Array] = {}  # what effects made of its coefficients (`film.effects`)
         self.reduce = grid.reduce
         self.c = scheme.c.ravel()
         self._own = Owned(self, grid.dm.comm)
@@ -161,7 +166,8 @@ class LubricationProblem:
 
     def certify(self, fields: Fields, eps1: float) -> Certificate:
         """Certificate of the fields p and r for a run whose tolerance was eps1 (`film.certify`). Collective."""
-        return certify(self, fields["p"], fields["r"], eps1)
+        found = certify(self, fields["p"], fields["r"], eps1)
+        return replace(found, measures=found.measures | self.more_measures)
 
     def boundary_flows(self, p: Array, r: Array) -> tuple[float, float, float, float]:
         """Scaled flow through the west, east, south and north side, positive towards larger x or y.
@@ -187,7 +193,7 @@ class LubricationProblem:
 
     def quantities(self, fields: Fields) -> dict[str, Any]:
         """Load, friction, flows, largest pressure, cavity, and the scene's own `extras`. Collective."""
-        return quantities(self, fields["p"], fields["r"])
+        return quantities(self, fields["p"], fields["r"]) | self.more
 
     def physical(self, fields: Fields) -> dict[str, tuple[Array, str]]:
         """Absolute pressure in Pa, void fraction, film in m."""
@@ -195,6 +201,7 @@ class LubricationProblem:
             "p": (fields["p"] * self.p_unit + self.p_c, "Pa"),
             "r": (fields["r"], ""),
             "h": (self.scheme.h.ravel(), "m"),
+            **self.more_fields,
         }
 
     @property
@@ -206,6 +213,8 @@ class LubricationProblem:
         """Given pressures (at a corner the mean of its two), the film, and the void: what enters west, none above p_c."""
         if name == "h":
             return np.array(self.film(x, y), dtype=float)
+        if name in self.more_fields:
+            return np.full(np.broadcast(x, y).shape, np.nan)
         grid = self.grid
         total, count = np.zeros(np.broadcast(x, y).shape), np.zeros(np.broadcast(x, y).shape)
         for k, p in enumerate(open_pressures(self)):
@@ -242,6 +251,28 @@ class LubricationProblem:
             other.__dict__.pop(name, None)
         other.dry, other.scheme = dry, self.coefficients_for(cavity=dry)
         other.c = other.scheme.c.ravel()
+        return other
+
+    def with_scheme(
+        self,
+        scheme: BoxScheme,
+        mu: float | Array,
+        p_sides: tuple[float, float, float, float] | None = None,
+        held: Held | None = None,
+    ) -> Self:
+        """The problem on the same grid with other coefficients; mu : viscosity at the east faces, Pa s."""
+        other = copy(self)
+        other.scheme, other.c, other.mu, other.exact = scheme, scheme.c.ravel(), mu, None  # type: ignore[assignment]
+        other.p_sides, other.held = p_sides or self.p_sides, held or self.held
+        other.more, other.more_fields, other.more_measures, other.cells = {}, {}, {}, {}
+        other.coefficients_for = None  # which are those without the effects
+        return other
+
+    def with_lift(self, lift: Array) -> Self:
+        """The problem with the film thicker by `lift` at the owned points, m: what is told of it, not its coefficients."""
+        other = copy(self)
+        other.scheme = replace(self.scheme, h=self.scheme.h + lift.reshape(self.grid.box))
+        other.film = LiftedFilm.of(self.film, self.grid, lift)
         return other
 
     def free_matrices(self) -> None:

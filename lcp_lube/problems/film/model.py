@@ -13,6 +13,7 @@ from ...base.parallel import Array
 from ...errors import InputError
 from ..facts import Facts
 from ..grid import EVEN, Grid, Places, Polar
+from .effects import Effect
 from .exact import ExactSolution
 from .film_slopes import film_slopes
 from .fluid import Law
@@ -72,6 +73,7 @@ class Model:
     law: Law | None = None  # a fluid that depends on the pressure; `build` makes the problem of the constant one
     polar: Polar | None = None  # of a sector (`Grid.polar`)
     places: Places | None = None  # of the lines of points; None: on the film's straight edges, if it has any
+    effects: tuple[Effect, ...] = ()  # what else makes its coefficients depend on the answer; `build` leaves them out
 
     def __post_init__(self) -> None:
         used = dict(zip(NAMES, self.sides, strict=True) if len(self.lengths) == 2 else zip(NAMES[:2], self.sides, strict=False))
@@ -111,7 +113,8 @@ class Model:
         if places is not None and places[0] is not None:
             places = (self.lengths[0] - places[0][::-1], places[1])
         supplies = tuple(replace(one, region=one.region.mirrored(self.lengths[0])) for one in self.supplies)
-        changed = {"sides": (east, west, *ends), "supplies": supplies, "places": places}
+        changed: dict[str, Any] = {"sides": (east, west, *ends), "supplies": supplies, "places": places}
+        changed["effects"] = tuple(effect.mirrored(self.lengths[0]) for effect in self.effects)
         return replace(self, gap=gap, U=-self.U, exact=None, **changed)  # type: ignore[arg-type]
 
     def lines(self, shape: Sequence[int]) -> Places:

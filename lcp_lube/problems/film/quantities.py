@@ -25,12 +25,14 @@ UNITS = {
     ),
     **dict.fromkeys(("p_max_at", "min_h", "min_h_at", "rupture", "reformation", "ruptures", "reformations"), "m"),
     **dict.fromkeys(("flow", "side_leakage", "flow_growth", "groove_flow", "supply_flow"), "m3/s"),
+    "deflection_max": "m",
     "cavitated_area": "m2",
-    "power_loss": "W",
     **dict.fromkeys(("moment", "friction_torque"), "N m"),
     "pad_load": "N",
     **dict.fromkeys(("inner_flow", "outer_flow"), "m3/s"),
     "pressure_centre": "m, deg",
+    **dict.fromkeys(("power_loss", "heat_power", "heat_out"), "W"),
+    **dict.fromkeys(("temperature_max", "temperature_effective", "temperature_out"), "K"),
     "attitude_deg": "deg",
 }
 PER_WIDTH = {"N": "N/m", "W": "W/m", "m3/s": "m2/s", "m2": "m"}

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from ...base.parallel import Array
 from .cavity import cavity_sign
 from .flows import friction, line_weights, point_weights, side_flows
-from .fluid import Tangent
 from .forces import forces, shaft_angle
 from .grooves import GroovedProblem
 from .lubrication import LubricationProblem
 from .quantities import largest_pressure, thinnest
 from .reynolds import sides
 from .supplies import supply_flows
+from .tangent import Tangent
 
 SIDES = ("west", "east", "south", "north")
 TIE = 1e-9  # relative: pressures so near the largest one are as large

@@ -85,6 +85,7 @@ class TurnedProblem(LubricationProblem):
             film=film,
             exact=exact,
         )
+        self.more_fields = {name: (self._here(values), unit) for name, (values, unit) in moving.more_fields.items()}
 
     def here(self, fields: Fields) -> Fields:
         """Fields of the mirror image as fields of the film as it stands. Collective."""

@@ -1,0 +1,163 @@
+"""Films whose coefficients depend on their answer: one loop for all effects, pressure, temperature, shear, deformation.
+
+The fields x that effects make of an answer (`film.effects`) go into the film's coefficients, the film is solved as any other,
+and the effects make new fields G(x) of its answer. x = G(x) is solved by PETSc's Anderson acceleration (SNES type
+anderson, `loop`), which has no factor to tune: each step costs one solve of a film, started from the one before.
+
+Barus' viscosity stays outside of the loop: it is a change of the unknown (problems/film/fluid.py), exact and one solve, also
+where other effects vary the viscosity as well. The certificate of the answer has the film's equations with the coefficients
+that it was solved with, `coupling`, the largest relative change that the effects still make of these, and the effects' own.
+"""
+
+from dataclasses import replace
+from math import prod
+
+import numpy as np
+
+from ..problems.film.effects import Cells, neutral
+from ..problems.film.fluid import Law
+from ..problems.film.model import Model
+from ..problems.solution import Outcome, Solution
+from ..problems.transfer import Transfer
+from ..scenes.scene import Solvable
+from .ask import Ask, Start
+from .compose import Inner
+from .levels import level_shapes
+from .loop import SETTLED, Loop
+
+NESTED_ABOVE = 2_000  # points from which the fields are first found on coarser grids
+
+
+def applies(scene: Solvable, ask: Ask) -> bool:
+    """Whether an effect makes the film's coefficients depend on its answer."""
+    model = getattr(scene, "model", None)
+    return isinstance(model, Model) and (model.law is not None or bool(model.effects))
+
+
+def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
+    """Solution of a scene with effects. Collective.
+
+    Returns
+    -------
+    Solution : of the film with the coefficients found; where they do not settle or no film can be solved with them, the last
+        state, its outcome and the reason. settings['details'] has fluid_solves, the number of films solved on this grid.
+
+    Raises
+    ------
+    InputError : a scheme that has no faces where densities or lifts could act.
+    """
+    loop = Loop(scene, _reduced(ask, scene.model.law), inner)  # type: ignore[attr-defined]
+    cells = neutral(loop.effects, loop.h.size)
+    if not loop.effects:
+        loop.film(cells)
+        loop.change = 0.0
+    else:
+        known, coarse = _known(loop), None
+        if known is None:
+            coarse = _coarser(scene, ask, inner, loop)
+            known = _taken(loop, coarse.problem) if coarse is not None else None
+        eps1 = ask.stopping_for((1e-8, 1e-8)).eps1
+        loop.settle(known or cells, SETTLED * eps1)
+        if coarse is not None:
+            coarse.destroy()
+    return _told(scene, ask, loop)
+
+
+def _reduced(ask: Ask, law: Law | None) -> Ask:
+    """The ask with its start in q."""
+    if ask.start is None or law is None:
+        return ask
+    near, found = ask.start.problem, ask.start.fields
+    unit = near.p_unit  # type: ignore[attr-defined]
+    return replace(ask, start=Start(near, {**found, "p": law.reduced(found["p"] * unit) / unit}, ask.start.settings))
+
+
+def _known(loop: Loop) -> Cells | None:
+    """The fields that a neighbour's answer was solved with, on this grid."""
+    near = loop.ask.start
+    return None if near is None else _taken(loop, near.problem)
+
+
+def _taken(loop: Loop, problem: object) -> Cells | None:
+    """The fields of another problem on this grid; None where it has not all of them."""
+    cells: Cells = getattr(problem, "cells", {})
+    if not set(loop.names) <= set(cells):
+        return None
+    grid, own = problem.grid, loop.base.grid  # type: ignore[attr-defined]
+    if grid.shape == own.shape:
+        return {name: cells[name] for name in loop.names}
+    if grid.dim != own.dim:
+        return None
+    transfer = Transfer(grid, own)
+    found = {name: transfer(cells[name]) for name in loop.names}
+    transfer.destroy()
+    return found
+
+
+def _coarser(scene: Solvable, ask: Ask, inner: Inner, loop: Loop) -> Solution | None:
+    """The answer on the next coarser grid, as a start: there the loop costs a quarter, or a half in 1D."""
+    if ask.nested is False or prod(scene.shape) <= NESTED_ABOVE or loop.model.grooves:
+        return None
+    shapes = level_shapes(scene.shape, loop.base.grid.comm.size)
+    if len(shapes) < 2 or prod(shapes[-2]) >= prod(scene.shape):
+        return None
+    found = solve(scene.with_shape(shapes[-2]), replace(ask, start=None, stopping=_loose(ask)), inner)
+    if not found.converged:
+        found.destroy()
+        return None
+    loop.work += found.settings["details"]["coupling_work"]
+    loop.start = found if loop.law.barus == 0.0 else None
+    return found
+
+
+def _loose(ask: Ask) -> dict:
+    """A start's tolerances."""
+    given = ask.stopping_for((1e-8, 1e-8))
+    return {"eps1": max(given.eps1, 1e-5), "max_it": given.max_it}
+
+
+def _told(scene: Solvable, ask: Ask, loop: Loop) -> Solution:
+    """The loop's last answer as a solution of the scene. Collective."""
+    solution, first, law = loop.solution, loop.first, loop.law
+    assert solution is not None and first is not None  # a film was solved
+    eps1 = solution.settings["eps1"]
+    outcome, message, reduce = solution.outcome, solution.message, loop.base.reduce
+    failure = ""
+    if loop.answer is None:  # the first film had no answer
+        loop.base.destroy()
+        return solution
+    at = loop.answer
+    problem = at.problem
+    if solution.converged and not np.isfinite(reduce.max(at.p)):
+        outcome = Outcome.NO_SOLUTION
+        message = f"no pressure carries the flow: viscosity grows without bound (barus = {law.barus:g} 1/Pa)"
+    elif loop.effects:
+        tol = SETTLED * eps1
+        with np.errstate(all="ignore"):
+            for effect in loop.effects:
+                told = effect.report(at)
+                problem.more |= told.numbers
+                problem.more_fields |= told.fields
+                problem.more_measures |= told.measures
+                failure = failure or told.failure
+        problem.more_measures["coupling"] = loop.change
+        if failure:
+            outcome, message = Outcome.NO_SOLUTION, failure
+        elif solution.converged and not loop.change <= tol:
+            outcome = Outcome.MAX_ITERATIONS
+            message = f"the coefficients still change by {loop.change:.1e} after {loop.solves} films ({', '.join(loop.names)})"
+        elif not solution.converged:
+            message = f"film {loop.solves} of the coupling: {message}"
+    fields = {"p": at.p / problem.p_unit, "r": at.r}
+    problem.cells = at.cells
+    certificate = problem.certify(fields, eps1)
+    solution.destroy()
+    count = f"{loop.solves} film{'s' * (loop.solves > 1)} solved"
+    inside = f"; {', '.join(loop.names)} by Anderson's method" if loop.effects else ""
+    by_q = "; viscosity with pressure by a change of unknown" if law.barus else ""
+    settings = {**first.settings, "why": [f"coupling: {count}{inside}{by_q}", *first.settings["why"]]}
+    if loop.rescued is not None:
+        settings |= {"method": loop.rescued.method, "took_over": loop.rescued.asked}
+    settings["details"] = {**first.settings["details"], "fluid_solves": loop.solves, "coupling_work": loop.work}
+    done = {"problem": problem, "fields": fields, "outcome": outcome, "message": message, "certificate": certificate}
+    return replace(first, **done, steps=loop.steps, settings=settings, times=loop.times).judged()  # type: ignore[arg-type]

@@ -1,0 +1,253 @@
+"""What physical effects do to a film: fields at its points that change viscosity, density, thickness and flows.
+
+An effect reads an answer (p, r, the flows through every face) and says what follows from it for the film's coefficients, in
+`CHANNELS`. Those multiply the scheme of the rigid, isoviscous film face by face, so that every effect composes with every other
+and with whatever solves the film. `drivers.coupling` finds the fields that reproduce themselves.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.parallel import Array
+from ..grid import Grid
+from ..transfer import Pick
+from .fluid import Law
+from .lubrication import LubricationProblem
+from .reynolds import sides
+from .supplies import Held, pressed
+
+# A field at the owned points, and its value where nothing has an effect. viscosity: over mu. density: over rho_0. lift: what is
+# added to the film, m. pressure_flow, drag_flow: factors of the flows that pressure and wall drive (roughness below the grid).
+CHANNELS = {"viscosity": 1.0, "density": 1.0, "lift": 0.0, "pressure_flow": 1.0, "drag_flow": 1.0}
+Cells = dict[str, Array]
+THINNEST = 0.05  # of the rigid film: no lift of an iterate leaves less
+FACTORS = ("k_W", "k_E", "k_S", "k_N", "u_W", "u_E", "mu")
+
+
+@dataclass(frozen=True)
+class Report:
+    """What an effect tells of an answer.
+
+    numbers : further quantities (docs/numbers.md). measures : how far its own equations are from holding, for the certificate.
+    fields : further fields at the points, with their units. failure : why there is no such answer; empty if there is one.
+    """
+
+    numbers: dict[str, Any]
+    measures: dict[str, float]
+    fields: dict[str, tuple[Array, str]]
+    failure: str = ""
+
+
+NOTHING = Report({}, {}, {})
+
+
+class Effect(Protocol):
+    """A rung: what one effect makes of an answer.
+
+    channels : what it may change. even : whether what it makes of an answer that is symmetric in y is so too.
+    """
+
+    @property
+    def channels(self) -> tuple[str, ...]: ...
+
+    @property
+    def even(self) -> bool: ...
+
+    def apply(self, at: "Answer", out: Cells) -> None:
+        """Change `out` by what follows from the answer. Collective."""
+        ...
+
+    def report(self, at: "Answer") -> Report:
+        """Numbers and measures of the answer. Collective."""
+        ...
+
+    def mirrored(self, length: float) -> "Effect":
+        """The effect in the mirror image of a film of this length."""
+        ...
+
+
+class Plain:
+    """What most effects are: even, the same in the mirror image, and with nothing to tell."""
+
+    channels: tuple[str, ...] = ("viscosity",)
+    even = True
+
+    def report(self, at: "Answer") -> Report:
+        return NOTHING
+
+    def mirrored(self, length: float) -> Any:
+        return self
+
+
+@dataclass
+class Answer:
+    """A film's answer as effects see it.
+
+    problem : the film with the coefficients that it was solved with. p : Pa above p_c. r : void fraction. cells : those
+    coefficients at the points. law : how viscosity depends on the pressure. base : the rigid, isoviscous film.
+    """
+
+    problem: LubricationProblem
+    p: Array
+    r: Array
+    cells: Cells
+    law: Law
+    base: LubricationProblem
+    memory: dict[int, Any] = field(default_factory=dict)  # what an effect found, by its id
+
+    @property
+    def grid(self) -> Grid:
+        return self.problem.grid
+
+    @cached_property
+    def mu(self) -> Array:
+        """Viscosity at the points, Pa s."""
+        return self.base.mu * self.cells.get("viscosity", 1.0) * self.law.viscosity(self.p)
+
+    @cached_property
+    def h(self) -> Array:
+        """Film at the points, m."""
+        return self.problem.scheme.h.ravel()
+
+    @cached_property
+    def gradient(self) -> tuple[Array, Array]:
+        """dp/dx and dp/dy at the points, Pa/m: means of those at the two faces. Collective."""
+        framed = framed_by(self.grid, self.p, self.problem.p_sides)
+        here = framed[1:-1, 1:-1]
+        dx = self.grid.steps(0)
+        along = (framed[1:-1, 2:] - framed[1:-1, :-2]) / (dx[:-1] + dx[1:])
+        across = np.zeros_like(here)
+        if self.grid.dim == 2:
+            dy = self.grid.steps(1)[:, None]
+            across = (framed[2:, 1:-1] - framed[:-2, 1:-1]) / (dy[:-1] + dy[1:])
+        return along.ravel(), across.ravel()
+
+
+@dataclass(frozen=True)
+class FaceFactors:
+    """Factors of a rigid, isoviscous film's scheme on the points of `grid`, each of shape grid.box.
+
+    k_W, k_E, k_S, k_N : of the conductances. u_W, u_E : of the wall's flows. mu : viscosity at the east face, over mu.
+    """
+
+    grid: Grid
+    values: dict[str, Array]
+
+    def on(self, grid: Grid, j: NDArray[np.int64], i: NDArray[np.int64]) -> "FaceFactors":
+        """Those of a part of the film, whose points are the lines j and columns i of this one's grid. Collective."""
+        take = Pick(self.grid, grid, j, i)
+        found = {name: take(self.values[name].ravel()).reshape(grid.box) for name in FACTORS}
+        take.destroy()
+        return FaceFactors(grid, found)
+
+    def film(self, problem: LubricationProblem) -> LubricationProblem:
+        """The film with these factors."""
+        return scaled(problem, self)
+
+
+def framed_by(grid: Grid, values: Array, at_sides: Sequence[float] | None = None) -> Array:
+    """Owned values with their neighbours'; beyond an open side the side's value, where given, else their own. Collective."""
+    out = grid.ghosted(values)
+    own = out[1:-1, 1:-1].copy()
+    rim = (out[1:-1, :1], out[1:-1, -1:], out[:1, 1:-1], out[-1:, 1:-1])
+    edge = (own[:, :1], own[:, -1:], own[:1], own[-1:])
+    for k, (view, inner, side) in enumerate(zip(rim, edge, sides(grid), strict=True)):
+        outside = np.isnan(view)
+        beyond = at_sides[k] if at_sides is not None and side.any() else inner
+        view[outside] = np.broadcast_to(beyond, view.shape)[outside]
+    return out
+
+
+def face_means(framed: Array) -> list[Array]:
+    """Means over the west, east, south and north face."""
+    here = framed[1:-1, 1:-1]
+    return [0.5 * (here + other) for other in around(framed)]
+
+
+def around(framed: Array) -> tuple[Array, Array, Array, Array]:
+    """The west, east, south and north neighbours."""
+    return framed[1:-1, :-2], framed[1:-1, 2:], framed[:-2, 1:-1], framed[2:, 1:-1]
+
+
+def factors(problem: LubricationProblem, cells: Cells, density_at_sides: Sequence[float] | None = None) -> FaceFactors:
+    """What the fields make of the scheme of a rigid, isoviscous film. Collective."""
+    grid = problem.grid
+    ones = np.ones(grid.box)
+    k, u, mu = [ones] * 4, [ones] * 4, ones
+    if "viscosity" in cells:
+        at_faces = face_means(framed_by(grid, cells["viscosity"]))
+        k, mu = [a / b for a, b in zip(k, at_faces, strict=True)], at_faces[1]
+    if "lift" in cells:
+        thick = [1.0 + part for part in face_means(framed_by(grid, cells["lift"] / problem.scheme.h.ravel()))]
+        k, u = [a * b**3 for a, b in zip(k, thick, strict=True)], thick
+    for name, driven in (("pressure_flow", (True, False)), ("drag_flow", (False, True)), ("density", (True, True))):
+        if name in cells:
+            at = face_means(framed_by(grid, cells[name], density_at_sides if name == "density" else None))
+            k = [a * b for a, b in zip(k, at, strict=True)] if driven[0] else k
+            u = [a * b for a, b in zip(u, at, strict=True)] if driven[1] else u
+    return FaceFactors(grid, dict(zip(FACTORS, [*k, *u[:2], mu], strict=True)))
+
+
+def scaled(
+    problem: LubricationProblem,
+    by: FaceFactors,
+    mobility: Sequence[Array] | None = None,
+    p_sides: tuple[float, float, float, float] | None = None,
+    held: Held | None = None,
+) -> LubricationProblem:
+    """The film with factors at its faces, conductances times mobilities, and other pressures at its sides and supplies."""
+    s, f, grid = problem.scheme, by.values, problem.grid
+    names = ("k_W", "k_E", "k_S", "k_N")
+    k: dict[str, Any] = {name: getattr(s, name) * f[name] * (mobility[i] if mobility else 1.0) for i, name in enumerate(names)}
+    couette_W, couette_E = s.couette_W * f["u_W"], s.couette_E * f["u_E"]
+    c = couette_W - couette_E + problem._sources
+    p_sides = p_sides or problem.p_sides
+    for conductance, at_side, p_side in zip(k.values(), sides(grid), p_sides, strict=True):
+        c = c + np.where(at_side, conductance * (p_side / problem.p_unit), 0.0)
+    u: dict[str, Any] = {"b_C": s.b_C * f["u_E"], "b_W": s.b_W * f["u_W"], "couette_W": couette_W, "couette_E": couette_E}
+    scheme = replace(s, **k, **u, c=c)
+    held = held or problem.held
+    if held is not None:
+        scheme = pressed(scheme, held, problem.p_unit)
+    return problem.with_scheme(scheme, problem.mu * f["mu"], p_sides, held)
+
+
+def answer(
+    base: LubricationProblem, law: Law, cells: Cells, by: FaceFactors, p: Array, r: Array, p_sides: tuple[float, ...]
+) -> Answer:
+    """An answer of `base` with these coefficients: p in Pa above p_c and r, whatever unknown it was solved in. Collective."""
+    framed = framed_by(base.grid, p, p_sides)
+    here = framed[1:-1, 1:-1]
+    mobility = [law.mobility(here, np.nan_to_num(other)) for other in around(framed)] if law.barus else None
+    if law.barus:
+        at_face = law.viscosity(0.5 * (here + np.nan_to_num(framed[1:-1, 2:])))
+        by = replace(by, values={**by.values, "mu": by.values["mu"] * at_face})
+    held = base.held
+    if held is not None and law.barus:  # back from q
+        held = replace(held, supplies=tuple(replace(one, p=float(law.pressure(np.array(one.p)))) for one in held.supplies))
+    film = scaled(base, by, mobility, p_sides, held)  # type: ignore[arg-type]
+    if "lift" in cells:
+        film = film.with_lift(cells["lift"])
+    return Answer(film, p, r, cells, law, base)
+
+
+def neutral(effects: Sequence[Effect], size: int) -> Cells:
+    """The fields of a film without effects, of those that the effects may change."""
+    used = {name for effect in effects for name in effect.channels}
+    return {name: np.full(size, value) for name, value in CHANNELS.items() if name in used}
+
+
+@dataclass(frozen=True)
+class Compressible(Plain):
+    """Dowson and Higginson's density, from the pressure."""
+
+    law: Law
+    channels: tuple[str, ...] = ("density",)
+
+    def apply(self, at: Answer, out: Cells) -> None:
+        out["density"] *= self.law.density(at.p)

@@ -1,0 +1,129 @@
+"""Viscosity by temperature: exponential law, Vogel's, Walther's (ASTM D341), and oils by their ISO grade.
+
+    exponential  mu = mu_1 exp(-beta (T - T_1))
+    Vogel        mu = a exp(b/(T - c))
+    Walther      log10 log10(nu + 0.7) = A - B log10 T,  nu = mu/rho in mm2/s (ASTM D341)
+
+Kinematic viscosities at 40 degrees C are the middles of ISO 3448's grades; those at 100 degrees C belong to a viscosity index
+of 100, by the equations of ASTM D2270. Density and specific heat of a mineral oil are typical values, not the grade's.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import exp, log, log10
+from typing import Protocol
+
+import numpy as np
+
+from ...base.parallel import Array
+from ...errors import InputError, nearest
+
+LOWEST, HIGHEST = 200.0, 600.0  # K: no oil is one outside
+WALTHER = 0.7  # mm2/s
+DENSITY, SPECIFIC_HEAT = 870.0, 2000.0  # kg/m3, J/(kg K): typical of mineral oils
+# Grade: mm2/s at 40 and at 100 degrees C.
+GRADES = {
+    10: (10.0, 2.659),
+    15: (15.0, 3.410),
+    22: (22.0, 4.294),
+    32: (32.0, 5.362),
+    46: (46.0, 6.770),
+    68: (68.0, 8.729),
+    100: (100.0, 11.381),
+    150: (150.0, 15.022),
+    220: (220.0, 19.437),
+    320: (320.0, 24.951),
+    460: (460.0, 31.769),
+    680: (680.0, 41.134),
+}
+NAMES = [f"ISO VG {grade}" for grade in GRADES]
+
+
+class Viscosity(Protocol):
+    """mu(T), Pa s, of temperatures in K."""
+
+    def __call__(self, T: Array) -> Array: ...
+
+
+@dataclass(frozen=True)
+class Exponential:
+    """mu_1 (Pa s) at T_1 (K), beta in 1/K."""
+
+    mu_1: float
+    T_1: float
+    beta: float
+
+    def __call__(self, T: Array) -> Array:
+        return self.mu_1 * np.exp(-self.beta * (np.asarray(T) - self.T_1))
+
+    @classmethod
+    def through(cls, T: Sequence[float], mu: Sequence[float]) -> "Exponential":
+        return cls(mu[0], T[0], log(mu[0] / mu[1]) / (T[1] - T[0]))
+
+
+@dataclass(frozen=True)
+class Vogel:
+    """a in Pa s, b and c in K; c lies below all temperatures."""
+
+    a: float
+    b: float
+    c: float
+
+    def __call__(self, T: Array) -> Array:
+        return self.a * np.exp(self.b / (np.asarray(T) - self.c))
+
+    @classmethod
+    def through(cls, T: Sequence[float], mu: Sequence[float]) -> "Vogel":
+        """From three points: with y = log mu, the ratio of the slopes gives c.
+
+        Raises
+        ------
+        InputError : points that no such law passes through.
+        """
+        first, second = (log(mu[k] / mu[k + 1]) / (T[k + 1] - T[k]) for k in (0, 1))
+        # log(mu_1/mu_2) = b (T_2 - T_1)/((T_1 - c)(T_2 - c)): first/second = (T_3 - c)/(T_1 - c).
+        ratio = first / second
+        if not ratio > 1.0 + 1e-9:
+            raise InputError("three points whose log(mu) does not bend upwards: no law of Vogel's passes through them")
+        c = (ratio * T[0] - T[2]) / (ratio - 1.0)
+        b = first * (T[0] - c) * (T[1] - c)
+        if not c < LOWEST:
+            raise InputError(f"Vogel's law through these points has its pole at {c:.4g} K: below {LOWEST:g} K is needed")
+        return cls(mu[0] * exp(-b / (T[0] - c)), b, c)
+
+
+@dataclass(frozen=True)
+class Walther:
+    """A, B of ASTM D341, rho in kg/m3."""
+
+    A: float
+    B: float
+    rho: float
+
+    def __call__(self, T: Array) -> Array:
+        with np.errstate(over="ignore"):
+            nu = 10.0 ** (10.0 ** (self.A - self.B * np.log10(np.asarray(T)))) - WALTHER
+        return np.maximum(nu, 1e-3) * 1e-6 * self.rho
+
+    @classmethod
+    def through(cls, T: Sequence[float], nu: Sequence[float], rho: float) -> "Walther":
+        """From kinematic viscosities in mm2/s at two temperatures."""
+        y = [log10(log10(one + WALTHER)) for one in nu]
+        B = (y[0] - y[1]) / (log10(T[1]) - log10(T[0]))
+        return cls(y[0] + B * log10(T[0]), B, rho)
+
+
+def named(name: str, rho: float = DENSITY) -> Walther:
+    """An oil by its grade, 'ISO VG 32'.
+
+    Raises
+    ------
+    InputError : no such grade.
+    """
+    words = name.upper().replace("ISO", "").replace("VG", "").replace("-", " ").split()
+    grade = int(words[0]) if len(words) == 1 and words[0].isdigit() and "VG" in name.upper() else -1
+    if grade not in GRADES:
+        close = min(GRADES, key=lambda one: abs(log(one / grade))) if grade > 0 else None
+        near = f" (did you mean ISO VG {close}?)" if close else nearest(name, NAMES)
+        raise InputError(f"{name}: no oil of that name{near}; allowed are {', '.join(NAMES)}")
+    return Walther.through((313.15, 373.15), GRADES[grade], rho)

@@ -1,0 +1,1 @@
+"""Effects beyond the rigid, isoviscous film: one file each."""

@@ -1,0 +1,59 @@
+"""[shear]: oils that are thinner where they are sheared fast: a generalised viscosity, which depends on the shear rate.
+
+    shear rate  g^2 = (U/h)^2 + (h |grad p|)^2/(12 mu^2), the mean of its square across the film
+    Eyring      mu_N asinh(mu_N g/tau_0)/(mu_N g/tau_0)
+    Carreau     mu_N (s + (1 - s) (1 + (lambda g)^2)^((n - 1)/2)),  s = mu at the highest rates over mu_N
+
+mu_N is the viscosity at that place's pressure and temperature. Reynolds' equation keeps its form with the mean viscosity, as is
+usual; profiles across the film are not resolved.
+"""
+
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from ...problems.film.effects import Answer, Cells, Plain
+from ..scene import Finite, Positive
+from ..units import measured
+from .table import EffectTable
+
+
+class Shear(EffectTable):
+    """Shear thinning, by Eyring's or Carreau's law."""
+
+    law: Literal["eyring", "carreau"] = Field(..., description="which law")
+    tau_0: Positive | None = measured("Pa", None, "Eyring stress")
+    time: Positive | None = measured("s", None, "Carreau's time lambda")
+    n: Annotated[Finite, Field(gt=0, le=1)] | None = Field(None, description="Carreau's exponent")
+    least: Annotated[Finite, Field(ge=0, lt=1)] = Field(0.0, description="Carreau: viscosity at the highest rates, over mu_N")
+
+    @model_validator(mode="after")
+    def _complete(self) -> "Shear":
+        needed = ("tau_0",) if self.law == "eyring" else ("time", "n")
+        missing = [name for name in needed if getattr(self, name) is None]
+        if missing:
+            raise ValueError(f"law = {self.law}: {' and '.join(missing)} is missing")
+        return self
+
+    def effect(self, scene: Any) -> "Thinning":
+        return Thinning(self)
+
+
+@dataclass(frozen=True)
+class Thinning(Plain):
+    """Viscosity over mu_N from the shear rate of an answer."""
+
+    table: Shear
+
+    def apply(self, at: Answer, out: Cells) -> None:
+        table, U, h = self.table, at.problem.U, at.h
+        along, across = at.gradient
+        rate = np.sqrt((U / h) ** 2 + (h**2 * (along**2 + across**2)) / (12.0 * at.mu**2))
+        if table.law == "eyring":
+            x = at.base.mu * out["viscosity"] * at.law.viscosity(at.p) * rate / table.tau_0
+            out["viscosity"] *= np.where(x > 1e-4, np.arcsinh(x) / np.maximum(x, 1e-4), 1.0 - x * x / 6.0)
+        else:
+            thin = (1.0 + (table.time * rate) ** 2) ** (0.5 * (table.n - 1.0))  # type: ignore[operator]
+            out["viscosity"] *= table.least + (1.0 - table.least) * thin

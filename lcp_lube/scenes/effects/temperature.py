@@ -1,0 +1,148 @@
+"""[temperature]: viscosity that depends on the temperature, and the heat balance that the temperature follows from."""
+
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from ...base.parallel import Array
+from ...problems.film import oils
+from ...problems.film.effects import Answer, Cells, Plain, Report
+from ...problems.film.energy import carried, fresh_flow, heated
+from ..scene import Finite, NotNegative, Positive
+from ..units import measured
+from .table import EffectTable
+
+Kelvin = Annotated[Finite, Field(ge=oils.LOWEST, le=oils.HIGHEST)]
+POINTS = {"exponential": 2, "walther": 2, "vogel": 3}
+
+
+class Temperature(EffectTable):
+    """Heat: by a balance of the whole bearing, or by the energy equation averaged over the film.
+
+    The viscosity by temperature: of an oil by its grade; by a law through points T, mu (then mu is not given elsewhere, and the
+    film without this effect has that of T_in); or exp(-beta (T - T_in)) times the scene's mu.
+    """
+
+    model: Literal["energy", "effective"] = Field("energy", description="equation in the film, or one effective temperature")
+    T_in: Kelvin = measured("K", 313.15, "temperature of the oil that is supplied")
+    oil: str | None = Field(None, description="grade of a mineral oil (ISO 3448), ISO VG 32 say; viscosity index 100")
+    law: Literal["exponential", "vogel", "walther"] | None = Field(None, description="law through the points T, mu")
+    T: list[Kelvin] | None = measured("K", None, "temperatures at which mu is given: 2, or 3 for vogel")
+    mu: list[Positive] | None = measured("Pa s", None, "viscosities at T")
+    beta: Annotated[Finite, Field(ge=0, le=1)] | None = measured("1/K", None, "viscosity: mu exp(-beta (T - T_in))")
+    rho: Positive = measured("kg/m^3", oils.DENSITY, "density of the oil")
+    specific_heat: Positive = measured("J/kg/K", oils.SPECIFIC_HEAT, "specific heat of the oil")
+    exchange: NotNegative = measured("W/m^2/K", 0.0, "heat transfer to the walls (energy); 0: adiabatic")
+    T_wall: Kelvin | None = measured("K", None, "temperature of the walls; default T_in")
+    carry_over: Annotated[Finite, Field(ge=0, le=1)] | None = Field(
+        None,
+        description="share of the oil arriving at a groove or supply (or east, for the west side) that goes on; default all, "
+        "nothing at sides",
+    )
+    share: Annotated[Finite, Field(gt=0, le=1)] = Field(
+        0.5, description="effective: T_eff = T_in + share (T_out - T_in), 1/2 in ISO 7902"
+    )
+
+    @model_validator(mode="after")
+    def _one_law(self) -> "Temperature":
+        given = [name for name in ("oil", "law", "beta") if getattr(self, name) is not None]
+        if len(given) != 1:
+            found = " and ".join(given) or "none"
+            raise ValueError(f"one of oil, law (with T and mu) and beta is needed for the viscosity, found {found}")
+        if self.oil is not None:
+            oils.named(self.oil)
+        if (self.law is None) != (self.T is None) or (self.law is None) != (self.mu is None):
+            raise ValueError("law, T and mu go together: all of them or none")
+        if self.law is not None and self.T is not None and self.mu is not None:
+            n = POINTS[self.law]
+            if len(self.T) != n or len(self.mu) != n:
+                raise ValueError(f"T and mu: {n} values each are needed for law = {self.law}")
+            if sorted(set(self.T)) != self.T or sorted(set(self.mu), reverse=True) != self.mu:
+                raise ValueError(f"T = {self.T}, mu = {self.mu}: T rising and mu falling is needed")
+            self.viscosity(0.0)
+        return self
+
+    @property
+    def own_mu(self) -> float | None:
+        """The viscosity at T_in, where it follows from this table; Pa s."""
+        return None if self.beta is not None else float(self.viscosity(0.0)(np.array(self.T_in)))
+
+    def viscosity(self, mu: float) -> oils.Viscosity:
+        """The law; mu : the scene's viscosity, at T_in, for those who go by beta."""
+        if self.oil is not None:
+            return oils.named(self.oil, self.rho)
+        if self.beta is not None:
+            return oils.Exponential(mu, self.T_in, self.beta)
+        assert self.T is not None and self.mu is not None  # as `_one_law` found
+        if self.law == "walther":
+            return oils.Walther.through(self.T, [1e6 * one / self.rho for one in self.mu], self.rho)
+        return (oils.Vogel if self.law == "vogel" else oils.Exponential).through(self.T, self.mu)
+
+    def effect(self, scene: Any) -> "Heat":
+        mu = scene.mu_0
+        wall = (self.T_wall or self.T_in) - self.T_in
+        return Heat(self.viscosity(mu), mu, self, wall)
+
+
+@dataclass(frozen=True)
+class Heat(Plain):
+    """Viscosity from the temperatures of an answer. law : mu(T), Pa s. mu : where there is no effect. wall : T_wall - T_in."""
+
+    law: oils.Viscosity
+    mu: float
+    table: Temperature
+    wall: float
+
+    def apply(self, at: Answer, out: Cells) -> None:
+        T = np.clip(self._temperature(at)[0], oils.LOWEST, oils.HIGHEST)
+        out["viscosity"] *= self.law(T) / self.mu
+
+    def _temperature(self, at: Answer) -> tuple[Array, dict[str, float], float]:
+        """T at the points, K; what is told of the heat; the equations' residual. Taken once an answer. Collective."""
+        if id(self) not in at.memory:
+            at.memory[id(self)] = self._solve(at)
+        return at.memory[id(self)]
+
+    def _solve(self, at: Answer) -> tuple[Array, dict[str, float], float]:
+        table, reduce = self.table, at.problem.reduce
+        flow, rho_c = carried(at), table.rho * table.specific_heat
+        power = float(reduce.sum(flow.dissipation))
+        fresh = fresh_flow(at, flow, table.carry_over)
+        if table.model == "energy":
+            found = heated(at, flow, rho_c, table.exchange, self.wall, table.carry_over)
+            T, out, residual = table.T_in + found.theta, found.out, found.residual
+            walls = np.where(flow.free, flow.area * (found.theta - self.wall).reshape(flow.area.shape), 0.0)
+            by_flow = out - table.exchange * reduce.sum(walls)
+            effective = reduce.sum(np.where(flow.free.ravel(), T, 0.0)) / max(reduce.sum(flow.free.astype(float)), 1.0)
+        else:
+            out = by_flow = power
+            rise = power / (rho_c * fresh) if fresh > 0 else np.inf if power > 0 else 0.0
+            effective, residual = table.T_in + table.share * rise, 0.0
+            T = np.full(at.p.size, effective)
+        T_out = table.T_in + (by_flow / (rho_c * fresh) if fresh > 0 else 0.0 if not power > 0 else np.inf)
+        size = max(abs(flow.power), abs(power))
+        told = {
+            "temperature_max": max(reduce.max(T), T_out if table.model == "effective" else -np.inf),
+            "temperature_effective": float(effective),
+            "temperature_out": float(T_out),
+            "heat_power": flow.power,
+            "heat_out": out,
+            "heat_defect": abs(flow.power - out) / size if size > 0 else 0.0,
+        }
+        return T, told, residual
+
+    def report(self, at: Answer) -> Report:
+        T, told, residual = self._temperature(at)
+        measures = {"energy_residual": residual, "heat_defect": told["heat_defect"]}
+        hottest, coldest = told["temperature_max"], at.problem.reduce.min(T)
+        failure = ""
+        if not (hottest <= oils.HIGHEST and coldest >= oils.LOWEST):
+            failure = (
+                f"no steady temperature: the oil would have {coldest:.4g} to {hottest:.4g} K, {oils.LOWEST:g} to "
+                f"{oils.HIGHEST:g} K are allowed; too little oil carries the heat away"
+            )
+        mu = at.base.mu * at.cells["viscosity"] * at.law.viscosity(at.p)
+        numbers = {key: value for key, value in told.items() if key != "heat_defect"}
+        return Report(numbers, measures, {"T": (T, "K"), "mu": (mu, "Pa s")}, failure)

@@ -1,0 +1,114 @@
+"""What the decision leaves out changes the quantity by less than the tolerance when it is solved for, over many scenes."""
+
+import pytest
+
+from lcp_lube import InputError, load_scene, solve
+from lcp_lube.drivers.decision import PART, coarse_shape, sentence
+
+SLIDER = {"shape": "linear", "h_start": 4e-5, "h_end": 2e-5}
+PAD = {"family": "bearing", "L": 0.1, "U": 5.0, "n": 999, "fluid": {"mu": 0.02, "p_supply": 1e5}, "film": [SLIDER]}
+WIDE = {**PAD, "dimension": 2, "width": 0.08, "nx": 79, "ny": 39}
+WARM, COOL = {"beta": 0.03, "T_in": 320.0}, {"beta": 1e-4, "T_in": 320.0}
+FLUID = {"mu": 0.02, "p_supply": 1e5, "barus": 2e-8, "density": "dowson-higginson"}
+CAVITY = [{"shape": "sinusoid", "h_min": 8e-6, "h_max": 2e-5}]
+SCENES = {
+    "all laws": {**PAD, "fluid": FLUID, "temperature": WARM, "shear": {"law": "eyring", "tau_0": 5e4}},
+    "weak laws": {**PAD, "fluid": {**FLUID, "barus": 1e-11}, "temperature": COOL, "shear": {"law": "eyring", "tau_0": 1e7}},
+    "cavity": {**PAD, "film": CAVITY, "fluid": FLUID, "temperature": WARM},
+    "cavity, weak": {**PAD, "film": CAVITY, "U": 0.05, "fluid": FLUID, "temperature": WARM},
+    "liner": {**PAD, "elastic": {"compliance": 1e-13}, "roughness": {"sigma": 4e-7}},
+    "soft liner": {**PAD, "elastic": {"compliance": 2e-12}, "roughness": {"sigma": 3e-6}},
+    "wide": {**WIDE, "fluid": FLUID, "temperature": WARM},
+    "wide, slow": {
+        **{**WIDE, "nx": 119, "ny": 47, "U": 0.02},
+        **{"fluid": FLUID, "temperature": WARM, "elastic": {"compliance": 1e-12}},
+    },
+    "friction": {**WIDE, "fluid": FLUID, "temperature": COOL, "quantity": "friction"},
+    "pocketed_pad_2d": {"scene": "pocketed_pad_2d", "nx": 119, "ny": 47},
+    "balance": {**PAD, "fluid": FLUID, "temperature": COOL, "balance": {"load": 3e5}},
+    "adiabatic_journal": {"scene": "adiabatic_journal", "n": 300},
+    "lined_pad": {"scene": "lined_pad", "n": 999},
+}
+
+
+def answer(name, model):
+    """The quantity, its value, and the model."""
+    data = dict(SCENES[name])
+    quantity = data.pop("quantity", None)
+    scene = load_scene(data.pop("scene"), data) if "scene" in data else load_scene(data)
+    with solve(scene, model=model) as s:
+        assert s.converged, s.message
+        found = s.settings.get("balance")
+        return (found["value"] if found else s.numbers[quantity or "load"]), s.settings["model"]
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_what_is_left_out_does_not_count(name):
+    value, model = answer(name, "auto")
+    full, _ = answer(name, "full") if model["left_out"] else (value, None)
+    assert value == pytest.approx(full, rel=model["tolerance"])
+    assert all(abs(effect) < PART * model["tolerance"] for effect in model["left_out"].values())
+    assert all(effect is None or abs(effect) >= PART * model["tolerance"] for effect in model["kept"].values())
+    # Of a fine solve with all effects; what is left out makes it cheaper.
+    if not model["left_out"]:
+        assert model["share_of_work"] <= 0.15
+
+
+def test_the_work_of_the_decision():
+    """In parts of the full solve's, which it spares."""
+    for name in ("weak laws", "cavity, weak", "wide, slow"):
+        data = SCENES[name]
+        with solve(data) as s, solve(data, model="full") as full:
+            spared = full.settings["details"]["coupling_work"]
+            own = s.settings["details"].get("coupling_work", s.problem.unknowns)
+            model = s.settings["model"]
+            assert model["left_out"] and model["share_of_work"] * own <= 0.15 * spared
+            assert sentence(model).startswith("left out: ") and "%" in sentence(model)
+
+
+def test_effects_are_left_out_and_kept():
+    assert set(answer("weak laws", "auto")[1]["left_out"]) == {"barus", "density", "temperature", "shear"}
+    strong = answer("all laws", "auto")[1]
+    assert "temperature" in strong["kept"] and strong["kept"]["temperature"] < -0.05 and strong["kept"]["barus"] > 0
+
+
+def test_least_and_named():
+    plain = load_scene({**SCENES["cavity"], "fluid": {"mu": 0.02, "p_supply": 1e5}, "temperature": None})
+    with solve(plain) as reference, solve(SCENES["cavity"], model="least") as least:
+        assert least.load == pytest.approx(reference.load, rel=1e-9) and "model" not in reference.settings
+    with solve(SCENES["cavity"], model="temperature, barus") as s:
+        assert set(s.settings["model"]["left_out"]) == {"density"} and s.temperature_max > 320.0
+
+
+def test_an_oil_without_its_temperature():
+    """The viscosity is that of T_in."""
+    scene = load_scene("lined_pad", {"n": 60})
+    with solve(scene, model="least") as s:
+        assert s.settings["scene_data"]["temperature"]["oil"] == "ISO VG 68"
+        assert s.problem.mu == pytest.approx(scene.temperature.own_mu)
+
+
+def test_small_grids_have_all_effects():
+    with solve({**SCENES["all laws"], "n": 30}) as s:
+        assert set(s.settings["model"]["kept"]) == {"barus", "density", "temperature", "shear"}
+        assert "too small" in s.settings["model"]["reason"]
+    assert coarse_shape((30,), 3) is None and coarse_shape((999,), 3) == (33,)
+    nx, ny = coarse_shape((199, 79), 3)
+    assert nx * ny * 3 <= 0.1 * 199 * 79
+
+
+def test_asked_accuracy_is_the_tolerance():
+    with solve(SCENES["all laws"], accuracy=0.2) as s:
+        assert s.converged and s.settings["model"]["tolerance"] == 0.2 and "density" in s.settings["model"]["left_out"]
+
+
+@pytest.mark.parametrize(
+    "model, message",
+    [
+        ("temprature", "--model temprature: allowed are auto, full, least.*nearest is temperature"),
+        ("elastic", "has no data for it; it has barus, density, temperature, shear"),
+    ],
+)
+def test_refused(model, message):
+    with pytest.raises(InputError, match=message):
+        solve(SCENES["all laws"], model=model)
