@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..api import solve
+from ..base.progress import Progress
 from ..base.quantity import in_si, quantity
 from ..drivers.ask import Ask
 from ..errors import InputError
@@ -87,7 +88,7 @@ def ask_of(args: argparse.Namespace, monitor: Monitor | None = None) -> Ask:
     )
 
 
-def solution_of(args: argparse.Namespace, monitor: Monitor | None = None) -> Solution:
+def solution_of(args: argparse.Namespace, monitor: Monitor | None = None, progress: Progress | None = None) -> Solution:
     """What `solve` with these arguments finds. Collective."""
     scene = scene_of(args)
     return solve(
@@ -102,6 +103,7 @@ def solution_of(args: argparse.Namespace, monitor: Monitor | None = None) -> Sol
         resume=args.resume,
         reduction=args.reduction,
         memory_check=not args.no_memory_check,
+        progress=progress,
     )
 
 

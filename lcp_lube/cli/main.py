@@ -8,8 +8,9 @@ from collections.abc import Callable
 from mpi4py import MPI
 
 from ..base.options import check_unread
+from ..base.progress import Line
 from ..errors import InputError, nearest
-from ..output.console import say
+from ..output.console import coloured, say
 from ..output.results import as_dict, finite, summary
 from ..output.table import table as text_table
 from ..problems.solution import Step
@@ -46,7 +47,11 @@ def run_solve(args: argparse.Namespace) -> int:
         if args.monitor and MPI.COMM_WORLD.rank == 0:
             print(monitor_line(k, step), file=sys.stderr, flush=True)
 
-    solution = solution_of(args, monitor)
+    line = Line()
+    try:
+        solution = solution_of(args, monitor, None if args.monitor or MPI.COMM_WORLD.rank else line)
+    finally:
+        line.end()
     try:
         check_unread()
         if args.explain and MPI.COMM_WORLD.rank == 0:
@@ -55,7 +60,7 @@ def run_solve(args: argparse.Namespace) -> int:
         if MPI.COMM_WORLD.rank == 0:
             for doubt in data["warnings"]:
                 print(f"lcp-lube: warning: {doubt}", file=sys.stderr, flush=True)
-        say(json.dumps(finite(data)) if args.json else summary(data))
+        say(json.dumps(finite(data)) if args.json else coloured(summary(data), data["outcome"], data["converged"]))
         failed = []  # a file that cannot be written costs neither the result nor the other files
         for path in args.output:
             try:

@@ -10,6 +10,7 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from ..base.progress import of_ladder
 from ..errors import InputError, nearest
 from ..problems.solution import Outcome, Solution
 from ..registry import METHODS
@@ -99,6 +100,8 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
                 "estimate": estimate,
             }
         )
+        seconds_by_level = [float(level["time_s"]) for level in levels]
+        ask.tell("accuracy", f"{quantity} to {estimate:.0e}", of_ladder(seconds_by_level, estimate, tol, 2.0 ** len(shape)))
         times = {name: times.get(name, 0.0) + seconds for name, seconds in solution.times.items()}
         shape = tuple(int(n + meshes) for n, meshes in zip(shape, problem.grid.meshes, strict=True))  # half the spacing
         end = _end([level["estimate"] for level in levels], values, tol, problem.grid.size) or _no_room(

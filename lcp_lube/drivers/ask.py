@@ -9,6 +9,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..base.options import wants_ksp
+from ..base.progress import Progress
 from ..errors import InputError
 from ..problems.solution import Fields, Problem, Solution
 from ..solvers.newton import Monitor, Stopping
@@ -51,6 +52,7 @@ class Ask:
     reduction : solve no more than symmetry leaves (`symmetry`).
     memory_check : refuse a run that needs more memory than there is, by an estimate (`memory`).
     monitor : called after every step with its number and record.
+    progress : told by the loops over grids, levels and time steps how far they have come.
     comm : communicator of petsc4py or mpi4py; default all ranks.
     """
 
@@ -73,6 +75,7 @@ class Ask:
     reduction: bool = True
     memory_check: bool = True
     monitor: Monitor | None = None
+    progress: Progress | None = None
     comm: PETSc.Comm | None = None
 
     def __post_init__(self) -> None:
@@ -82,6 +85,11 @@ class Ask:
             object.__setattr__(self, "options", {})
         if self.comm is not None:
             object.__setattr__(self, "comm", PETSc.Comm(self.comm))  # mpi4py's will do too
+
+    def tell(self, loop: str, words: str, part: float) -> None:
+        """How far a loop has come, for `progress`."""
+        if self.progress is not None:
+            self.progress(loop, words, part)
 
     @property
     def mpi(self) -> MPI.Comm:

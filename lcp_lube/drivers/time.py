@@ -102,6 +102,8 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
             problem.accept(step, solution.fields)
         near = solution.fields
         solution.destroy()
+        done = len(certificates)
+        ask.tell("time", f"time step {done} of {problem.steps}", done / problem.steps)
     if outcome is Outcome.CONVERGED:
         message = f"{problem.steps} time steps, {len(record) / problem.steps:.1f} iterations each"
     else:

@@ -21,3 +21,13 @@ def say(text: str) -> None:
         except OSError as error:
             sys.stdout = open(os.devnull, "w")  # noqa: SIM115  (else Python tries to flush it once more at its end)
             raise InputError(f"standard output: {error.strerror}") from None
+
+
+def coloured(text: str, word: str, good: bool) -> str:
+    """The text with a word at the start of a line in green or, bold, in red; as it is where no terminal will show it.
+
+    NO_COLOR, or TERM=dumb, switch that off.
+    """
+    if not sys.stdout.isatty() or os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb":
+        return text
+    return f"\n{text}".replace(f"\n{word}", f"\n\x1b[{'32' if good else '1;31'}m{word}\x1b[0m", 1)[1:]

@@ -1,0 +1,93 @@
+"""How far a long run has come: what loops tell, the line that is shown on a terminal and nowhere else."""
+
+import io
+import os
+import pty
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from conftest import ENVIRONMENT
+
+from lcp_lube import solve
+from lcp_lube.base.progress import ORDER, Line, decades, duration, of_ladder
+from lcp_lube.output.console import coloured
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_nothing_is_shown_at_once_and_nothing_off_a_terminal() -> None:
+    now = [0.0]
+    screen, file = Terminal(), io.StringIO()
+    lines = [Line(stream, clock=lambda: now[0]) for stream in (screen, file)]
+    for seconds in (0.5, 1.9, 4.0):
+        now[0] = seconds
+        for line in lines:
+            line("grids", "grid 10", 0.25)
+            if seconds < 2:
+                assert screen.getvalue() == ""
+    assert file.getvalue() == "" and "grid 10; about 12 s left" in screen.getvalue()
+    lines[0].end()
+    assert screen.getvalue().endswith("\r\x1b[K")
+
+
+def test_the_outermost_loop_knows_the_time_left() -> None:
+    line = Line(Terminal(), clock=lambda: 10.0)
+    line("accuracy", "load to 1e-02", 0.5)
+    line("grids", "grid 20", 0.9)
+    assert line.text(20.0) == "lcp-lube: load to 1e-02, grid 20; about 10 s left"
+    line("accuracy", "load to 5e-03", 0.8)  # its grid has ended
+    assert line.text(20.0) == "lcp-lube: load to 5e-03; about 2 s left"
+
+
+def test_words_and_parts() -> None:
+    assert [duration(s) for s in (0.1, 40, 600, 7200)] == ["1 s", "40 s", "10 min", "2 h"]
+    assert decades(1.0, 1e-4, 1e-8) == pytest.approx(0.5) and decades(1.0, 0.0, 1e-8) == 0.0
+    assert decades(1.0, 1e-12, 1e-8) == 1.0 and decades(float("nan"), 1.0, 1e-8) == 0.0
+    assert of_ladder([1.0, 4.0], 1e-2, 1e-3, 4.0) == pytest.approx(5.0 / (5.0 + 16.0 + 64.0))
+    assert of_ladder([1.0], 1e-4, 1e-3, 4.0) == 1.0 and 0 < of_ladder([1.0], float("inf"), 1e-3, 4.0) < 0.1
+
+
+@pytest.mark.parametrize(
+    "scene, how, loop",
+    [
+        ("problem1", {"accuracy": 1e-4}, "accuracy"),
+        ("problem4", {"n": 30, "method": "fas"}, "grids"),
+        ("squeeze", {"n": 15, "steps": 6}, "time"),
+    ],
+)
+def test_loops_tell(scene: str, how: dict[str, object], loop: str) -> None:
+    told: list[tuple[str, str, float]] = []
+    with solve(scene, **how, progress=lambda *what: told.append(what)) as solution:
+        assert solution.converged
+    assert {name for name, _, _ in told} <= set(ORDER) and all(0.0 <= part <= 1.0 for _, _, part in told)
+    parts = [part for name, _, part in told if name == loop]
+    assert parts and (loop == "grids" or parts[-1] == 1.0)
+    if loop == "time":
+        assert parts == sorted(parts) and len(parts) == 6
+
+
+def test_colours_on_a_terminal_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = "scene\nconverged: 3 iterations"
+    assert coloured(text, "converged", True) == text  # pytest's stdout is none
+    monkeypatch.setattr(sys, "stdout", Terminal())
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    assert coloured(text, "converged", True) == "scene\n\x1b[32mconverged\x1b[0m: 3 iterations"
+    assert "\x1b[1;31mstalled" in coloured("scene\nstalled: 3", "stalled", False)
+    monkeypatch.setenv("NO_COLOR", "1")
+    assert coloured(text, "converged", True) == text
+
+
+def test_output_of_a_pipe_has_no_trace_of_it(tmp_path: Path) -> None:
+    """On a terminal stderr may have a line that is cleared; the summary is on stdout all the same."""
+    command = [sys.executable, "-m", "lcp_lube", "solve", "problem1", "--n", "30"]
+    ours, theirs = pty.openpty()
+    done = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, stdout=subprocess.PIPE, stderr=theirs, check=False)
+    os.close(theirs)
+    os.close(ours)
+    assert done.returncode == 0 and b"\x1b" not in done.stdout and b"converged" in done.stdout
