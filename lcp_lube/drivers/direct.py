@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from ..base.options import recipe
-from ..base.progress import decades
 from ..base.stages import Stages
 from ..problems.box import BoxProblem
 from ..problems.facts import Facts
@@ -19,13 +18,14 @@ from ..scenes.scene import Solvable
 from ..solvers.enclosure import enclose
 from ..solvers.job import Job
 from ..solvers.method import Method
-from ..solvers.newton import Monitor, Stopping, iterate
+from ..solvers.newton import Stopping, iterate
 from . import memory
 from .ask import Ask, Start
 from .checkpoint import CHOICES, Checkpoint, Checkpointer, load
 from .compose import Inner
 from .levels import level_shapes
 from .plan import Plan, default_recipe, plan
+from .watch import watching
 
 # A coarse answer is a start: its front matters, not its last digits. An interior method's layer there must be thin, though.
 COARSE_EPS = {False: 1e-4, True: 1e-8}  # by MethodEntry.interior
@@ -252,9 +252,8 @@ class Run:
             else:
                 before = saved.restore(method, level.grid, reached) if saved is not None else []
                 self._saved = None
-                ended = self._keeper.iterate(
-                    method, level.grid, stopping, self._monitor(level, stopping), before, reached, **record
-                )
+                monitor = watching(self.ask, level, self.problem, stopping)
+                ended = self._keeper.iterate(method, level.grid, stopping, monitor, before, reached, **record)
                 self.outcome, self.message, self.steps = ended
             self.fields = method.fields
             if not tried:
@@ -263,23 +262,6 @@ class Run:
             self.ksp_type, self.pc_type = (krylov.ksp_type, krylov.pc_type) if krylov else (None, None)
         finally:
             method.destroy()
-
-    def _monitor(self, level: Problem, stopping: Stopping) -> Monitor | None:
-        """The caller's monitor, and what `progress` is told: the grid, and how far ||F|| has come down on it."""
-        ask, name = self.ask, " x ".join(map(str, level.grid.shape))
-        if ask.progress is None:
-            return ask.monitor
-        first: list[float] = []
-        share = level.grid.size / self.problem.grid.size  # coarser grids before it have taken some of the time
-
-        def watch(k: int, step: Step) -> None:
-            if ask.monitor is not None:
-                ask.monitor(k, step)
-            first.append(step.norm)
-            part = share * decades(max(first), step.norm, stopping.eps1)
-            ask.tell("grids", f"grid {name}, step {k}, ||F|| {step.norm:.1e}", part)
-
-        return watch
 
     def enclose(self, problem: LubricationProblem) -> Enclosure:
         """A band around the answer, by the inner solver that has just solved this problem, or would have."""
