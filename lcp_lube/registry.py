@@ -43,7 +43,8 @@ class MethodEntry(Entry):
     if it solves no linear systems; nested: it can
     start from a coarser grid's answer, which must lie strictly inside p, r > 0 if it is an interior method, and does so by
     default on grids of more than `nested_above` points; eps: its default tolerances of ||F|| and ||alpha d||; fallback: the
-    methods that take over in turn where it fails; variants: the same idea for other kinds of problems.
+    methods that take over in turn where it fails; at_most: the points that it can do; variants: the same idea for other kinds
+    of problems.
     """
 
     kinds: tuple[str, ...] = ("lubrication",)
@@ -53,6 +54,7 @@ class MethodEntry(Entry):
     interior: bool = True
     eps: tuple[float, float] = (1e-8, 1e-8)
     fallback: tuple[str, ...] = ()
+    at_most: float = inf
     variants: dict[str, "MethodEntry"] = field(default_factory=dict)
 
     def of(self, kind: str) -> "MethodEntry":
@@ -79,7 +81,7 @@ METHODS: dict[str, MethodEntry] = {
         nested=True,
         nested_above=SMALL,
         interior=False,
-        fallback=("monotone", "din-pc"),
+        fallback=("pivoting", "monotone", "din-pc"),
         variants={
             "box": MethodEntry(
                 "lcp_lube.solvers.box_active_set:build",
@@ -138,7 +140,7 @@ METHODS: dict[str, MethodEntry] = {
         systems=(),
         interior=False,
         eps=(1e-11, inf),
-        fallback=("active-set", "monotone", "din-pc"),
+        fallback=("active-set", "pivoting", "monotone", "din-pc"),
         variants={
             "box": MethodEntry(
                 "lcp_lube.solvers.fas.box:build",
@@ -158,6 +160,13 @@ METHODS: dict[str, MethodEntry] = {
         nested=True,
         nested_above=200,
         interior=False,
+    ),
+    "pivoting": MethodEntry(
+        "lcp_lube.solvers.pivoting:build",
+        "principal pivoting, elimination without subtraction: small films of any ratio of heights",
+        systems=(),
+        interior=False,
+        at_most=SMALL,
     ),
     "fbn-a": MethodEntry("lcp_lube.solvers.fischer:build_armijo", "Fischer-Burmeister Newton, Armijo rule on ||F||^2/2"),
     "fbn-i": MethodEntry("lcp_lube.solvers.fischer:build_inexact", "Fischer-Burmeister Newton, inexact decrease of ||F||"),

@@ -1,12 +1,14 @@
 """A film solved without the package's discretisation, matrices or methods: what `wild_films` are compared with.
 
 Faces are listed one by one, flows through them and the balances of the cells computed in extended precision, so that they
-telescope whatever the film ratio; steps are semismooth Newton steps by dense elimination. A wall that moves to smaller x is
-discretised as it stands, upwind from the east. The answer of a Newton step that changes no sign is the discrete solution,
-which is unique; where steps cycle, they start again from the package's answer, and have to end there all the same.
+telescope whatever the film ratio; steps are semismooth Newton steps by dense elimination, or by
+sparse elimination with 100 digits where conductances differ by more than double precision can factor. A wall that moves to
+smaller x is discretised as it stands, upwind from the east. The answer of a Newton step that changes no sign is the discrete
+solution, which is unique; where steps cycle, they start again from the package's answer, and have to end there all the same.
 """
 
 from dataclasses import dataclass
+from decimal import Decimal, localcontext
 from itertools import pairwise
 from typing import Any
 
@@ -14,6 +16,7 @@ import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 
 LONG = np.longdouble
+BEYOND_LU = 1e12  # ratio of conductances at which factors in double precision are no longer to be trusted
 COLUMNS = ("i", "j", "k", "u", "b_i", "b_j", "p_i", "p_j", "r_i", "r_j")
 GAUSS = 0.5 / np.sqrt(3.0)
 
@@ -39,15 +42,45 @@ class Faces:
             getattr(self, name).append(row.get(name, 0.0))
 
 
-def places(n: int, length: float, first: str, last: str) -> tuple[np.ndarray, np.ndarray, float]:
-    """Coordinates of the points with a neighbour before and behind, of the faces, and the spacing."""
+@dataclass
+class Line:
+    """Points with a neighbour before and behind and the faces between, m; distances of the points; the cells' ends."""
+
+    points: np.ndarray
+    faces: np.ndarray
+    gaps: np.ndarray
+    starts: np.ndarray
+    ends: np.ndarray
+
+    @property
+    def widths(self) -> np.ndarray:
+        return self.ends - self.starts
+
+    def turned(self, length: float) -> "Line":
+        points, faces, starts, ends = (length - a[::-1] for a in (self.points, self.faces, self.ends, self.starts))
+        return Line(points, faces, self.gaps[::-1], starts, ends)
+
+
+def line_of(n: int, length: float, first: str, last: str, chosen: np.ndarray | None) -> Line:
+    """n points between two sides, evenly spaced or where they were chosen to lie; a cell ends half-way between two points."""
+    if chosen is not None:
+        before = {"open": 0.0, "closed": -chosen[0], "periodic": chosen[-1] - length}[first]
+        behind = {"open": length, "closed": 2.0 * length - chosen[-1], "periodic": chosen[0] + length}[last]
+        around = np.concatenate([[before], chosen, [behind]])
+        gaps, faces, points = np.diff(around), 0.5 * (around[1:] + around[:-1]), np.clip(around, 0, length)
+        starts, ends = chosen - 0.5 * gaps[:-1], chosen + 0.5 * gaps[1:]
+        if first == "periodic":  # one face, seen from both ends
+            points[[0, -1]], faces = chosen[[-1, 0]], np.mod(faces, length)
+            faces[-1], gaps[-1] = faces[0], gaps[0]
+        return Line(points, faces, gaps, starts, ends)
     offset = {"open": 1.0, "closed": 0.5, "periodic": 0.5}
     meshes = n + offset[first] + offset[last] - 1.0
     points, faces = np.arange(-1, n + 1), np.arange(0, n + 1)
     if first == "periodic":
         points, faces = points % n, faces % n
-    lines = (np.clip(points + offset[first], 0, meshes), np.clip(faces + offset[first] - 0.5, 0, meshes))
-    return lines[0] * (length / meshes), lines[1] * (length / meshes), length / meshes
+    d = length / meshes
+    at, between = np.clip(points + offset[first], 0, meshes) * d, np.clip(faces + offset[first] - 0.5, 0, meshes) * d
+    return Line(at, between, np.full(n + 1, d), at[1:-1] - 0.5 * d, at[1:-1] + 0.5 * d)
 
 
 def inside(jumps: Any, a: float, b: float) -> list[float]:
@@ -55,19 +88,19 @@ def inside(jumps: Any, a: float, b: float) -> list[float]:
 
 
 def resistance(
-    film: Any, a: float, b: float, plain: float, s: float, width: float, jumps: Any, across: Any
+    film: Any, a: float, b: float, plain: float, s: float, strip: tuple[float, float], jumps: Any, across: Any
 ) -> tuple[float, float]:
-    """C and H of the face between points a and b on the line s: in series along t, side by side across it.
+    """C and H of the face between points a and b on the line s: in series along t, side by side across it, over the strip.
 
     plain : film at the face, for a face without jumps.
     """
-    cuts, found = inside(across, s - 0.5 * width, s + 0.5 * width), inside(jumps, a, b)
+    cuts, found = inside(across, *strip), inside(jumps, a, b)
     if not cuts and not found:
         return plain**3, plain
-    ends = [s - 0.5 * width, *cuts, s + 0.5 * width]
+    ends = [strip[0], *cuts, strip[1]]
     C = H = 0.0
     for low, high in pairwise(ends):
-        middle, share = (0.5 * (low + high), (high - low) / width) if cuts else (s, 1.0)
+        middle, share = (0.5 * (low + high), (high - low) / (strip[1] - strip[0])) if cuts else (s, 1.0)
         if found:
             series = drag = 0.0
             marks = [a, *found, b]
@@ -91,23 +124,28 @@ def discretise(scene: Any) -> tuple[Faces, int, np.ndarray]:
     p_side = [side.p if side.kind == "open" else 0.0 for side in model.sides]
     mu, U, scheme = model.mu, model.U, model.scheme
     jumps = getattr(model.gap, "jumps", lambda axis: ())
-    ways = kinds[:2] if U >= 0 else kinds[1::-1]
-    xs, xf, dx = places(nx, model.lengths[0], *ways)
-    if U < 0:  # counted from the inlet: where the film jumps, the last bit of x decides which side of it is meant
-        xs, xf = model.lengths[0] - xs[::-1], model.lengths[0] - xf[::-1]
+    # Where lines lie is a choice; U < 0: counted from the inlet, as the last bit of x decides which side of a jump is meant.
+    chosen_x, chosen_y = (model if U >= 0 else model.mirrored).lines(shape)
+    x = line_of(nx, model.lengths[0], *(kinds[:2] if U >= 0 else kinds[1::-1]), chosen_x)
+    if U < 0:
+        x = x.turned(model.lengths[0])
     plane = len(shape) == 2
-    ys, yf, dy = places(ny, model.lengths[1], *kinds[2:]) if plane else (np.zeros(3), np.zeros(2), 1.0)
+    y = (
+        line_of(ny, model.lengths[1], kinds[2], kinds[3], chosen_y)
+        if plane
+        else Line(*map(np.array, ([0.0] * 3, [0.0] * 2, [1.0] * 2, [0.0], [1.0])))
+    )
     jx, jy = jumps("x"), jumps("y")
 
     def film(x: Any, y: Any) -> np.ndarray:
         x, y = np.atleast_1d(x), np.atleast_1d(y)
         return np.broadcast_to(model.gap(x[None, :], y[:, None]), (y.size, x.size))
 
-    at_points, at_x_faces = film(xs, ys[1:-1]), film(xf, ys[1:-1])
+    at_points, at_x_faces = film(x.points, y.points[1:-1]), film(x.faces, y.points[1:-1])
     faces = Faces(*([] for _ in range(10)))
     dead = np.zeros(nx * ny, dtype=bool)
     for m in range(ny):
-        y = float(ys[m + 1])
+        place, strip, width = float(y.points[m + 1]), (float(y.starts[m]), float(y.ends[m])), float(y.widths[m])
         h = at_points[m]
         for f in range(nx + 1):
             ends = (f == 0, f == nx)
@@ -118,29 +156,33 @@ def discretise(scene: Any) -> tuple[Faces, int, np.ndarray]:
                 continue
             if f == nx and kinds[1] == "periodic":
                 continue  # the face at 0
-            along = lambda t, s, f=f: film(xf[f] if t is None else t, s)[0, 0]  # noqa: E731
-            C, H = resistance(along, float(xs[f]), float(xs[f + 1]), float(at_x_faces[m, f]), y, dy, jx, jy)
+            along = lambda t, s, f=f: film(x.faces[f] if t is None else t, s)[0, 0]  # noqa: E731
+            a, b = float(x.points[f]), float(x.points[f + 1])
+            C, H = resistance(along, a, b, float(at_x_faces[m, f]), place, strip, jx, jy)
+            k = C * width / (6 * mu * float(x.gaps[f]))
             i, j = m * nx + (f - 1) % nx, m * nx + f % nx
             h_up = h[f] if U >= 0 else h[f + 1]
-            u, b = {"face": (U * H, U * H), "nodal": (U * H, U * h_up), "upwind": (U * h_up, U * h_up)}[scheme]
-            word = {"b_i": b} if U >= 0 else {"b_j": -b}
+            u, carried = {"face": (H, H), "nodal": (H, h_up), "upwind": (h_up, h_up)}[scheme]
+            u, carried = U * width * u, U * width * carried
+            word = {"b_i": carried} if U >= 0 else {"b_j": -carried}
             if ends[0] and kinds[0] == "open":
-                faces.add(-1, j, C / (6 * mu * dx), u=u, p_i=p_side[0], r_i=model.sides[0].r, **word)
+                faces.add(-1, j, k, u=u, p_i=p_side[0], r_i=model.sides[0].r, **word)
             elif ends[1]:
-                faces.add(i, -1, C / (6 * mu * dx), u=u, p_j=p_side[1], r_j=model.sides[1].r, **word)
+                faces.add(i, -1, k, u=u, p_j=p_side[1], r_j=model.sides[1].r, **word)
             else:
-                faces.add(i, j, C / (6 * mu * dx), u=u, **word)
+                faces.add(i, j, k, u=u, **word)
     if plane:
-        at_y_faces = film(xs[1:-1], yf)
+        at_y_faces = film(x.points[1:-1], y.faces)
         for f in range(ny + 1):
             side = 2 if f == 0 else 3
             if (f in (0, ny) and kinds[side] == "closed") or (f == ny and kinds[3] == "periodic"):
                 continue
             for l in range(nx):
-                a, b = float(ys[f]), float(ys[f + 1])
-                across = lambda t, s, f=f: film(s, yf[f] if t is None else t)[0, 0]  # noqa: E731
-                C, _ = resistance(across, a, b, float(at_y_faces[f, l]), float(xs[l + 1]), dx, jy, jx)
-                k = C * dx / (6 * mu * dy**2)
+                a, b = float(y.points[f]), float(y.points[f + 1])
+                strip = (float(x.starts[l]), float(x.ends[l]))
+                across = lambda t, s, f=f: film(s, y.faces[f] if t is None else t)[0, 0]  # noqa: E731
+                C, _ = resistance(across, a, b, float(at_y_faces[f, l]), float(x.points[l + 1]), strip, jy, jx)
+                k = C * float(x.widths[l]) / (6 * mu * float(y.gaps[f]))
                 i, j = (f - 1) % ny * nx + l, f % ny * nx + l
                 if f == 0 and kinds[2] == "open":
                     faces.add(-1, j, k, p_i=p_side[2])
@@ -156,6 +198,9 @@ class Dense:
 
     def __init__(self, scene: Any):
         faces, self.n, dead = discretise(scene)
+        nx, ny = (*scene.shape, 1)[:2]
+        numbers = np.arange(nx * ny).reshape(ny, nx)
+        self.order = (numbers if nx <= ny else numbers.T).ravel().tolist()
         self.ring = scene.shape[0] if scene.model.sides[0].kind == "periodic" else 0
         self.i, self.j = np.array(faces.i), np.array(faces.j)
         self.k, self.u, self.b_i, self.b_j, self.p_i, self.p_j, self.r_i, self.r_j = (
@@ -203,12 +248,40 @@ class Dense:
         np.add.at(out, self.j, -flow)
         return out[:-1] - self.virtual * self.a * r[:-1]
 
-    def step(self, y: np.ndarray) -> np.ndarray:
+    def branch(self, y: np.ndarray) -> np.ndarray:
         full = y >= 0
         if self.ring:  # one that is empty all round has no steady flow
             lines, values = full.reshape(-1, self.ring), y.reshape(-1, self.ring)
             empty = np.flatnonzero(~lines.any(axis=1))
             lines[empty, np.argmax(values[empty], axis=1)] = True
+        return full
+
+    def exact_step(self, y: np.ndarray) -> np.ndarray:
+        """`step` in arithmetic of 100 digits, by sparse elimination without pivoting: no ratio of conductances is too much."""
+        full = self.branch(y)
+        with localcontext(prec=100):
+            rows: list[dict[int, Decimal]] = [{} for _ in range(self.n)]
+            rhs = [Decimal(0)] * self.n
+            faces = [[exact(v) for v in getattr(self, name)] for name in COLUMNS[2:]]
+            for i, j, k, u, b_i, b_j, p_i, p_j, r_i, r_j in zip(self.i, self.j, *faces, strict=True):
+                for cell, sign in ((i, 1), (j, -1)):
+                    if cell < 0:
+                        continue
+                    flow = u
+                    for other, of_p, of_r, p, r in ((i, k, -b_i, p_i, r_i), (j, -k, b_j, p_j, r_j)):
+                        if other < 0:
+                            flow += of_p * p + of_r * r
+                        else:
+                            value = sign * (of_p if full[other] else -of_r)
+                            rows[cell][other] = rows[cell].get(other, Decimal(0)) + value
+                    rhs[cell] -= sign * flow
+            for cell in np.flatnonzero((self.virtual > 0) & ~full):
+                rows[cell][cell] = rows[cell].get(cell, Decimal(0)) + exact(self.a[cell])
+            x = eliminate(rows, rhs, self.order)
+            return np.array([LONG(str(v)) * LONG(a if f else b) for v, f, a, b in zip(x, full, self.a, self.b, strict=True)])
+
+    def step(self, y: np.ndarray) -> np.ndarray:
+        full = self.branch(y)
         J = np.where(full[None, :], self.A / self.a, -self.B / self.b)
         factors, z = lu_factor(J, check_finite=False), np.zeros(self.n, dtype=LONG)
         for _ in range(20):  # refinement: the equations of this sign pattern, their flows in extended precision
@@ -223,14 +296,52 @@ class Dense:
     def solve(self, start: tuple[np.ndarray, np.ndarray] | None = None) -> tuple[np.ndarray, np.ndarray]:
         """p (Pa above p_c) and r; ArithmeticError where no sign pattern is its own."""
         y = np.ones(self.n, dtype=LONG) if start is None else start[0] * self.a.astype(LONG) - start[1] * self.b
-        for _ in range(60):
-            new = self.step(y)
-            if not np.all(np.isfinite(new)):
-                break
-            pressed = np.max(np.abs(new / self.a), initial=0)
-            flips = (new >= 0) != (y >= 0)
-            tiny = (np.abs(new) / self.a <= max(1e-12 * pressed, self.rounding)) & (np.abs(new) / self.b <= 1e-12)
-            if not np.any(flips & ~tiny):
-                return self.fields(new)
-            y = new
+        for step, many in ((self.step, 60), (self.exact_step, 20)):
+            if step == self.step and float(self.k.max() / self.k.min()) > BEYOND_LU:
+                continue
+            for _ in range(many):
+                new = step(y)
+                if not np.all(np.isfinite(new)):
+                    break
+                pressed = np.max(np.abs(new / self.a), initial=0)
+                flips = (new >= 0) != (y >= 0)
+                tiny = (np.abs(new) / self.a <= max(1e-12 * pressed, self.rounding)) & (np.abs(new) / self.b <= 1e-12)
+                if not np.any(flips & ~tiny):
+                    return self.fields(new)
+                y = new
+            if not np.all(np.isfinite(y)):
+                y = np.ones(self.n, dtype=LONG)
         raise ArithmeticError("the signs do not settle")
+
+
+def exact(value: Any) -> Decimal:
+    """A number of extended precision as it stands."""
+    high = float(value)
+    return Decimal(high) + Decimal(float(LONG(value) - LONG(high)))
+
+
+def eliminate(rows: list[dict[int, Decimal]], rhs: list[Decimal], order: list[int]) -> list[Decimal]:
+    """Gauss without pivoting, in an order that keeps the band short; consumes what it is given."""
+    place = {cell: at for at, cell in enumerate(order)}
+    below: list[set[int]] = [set() for _ in order]  # cells whose rows have an entry in this column, and come later
+    for i, row in enumerate(rows):
+        for j in row:
+            if place[i] > place[j]:
+                below[j].add(i)
+    for k in order:
+        if not rows[k].get(k):
+            raise ArithmeticError("singular")
+        later = {j: v for j, v in rows[k].items() if place[j] > place[k] and v}
+        for i in below[k]:
+            factor = rows[i].pop(k, Decimal(0)) / rows[k][k]
+            if not factor:
+                continue
+            for j, v in later.items():
+                rows[i][j] = rows[i].get(j, Decimal(0)) - factor * v
+                if place[i] > place[j]:
+                    below[j].add(i)
+            rhs[i] -= factor * rhs[k]
+    x = [Decimal(0)] * len(rows)
+    for k in reversed(order):
+        x[k] = (rhs[k] - sum((v * x[j] for j, v in rows[k].items() if place[j] > place[k]), Decimal(0))) / rows[k][k]
+    return x

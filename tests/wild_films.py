@@ -30,7 +30,6 @@ SHAPES = (
     "formula",
     "profile",
 )
-BEYOND = 1e15  # ratio of conductances at which adding the least of them to the largest changes next to nothing
 FORMULAS = (
     "1 + 0.5*sin({a}*x/{L}) + 0.3*cos({b}*y/{W})",
     "exp(2*sin({a}*x/{L} + {b}*y/{W}))",
@@ -146,7 +145,7 @@ def scene_of(seed: int, folder: Path) -> BearingScene:
 class Verdict:
     """What became of a film: refused, converged or another outcome; and how far from the dense answer it is.
 
-    error : of p, in parts of the largest. ratio : largest over smallest conductance of the film's faces.
+    error : of p, in parts of the largest. ratio : largest over smallest conductance of the film's faces, for the record.
     """
 
     seed: int
@@ -162,10 +161,8 @@ class Verdict:
 
     @property
     def good(self) -> bool:
-        """Refused, or right. A film whose conductances' ratio no double holds may end uncertified, but never wrong."""
-        if self.what == "converged":
-            return self.error <= WRONG
-        return self.what == "refused" or self.ratio > BEYOND
+        """Refused, or right."""
+        return self.what == "refused" or (self.what == "converged" and self.error <= WRONG)
 
 
 def judge(seed: int, folder: Path, **how_to: Any) -> Verdict:

@@ -174,7 +174,9 @@ class Run:
             return
         reached, record, failures = self.fields, [], ""
         steps = self.steps
-        for k, name in enumerate(METHODS[self.chosen.method].of(self.problem.kind).fallback, start=1):
+        others = METHODS[self.chosen.method].of(self.problem.kind).fallback
+        others = tuple(name for name in others if self.facts.size <= METHODS[name].at_most)
+        for k, name in enumerate(others, start=1):
             if self.outcome is Outcome.CONVERGED:
                 failure = self.problem.certify(self.fields, self.stopping.eps1).failure
                 if not failure:
@@ -235,6 +237,8 @@ class Run:
         method without linear systems the next one is chosen as if it had been the first.
         """
         entry = METHODS[name].of(self.problem.kind)
+        if not entry.systems:
+            return "", None
         inner = default_recipe(self.facts, entry.systems[0], large=False)[0]
         if self.chosen.system or entry.interior:
             return entry.systems[0], inner
@@ -268,7 +272,7 @@ class Run:
         solver = self.chosen if self.chosen.system else self._plan("active-set", nested=False)
         system, inner = solver.system, solver.recipe
         if self.method != self.chosen.method:
-            system = METHODS[self.method].systems[0]
+            system = (METHODS[self.method].systems or METHODS["active-set"].systems)[0]
             inner = default_recipe(self.facts, system, large=False)[0]
         with recipe(inner), self.stages("certify"):
             return enclose(problem, self.fields, system, Stages())

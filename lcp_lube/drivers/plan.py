@@ -59,6 +59,8 @@ def plan(facts: Facts, ask: Ask, scene: str) -> Plan:
     else:
         fitting = [name for name, other in METHODS.items() if facts.kind in other.kinds]
         raise InputError(f"--method {method}: not for scene {scene}; allowed are {', '.join(fitting)}")
+    if facts.size > entry.at_most:
+        raise InputError(f"--method {method}: for at most {entry.at_most} points, scene {scene} has {facts.size}")
     if not entry.systems:
         for option, given in (("--system", None if system == "auto" else system), ("--recipe", recipe)):
             if given is not None:

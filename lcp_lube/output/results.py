@@ -113,7 +113,7 @@ QUANTITIES = (
     *("rupture_time", "sigma", "sigma_time", "front", "reformation_time"),  # squeeze films
 )
 MEASURES = (
-    *("residual", "natural_residual", "complementarity", "mass_defect", "balance"),
+    *("residual", "natural_residual", "complementarity", "mass_defect", "p_error", "balance"),
     *("coupling", "energy_residual", "heat_defect", "min_p", "min_r"),
 )
 UNITS = {"min_p": " Pa"}

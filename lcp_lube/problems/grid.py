@@ -200,7 +200,15 @@ class Grid:
         """
         start, end = self._owned(side)
         around = self._around[side]
-        return np.full(end - start + 1, self.spacing[side]) if around is None else np.diff(around)[start : end + 1]
+        if around is None:
+            return np.full(end - start + 1, self.spacing[side])
+        return self._once(side, np.diff(around))[start : end + 1]
+
+    def _once(self, side: int, at_faces: Array) -> Array:
+        """Periodic ends have one face, seen from both: to the last bit, or what leaves one cell does not enter the next."""
+        if self.periodic[side]:
+            at_faces[-1] = at_faces[0]
+        return at_faces
 
     def widths(self, side: int, everywhere: bool = False) -> Array:
         """Widths of the owned columns (side 0) or lines (1) of cells, or of all, in spacings: 1, and 1/2 on a mirror."""
@@ -227,9 +235,11 @@ class Grid:
         start, end = self._owned(side)
         around, n, offset, L = self._around[side], self.shape[side], self.offset[side], self.lengths[side]
         if around is not None:
-            at_points, at_faces = around[start : end + 2], (0.5 * (around[1:] + around[:-1]))[start : end + 1]
-            within = np.mod if self.periodic[side] else lambda at, length: np.clip(at, 0.0, length)
-            return self.origin[side] + within(at_points, L), self.origin[side] + within(at_faces, L)
+            at_points, at_faces = around, 0.5 * (around[1:] + around[:-1])
+            if self.periodic[side]:
+                at_points, at_faces = np.concatenate([around[-2:-1], around[1:-1], around[1:2]]), np.mod(at_faces, L)
+            at_points, at_faces = np.clip(at_points, 0.0, L), self._once(side, np.clip(at_faces, 0.0, L))
+            return self.origin[side] + at_points[start : end + 2], self.origin[side] + at_faces[start : end + 1]
         points, faces = np.arange(start - 1, end + 1), np.arange(start, end + 1)
         if self.periodic[side]:
             points, faces = points % n, faces % n

@@ -76,7 +76,8 @@ def right():
 def assert_honest(solution, right, may_converge):
     """Not converged, with an outcome and a message; or, where that can be, converged to the right answer."""
     if solution.converged:
-        assert may_converge, f"converged: {solution.message}"
+        # Principal pivoting has elimination of its own, and may take over from a method whose inner solver lies.
+        assert may_converge or solution.settings["method"] == "pivoting", f"converged: {solution.message}"
         for name, expected in right.items():
             np.testing.assert_allclose(solution.fields[name], expected, atol=1e-3 * np.abs(expected).max())
     else:
@@ -233,9 +234,9 @@ def test_a_certificate_of_nan():
 @pytest.mark.parametrize(
     "words",
     [
-        "problem1 -ksp_type python -ksp_python_type tests.corrupted.Lazy",
+        "problem1 --no-rescue -ksp_type python -ksp_python_type tests.corrupted.Lazy",
         "problem3 --method din -ksp_type python -ksp_python_type tests.corrupted.Noise",
-        "problem4 --n 9 -ksp_type gmres -pc_type python -pc_python_type tests.corrupted.NaNPC",
+        "problem4 --n 9 --no-rescue -ksp_type gmres -pc_type python -pc_python_type tests.corrupted.NaNPC",
         pytest.param(
             "obstacle_bratu --n 9 --method interior -ksp_type gmres -pc_type none -ksp_rtol 1",
             marks=pytest.mark.skipif(PETSC_REFUSES_RTOL_1, reason="newer releases refuse this tolerance"),

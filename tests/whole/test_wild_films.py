@@ -7,10 +7,7 @@ import numpy as np
 import pytest
 from wild_films import judge
 
-COUNT = 300
-# Among films of 5,000 seeds one or two end uncertified: pressures that are rounding of what the wall drags through a ring.
-# More than two among 300 are then as good as impossible.
-UNCERTIFIED = 2
+COUNT = 500
 
 
 def test_films_that_nobody_tuned_for(tmp_path, capsys):
@@ -19,10 +16,7 @@ def test_films_that_nobody_tuned_for(tmp_path, capsys):
     with capsys.disabled():
         print(f"\nwild films from WILD_SEED={first}")
     verdicts = [judge(seed, tmp_path) for seed in range(first, first + COUNT)]
-    wrong = [verdict for verdict in verdicts if verdict.wrong]
-    assert not wrong
-    uncertified = [verdict for verdict in verdicts if not verdict.good]
-    assert len(uncertified) <= UNCERTIFIED, uncertified
+    assert not [verdict for verdict in verdicts if not verdict.good]
     kinds = {verdict.what for verdict in verdicts}
     assert {"refused", "converged"} <= kinds
     assert np.mean([verdict.what == "converged" for verdict in verdicts]) > 0.6
@@ -32,15 +26,15 @@ CERTIFIED_WRONG_ONCE = [
     (30814, "thin parts beside a wall that drags all"),
     (30880, "no pressure but rounding's"),
     (902845, "a pocket behind a film of 1e-15 of its conductance"),
+    (5017662, "half way up a steep wall between two pressures"),
+    (5018091, "a dimple of 1e16 times its surroundings' conductance"),
 ]
 
 
 @pytest.mark.parametrize("seed, why", CERTIFIED_WRONG_ONCE)
-@pytest.mark.parametrize("method", ["active-set", "din-pc", "monotone", "fas"])
+@pytest.mark.parametrize("method", ["active-set", "din", "din-pc", "monotone", "fas", "pivoting"])
 def test_films_with_answers_that_the_certificate_once_let_pass(seed, why, method, tmp_path):
-    """No method alone calls a wrong answer converged, but for one."""
-    if (seed, method) == (902845, "din-pc"):
-        pytest.xfail("open: an interior method's answer, wrong by 6 % in such a pocket, whose misfit is rounding in every cell")
+    """No method alone calls a wrong answer converged."""
     assert not judge(seed, tmp_path, method=method, rescue=False).wrong
 
 
@@ -49,6 +43,13 @@ ONCE_FAILED = [
     (681, "at rest"),
     (665, "a ring next to empty"),
     (904489, "sqrt(x), U < 0"),
+    (903736, "a ring with no pressure but rounding's"),
+    (5000882, "a ring, 3 Pa where the wall could make 1e14"),
+    (5010015, "a ring, one full cell"),
+    (5010571, "cycles, conductances of 3e11"),
+    (5016902, "conductances of 3e14"),
+    (5000819, "pressures of 1e-199"),
+    (880676270, "lines on edges round a ring: one face, seen from both ends"),
     *CERTIFIED_WRONG_ONCE,
 ]
 

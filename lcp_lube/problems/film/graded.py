@@ -1,0 +1,180 @@
+"""A film's Jacobian factored without subtraction: right are also pressures that hang on 1e-16 of the flows beside them."""
+
+from importlib.util import find_spec
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.elimination import Elimination
+from ...base.parallel import Array
+from ..grid import Grid
+
+if TYPE_CHECKING:
+    from .lubrication import LubricationProblem
+
+WORK = {True: 4e8, False: 2e5}  # multiplications of a factorisation, compiled or not: some 0.3 s
+UNIT = 2.0**-53
+REFINEMENTS = 10
+HALVES = 60  # steps of half the wrong cells that may fail to make fewer of them
+PATIENCE = HALVES + 5  # and of all of them before
+
+
+def within_reach(grid: Grid) -> bool:
+    """Whether a factorisation is a matter of less than a second, and its band one of 100 MB."""
+    return grid.size * _order(grid)[1] ** 2 <= WORK[find_spec("numba") is not None]
+
+
+class GradedJacobian:
+    """J of G(z) = A max(z, 0) + B s max(-z, 0) - c: the columns of A for full cells, those of -B for the others. Collective.
+
+    Every rank has the whole of it: it is for small films.
+
+    Parameters
+    ----------
+    full : of this rank's points.
+    """
+
+    def __init__(self, problem: "LubricationProblem", full: NDArray[np.bool_]):
+        s, self.grid, self._full = problem.scheme, problem.grid, full
+        self._at, b = _order(self.grid)
+        k_W, k_E, k_S, k_N, b_C, b_W, theta = whole(self.grid, s.k_W, s.k_E, s.k_S, s.k_N, s.b_C, s.b_W, full.astype(float))
+        is_full, none = theta > 0, np.zeros_like(b_C)
+        handed, loss = np.zeros((self.grid.size, 2 * b + 1)), np.zeros(self.grid.size)
+        round_x, round_y = (*self.grid.periodic, False)[:2]
+        # What a cell gives to the west the cell there gets from its east, and so on. Void goes to the east alone.
+        for k, beside_k, carried, beside_b, axis, step, around in (
+            (k_W, k_E, none, none, 1, -1, round_x),
+            (k_E, k_W, -b_C, b_W, 1, 1, round_x),
+            (k_S, k_N, none, none, 0, -1, round_y),
+            (k_N, k_S, none, none, 0, 1, round_y),
+        ):
+            inside: NDArray[np.bool_] = np.ones(theta.shape, dtype=bool)
+            if not around:
+                np.moveaxis(inside, axis, 0)[0 if step < 0 else -1] = False
+            given = np.where(is_full, k, carried)
+            taken = np.where(inside, np.where(is_full, np.roll(beside_k, -step, axis), np.roll(beside_b, -step, axis)), 0.0)
+            apart = np.roll(self._at, -step, axis) - self._at
+            np.add.at(handed, (self._at[inside], apart[inside] + b), taken[inside])
+            loss[self._at.ravel()] += np.maximum(given - taken, 0.0).ravel()
+        self._factors = Elimination(handed, loss)
+
+    @property
+    def singular(self) -> bool:
+        return self._factors.singular >= 0
+
+    def solve(self, f: Array) -> Array:
+        """y with J y = f, of this rank's points. Collective."""
+        (flow,), grid = whole(self.grid, f), self.grid
+        ordered = np.empty(grid.size)
+        ordered[self._at] = flow
+        y = self._factors.solve(ordered)[self._at]
+        return y[grid.y_start : grid.y_end, grid.x_start : grid.x_end].ravel()
+
+
+class Pivots:
+    """Principal pivoting on the full cells (Judice and Pires; Murty), its systems solved without subtraction.
+
+    Every blend of A's and -B's columns is an M-matrix, so exactly one set of full cells has p >= 0 in it and r >= 0 outside.
+    All cells of the wrong sign change sides at once, as long as this makes fewer of them; where it does not, half of them by
+    chance, and at last the last one alone, and of such steps no set comes twice. On closed and periodic lines, where a blend
+    may be singular, that is no proof. Collective.
+
+    Attributes
+    ----------
+    p, r : complementary but for signs; wrong : number of cells whose sign is wrong, beyond rounding of what flows there.
+    """
+
+    def __init__(self, problem: "LubricationProblem", p: Array, r: Array):
+        s, self.problem = problem.scheme, problem
+        self._a, self._b = (s.k_W + s.k_E + s.k_S + s.k_N).ravel(), -s.b_C.ravel()
+        self.full = self._a * p >= self._b * r
+        self.p, self.r = np.maximum(p, 0.0), np.maximum(r, 0.0)
+        self._driven = problem.reduce.norm(problem.c) > 0  # or else all is zero, and signs are rounding
+        self._fewest, self._patience = np.inf, PATIENCE
+        self._part()
+
+    def step(self) -> float:
+        """Solve for the present full cells, and let the wrong ones change sides; returns the change in p. Collective.
+
+        Raises
+        ------
+        ZeroDivisionError : a part of the film has no way out, whatever the reason.
+        """
+        reduce, before = self.problem.reduce, self.p
+        jacobian = GradedJacobian(self.problem, self.full)
+        if jacobian.singular:
+            raise ZeroDivisionError("a part of the film has no way out")
+        last = np.inf
+        for _ in range(REFINEMENTS):
+            y = jacobian.solve(-self.problem.balance(self.p, self.r))
+            self.p, self.r = self.p + np.where(self.full, y, 0.0), self.r - np.where(self.full, 0.0, y)
+            pairs = ((np.where(self.full, y, 0.0), self.p), (np.where(self.full, 0.0, y), self.r))
+            size = max(reduce.max(np.abs(moved)) / (reduce.max(np.abs(whole)) or 1.0) for moved, whole in pairs)
+            if size <= UNIT or not size < 0.5 * last:  # done, or rounding, or NaN
+                break
+            last = size
+        p_max = reduce.max(np.abs(self.p))
+        bad = np.where(self.full, self.p < -8 * UNIT * p_max, self.r < -8 * UNIT)
+        self.wrong = int(reduce.sum(bad.astype(float))) if self._driven else 0
+        self.p, self.r = (np.maximum(a, 0.0) for a in (self.p, self.r))
+        if self.wrong:
+            if self.wrong < self._fewest:
+                self._fewest, self._patience = self.wrong, PATIENCE
+            else:
+                self._patience -= 1
+            number = np.where(bad, self.problem.grid.first + np.arange(bad.size), -1)
+            if self._patience <= 0:
+                bad = number == reduce.max(number.astype(float))
+            elif self._patience <= HALVES:
+                chance = np.random.default_rng(self._patience).random(self.problem.size)
+                bad &= chance[np.maximum(number, 0)] < 0.5
+            self.full = self.full ^ bad
+            self._part()
+        return reduce.max(np.abs(self.p - before))
+
+    def _part(self) -> None:
+        """No void in the full cells, no pressure in the others.
+
+        A ring that is empty all round, which no solution is and whose matrix is singular, is full where it is least empty.
+        """
+        grid = self.problem.grid
+        if grid.periodic[0]:
+            full, void = whole(grid, self.full.astype(float), self.r)
+            empty = np.flatnonzero(~(full > 0).any(axis=1))
+            full[empty, np.argmin(void[empty], axis=1)] = 1.0
+            self.full = (full > 0)[grid.y_start : grid.y_end, grid.x_start : grid.x_end].ravel()
+        self.p, self.r = np.where(self.full, self.p, 0.0), np.where(self.full, 0.0, self.r)
+
+
+def whole(grid: Grid, *fields: Array) -> list[Array]:
+    """Fields of this rank's points as those of the whole grid, of shape (ny, nx), on every rank. Collective."""
+    boxes = [np.reshape(field, grid.box) for field in fields]
+    if grid.comm.size == 1:
+        return boxes
+    out = [np.empty((*grid.shape, 1)[1::-1]) for _ in fields]
+    own = (slice(grid.y_start, grid.y_end), slice(grid.x_start, grid.x_end))
+    for place, parts in grid.comm.allgather((own, boxes)):
+        for field, part in zip(out, parts, strict=True):
+            field[place] = part
+    return out
+
+
+def _order(grid: Grid) -> tuple[NDArray[np.int64], int]:
+    """Each point's place in the elimination, shape (ny, nx), and the band that this makes: lines across the shorter way."""
+    (nx, ny), (round_x, round_y) = (*grid.shape, 1)[:2], (*grid.periodic, False)[:2]
+    x, y = _places(nx, round_x), _places(ny, round_y)
+    orders = [y[:, None] * nx + x, x * ny + y[:, None]]
+    bands = [_band(nx, round_x, ny, round_y), _band(ny, round_y, nx, round_x)]
+    best = int(np.argmin(bands))
+    return orders[best], bands[best]
+
+
+def _places(n: int, around: bool) -> NDArray[np.int64]:
+    """0, 1, 2 ... along a line; round a ring 0, 2, 4 ... 3, 1, so that neighbours are two apart at most."""
+    m = np.arange(n)
+    return np.where(2 * m < n, 2 * m, 2 * (n - m) - 1) if around else m
+
+
+def _band(fast: int, fast_around: bool, slow: int, slow_around: bool) -> int:
+    return max((1 + slow_around) * fast if slow > 1 else 0, (1 + fast_around) if fast > 1 else 0)

@@ -1,0 +1,68 @@
+"""Principal pivoting on the full cells: small films of any ratio of heights, right to the last digits (`film.graded`)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.stages import Stages
+from ..linear.krylov import LinearSolverError
+from ..problems.film.graded import Pivots
+from ..problems.film.lubrication import LubricationProblem
+from ..problems.solution import Fields, Step
+from .job import Job
+from .method import Method
+from .method_options import MethodOptions, make_options
+
+
+@dataclass(frozen=True)
+class PivotingOptions(MethodOptions):
+    """There are none."""
+
+    method = "pivoting"
+
+
+class Pivoting(Pivots, Method):
+    """`newton.iterate` runs it. `norm` is the share of cells whose sign is wrong.
+
+    Parameters
+    ----------
+    start : fields p and r; default a full film.
+    """
+
+    state = ("p", "r", "full", "norm", "_fewest", "_patience")
+
+    def __init__(self, problem: LubricationProblem, stages: Stages, start: Fields | None = None):
+        ones = np.ones(problem.grid.local_size)
+        usable = start is not None and np.isfinite(problem.reduce.norm(*start.values()))
+        super().__init__(problem, *((start["p"], start["r"]) if start and usable else (ones, 0.0 * ones)))
+        self.stages, self.norm = stages, 1.0
+
+    @property
+    def fields(self) -> Fields:
+        return {"p": self.p, "r": self.r}
+
+    def advance(self) -> Step:
+        """One set of full cells.
+
+        Raises
+        ------
+        LinearSolverError : a part of the film has no way out.
+        """
+        try:
+            with self.stages("KSP"):
+                moved = self.step()
+        except ZeroDivisionError as error:
+            raise LinearSolverError(str(error)) from None
+        self.norm = self.wrong / self.problem.size
+        return Step(self.norm, moved, 1.0, enough=not self.wrong)
+
+
+def build(job: Job) -> Pivoting:
+    """The registry's door.
+
+    Raises
+    ------
+    InputError : an option.
+    """
+    make_options(PivotingOptions, "pivoting", job.options)
+    return Pivoting(job.problem, job.stages, job.start)
