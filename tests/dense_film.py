@@ -126,7 +126,8 @@ def discretise(scene: Any) -> tuple[Faces, int, np.ndarray]:
     jumps = getattr(model.gap, "jumps", lambda axis: ())
     # Where lines lie is a choice; U < 0: counted from the inlet, as the last bit of x decides which side of a jump is meant.
     chosen_x, chosen_y = (model if U >= 0 else model.mirrored).lines(shape)
-    x = line_of(nx, model.lengths[0], *(kinds[:2] if U >= 0 else kinds[1::-1]), chosen_x)
+    inlet, outlet = kinds[:2] if U >= 0 else kinds[1::-1]
+    x = line_of(nx, model.lengths[0], inlet, outlet, chosen_x)
     if U < 0:
         x = x.turned(model.lengths[0])
     plane = len(shape) == 2

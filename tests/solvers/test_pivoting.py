@@ -7,6 +7,8 @@ from side_scenes import SCENES
 from lcp_lube import InputError, load_scene, solve
 from lcp_lube.problems.film.graded import GradedJacobian, Pivots, whole
 
+SUPPLY = '[[supply]]\nshape = "rectangle"\nx_mm = [4, 6]\ny_mm = [2, 4]\np = 1e6\n'
+FILMS = {**SCENES, "supply": SCENES["dead_end"] + SUPPLY}
 POCKET = {
     "family": "bearing",
     "dimension": 2,
@@ -30,10 +32,10 @@ def assembled(mat):
     return out
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", FILMS)
 def test_jacobian_is_the_assembled_one(name, tmp_path):
     """Sides of every kind: J y = f for the columns of A and -B."""
-    (tmp_path / "scene.toml").write_text(SCENES[name])
+    (tmp_path / "scene.toml").write_text(FILMS[name])
     problem = load_scene(tmp_path / "scene.toml", {"nx": 7, "ny": 5}).build()
     full = np.random.default_rng(1).random(problem.size) < 0.6
     A, B = assembled(problem.A), assembled(problem.B)
@@ -45,9 +47,9 @@ def test_jacobian_is_the_assembled_one(name, tmp_path):
     problem.destroy()
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", FILMS)
 def test_answers_are_those_of_the_active_set(name, tmp_path):
-    (tmp_path / "scene.toml").write_text(SCENES[name])
+    (tmp_path / "scene.toml").write_text(FILMS[name])
     scene = load_scene(tmp_path / "scene.toml", {"nx": 13, "ny": 7})
     found, other = (solve(scene, method=method, rescue=False) for method in ("pivoting", "active-set"))
     assert found.converged and other.converged

@@ -89,8 +89,8 @@ def p_error(problem: "LubricationProblem", p: Array, r: Array) -> float:
         else:
             return np.inf
         void = ~pivots.full * 1.0
-        entering = problem.grid.ghosted(void, outside=0.0)[1:-1, :-2]
-        carried = -scheme.b_C.ravel() * void + (scheme.b_W * entering).ravel()
+        from_west = problem.grid.ghosted(void, outside=0.0)[1:-1, :-2]
+        carried = -scheme.b_C.ravel() * void + (scheme.entering * from_west).ravel()
         rounded = 4 * UNIT * (2 * carried + (np.abs(scheme.couette_W) + np.abs(scheme.couette_E)).ravel())
         allowed = reduce.max(np.where(pivots.full, GradedJacobian(problem, pivots.full).solve(rounded), 0.0))
     except ZeroDivisionError:

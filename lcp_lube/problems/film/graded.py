@@ -38,16 +38,17 @@ class GradedJacobian:
     def __init__(self, problem: "LubricationProblem", full: NDArray[np.bool_]):
         s, self.grid, self._full = problem.scheme, problem.grid, full
         self._at, b = _order(self.grid)
-        k_W, k_E, k_S, k_N, b_C, b_W, theta = whole(self.grid, s.k_W, s.k_E, s.k_S, s.k_N, s.b_C, s.b_W, full.astype(float))
+        k_W, k_E, k_S, k_N, b_C, theta = whole(self.grid, s.k_W, s.k_E, s.k_S, s.k_N, s.b_C, full.astype(float))
+        W, E, S, N, b_W = whole(self.grid, *s.coupling, s.entering)  # what a cell takes from its neighbours
         is_full, none = theta > 0, np.zeros_like(b_C)
         handed, loss = np.zeros((self.grid.size, 2 * b + 1)), np.zeros(self.grid.size)
         round_x, round_y = (*self.grid.periodic, False)[:2]
         # What a cell gives to the west the cell there gets from its east, and so on. Void goes to the east alone.
         for k, beside_k, carried, beside_b, axis, step, around in (
-            (k_W, k_E, none, none, 1, -1, round_x),
-            (k_E, k_W, -b_C, b_W, 1, 1, round_x),
-            (k_S, k_N, none, none, 0, -1, round_y),
-            (k_N, k_S, none, none, 0, 1, round_y),
+            (k_W, E, none, none, 1, -1, round_x),
+            (k_E, W, -b_C, b_W, 1, 1, round_x),
+            (k_S, N, none, none, 0, -1, round_y),
+            (k_N, S, none, none, 0, 1, round_y),
         ):
             inside: NDArray[np.bool_] = np.ones(theta.shape, dtype=bool)
             if not around:
