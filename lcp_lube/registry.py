@@ -1,7 +1,6 @@
 """The one place where a name is bound to code: methods, systems, scene families, film shapes, drivers, charts, recipes.
 
-Imports no PETSc. A package from outside adds lines: an entry point of the group 'lcp_lube' names a function, which is called
-with this module (docs/architecture.md).
+Imports no PETSc. A package from outside adds lines by an entry point of the group 'lcp_lube' (docs/architecture.md).
 """
 
 import os
@@ -39,12 +38,11 @@ class Entry:
 class MethodEntry(Entry):
     """A method: `target` is build(job: solvers.job.Job) -> Method.
 
-    kinds are the problems it solves (`Problem.kind`), systems the matrices it can use, its default first, none
-    if it solves no linear systems; nested: it can
-    start from a coarser grid's answer, which must lie strictly inside p, r > 0 if it is an interior method, and does so by
-    default on grids of more than `nested_above` points; eps: its default tolerances of ||F|| and ||alpha d||; fallback: the
-    methods that take over in turn where it fails; at_most: the points that it can do; variants: the same idea for other kinds
-    of problems.
+    kinds are the problems it solves (`Problem.kind`), systems the matrices it can use, its default first, none if it solves no
+    linear systems; nested: it can start from a coarser grid's answer, which must lie strictly inside p, r > 0 if it is an
+    interior method, and does so by default on grids of more than `nested_above` points; eps: its default tolerances of ||F||
+    and ||alpha d||; fallback: the methods that take over in turn where it fails; at_most: the points that it can do;
+    variants: the same idea for other kinds of problems.
     """
 
     kinds: tuple[str, ...] = ("lubrication",)
@@ -162,11 +160,7 @@ METHODS: dict[str, MethodEntry] = {
         interior=False,
     ),
     "pivoting": MethodEntry(
-        "lcp_lube.solvers.pivoting:build",
-        "principal pivoting, elimination without subtraction: small films of any ratio of heights",
-        systems=(),
-        interior=False,
-        at_most=SMALL,
+        "lcp_lube.solvers.pivoting:build", "small films of any ratio of heights", systems=(), interior=False, at_most=SMALL
     ),
     "fbn-a": MethodEntry("lcp_lube.solvers.fischer:build_armijo", "Fischer-Burmeister Newton, Armijo rule on ||F||^2/2"),
     "fbn-i": MethodEntry("lcp_lube.solvers.fischer:build_inexact", "Fischer-Burmeister Newton, inexact decrease of ||F||"),
@@ -315,7 +309,5 @@ def read_recipe(name: str) -> dict[str, str]:
 # First a search for the name: the module that parses these files takes longer to import than all the rest.
 _files = (file for folder in sys.path for file in Path(folder).glob("*-info/entry_points.txt"))
 if any(os.access(file, os.R_OK) and b"[lcp_lube]" in file.read_bytes() for file in _files):
-    from importlib import metadata
-
-    for _point in metadata.entry_points(group="lcp_lube"):
+    for _point in import_module("importlib.metadata").entry_points(group="lcp_lube"):
         _point.load()(sys.modules[__name__])

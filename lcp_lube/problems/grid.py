@@ -200,15 +200,8 @@ class Grid:
         """
         start, end = self._owned(side)
         around = self._around[side]
-        if around is None:
-            return np.full(end - start + 1, self.spacing[side])
-        return self._once(side, np.diff(around))[start : end + 1]
-
-    def _once(self, side: int, at_faces: Array) -> Array:
-        """Periodic ends have one face, seen from both: to the last bit, or what leaves one cell does not enter the next."""
-        if self.periodic[side]:
-            at_faces[-1] = at_faces[0]
-        return at_faces
+        steps = np.full(self.shape[side] + 1, self.spacing[side]) if around is None else np.diff(around)
+        return (np.append(steps[:-1], steps[0]) if self.periodic[side] else steps)[start : end + 1]
 
     def widths(self, side: int, everywhere: bool = False) -> Array:
         """Widths of the owned columns (side 0) or lines (1) of cells, or of all, in spacings: 1, and 1/2 on a mirror."""
@@ -235,10 +228,10 @@ class Grid:
         start, end = self._owned(side)
         around, n, offset, L = self._around[side], self.shape[side], self.offset[side], self.lengths[side]
         if around is not None:
-            at_points, at_faces = around, 0.5 * (around[1:] + around[:-1])
-            if self.periodic[side]:
-                at_points, at_faces = np.concatenate([around[-2:-1], around[1:-1], around[1:2]]), np.mod(at_faces, L)
-            at_points, at_faces = np.clip(at_points, 0.0, L), self._once(side, np.clip(at_faces, 0.0, L))
+            at_points, at_faces = np.clip(around, 0.0, L), np.clip(0.5 * (around[1:] + around[:-1]), 0.0, L)
+            if self.periodic[side]:  # one face, seen from both ends, to the last bit
+                at_points, at_faces[0] = around[[n, *range(1, n + 1), 1]], np.mod(0.5 * (around[0] + around[1]), L)
+                at_faces[-1] = at_faces[0]
             return self.origin[side] + at_points[start : end + 2], self.origin[side] + at_faces[start : end + 1]
         points, faces = np.arange(start - 1, end + 1), np.arange(start, end + 1)
         if self.periodic[side]:

@@ -73,11 +73,11 @@ def test_fallback_takes_over_and_says_so():
     assert solution.converged and "took over" not in solution.message
     solution.destroy()
     rescued = run("problem3", {"n": 60}, method="active-set", options={"give_up": 1})  # an option is no wish to fail
-    assert rescued.converged and (rescued.method, rescued.asked, rescued.took_over) == ("monotone", "active-set", "monotone")
+    assert rescued.converged and (rescued.method, rescued.asked, rescued.took_over) == ("pivoting", "active-set", "pivoting")
     assert (
         summary(as_dict(rescued))
         .splitlines()[0]
-        .startswith("problem3 (n = 60, scheme nodal) by active-set, from which monotone took over, on")
+        .startswith("problem3 (n = 60, scheme nodal) by active-set, from which pivoting took over,")
     )
     given_up = run("problem3", {"n": 60}, method="active-set", options={"give_up": 1}, rescue=False)
     assert (
@@ -94,7 +94,7 @@ def test_fallback_from_a_cycling_start(monkeypatch):
 
     monkeypatch.setattr(ActiveSetOptions.__init__, "__defaults__", (1.0, 4, 1, 1e-8, 16))  # give up after one step
     solution = run("problem3", {"n": 60}, method="active-set")
-    assert solution.converged and "monotone took over" in solution.message
+    assert solution.converged and "pivoting took over" in solution.message
     solution.destroy()
 
 
