@@ -194,11 +194,39 @@ def discretise(scene: Any) -> tuple[Faces, int, np.ndarray]:
     return faces, nx * ny, dead
 
 
+def faces_of(problem: Any) -> tuple[Faces, int, np.ndarray]:
+    """What `discretise` returns, from the package's own coefficients, for a film whose faces depend on its cavities (rims)."""
+    s, grid = problem.scheme, problem.grid
+    ny, nx = grid.box
+    around = (*grid.periodic, False)[:2]
+    unit, p_side = LONG(problem.p_unit), problem.p_sides
+    faces, dead = Faces(*([] for _ in range(10))), np.zeros(nx * ny, dtype=bool)
+    for m in range(ny):
+        for l in range(nx):
+            i = m * nx + l
+            if l == 0 and not around[0] and s.k_W[m, l] > 0:
+                faces.add(-1, i, s.k_W[m, l] / unit, u=s.couette_W[m, l], p_i=p_side[0])
+            flow = {"u": s.couette_E[m, l], "b_i": -s.b_C[m, l]}
+            if l < nx - 1 or around[0]:
+                faces.add(i, m * nx + (l + 1) % nx, s.k_E[m, l] / unit, **flow)
+            elif s.k_E[m, l] > 0:
+                faces.add(i, -1, s.k_E[m, l] / unit, p_j=p_side[1], **flow)
+            else:
+                dead[i] = True
+            if m == 0 and not around[1] and s.k_S[m, l] > 0:
+                faces.add(-1, i, s.k_S[m, l] / unit, p_i=p_side[2])
+            if m < ny - 1 or around[1]:
+                faces.add(i, (m + 1) % ny * nx + l, s.k_N[m, l] / unit)
+            elif s.k_N[m, l] > 0:
+                faces.add(i, -1, s.k_N[m, l] / unit, p_j=p_side[3])
+    return faces, nx * ny, dead
+
+
 class Dense:
     """Balances G(y) of the cells, p = max(y, 0)/a and r = max(-y, 0)/b, and Newton's method on them."""
 
-    def __init__(self, scene: Any):
-        faces, self.n, dead = discretise(scene)
+    def __init__(self, scene: Any, problem: Any = None):
+        faces, self.n, dead = discretise(scene) if problem is None else faces_of(problem)
         nx, ny = (*scene.shape, 1)[:2]
         numbers = np.arange(nx * ny).reshape(ny, nx)
         self.order = (numbers if nx <= ny else numbers.T).ravel().tolist()

@@ -176,8 +176,14 @@ def judge(seed: int, folder: Path, **how_to: Any) -> Verdict:
     how: Any = {"message": solution.message, "method": str(solution.settings["method"])}
     p, r, converged, outcome = solution.fields["p"] * problem.p_unit, solution.fields["r"], solution.converged, solution.outcome
     p_sides, p_unit = problem.p_sides, problem.p_unit
+    if getattr(scene.model.gap, "rims", ()) and scene.model.scheme == "face":  # its faces are made for the cavities found
+        moving = getattr(problem, "moving", None)
+        dense = Dense(scene, moving or problem)
+        if moving is not None:  # the mirror image is what is solved
+            p, r = (field.reshape(problem.grid.box)[:, ::-1].ravel() for field in (p, r))
+    else:
+        dense = Dense(scene)
     solution.destroy()
-    dense = Dense(scene)
     ratio = float(dense.k.max() / dense.k.min())
     if not converged:
         return Verdict(seed, str(outcome), **how, ratio=ratio)
