@@ -35,6 +35,7 @@ def answers():
         "fas": printed(solve("problem4", n=20, method="fas")),
         "certify": printed(solve(load_scene("problem1", {"n": 20}), certify=True)),
         "round": printed(solve(load_scene("dimpled_pad", {"nx": 30, "ny": 30, "film.dimples.form": "round"}))),
+        "deep": printed(solve(load_scene("pocketed_pad_2d", {"nx": 14, "ny": 9, "film.pocket.depth": 0.2}))),
         "balance": printed(solve(load_scene("pocketed_pad", {**film, "balance.load": 3e4}))),
     }
     return {
