@@ -13,7 +13,8 @@ from .units import metres
 class TexturedScene(LubricationScene):
     """Textured slider of the FBNS codes: 80 mm square, K x K cells with a square dimple each, 100 kPa all round.
 
-    The reference grid has 30 K interior points a side; others see the same film.
+    The reference grid has 30 K interior points a side; others see the same film. mean_cubes is the reference's, of its scheme
+    'upwind' alone unless it is given.
     """
 
     dimension: Literal[2] = 2
@@ -36,6 +37,8 @@ class TexturedScene(LubricationScene):
         data = cls.in_si_units(data)
         if isinstance(data, dict) and "n" not in data and isinstance(data.get("K", 4), int):
             data = {**data, "n": 30 * data.get("K", 4)}
+        if isinstance(data, dict) and data.get("scheme", "upwind") != "upwind":
+            data = {"mean_cubes": False, **data}
         return data
 
     @property

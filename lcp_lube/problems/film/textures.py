@@ -33,6 +33,11 @@ class Dimples:
         """h (m) at x and y (m)."""
         return self.h + 0.5 * self.depth * np.minimum(self._profile(x), self._profile(y))
 
+    def jumps(self, axis: str) -> tuple[float, ...]:
+        """x or y (m) of the rims' edges, half-way between nodes."""
+        nodes = 30.0 * np.arange(self.K)[:, None] + np.array([4.5, 5.5, 25.5, 26.5])
+        return tuple((nodes * (self.L / (30 * self.K + 1))).ravel())
+
 
 @dataclass(frozen=True)
 class Rough:
