@@ -43,7 +43,7 @@ class TexturedScene(LubricationScene):
 
     @property
     def gap(self) -> Dimples:
-        return Dimples(self.h, self.depth, self.L, self.K)
+        return Dimples(self.h, self.depth, self.L, self.K, edged=self.scheme == "face" and not self.mean_cubes)
 
 
 class RoughScene(SliderScene):

@@ -125,3 +125,14 @@ def test_the_square_dimpled_pad():
         solution = solve(pad(n))
         assert solution.numbers["pressure_integral"] == pytest.approx(6.1969, rel=error)
         solution.destroy()
+
+
+@pytest.mark.parametrize("n", [12, 25, 40])
+def test_drag_beside_edges_along_the_flow(n):
+    """A film that varies across the flow alone, full and without pressure: mu U L times the sum of width over film."""
+    film = [{"shape": "constant", "h_um": 2.0}, {"shape": "pocket", "depth_um": 3.0, "x_mm": [-1, 11], "y_mm": [2.3, 6.1]}]
+    data = {"family": "bearing", "dimension": 2, "L_mm": 10, "width_mm": 10, "U": 1.0, "n": n}
+    solution = solve(load_scene({**data, "fluid": {"mu": 0.02, "p_supply": 1e5}, "film": film}))
+    exact = 0.02 * 1.0 * 0.01 * (6.2e-3 / 2e-6 + 3.8e-3 / 5e-6)
+    assert solution.numbers["friction"] == pytest.approx(exact, rel=1e-9)
+    solution.destroy()

@@ -9,6 +9,7 @@ import numpy as np
 from ...base.parallel import Array
 from ..grid import Grid
 from .cavity import cavity_sign
+from .edges import strips
 from .reynolds import BoxScheme, sides
 
 if TYPE_CHECKING:
@@ -87,7 +88,7 @@ def drag(problem: LubricationProblem, scheme: BoxScheme, p_pa: Array, r: Array, 
     ----------
     lifted : added to the film, of which `scheme` has the coefficients then.
     """
-    grid, s, film = problem.grid, scheme, problem.film
+    grid, s = problem.grid, scheme
     before, behind = grid.steps(0)[:-1], grid.steps(0)[1:]
     muU, weight, rims = problem.mu * problem.U, line_weights(grid), grid.rims(1) if grid.dim == 2 else (0.0, 0.0)
     full = (cavity_sign(problem.reduce, p_pa, r) >= 0).reshape(grid.box)
@@ -95,13 +96,38 @@ def drag(problem: LubricationProblem, scheme: BoxScheme, p_pa: Array, r: Array, 
     first, last, south, north = sides(grid)
     walls = sides(grid, ("closed",))[:2]
     p_east = np.where(last, problem.p_sides[1], grid.ghosted(p_pa)[1:-1, 2:])
-    h_west, h_east = (np.broadcast_to(film(grid.x + step, grid.y) + lifted, grid.box) for step in (-before / 2, behind / 2))
+    h_west, *west = sheared_faces(problem, grid.x - before / 2, lifted)
+    h_east, resting, h_moving = sheared_faces(problem, grid.x + behind / 2, lifted)
     passes = ~np.broadcast_to(walls[1], grid.box)  # the east face
     liquid = 1.0 + s.b_C * r / np.where(passes & (s.couette_E != 0.0), s.couette_E, np.inf)
-    east, own = np.where(passes, liquid / h_east, 0.0), np.where(first, before / behind / h_west, 0.0)
+    east = np.where(passes, resting + liquid / h_moving, 0.0)
+    own = np.where(first, before / behind * (west[0] + 1.0 / west[1]), 0.0)
     for wall, share in zip(walls, (0.5 * before / behind, 0.5), strict=True):
         own = own + np.where(wall, share * np.where(full, 4.0, 1.0 - r) / s.h, 0.0)
     push = np.where(passes, 0.5 * h_east * (p_east - p), 0.0), np.where(first, 0.5 * h_west * (p - problem.p_sides[0]), 0.0)
-    strips = muU * grid.stretch(grid.y) ** 2 * behind * (1.0 + 0.5 * (rims[0] * south + rims[1] * north) / weight)
+    per_row = muU * grid.stretch(grid.y) ** 2 * behind * (1.0 + 0.5 * (rims[0] * south + rims[1] * north) / weight)
     scale = weight * (grid.spacing[1] if grid.dim == 2 else 1.0)
-    return (strips * east + push[0]) * scale, (strips * own + push[1]) * scale
+    return (per_row * east + push[0]) * scale, (per_row * own + push[1]) * scale
+
+
+def sheared_faces(problem: LubricationProblem, x: Array, lifted: complex = 0.0) -> tuple[Array, Array, Array]:
+    """The film h of a face of each owned point, at x, m, and what shears it per mu U: a + liquid/b, as a (1/m) and b (m).
+
+    liquid is the part of the whole film's flow that there is. Where no edge along the flow divides the cell, a = 0 and b = h.
+    In the strips on both sides of an edge a cavity carries a layer of one thickness t, or the whole film where that is thinner:
+    t/h^2, and 1/h. That is linear in what flows between a film that is full in the thinnest strip alone and one that is full.
+    """
+    grid, film = problem.grid, problem.film
+    h = np.broadcast_to(film(x, grid.y) + lifted, grid.box)
+    resting, moving = np.zeros_like(h), h
+    jumps = getattr(film, "jumps", lambda axis: ())("y") if grid.dim == 2 else ()
+    if jumps:
+        rows, in_strips, shares = strips(film, x[0], grid.y[:, 0], grid.steps(1), jumps)
+        if rows.size:
+            thinnest, uneven = in_strips.min(axis=0) + lifted, np.ptp(in_strips, axis=0) > 1e-9 * in_strips.max(axis=0)
+            parts = in_strips + lifted
+            mean, full, layer = (np.sum(shares * part, axis=0) for part in (parts, 1.0 / parts, thinnest / parts**2))
+            slope = np.where(uneven, (full - layer) / np.where(uneven, 1.0 - thinnest / mean, 1.0), full)
+            h, moving = np.array(h), np.array(h)
+            h[rows], resting[rows], moving[rows] = mean, full - slope, 1.0 / slope
+    return h, resting, moving

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ...base.parallel import Array
 from .cavity import cavity_sign
-from .flows import friction, line_weights, point_weights, side_flows
+from .flows import friction, line_weights, point_weights, sheared_faces, side_flows
 from .forces import forces, shaft_angle
 from .grooves import GroovedProblem
 from .lubrication import LubricationProblem
@@ -112,18 +112,19 @@ def slope(problem: LubricationProblem, tangent: Tangent, p: Array, r: Array, nam
 
 def _friction(problem: LubricationProblem, tangent: Tangent, p: Array, r: Array, lever: Any) -> Slope:
     """Of `flows.drag`, term by term."""
-    grid, s, film = problem.grid, problem.scheme, problem.film
+    grid, s = problem.grid, problem.scheme
     before, behind = grid.steps(0)[:-1], grid.steps(0)[1:]
     dy, unit = grid.spacing[1] if grid.dim == 2 else 1.0, problem.p_unit
     weight, rims = line_weights(grid), grid.rims(1) if grid.dim == 2 else (0.0, 0.0)
     first, last, south, north = sides(grid)
     walls = sides(grid, ("closed",))[:2]
-    h_west, h_east = (np.broadcast_to(film(grid.x + step, grid.y), grid.box) for step in (-before / 2, behind / 2))
+    h_west, *west = sheared_faces(problem, grid.x - before / 2)
+    h_east, resting, h_moving = sheared_faces(problem, grid.x + behind / 2)
     full = (cavity_sign(problem.reduce, p, r) >= 0).reshape(grid.box)
     void = r.reshape(grid.box)
     passes = ~np.broadcast_to(walls[1], grid.box)
     share = s.b_C / np.where(passes & (s.couette_E != 0.0), s.couette_E, np.inf)  # the liquid's share of a face is 1 + share r
-    sheared = np.where(passes, share / h_east, 0.0)
+    sheared = np.where(passes, share / h_moving, 0.0)
     parts: list[tuple[NDArray[np.bool_], Any]] = list(zip(walls, (0.5 * before / behind, 0.5), strict=True))
     for wall, part in parts:
         sheared = sheared - np.where(wall & ~full, part / s.h, 0.0)
@@ -135,7 +136,9 @@ def _friction(problem: LubricationProblem, tangent: Tangent, p: Array, r: Array,
     dp = from_west - towards + np.where(first, 0.5 * h_west, 0.0) * weight * unit
     if tangent.viscosity is not None:  # that of a face follows the mean of its two points' pressures
         own, other = tangent.viscosity  # d log(mu)/dp at the west and the east point of the east face
-        shear = np.where(passes, (1.0 + share * void) / h_east, 0.0) + np.where(first, before / behind / h_west, 0.0)
+        shear = np.where(passes, resting + (1.0 + share * void) / h_moving, 0.0) + np.where(
+            first, before / behind * (west[0] + 1.0 / west[1]), 0.0
+        )
         for wall, part in parts:
             shear = shear + np.where(wall, part * np.where(full, 4.0, 1.0 - void) / s.h, 0.0)
         drag = problem.mu * per_row * shear

@@ -15,12 +15,14 @@ class Dimples:
 
     With xi = x (30 K + 1)/L the node number, a cell has 30 nodes; those numbered 6 to 25 in both directions lie at full
     depth, 5 and 26 (the rim) at half. Between nodes the film is that of the nearest one, so that coarser grids see it too.
+    edged : whether it tells its edges, half-way between nodes; the reference's scheme knows none.
     """
 
     h: float
     depth: float
     L: float
     K: int
+    edged: bool = True
 
     def _profile(self, x: Array) -> Array:
         """2 in a dimple, 1 on its rim, 0 outside."""
@@ -35,6 +37,8 @@ class Dimples:
 
     def jumps(self, axis: str) -> tuple[float, ...]:
         """x or y (m) of the rims' edges, half-way between nodes."""
+        if not self.edged:
+            return ()
         nodes = 30.0 * np.arange(self.K)[:, None] + np.array([4.5, 5.5, 25.5, 26.5])
         return tuple((nodes * (self.L / (30 * self.K + 1))).ravel())
 
