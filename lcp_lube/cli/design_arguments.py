@@ -21,6 +21,16 @@ def add(
     _solver_options(sensitivity, scene_options)
     sensitivity.add_argument("--quantity", default="load", metavar="Q,Q,...", help="default load; vectors by part, force_x")
     sensitivity.add_argument("--by", metavar="KEY,KEY,...", help="numbers of the scene; default all of them")
+    sensitivity.add_argument(
+        "--tolerance",
+        action="append",
+        default=[],
+        metavar="KEY=U",
+        help="standard deviation of a number, 1um or 5%% of its value, h for the film's level: error bars; adds to [tolerance]",
+    )
+    text = "confirm the error bars by so many solves with normally distributed numbers"
+    sensitivity.add_argument("--monte-carlo", type=whole, metavar="N", help=text)
+    sensitivity.add_argument("--seed", type=whole, default=1, help="of these numbers, default 1")
     sensitivity.add_argument("--plot", metavar="FILE.png", help="bars, and the film's own derivative at every point")
     sensitivity.add_argument("--output", metavar="FILE", help="fields with d(Q)/dh per area: .npz, .vts (ParaView) or .h5")
     sensitivity.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")

@@ -2,20 +2,24 @@
 
 import argparse
 import json
+from functools import partial
 from typing import Any
 
 from ..api import solve
 from ..base.options import check_unread
 from ..drivers.adjoint import Adjoint
+from ..drivers.ask import Ask
 from ..drivers.equations import check_film
 from ..drivers.film_gradient import FilmGradient
 from ..drivers.gradient import Gradient, gradients
+from ..errors import InputError
 from ..output import files, sensitivity
 from ..output.console import say
 from ..output.results import as_dict, finite
 from ..problems.solution import Solution
 from ..scenes.scene import Scene
 from ..scenes.values import key_of, values_of
+from ..studies.error_bars import deviations, first_order, monte_carlo
 from .asked import ask_of, scene_of
 
 HEAD = ("scene", "nx", "ny", "outcome", "converged", "message")
@@ -39,7 +43,12 @@ def run(args: argparse.Namespace) -> int:
         files.check_target(args.plot, plot=True)
     if args.output:
         files.check_target(args.output)
-    solution = solve(scene, ask_of(args))
+    deviation = deviations(scene, {**(scene.tolerance or {}), **dict(map(_assignment, args.tolerance))})
+    if args.monte_carlo is not None and not deviation:
+        raise InputError(f"--monte-carlo {args.monte_carlo}: --tolerance KEY=U is needed too")
+    keys = [*keys, *(key for key in deviation if key not in map(partial(key_of, scene), keys))] if keys else keys
+    ask = ask_of(args)
+    solution = solve(scene, ask)
     try:
         check_unread()
         data = as_dict(solution)
@@ -49,14 +58,70 @@ def run(args: argparse.Namespace) -> int:
             record |= sensitivity.as_dict(found[0], solution)
             if found[1:]:
                 record["others"] = [sensitivity.as_dict(one, solution) for one in found[1:]]
+            bars = error_bars(args, scene, solution, found, deviation, ask)
+            for one, into in zip(found, [record, *record.get("others", [])], strict=True):
+                into |= {"error_bar": bars[one.quantity]} if bars else {}
             pictures(args, scene, solution, found)
         if args.json:
             say(json.dumps(finite(record)))
         else:
             say(text(record, scene, solution, found if solution.converged else []))
+            if solution.converged and bars:
+                say("\n".join(bar_line(name, bar, sensitivity.unit_of(solution, name)) for name, bar in bars.items()))
     finally:
         solution.destroy()
     return 0 if solution.converged else 1
+
+
+def _assignment(text: str) -> tuple[str, str]:
+    key, equals, value = (part.strip() for part in text.partition("="))
+    if not (key and equals and value):
+        raise InputError(f"--tolerance {text}: KEY=U is needed")
+    return key, value
+
+
+def error_bars(
+    args: argparse.Namespace,
+    scene: Scene,
+    solution: Solution,
+    found: list[Gradient],
+    deviation: dict[str, float],
+    ask: Ask,
+) -> dict[str, dict[str, Any]]:
+    """By quantity: standard deviation to first order, its parts, and what samples gave. Collective."""
+    if not deviation:
+        return {}
+    bars: dict[str, dict[str, Any]] = {}
+    for one in found:
+        size, parts = first_order(one, deviation)
+        bars[one.quantity] = {"value": one.value, "deviation": size, "parts": parts}
+    if args.monte_carlo is not None:
+        names = [one.quantity for one in found]
+        samples = monte_carlo(scene, solution, names, deviation, args.monte_carlo, args.seed, ask)
+        for name in names:
+            bars[name] |= {
+                "monte_carlo": {
+                    "mean": samples.mean[name],
+                    "deviation": samples.deviation[name],
+                    "relative_error": samples.error,
+                    "samples": samples.solved,
+                    "failed": samples.failed,
+                    "seed": args.seed,
+                }
+            }
+    return bars
+
+
+def bar_line(name: str, bar: dict[str, Any], unit: str) -> str:
+    """First order beside the samples."""
+    parts = ", ".join(f"{key} {part:.3g}" for key, part in sorted(bar["parts"].items(), key=lambda item: -item[1]))
+    lines = [f"{name} = {bar['value']:.6g} +- {bar['deviation']:.3g} {unit}, to first order ({parts})"]
+    if samples := bar.get("monte_carlo"):
+        lines.append(
+            f"{name} = {samples['mean']:.6g} +- {samples['deviation']:.3g} {unit}, of {samples['samples']} samples"
+            f" (seed {samples['seed']}, {samples['failed']} failed; +- {samples['relative_error']:.1%} of the deviation)"
+        )
+    return "\n".join(lines)
 
 
 def pictures(args: argparse.Namespace, scene: Scene, solution: Solution, found: list[Gradient]) -> None:

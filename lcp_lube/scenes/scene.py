@@ -73,6 +73,7 @@ class Scene(Measured):
     family: str = "slider"
     name: str = ""
     scheme: str | None = None
+    tolerance: dict[str, Any] | None = Field(None, description="standard deviations of numbers by key, for error bars")
     _folder: Path | None = PrivateAttr(None)  # of the scene's file: other files' names are relative to it
     _follows: frozenset[str] = PrivateAttr(frozenset())  # keys whose values follow from those that were given
 

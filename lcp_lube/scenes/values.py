@@ -16,6 +16,7 @@ def values_of(scene: Scene) -> dict[str, float]:
     data = scene.data_si()
     for key in (*scene._follows, *UNITS_ALONE):
         data.pop(key, None)
+    data.pop("tolerance", None)
     if isinstance(balance := data.get("balance"), dict):
         data["balance"] = {"load": balance["load"]}
     found: dict[str, float] = {}

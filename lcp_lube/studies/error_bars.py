@@ -1,0 +1,149 @@
+"""Error bars: what tolerances of a scene's numbers make of a result, to first order and by solving for samples of them."""
+
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from tqdm import tqdm
+
+from ..api import solve
+from ..base.quantity import in_si
+from ..drivers.adjoint import Adjoint
+from ..drivers.ask import Ask
+from ..drivers.gradient import Gradient
+from ..errors import InputError
+from ..problems.solution import Solution
+from ..scenes.scene import Scene
+from ..scenes.values import key_of, values_of, with_values
+
+LEVEL = "h"  # stands for the level of the whole film
+
+
+@dataclass(frozen=True)
+class Samples:
+    """What solves for samples gave: mean and standard deviation by quantity; failed ones are left out.
+
+    error : of the standard deviation itself, relative, 1/sqrt(2 (N - 1)).
+    """
+
+    mean: dict[str, float]
+    deviation: dict[str, float]
+    solved: int
+    failed: int
+
+    @property
+    def error(self) -> float:
+        return 1.0 / np.sqrt(2.0 * max(self.solved - 1, 1))
+
+
+def deviations(scene: Scene, tolerances: Mapping[str, Any]) -> dict[str, float]:
+    """Standard deviations in SI by key, from texts such as '1um', '5%' (of the value) or numbers in SI.
+
+    Raises
+    ------
+    InputError : a key that is no number of the scene, a text that is none, a deviation that is not positive.
+    """
+    values, units, out = values_of(scene), scene.data_units(), {}
+    for text, given in _flat(tolerances).items():
+        if text == LEVEL and "h" not in values:
+            if "h_offset" not in values:
+                raise InputError(
+                    f"--tolerance {text}: scene {scene.name} has no h_offset, the film's level; name one of its numbers"
+                )
+            key = "h_offset"
+        else:
+            key = key_of(scene, text)
+        unit = next((units[name] for name in (key, _numbered(scene, key), key.rpartition(".")[0]) if name in units), "")
+        try:
+            relative = str(given).strip().endswith("%")
+            size = in_si(str(given), "" if relative else unit)
+        except InputError as error:
+            raise InputError(f"--tolerance {text}={given}: {error}") from None
+        if size is None:
+            raise InputError(f"--tolerance {text}={given}: a number, or a per cent of the value, is needed")
+        size = abs(values[key]) * size if relative else size
+        if not (np.isfinite(size) and size > 0):
+            what = f"{values[key]:g} is the value" if relative else "more than 0 is needed"
+            raise InputError(f"--tolerance {text}={given}: {what}")
+        out[key] = float(size)
+    return out
+
+
+def _flat(table: Mapping[str, Any], path: str = "") -> dict[str, Any]:
+    """Nested tables by the paths of their keys."""
+    out: dict[str, Any] = {}
+    for key, value in table.items():
+        out |= _flat(value, f"{path}{key}.") if isinstance(value, Mapping) else {f"{path}{key}": value}
+    return out
+
+
+def _numbered(scene: Scene, key: str) -> str:
+    """film.2.depth for film.pocket.depth: as units go by."""
+    words = key.split(".")
+    tables = getattr(scene, words[0], None)
+    if len(words) < 3 or not isinstance(tables, list):
+        return key
+    found = (k for k, one in enumerate(tables, 1) if getattr(one, "shape", None) == words[1])
+    return ".".join([words[0], str(next(found, words[1])), *words[2:]])
+
+
+def first_order(gradient: Gradient, deviation: Mapping[str, float]) -> tuple[float, dict[str, float]]:
+    """Standard deviation of a quantity whose numbers vary independently: root of the sum of (dQ/da u_a)^2, and these terms.
+
+    Raises
+    ------
+    InputError : a number without a derivative.
+    """
+    for key in deviation:
+        if key not in gradient.gradient:
+            raise InputError(f"--tolerance {key}: no derivative: {gradient.held.get(key, 'it is no number of the film')}")
+    parts = {key: abs(gradient.gradient[key]) * u for key, u in deviation.items()}
+    return float(np.sqrt(sum(part**2 for part in parts.values()))), parts
+
+
+def monte_carlo(
+    scene: Scene, near: Solution, quantities: Sequence[str], deviation: Mapping[str, float], count: int, seed: int, ask: Ask
+) -> Samples:
+    """Solve for normally distributed numbers, each sample started from the answer in the middle. Collective.
+
+    Raises
+    ------
+    InputError : fewer than two samples, or none that could be solved.
+    """
+    if count < 2:
+        raise InputError(f"--monte-carlo {count}: at least 2 samples are needed")
+    draws = np.random.default_rng(seed).standard_normal((count, len(deviation)))
+    values = values_of(scene)
+    rows: list[list[float]] = []
+    quiet = None if MPI.COMM_WORLD.rank == 0 else True
+    for draw in tqdm(draws, unit="sample", disable=quiet, file=sys.stderr):
+        changed = {key: values[key] + u * float(x) for (key, u), x in zip(deviation.items(), draw, strict=True)}
+        try:
+            at = with_values(scene, changed)
+            with solve(at, ask, start=near) as solution:
+                if solution.converged:
+                    rows.append(numbers(at, solution, quantities))
+        except InputError:
+            pass  # a sample outside of what is allowed: counted as failed
+    if len(rows) < 2:
+        raise InputError(f"--monte-carlo {count}: {len(rows)} samples could be solved; smaller tolerances are needed")
+    table = np.array(rows)
+    mean, spread = table.mean(axis=0), table.std(axis=0, ddof=1)
+    by_name = [dict(zip(quantities, map(float, row), strict=True)) for row in (mean, spread)]
+    return Samples(by_name[0], by_name[1], len(rows), count - len(rows))
+
+
+def numbers(scene: Scene, solution: Solution, quantities: Sequence[str]) -> list[float]:
+    """Values of quantities as `gradients` has them. Collective."""
+    known = solution.numbers
+    if all(isinstance(known.get(name), float) for name in quantities):
+        return [known[name] for name in quantities]
+    adjoint = Adjoint(scene, solution, [])
+    try:
+        report = adjoint.equations.report(adjoint.numbers)
+        return [adjoint.value(name) if name in adjoint.found else report[name] for name in quantities]
+    finally:
+        adjoint.destroy()
