@@ -2,6 +2,7 @@
 
 import argparse
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 
@@ -34,6 +35,20 @@ def add(
     sensitivity.add_argument("--plot", metavar="FILE.png", help="bars, and the film's own derivative at every point")
     sensitivity.add_argument("--output", metavar="FILE", help="fields with d(Q)/dh per area: .npz, .vts (ParaView) or .h5")
     sensitivity.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")
+
+    optimise = command("optimise", "the numbers of a scene, within bounds, that make one of its results largest or smallest")
+    _solver_options(optimise, scene_options)
+    optimise.add_argument("--maximise", metavar="Q", help="a number of the results: load, ...")
+    optimise.add_argument("--minimise", metavar="Q", help="or this: friction, friction_coefficient, ...")
+    text = "a number of the scene and its range, dimples.depth=0um:10um; several --vary"
+    optimise.add_argument("--vary", action="append", default=[], metavar="KEY=FROM:TO", help=text)
+    text = "a limit that the design keeps, 'friction<=1'; several --subject"
+    optimise.add_argument("--subject", action="append", default=[], metavar="Q<=BOUND", help=text)
+    optimise.add_argument("--steps", type=whole, default=100, metavar="N", help="of the optimiser at most, default 100")
+    optimise.add_argument("--output", type=Path, metavar="FILE.toml", help="the best design as a scene")
+    text = "every design is a row of it, and those that are there are not solved again; default FILE.csv beside --output"
+    optimise.add_argument("--history", type=Path, metavar="FILE.csv", help=text)
+    optimise.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")
 
 
 def _solver_options(parser: argparse.ArgumentParser, scene_options: Callable[[Any], None]) -> None:

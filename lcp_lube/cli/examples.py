@@ -9,6 +9,8 @@ EXAMPLES: dict[str, str] = {
     "chart": "lcp-lube chart precision problem1 --quick",
     "verify": "lcp-lube verify --quick",
     "coefficients": "lcp-lube coefficients two_groove_journal --set eccentricity=0.477",
+    "sensitivity": "lcp-lube sensitivity pocketed_pad --quantity load,friction",
+    "optimise": "lcp-lube optimise pocketed_pad --maximise load --vary film.pocket.depth=0.2um:5um --output best.toml",
     "doctor": "lcp-lube doctor --json",
     "new": "lcp-lube new my_pad.toml --from pocketed_pad",
     "list": "lcp-lube list",

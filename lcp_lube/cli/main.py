@@ -152,6 +152,12 @@ def run_sensitivity(args: argparse.Namespace) -> int:
     return run(args)
 
 
+def run_optimise(args: argparse.Namespace) -> int:
+    from .optimise import run
+
+    return run(args)
+
+
 def run_explore(args: argparse.Namespace) -> int:
     from .explore.command import run
 
@@ -192,6 +198,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "sweep": run_sweep,
     "coefficients": run_coefficients,
     "sensitivity": run_sensitivity,
+    "optimise": run_optimise,
     "explore": run_explore,
     "table": run_table,
     "chart": run_chart,
