@@ -55,9 +55,10 @@ format: $(READY) ## let ruff rewrite the code
 charts: $(READY) ## make the runs that benchmarks/results lacks, then draw all charts
 	$(BIN)/python benchmarks/precision_peers.py
 	for chart in precision stability scaling; do $(BIN)/lcp-lube chart $$chart --results benchmarks/results || exit; done
-
-pictures: $(READY) ## draw the pictures of README.md and docs/ anew
 	$(BIN)/python tools/pictures.py
+
+pictures: $(READY) ## draw the pictures of README.md, docs/ and benchmarks/ anew that are stale; ALL=1: all of them
+	$(BIN)/python tools/pictures.py $(if $(ALL),--all)
 
 # Tools of the documentation only; the package itself does not need them.
 .venv/.docs: pyproject.toml $(READY)
