@@ -60,9 +60,7 @@ class MethodEntry(Entry):
 
 
 METHODS: dict[str, MethodEntry] = {
-    "din": MethodEntry(
-        "lcp_lube.solvers.din:build", "damped inexact Newton of Mezzadri and Galligani (interior method)", nested=True
-    ),
+    "din": MethodEntry("lcp_lube.solvers.din:build", "damped inexact Newton of Mezzadri and Galligani (interior)", nested=True),
     "din-pc": MethodEntry(
         "lcp_lube.solvers.din_pc:build",
         "DIN with a predictor-corrector step: fewer iterations",
@@ -192,6 +190,7 @@ FAMILIES: dict[str, Entry] = {
     "textured": Entry("lcp_lube.scenes.textured:TexturedScene", "flat slider with square dimples"),
     "journal": Entry("lcp_lube.scenes.journal:JournalScene", "journal bearing with an axial groove at the widest gap"),
     "grooved_journal": Entry("lcp_lube.scenes.grooved:GroovedJournalScene", "journal with axial grooves under a vertical load"),
+    "tilting_pad": Entry("lcp_lube.scenes.tilting:TiltingPadScene", "journal in separate pads, fixed or tilting about pivots"),
     "thrust": Entry("lcp_lube.scenes.thrust:ThrustScene", "thrust bearing: equal sectors with tapered lands, steps or spirals"),
     "rough": Entry("lcp_lube.scenes.textured:RoughScene", "slider with one wave and a random surface"),
     "bearing": Entry("lcp_lube.scenes.bearing:BearingScene", "a bearing of any kind: film shapes added up, a condition a side"),
@@ -236,6 +235,7 @@ DRIVERS: dict[str, Entry] = {
     "decision": Entry("lcp_lube.drivers.decision", "effects that do not count are left out"),
     "accuracy": Entry("lcp_lube.drivers.accuracy", "finer and finer grids until a quantity is as good as asked for"),
     "balance": Entry("lcp_lube.drivers.balance", "the film that carries the load asked for"),
+    "pads": Entry("lcp_lube.drivers.pads", "pads that tilt, and the place of what they carry, by Newton's method"),
     "position": Entry("lcp_lube.drivers.position", "where a journal lies under a load, by Newton's method"),
     "attitude": Entry("lcp_lube.drivers.attitude", "the attitude that follows from the load's direction"),
     "time": Entry("lcp_lube.drivers.time", "step by step, where the film moves"),

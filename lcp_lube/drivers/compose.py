@@ -48,6 +48,8 @@ CANNOT = (
     ("accuracy", "resume", "its many grids make one answer; give --n for one grid"),
     ("balance", "checkpoint", "its many solves make one answer; give the value that was found for one solve"),
     ("balance", "resume", "its many solves make one answer; give the value that was found for one solve"),
+    ("pads", "checkpoint", "its many solves make one answer; give the place and the tilts that were found for one solve"),
+    ("pads", "resume", "its many solves make one answer; give the place and the tilts that were found for one solve"),
     ("position", "checkpoint", "its many solves make one answer; give the eccentricity that was found for one solve"),
     ("position", "resume", "its many solves make one answer; give the eccentricity that was found for one solve"),
     ("time", "checkpoint", "it goes on in time, and holds its own memory of earlier steps"),

@@ -1,12 +1,15 @@
 """Thrust bearings: equal sectors side by side, one of which is solved in polar coordinates."""
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from petsc4py import PETSc
 from pydantic import Field, model_validator
 
+from ..base.parallel import Array
 from ..problems.facts import Facts
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model, Side
@@ -18,13 +21,25 @@ from .supply import Place, SupplyTable, supplies_of
 from .units import measured, metres
 
 
+@dataclass(frozen=True)
+class _Times:
+    """A shape times a number."""
+
+    by: float
+    shape: Shape
+
+    def __call__(self, x: Array, y: Array) -> Array:
+        return self.by * self.shape(x, y)
+
+
 class ThrustScene(Scene):
     """A thrust bearing of equal sectors under a flat runner that turns towards larger angles; 2D, polar coordinates.
 
     Lines run along the angle: x is the arc at the mean radius from where the runner enters, y the radius beyond the inner one.
     What is printed is of the whole bearing, fields are of one sector. Profiles: flat; tapered_land, a film that falls by
     `taper` over taper_part of the pad's angle, and a flat land (taper_part = 1: an inclined sector); step, by `taper` at
-    taper_part; spiral, grooves of depth `taper`, one of them with its land a sector.
+    taper_part; spiral, grooves of depth `taper`, one of them with its land a sector. With pivot_part the pads tilt, h_min being
+    the film at the pivot.
     """
 
     D_inner: Positive = metres(0.06, "inner diameter")
@@ -42,6 +57,14 @@ class ThrustScene(Scene):
     )
     ratio: Annotated[float, Field(gt=0, lt=1)] = Field(0.5, description="groove over groove and land, of spirals")
     seal: NotNegative = metres(0.0, "width at the inner radius without spirals (angle below 0: at the outer one)")
+    pivot_part: Annotated[float, Field(gt=0, lt=1)] | None = Field(
+        None, description="pads tilt about a pivot at this part of their angle from the inlet; default: fixed pads"
+    )
+    pivot_radius: Positive | None = metres(None, "of a pivot that is a point; default: a radial line")
+    pitch: Finite | None = Field(
+        None, description="tilt about the radius through the pivot, rad, positive: inlet open; default: found"
+    )
+    roll: Finite | None = Field(None, description="tilt across, rad, positive: outer radius open; default: found on a point")
     film: list[FilmPart] = Field([], description="shapes that are added to the film; x along the mean radius, y outwards")
     speed_rpm: Positive = Field(3000.0, description="speed of the runner, rpm")
     mu: Positive = measured("Pa s", 0.02, "viscosity")
@@ -68,9 +91,15 @@ class ThrustScene(Scene):
         if self.profile == "spiral" and (self.pad_deg is not None or not self.angle_deg):
             raise ValueError("profile = spiral: a sector is a groove and its land; neither pad_deg nor angle_deg = 0")
         if self.profile != "spiral" and self.pad_deg is None and not max(self.p_inner, self.p_outer) > 0 and not self.supply:
-            raise ValueError(
-                "pad_deg is missing: without grooves between the pads nothing feeds them but p_inner or p_outer > 0"
-            )
+            raise ValueError("pad_deg is missing: without grooves between the pads p_inner or p_outer > 0 has to feed them")
+        if self.pivot_part is None and (self.pivot_radius or self.pitch or self.roll):
+            raise ValueError("pivot_part is missing: pads that tilt have a pivot")
+        if self.pivot_part is not None and self.pad_deg is None:
+            raise ValueError(f"pivot_part = {self.pivot_part:g}: pads that tilt are apart: pad_deg is needed")
+        if self.pivot_radius is not None and not self.D_inner < 2 * self.pivot_radius < self.D_outer:
+            raise ValueError(f"pivot_radius = {self.pivot_radius:g}: between the inner and the outer radius is needed")
+        if self.pivot_part is not None and self.balance is not None and self.balance.vary not in (None, "h_min"):
+            raise ValueError(f"balance.vary = {self.balance.vary}: the film at the pivot follows from the load: h_min")
         self._supplies()
         return self
 
@@ -112,8 +141,21 @@ class ThrustScene(Scene):
             between = (inner + self.seal, outer) if self.angle_deg > 0 else (inner, outer - self.seal)
             angle = math.radians(self.angle_deg)
             parts.append(SpiralGrooves(self.taper, self.pads, angle, self.ratio, between, self.radii))
+        if self.pivot_part is not None:
+            pitch, roll = self.tilt_modes
+            parts += [_Times(self.pitch or 0.0, pitch), _Times(self.roll or 0.0, roll)]
         extent = Extent((L, width), self._folder or Path())
         return Sum([*parts, *(table.part(extent) for table in self.film)])
+
+    @property
+    def tilt_modes(self) -> tuple[Shape, Shape]:
+        """dh of a tilt about the radius through the pivot that opens the inlet, and of one that opens the outer radius."""
+        (L, _), (inner, mean) = self.side_lengths, self.radii
+        at, radius = (self.pivot_part or 0.0) * L / mean, self.pivot_radius or mean
+        return (
+            lambda x, y: -(inner + y) * np.sin(x / mean - at),
+            lambda x, y: (inner + y) * np.cos(x / mean - at) - radius,
+        )
 
     @property
     def model(self) -> Model:

@@ -514,7 +514,7 @@ BLOCKS = re.findall(r"```toml\n(.*?)```", (Path(__file__).parents[2] / "docs" / 
 def test_documented_scenes(tmp_path, block):
     (tmp_path / "documented.toml").write_text(block)
     solution = solve(load_scene(tmp_path / "documented.toml"))
-    assert solution.converged and len(BLOCKS) == 5
+    assert solution.converged and len(BLOCKS) == 6
     solution.destroy()
 
 

@@ -74,3 +74,39 @@ class Bore:
         if self.dam is not None and axis == "y":
             found += [0.5 * (self.turning.B - self.dam.width), 0.5 * (self.turning.B + self.dam.width)]
         return tuple(float(t) for t in found)
+
+
+@dataclass(frozen=True)
+class PadBore:
+    """h(x, y) between a journal and pads around it, m: each pad's own bore, tilted about its pivot.
+
+    On the pad about the middle angle m_k, with its pivot at q_k, clearance c_p of its bore and c at the pivot,
+
+        h = c_p - (c_p - c) cos(theta - q_k) - c e cos(theta - attitude) - tilt_k R sin(theta - q_k) :
+
+    a positive tilt (rad) opens the edge at which the journal enters. eccentricity e is relative to c, half: of a pad's extent,
+    rad. Between pads the film is that of the nearer edge, where it stands for nothing.
+    """
+
+    turning: Turning
+    eccentricity: float
+    attitude: float
+    c_pad: float
+    half: float
+    middles: tuple[float, ...]
+    pivots: tuple[float, ...]
+    tilts: tuple[float, ...]
+
+    def __call__(self, x: Array, y: Array | None = None, /) -> Array:
+        """The film at x and y (m), with the broadcast shape of both."""
+        turning, x = self.turning, np.asarray(x, dtype=float)
+        middles = np.array(self.middles)
+        off = np.remainder(turning.theta(x)[..., None] - middles + math.pi, 2.0 * math.pi) - math.pi
+        pad = np.abs(off).argmin(axis=-1)
+        nearest = np.take_along_axis(off, pad[..., None], axis=-1)[..., 0]
+        theta = middles[pad] + np.clip(nearest, -self.half, self.half)
+        from_pivot = theta - np.array(self.pivots)[pad]
+        h = turning.c * (1.0 - self.eccentricity * np.cos(theta - self.attitude))
+        h = h + 2.0 * (self.c_pad - turning.c) * np.sin(0.5 * from_pivot) ** 2
+        h = h - np.array(self.tilts)[pad] * turning.R * np.sin(from_pivot)
+        return np.array(np.broadcast_to(h, np.broadcast_shapes(x.shape, np.shape(0.0 if y is None else y))))

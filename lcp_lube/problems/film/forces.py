@@ -58,29 +58,29 @@ def forces(problem: LubricationProblem, p_pa: Array) -> dict[str, Any]:
     grid, shaft, reference = problem.grid, problem.shaft, ambient(problem)
     middle = [start + 0.5 * length for start, length in zip(grid.origin, grid.lengths, strict=False)]
 
-    def integral(weight: Callable[[Array, Array], Array], above: float = reference) -> float:
-        return _integral(problem, p_pa, above, weight)
+    def over(weight: Callable[[Array, Array], Array], above: float = reference) -> float:
+        return integral(problem, p_pa, above, weight)
 
-    out: dict[str, Any] = {"pressure_integral": integral(lambda x, y: np.ones(1), 0.0)}
+    out: dict[str, Any] = {"pressure_integral": over(lambda x, y: np.ones(1), 0.0)}
     if shaft is None and grid.polar is not None:
-        return out | _of_sector(grid.polar, integral)
+        return out | _of_sector(grid.polar, over)
     if shaft is None:
-        out["load"] = integral(lambda x, y: np.ones(1))
-        about_y = -integral(lambda x, y: x - middle[0])
-        out["moment"] = [integral(lambda x, y: y - middle[1]), about_y] if grid.dim == 2 else about_y
+        out["load"] = over(lambda x, y: np.ones(1))
+        about_y = -over(lambda x, y: x - middle[0])
+        out["moment"] = [over(lambda x, y: y - middle[1]), about_y] if grid.dim == 2 else about_y
         return out
 
     def phi(x: Array) -> Array:
         return shaft_angle(problem, shaft, x)
 
-    force = [-integral(lambda x, y: np.cos(phi(x))), -integral(lambda x, y: np.sin(phi(x)))]
+    force = [-over(lambda x, y: np.cos(phi(x))), -over(lambda x, y: np.sin(phi(x)))]
     out |= {"load": hypot(*force), "force": force, "attitude_deg": None}
     if shaft.widest is not None and 0 < out["load"] < inf:
         out["attitude_deg"] = attitude(shaft.widest, force, problem.U)
     if grid.dim == 2:
         out["moment"] = [
-            -integral(lambda x, y: (y - middle[1]) * np.cos(phi(x))),
-            -integral(lambda x, y: (y - middle[1]) * np.sin(phi(x))),
+            -over(lambda x, y: (y - middle[1]) * np.cos(phi(x))),
+            -over(lambda x, y: (y - middle[1]) * np.sin(phi(x))),
         ]
     return out
 
@@ -108,7 +108,7 @@ def _of_sector(polar: tuple[float, float], integral: Callable[..., float]) -> di
     return {"load": load, "moment": moment, "pressure_centre": centre}
 
 
-def _integral(problem: LubricationProblem, p_pa: Array, above: float, weight: Callable[[Array, Array], Array]) -> float:
+def integral(problem: LubricationProblem, p_pa: Array, above: float, weight: Callable[[Array, Array], Array]) -> float:
     """Integral of (p - above) weight(x, y): trapezoidal to the open sides, a corner having the mean of its two; cells end at
     the others. Collective."""
     grid = problem.grid

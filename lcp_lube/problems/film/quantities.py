@@ -29,6 +29,7 @@ UNITS = {
     "cavitated_area": "m2",
     **dict.fromkeys(("moment", "friction_torque"), "N m"),
     "pad_load": "N",
+    "pad_tilts": "rad",
     **dict.fromkeys(("inner_flow", "outer_flow"), "m3/s"),
     "pressure_centre": "m, deg",
     **dict.fromkeys(("power_loss", "heat_power", "heat_out"), "W"),

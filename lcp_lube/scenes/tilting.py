@@ -1,0 +1,149 @@
+"""Journal bearings of separate pads, fixed or tilting about pivots, under a load of given direction."""
+
+import math
+from typing import Annotated, Any
+
+from petsc4py import PETSc
+from pydantic import Field, model_validator
+
+from ..problems.facts import Facts
+from ..problems.film.bore import PadBore
+from ..problems.film.forces import Shaft
+from ..problems.film.grooves import Groove
+from ..problems.film.lubrication import LubricationProblem
+from ..problems.film.model import Model, Side
+from ..problems.film.turning import Turning
+from .balance import BalanceTable
+from .scene import Count, Finite, NotNegative, Positive, Scene
+from .units import measured, metres
+
+
+class TiltingPadScene(Scene):
+    """A journal in pads that tilt about their pivots; 2D. Angles are counted from the load, in the sense of rotation.
+
+    The pads' tilts are found at which no moment acts about any pivot, and with balance.load the journal's place at which the
+    films carry the load. clearance is that of the assembled bearing: between the journal in the middle and a pad at its pivot.
+    preload m makes the pads' own bore wider, clearance/(1 - m). Between pads p_groove holds. With `tilts` given they are fixed.
+    """
+
+    D: Positive = metres(0.1, "diameter")
+    L_over_D: Positive = Field(0.5, description="width over diameter")
+    clearance: Positive = metres(1e-4, "radial clearance at the pivots, the journal in the middle")
+    preload: Annotated[float, Field(ge=0, lt=1, description="of the pads: 1 - clearance over that of their own bore")] = 0.3
+    pivots_deg: list[Finite] = Field(
+        [36.0, 108.0, 180.0, 252.0, 324.0], min_length=1, description="pivots of the pads, degrees from the load, ascending"
+    )
+    pad_deg: Annotated[float, Field(gt=0, lt=360, description="extent of each pad, degrees")] = 60.0
+    pivot_part: Annotated[float, Field(gt=0, lt=1, description="where the pivot is, in parts of the pad from its inlet")] = 0.5
+    tilts: list[Finite] | None = Field(
+        None, description="tilts of the pads, rad, positive: inlet open; default: as they follow"
+    )
+    speed_rpm: Positive = Field(3000.0, description="speed of the journal, rpm")
+    mu: Positive = measured("Pa s", 0.02, "viscosity")
+    eccentricity: Annotated[float, Field(ge=0, lt=2, description="of the journal over the clearance")] = 0.3
+    attitude_deg: Finite = Field(0.0, description="from the load to the journal's displacement, degrees")
+    p_groove: NotNegative = measured("Pa", 0.0, "pressure between the pads, above p_c")
+    p_end: NotNegative = measured("Pa", 0.0, "pressure at both ends, above p_c")
+    p_c: Finite = measured("Pa", 0.0, "cavitation pressure")
+    balance: BalanceTable | None = Field(None, description="load to carry; the journal's place is found for it")
+    scheme: str | None = Field("face", description="form of the Couette flux: face")
+    n: Count = Field(360, description="points around, and an odd number near a sixteenth of them across")
+    nx: Count | None = Field(None, description="points around; default n")
+    ny: Count | None = Field(None, description="points across; default as n says")
+
+    @model_validator(mode="after")
+    def _possible(self) -> "TiltingPadScene":
+        if self.scheme != "face":
+            raise ValueError(f"scheme = {self.scheme}: face is allowed")
+        if sorted(self.pivots_deg) != self.pivots_deg or self.pivots_deg[-1] - self.pivots_deg[0] >= 360.0:
+            raise ValueError(f"pivots_deg = {self.pivots_deg}: ascending angles within a turn are needed")
+        turn = [*self.pivots_deg[1:], self.pivots_deg[0] + 360.0]
+        least = min(b - a for a, b in zip(self.pivots_deg, turn, strict=True))
+        if least - self.pad_deg < 360.0 / self.shape[0] * (1 - 1e-9):
+            most = least - 360.0 / self.shape[0]
+            raise ValueError(f"pad_deg = {self.pad_deg:g}: pads {least:g} degrees apart overlap; at most {most:g} is allowed")
+        if self.tilts is not None and len(self.tilts) != len(self.pivots_deg):
+            raise ValueError(f"tilts = {self.tilts}: {len(self.pivots_deg)} values are needed, one a pad")
+        if self.pad_deg / 360.0 * self.shape[0] < 8:
+            needed = math.ceil(2880 / self.pad_deg)
+            raise ValueError(f"nx = {self.shape[0]}: pads of {self.pad_deg:g} degrees need {needed} points around")
+        if self.balance is not None and self.balance.vary not in (None, "eccentricity"):
+            raise ValueError(f"balance.vary = {self.balance.vary}: the journal's place follows from the load: eccentricity")
+        return self
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return self.nx or self.n, self.ny or max(3, self.n // 16 | 1)
+
+    @property
+    def omega(self) -> float:
+        """Angular velocity, rad/s."""
+        return 2.0 * math.pi * self.speed_rpm / 60.0
+
+    @property
+    def turning(self) -> Turning:
+        """Place x = 0 lies half a mesh before the first pad's outlet."""
+        outlet = self.pivots_deg[0] + (1.0 - self.pivot_part) * self.pad_deg
+        start = math.radians(outlet) - math.pi / self.shape[0]
+        return Turning(0.5 * self.D, self.clearance, self.L_over_D * self.D, self.omega, start)
+
+    @property
+    def gap(self) -> PadBore:
+        """The film h(x, y), m."""
+        middles = (at + (0.5 - self.pivot_part) * self.pad_deg for at in self.pivots_deg)
+        return PadBore(
+            self.turning,
+            self.eccentricity,
+            math.radians(self.attitude_deg),
+            self.clearance / (1.0 - self.preload),
+            math.radians(0.5 * self.pad_deg),
+            tuple(map(math.radians, middles)),
+            tuple(map(math.radians, self.pivots_deg)),
+            tuple(self.tilts or [0.0] * len(self.pivots_deg)),
+        )
+
+    @property
+    def grooves(self) -> tuple[Groove, ...]:
+        """The columns between the pads, whose edges are points of the grid: that behind pad k is the k-th."""
+        nx, meshes = self.shape[0], self.shape[0] / 360.0
+        first = self.pivots_deg[0] + (1.0 - self.pivot_part) * self.pad_deg
+        out = []
+        for at, behind in zip(self.pivots_deg, [*self.pivots_deg[1:], self.pivots_deg[0] + 360.0], strict=True):
+            start = round((at + (1.0 - self.pivot_part) * self.pad_deg - first) * meshes)
+            end = round((behind - self.pivot_part * self.pad_deg - first) * meshes)
+            out.append(Groove(start % nx, max(1, end - start + 1), self.p_groove))
+        return tuple(out)
+
+    @property
+    def model(self) -> Model:
+        """What is discretised."""
+        ends, turning = Side(p=self.p_end), self.turning
+        return Model(
+            lengths=(turning.length, turning.B),
+            sides=(Side("periodic"), Side("periodic"), ends, ends),
+            gap=self.gap,
+            mu=self.mu,
+            U=turning.R * turning.omega,
+            p_c=self.p_c,
+            p_unit=self.mu * self.omega * (turning.R / self.clearance) ** 2,
+            scheme="face",
+            shaft=Shaft(turning.R, math.radians(self.attitude_deg) + math.pi if self.eccentricity else None, turning.start),
+            grooves=self.grooves,
+        )
+
+    def facts(self, comm: PETSc.Comm | None = None) -> Facts:
+        return self.model.facts(self.shape, comm)
+
+    def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
+        """The discrete problem on this scene's grid. Collective.
+
+        Raises
+        ------
+        InputError : more ranks than the grid can be dealt to, pads that touch the journal.
+        """
+        problem = self.model.build(self.shape, comm)
+        problem.extras = self._bearing_numbers
+        return problem
+
+    def _bearing_numbers(self, values: dict[str, Any]) -> dict[str, Any]:
+        return self.turning.numbers(values["load"], self.mu, self.eccentricity)

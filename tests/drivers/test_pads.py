@@ -1,0 +1,110 @@
+"""Pads that tilt: equilibrium, symmetry, stiffness against differences, no cross-coupling, pads that idle, bad input."""
+
+import math
+
+import numpy as np
+import pytest
+
+from lcp_lube import InputError, load_scene, solve
+from lcp_lube.drivers.coefficients import coefficients
+from lcp_lube.drivers.pads import JournalPads, ThrustPads
+
+SMALL = {"nx": 90, "ny": 5}  # whole meshes from pivot to pivot, and in a pad
+FLAT = {"nx": 29, "ny": 15}
+
+
+@pytest.mark.parametrize(("load", "preload", "pivot"), [(100.0, 0.5, 0.5), (3e4, 0.8, 0.62)])
+def test_journal_in_balance(load, preload, pivot):
+    """The films carry the load along its line, no moment is left about any pivot, pads alike in place tilt alike."""
+    scene = load_scene("tilting_pad_journal", {**SMALL, "balance.load": load, "preload": preload, "pivot_part": pivot})
+    with solve(scene) as solution:
+        assert solution.converged, solution.message
+        values = solution.problem.quantities(solution.fields)
+        assert values["force"] == pytest.approx([-load, 0.0], abs=1e-5 * load)
+        assert abs(math.radians(solution.settings["attitude_deg"])) < 1e-4  # pivots on both sides of the load
+        bearing = JournalPads(scene)
+        q = np.array(solution.settings["coordinates"])
+        films = list(bearing.films(bearing.at(q), solution))
+        off, _ = bearing.misfit(solution, films)
+        assert np.abs(off[2:]).max() < 1e-7 * load * 0.05
+        for film in films:
+            film.problem.destroy()
+        shift = q[0] * np.sin(np.radians(scene.pivots_deg)) / 0.05  # what the journal's displacement makes of equal gaps
+        tilts = np.array(values["pad_tilts"]) - shift
+        assert tilts[[0, 1]] == pytest.approx(tilts[[4, 3]], abs=1e-3 * np.abs(tilts).max())
+
+
+def test_no_cross_coupling_and_stiffness_against_differences():
+    """Pads on pivots push towards their pivots alone; K with pads that follow is that of solves with the journal displaced."""
+    scene = load_scene("tilting_pad_journal", SMALL)
+    with solve(scene) as solution:
+        slow, fast = coefficients(scene, solution, (0.0, 1e-2))
+        q = np.array(solution.settings["coordinates"])
+    assert max(abs(slow.K[0, 1]), abs(slow.K[1, 0])) < 1e-6 * slow.K[0, 0]
+    assert np.allclose(slow.K, fast.K, rtol=1e-6, atol=1e-6 * slow.K.max()) and np.allclose(slow.C, fast.C, rtol=1e-4, atol=1.0)
+    K = np.zeros((2, 2))
+    for k in range(2):
+        ends = []
+        for sign in (1.0, -1.0):
+            e = q[:2].copy()
+            e[k] += sign * 1e-4 * scene.clearance
+            there = {
+                "eccentricity": float(np.hypot(*e)) / scene.clearance,
+                "attitude_deg": math.degrees(math.atan2(e[1], e[0])),
+            }
+            with solve(scene.model_copy(update={"balance": None, **there})) as other:
+                ends.append(np.array(other.problem.quantities(other.fields)["force"]))
+        K[:, k] = -(ends[0] - ends[1]) / (2e-4 * scene.clearance)
+    assert np.abs(slow.K - K).max() < 1e-6 * np.abs(K).max()
+
+
+def test_load_on_a_pad_and_fixed_pads():
+    on = {"pivots_deg": [0.0, 72.0, 144.0, 216.0, 288.0]}
+    with solve("tilting_pad_journal", **SMALL, **on) as solution:
+        assert solution.converged
+        tilts = solution.problem.quantities(solution.fields)["pad_tilts"]
+    with solve("tilting_pad_journal", **SMALL, **on, tilts=tilts) as fixed:
+        assert fixed.converged  # two coordinates alone: the place is the same
+        assert fixed.settings["coordinates"][0] > 0
+
+
+def test_a_pad_without_preload_idles():
+    """The journal moves away from the upper pads, whose gap then diverges from the pivot both ways: they have no pressure."""
+    with solve(load_scene("tilting_pad_journal", {"nx": 90, "ny": 3, "preload": 0.0, "balance.load": 5e3})) as solution:
+        assert solution.converged, solution.message
+        values = solution.problem.quantities(solution.fields)
+        assert values["force"] == pytest.approx([-5e3, 0.0], abs=1e-2)
+
+
+def test_thrust_pads():
+    """The load acts at the pivots."""
+    scene = load_scene("tilting_pad_thrust", FLAT)
+    with solve(scene) as solution:
+        assert solution.converged, solution.message
+        values = solution.problem.quantities(solution.fields)
+        assert values["load"] == pytest.approx(1e4, rel=1e-6)
+        assert values["pressure_centre"] == pytest.approx([0.0465, 0.6 * 38.0], rel=1e-6)
+        assert ThrustPads(scene).free.all() and values["pad_tilts"][0] > 0
+    line = {**FLAT, "pivot_radius": None}
+    with solve("tilting_pad_thrust", **line) as solution:
+        values = solution.problem.quantities(solution.fields)
+        assert solution.converged and values["pad_tilts"][1] == 0.0
+        radius, angle = values["pressure_centre"]
+        assert math.sin(math.radians(angle - 0.6 * 38.0)) * radius == pytest.approx(0.0, abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("name", "keys", "words"),
+    [
+        ("tilting_pad_journal", {"pad_deg": 72.0}, "overlap"),
+        ("tilting_pad_journal", {"pivots_deg": [0.0, 400.0]}, "within a turn"),
+        ("tilting_pad_journal", {"tilts": [0.0]}, "5 values are needed"),
+        ("tilting_pad_journal", {"eccentricity": 1.9, "balance": None}, "must be positive everywhere"),
+        ("tilting_pad_thrust", {"pivot_radius": 0.5}, "between the inner and the outer radius"),
+        ("tilting_pad_thrust", {"pivot_part": None}, "pivot_part is missing"),
+    ],
+)
+def test_bad_input(name, keys, words):
+    with pytest.raises(InputError) as error:
+        solve(name, **keys)
+    assert words in str(error.value) and "\n" not in str(error.value)
