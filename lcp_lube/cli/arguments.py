@@ -86,6 +86,7 @@ def parser_of_all() -> Parser:
     solve.add_argument("--output", action="append", default=[], metavar="FILE", help=".npz, .nc, .vts or .pvd (ParaView), .h5")
     solve.add_argument("--boundary", action="store_true", help="--output writes the points of the sides as well")
     solve.add_argument("--plot", metavar="FILE.png", help="picture of p, r and h")
+    solve.add_argument("--plot-model", metavar="FILE.png", help="picture of the effects that were kept and left out")
     solve.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")
     solve.add_argument("--explain", action="store_true", help="say on stderr what was chosen, and why")
     solve.add_argument("--monitor", action="store_true", help="a line an iteration on stderr")
@@ -131,7 +132,7 @@ def parser_of_all() -> Parser:
     _results_option(table)
 
     chart = command("chart", "long experiments: the runs in a csv, the pictures drawn from it")
-    charts = chart.add_subparsers(dest="chart", required=True, metavar="precision|stability|scaling", parser_class=Parser)
+    charts = chart.add_subparsers(dest="chart", required=True, metavar="precision|stability|scaling|rungs", parser_class=Parser)
     text = "errors of load, largest pressure and rupture, and what they cost, for every method, system and recipe"
     precision = charts.add_parser("precision", help=text, description=text, allow_abbrev=False)
     precision.add_argument("scenes", nargs="*", metavar="SCENE", help="films; default: seven of them, see studies/precision.py")
@@ -140,7 +141,9 @@ def parser_of_all() -> Parser:
     stability.add_argument("maps", nargs="*", metavar="MAP", help=f"any of {', '.join(STABILITY)}; default all")
     text = "a whole solve's cost by grid and by ranks: run it under mpiexec -n 1, 2, 4, ... in turn"
     scaling = charts.add_parser("scaling", help=text, description=text, allow_abbrev=False)
-    for parser_of_chart in (precision, stability, scaling):
+    text = "effects one by one: what each buys in accuracy, and costs, on five scenes"
+    rungs = charts.add_parser("rungs", help=text, description=text, allow_abbrev=False)
+    for parser_of_chart in (precision, stability, scaling, rungs):
         parser_of_chart.add_argument("--quick", action="store_true", help="a small chart in seconds, with a csv of its own")
         _results_option(parser_of_chart)
 

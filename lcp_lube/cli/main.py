@@ -38,8 +38,8 @@ def run_solve(args: argparse.Namespace) -> int:
 
     for path in args.output:
         files.check_target(path)
-    if args.plot:
-        files.check_target(args.plot, plot=True)
+    for path in filter(None, (args.plot, args.plot_model)):
+        files.check_target(path, plot=True)
 
     def monitor(k: int, step: Step) -> None:
         if k == 1:
@@ -72,6 +72,13 @@ def run_solve(args: argparse.Namespace) -> int:
 
             try:
                 plot(solution, args.plot)
+            except InputError as error:
+                failed.append(str(error))
+        if args.plot_model:
+            from ..output.model_picture import plot_model
+
+            try:
+                plot_model(solution.settings.get("model", {"reason": "the scene names no effects"}), args.plot_model)
             except InputError as error:
                 failed.append(str(error))
     finally:
@@ -122,6 +129,10 @@ def run_chart(args: argparse.Namespace) -> int:
         from ..studies import scaling
 
         return scaling.chart(quick=args.quick, results=args.results)
+    if args.chart == "rungs":
+        from ..studies import rungs
+
+        return rungs.chart(quick=args.quick, results=args.results)
     for name in args.maps:
         if name not in STABILITY:
             raise InputError(f"chart stability {name}: allowed are {', '.join(STABILITY)}{nearest(name, STABILITY)}")

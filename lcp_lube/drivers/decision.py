@@ -59,7 +59,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         kept, effects, record = _decided(scene, names, ask, inner)
     gone = [name for name in names if name not in kept]
     solution = inner(without(scene, gone) if gone else scene, ask)
-    work = _work(solution)
+    work = total_work(solution)
     if "coarse_work" in record:
         record["share_of_work"] = record.pop("coarse_work") / work
     model = {
@@ -105,14 +105,14 @@ def _decided(scene: Any, names: list[str], ask: Ask, inner: Inner) -> tuple[list
         full = inner(coarse, replace(ask, **quick))
     except InputError:
         return names, {}, {"reason": f"no film on the coarse grid {shape}"}
-    work, effects = _work(full), {}
+    work, effects = total_work(full), {}
     try:
         if not full.converged:
             return names, {}, {"reason": f"no answer on the coarse grid {shape}: {full.message}"}
         value, quantity = _quantity(full, ask.quantity, scene)
         for name in names:
             other = inner(without(coarse, [name]), replace(ask, **{**quick, "start": full}))
-            work += _work(other)
+            work += total_work(other)
             reference = _quantity(other, quantity, scene)[0] if other.converged else None
             other.destroy()
             if reference is not None and value is not None and reference != 0.0 and isfinite(value / reference):
@@ -136,7 +136,7 @@ def _quantity(solution: Solution, quantity: str | None, scene: Any) -> tuple[flo
     return find_value(found, name, scene), name
 
 
-def _work(solution: Solution) -> float:
+def total_work(solution: Solution) -> float:
     """Unknowns times solves: of all films of the last balance step, times its steps."""
     each = solution.settings.get("details", {}).get("coupling_work", solution.problem.unknowns)
     return each * solution.settings.get("balance", {}).get("solves", 1)

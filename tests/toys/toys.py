@@ -11,6 +11,7 @@ def register(registry):
     registry.SHAPES["toy-shape"] = Entry("toys:toy_shape", "a toy: a film of constant height")
     registry.FAMILIES["toy-family"] = Entry("toys:toy_family", "a toy: problem 1 with a film twice as thick")
     registry.STABILITY["toy-map"] = Entry("toys:chart", "a toy: a map that draws nothing")
+    registry.RUNGS["toy_liner"] = Entry("toy_liner:ToyLiner", "a toy: a wall that gives way")
     registry.DRIVERS = {"toy-driver": Entry("toys", "a toy: leaves a note"), **registry.DRIVERS}
 
 

@@ -20,7 +20,7 @@ def path() -> str:
 
 def test_toys_are_listed(toys):
     out = toys("list").out
-    for name in ("toy-method", "toy-shape", "toy-map"):
+    for name in ("toy-method", "toy-shape", "toy-map", "toy_liner"):
         assert f"  {name}" in out, name
     assert "toy-map, a toy" in toys("chart", "stability", "--help").out
 
@@ -35,6 +35,20 @@ def test_toys_solve(toys, tmp_path):
     )
     assert toys("solve", "b.toml", "--json").json["min_h"] == pytest.approx(2e-6)
     assert toys("new", "c.toml", "--from", "a.toml").status == 0
+
+
+def test_a_toy_effect(toys, tmp_path):
+    """An effect from outside is solved for, certified, named and left out as the package's own; it is what [elastic] does."""
+    scene = 'family = "bearing"\nL_mm = 10\nU = 1\nn = 300\nfluid.mu = 0.01\n'
+    film = 'film = [{ shape = "linear", h_start_um = 4, h_end_um = 2 }]\n'
+    loads = {}
+    for name, table in (("toy", "toy_liner.D = 1e-14"), ("elastic", "elastic.compliance = 1e-14")):
+        (tmp_path / f"{name}.toml").write_text(scene + table + "\n" + film)
+        done = toys("solve", f"{name}.toml", "--json")
+        loads[name] = done.json["load"]
+        assert done.status == 0 and done.json["coupling"] < 1e-8
+    assert loads["toy"] == pytest.approx(loads["elastic"], rel=1e-9)
+    assert "toy_liner" in toys("solve", "toy.toml", "--model", "least", "--json").json["model"]["left_out"]
 
 
 def test_toys_are_compared_and_charted(toys):

@@ -1,0 +1,131 @@
+"""`chart rungs`: error against work with effects as steps: what each effect buys and costs, and what the decision takes.
+
+From the film without effects on, those that the scene names are added one by one, the largest first; the error is the distance
+of the quantity from that of the model with all of them, on the same grid. Work is unknowns times films solved, which does not
+depend on the machine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mpi4py import MPI
+
+from ..api import solve
+from ..base.resumable import ResumableCsv, Row
+from ..drivers.decision import total_work
+from ..output.console import say
+from ..registry import RUNGS
+from ..scenes.effects.table import named
+from ..scenes.scene import Scene, load_scene
+from .drawing import look, new_figure, save
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_WEDGE = [{"shape": "linear", "h_start": 4e-5, "h_end": 2e-5}]
+_LAWS = {"mu": 0.02, "p_supply": 1e5, "barus": 2e-8, "density": "dowson-higginson"}
+_WARM = {"beta": 0.03, "T_in": 320.0}
+_PAD = {"family": "bearing", "L": 0.1, "U": 5.0, "fluid": _LAWS, "film": _WEDGE}
+# Name: data, and the number of points of the full and of the quick chart.
+SCENES: dict[str, tuple[Any, int, int]] = {
+    "lined_pad": ("lined_pad", 1999, 999),
+    "pocketed_pad_2d": ("pocketed_pad_2d", 159, 39),
+    "adiabatic_journal": ("adiabatic_journal", 360, 120),
+    "warm pad": (
+        {**_PAD, "dimension": 2, "width": 0.08, "temperature": _WARM, "shear": {"law": "eyring", "tau_0": 1e5}},
+        127,
+        31,
+    ),
+    "slow cavity": (
+        {**_PAD, "U": 0.3, "film": [{"shape": "sinusoid", "h_min": 8e-6, "h_max": 2e-5}], "temperature": _WARM},
+        1999,
+        999,
+    ),
+}
+KEY = ("scene", "n", "model")
+NO_ERROR = 1e-8  # where an error that is none is drawn
+COLUMNS = (*KEY, "outcome", "quantity", "value", "error", "work", "share_of_work", "seconds")
+
+
+def chart(quick: bool, results: Path) -> int:
+    """Make the runs that are not there, draw them; exit status. Collective."""
+    store = ResumableCsv(results / f"rungs{'_quick' * quick}.csv", COLUMNS, KEY)
+    rows = [row for name, (source, n, few) in SCENES.items() for row in _of_scene(store, name, source, few if quick else n)]
+    path = results / f"rungs{'_quick' * quick}.png"
+    save(lambda: _draw(rows), path, MPI.COMM_WORLD)
+    say(f"{path}: {len(rows)} runs of {len(SCENES)} scenes")
+    return 0 if all(row["outcome"] == "converged" for row in rows) else 1
+
+
+def _of_scene(store: ResumableCsv, name: str, source: Any, n: int) -> Iterator[Row]:
+    """Rows from the least model to the full one, then the decision's."""
+    size = {"n": n} if not isinstance(source, dict) and "2d" not in source else {"nx": n, "ny": max(3, n // 2)}
+    if isinstance(source, dict) and source.get("dimension", 1) == 1:
+        size = {"n": n}
+    scene = load_scene({**source, **size, "name": name}) if isinstance(source, dict) else load_scene(source, size)
+    full = _run(store, scene, name, n, "full")
+    names = named(scene)
+    alone = {one: _run(store, scene, name, n, one) for one in names}
+    least = _run(store, scene, name, n, "least")
+    start = float(least["value"])
+    order = sorted(names, key=lambda one: -abs(float(alone[one]["value"]) - start))
+    steps = [least, *(_run(store, scene, name, n, ",".join(order[:k])) for k in range(1, len(order))), full]
+    for row in [*steps, _run(store, scene, name, n, "auto")]:
+        yield {**row, "error": f"{abs(float(row['value']) / float(full['value']) - 1.0):.3e}"}
+
+
+def _run(store: ResumableCsv, scene: Scene, name: str, n: int, model: str) -> Row:
+    key = {"scene": name, "n": n, "model": model}
+    if (row := store.find(**key)) is not None:
+        return row
+    with solve(scene, model=model) as s:
+        found = s.settings.get("balance")
+        value = found["value"] if found else s.numbers["load"]
+        share = s.settings["model"].get("share_of_work", 0.0)
+        made: dict[str, Any] = {
+            **{**key, "outcome": str(s.outcome), "quantity": found["vary"] if found else "load", "value": f"{value:.12g}"},
+            **{"error": "", "work": f"{total_work(s) * (1.0 + share):.6g}", "share_of_work": f"{share:.4g}"},
+            "seconds": f"{s.times['total']:.3g}",
+        }
+    return store.add(made)
+
+
+def _draw(rows: Sequence[Row]) -> Figure:
+    figure = new_figure(
+        5.6,
+        "Each line goes from the film without effects, by the largest first, to the one with all, whose error is none (at "
+        f"{NO_ERROR:g}). Star: what the decision takes, its own work included. Lines at 1 % (dashed) and a tenth of that.",
+    )
+    names = list(dict.fromkeys(row["scene"] for row in rows))
+    axes = figure.subplots(2, 3, sharey=True).ravel()
+    for number, (name, ax) in enumerate(zip(names, axes, strict=False)):
+        *steps, auto = [row for row in rows if row["scene"] == name]
+        x, y = zip(*(_place(row) for row in steps), strict=True)
+        ax.plot(x, y, **look(number))
+        before: set[str] = set()
+        for k, row in enumerate(steps):
+            models = set() if row["model"] == "least" else set(row["model"].split(","))
+            new = [RUNGS[one].line for one in models - before] if row["model"] != "full" else ["all"]
+            left = k % 2 == 1
+            place = {"xytext": (-5 if left else 5, 3), "ha": "right" if left else "left", "textcoords": "offset points"}
+            ax.annotate(", ".join(new) or "none", _place(row), **place, fontsize=6.5)
+            before = models if row["model"] != "full" else before
+        star = {**look(number), "marker": "*", "markersize": 10, "linestyle": "none", "markeredgecolor": "black"}
+        ax.plot(*([one] for one in _place(auto)), **star)
+        ax.axhline(1e-2, color="0.5", linestyle="--", linewidth=0.7)
+        ax.axhline(1e-3, color="0.5", linewidth=0.7)
+        ax.set(xscale="log", yscale="log", title=f"{name}: {steps[0]['quantity']}", xlabel="unknowns x films")
+        ax.set_xlim(0.15 * min(x), 15.0 * max(x))
+    for ax in axes[:: axes.size // 2]:
+        ax.set_ylabel("error")
+    for ax in axes[len(names) :]:
+        ax.set_axis_off()
+    return figure
+
+
+def _place(row: Row) -> tuple[float, float]:
+    """Work and error."""
+    return float(row["work"]), max(float(row["error"]), NO_ERROR)
