@@ -136,3 +136,35 @@ def test_drag_beside_edges_along_the_flow(n):
     exact = 0.02 * 1.0 * 0.01 * (6.2e-3 / 2e-6 + 3.8e-3 / 5e-6)
     assert solution.numbers["friction"] == pytest.approx(exact, rel=1e-9)
     solution.destroy()
+
+
+def test_area_and_fronts_of_the_cavity():
+    """They lie inside the cells: the area of a journal's cavity is of second order, and counted by points it is of first."""
+    areas = []
+    for nx, ny in ((90, 19), (180, 39), (360, 79)):
+        solution = solve(load_scene("journal", {"nx": nx, "ny": ny}))
+        areas.append(solution.numbers["cavitated_area"])
+        solution.destroy()
+    assert areas[0] == pytest.approx(areas[2], rel=5e-3) and areas[1] == pytest.approx(areas[2], rel=5e-4)
+
+
+def test_order_over_places_of_an_edge():
+    """Load, friction and area of a pocket anywhere: no place is bad, and the mean falls by 2^1.8 a grid and more."""
+    rng = np.random.default_rng(2)
+    errors = []
+    for t, u in rng.random((4, 2)):
+        film = [
+            {"shape": "linear", "h_start_um": 2.4, "h_end_um": 2.0},
+            {"shape": "pocket", "depth_um": 2.5, "x_mm": [2.0 + t, 5.0 + t], "y_mm": [2.5 + u, 6.5 + u]},
+        ]
+        data = {"family": "bearing", "dimension": 2, "L_mm": 10, "width_mm": 10, "U": 1.0, "film": film}
+        found = []
+        for n in (20, 40, 80, 240):
+            solution = solve(load_scene({**data, "n": n, "fluid": {"mu": 0.02, "p_supply": 1e5}}))
+            found.append([solution.numbers[name] for name in ("pressure_integral", "friction", "cavitated_area")])
+            solution.destroy()
+        errors.append(np.abs(np.array(found[:3]) / found[3] - 1.0))
+    worst, mean = np.max(errors, axis=0), np.sqrt(np.mean(np.square(errors), axis=0))
+    assert (worst <= 3.0 * np.median(errors, axis=0) + 1e-4).all()
+    assert (np.log2(mean[0] / mean[2]) / 2 > [1.8, 1.5, 1.0]).all()
+    assert worst[2, 0] < 1e-3 and worst[2, 1] < 1e-3

@@ -2,67 +2,129 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...base.parallel import Array
 from ..grid import Grid
 from .cavity import cavity_sign
-from .flows import stream_weights
-from .reynolds import Film
+from .flows import line_weights, point_weights, stream_weights
+from .reynolds import Film, sides
 
 if TYPE_CHECKING:
     from .lubrication import LubricationProblem
 
 
-def fronts(problem: LubricationProblem, p: Array, r: Array) -> tuple[list[float], list[float]]:
-    """x of all ruptures and of all reformations, m, in ascending order, in 2D along `middle_row`. Collective.
+@dataclass(frozen=True)
+class Fronts:
+    """Ends of the cavities along the flow, in all lines of this rank's points.
 
-    Each front is found to its cell (`cavity.cavity_sign`) and placed inside it. Rupture: where U h = Q, Q being the
-    flow along the line (p = p' = 0 there; in 1D the one flow of the discrete solution, in 2D what leaves the first cell of the
-    cavity), within the cell or one beside it: the discrete front may be late. Reformation: where the pressure behind it,
-    extrapolated linearly, is zero. A cavity that begins with the void that enters at the west has no rupture.
+    Attributes
+    ----------
+    ruptures, reformations : pairs of arrays, numbers of the rank's lines and x, m. shift : by how much longer the cavities of
+        each line are than the cells of their points, m, shape (ny_local,).
     """
-    if not problem.U:
-        return [], []  # at rest a film does not cavitate
-    grid, film, scheme = problem.grid, problem.film, problem.scheme
-    start, L, steps = grid.origin[0], grid.lengths[0], grid.steps(0)
+
+    ruptures: tuple[NDArray[np.int64], Array]
+    reformations: tuple[NDArray[np.int64], Array]
+    shift: Array
+
+
+def line_fronts(problem: LubricationProblem, p: Array, r: Array) -> Fronts:
+    """Where cavities begin and end along the flow, placed inside the cells in which they do. Collective.
+
+    Rupture: where U h = Q, Q being the flow along the line (p = p' = 0 there; in 1D the one flow of the discrete solution, in
+    2D what leaves the first cell of the cavity), within the cell or one beside it: the discrete front may be late. Reformation:
+    the face between cavity and full film lacks the flow U h r + k p of a full one, k p if the film were full from the last
+    point of the cavity on; begun a part k p/(k p + U h r) of the way upstream the film presses back as much.
+    """
+    grid, film, s = problem.grid, problem.film, problem.scheme
+    start, steps = grid.origin[0], grid.steps(0)
     behind, ahead = steps[:-1], steps[1:]
-    x, row = grid.x[0], middle_row(problem) - grid.y_start
-    here = 0 <= row < grid.box[0]
-    row = row if here else 0
-    y = np.full_like(x, grid.y[row, 0])
-    z = grid.ghosted(cavity_sign(problem.reduce, p, r))[row + 1]
+    z = grid.ghosted(cavity_sign(problem.reduce, p, r))[1:-1]
     opens = [kind == "open" for kind in grid.ends[0]]
     if grid.x_start == 0 and opens[0]:
-        z[0] = -1.0 if problem.r_in > 0 else 1.0
+        z[:, 0] = -1.0 if problem.r_in > 0 else 1.0
     cavity = z < 0
     if grid.dim == 1 and opens[0]:
-        Q = np.full_like(x, problem.boundary_flows(p, r)[0])
+        Q = np.full(grid.box, problem.boundary_flows(p, r)[0])
     else:
-        leaves = scheme.couette_E + scheme.b_C * r.reshape(grid.box)
-        Q = scheme.flow_unit * leaves[row] / stream_weights(grid)[row]
-    front = cavity[1:-1] & ~cavity[:-2] & here
-    before = (x - 2.0 * behind)[front]
+        Q = s.flow_unit * (s.couette_E + s.b_C * r.reshape(grid.box)) / stream_weights(grid)
+    row, i = np.nonzero(cavity[:, 1:-1] & ~cavity[:, :-2])
+    x, y = grid.x[0], grid.y[:, 0]
+    before = (x - 2.0 * behind)[i]
     before = before if grid.periodic[0] else np.maximum(before, start)
-    ruptures = _rises_through(film, Q[front] / problem.U, before, (x + ahead)[front], y[front])
-    p_line = grid.ghosted(p)[row + 1]
-    last = grid.x_end == grid.shape[0] and opens[1]
-    if last:
-        p_line[-1] = problem.p_sides[1] / problem.p_unit
-    rise = p_line[2:] - p_line[1:-1]
-    back = np.where(rise > 0, np.clip(p_line[1:-1] / np.where(rise > 0, rise, 1.0), 0.0, 1.0), 0.5)
-    full_again = ~cavity[1:-1] & cavity[:-2] & here
-    reformations = (x - back * behind)[full_again]
-    if last and here and cavity[-2] and problem.p_sides[1] > 0:
-        reformations = np.append(reformations, start + L - 0.5 * steps[-1])  # before a side above the cavitation pressure
-    parts = grid.comm.allgather((ruptures.tolist(), reformations.tolist()))
-    found = ([place for part in parts for place in part[k]] for k in (0, 1))
+    ruptures = _rises_through(film, Q[row, i] / problem.U, before, (x + ahead)[i], y[row])
+    shift = np.zeros(grid.box[0])
+    np.add.at(shift, row, (x - 0.5 * behind)[i] - ruptures)
+    starts = row, ruptures
+    row, i = np.nonzero(~cavity[:, 1:-1] & cavity[:, :-2])
+    pressed = (s.k_W * p.reshape(grid.box))[row, i]
+    lacking = (s.b_W * grid.ghosted(r, outside=0.0)[1:-1, :-2])[row, i]
+    known = pressed + lacking > 0.0
+    back = np.where(known & (lacking > 0.0), pressed / np.where(known, pressed + lacking, 1.0), 0.5)
+    np.add.at(shift, row, ((0.5 - back) * behind[i]))
+    closes, places = row, (x[i] - back * behind[i])
+    if grid.x_end == grid.shape[0] and opens[1]:
+        row = np.flatnonzero(cavity[:, -2])
+        if problem.p_sides[1] > 0:  # before a side above the cavitation pressure
+            closes = np.append(closes, row)
+            places = np.append(places, np.full(row.size, start + grid.lengths[0] - 0.5 * steps[-1]))
+        else:
+            shift[row] += 0.5 * steps[-1]
+    return Fronts(starts, (closes, places), shift)
+
+
+def fronts(problem: LubricationProblem, found: Fronts | None) -> tuple[list[float], list[float]]:
+    """x of all ruptures and of all reformations, m, in ascending order, in 2D along `middle_row`. Collective.
+
+    A cavity that begins with the void that enters at the west has no rupture. found : `line_fronts`; None: the film is at rest,
+    and does not cavitate.
+    """
+    if found is None:
+        return [], []
+    grid = problem.grid
+    start, L = grid.origin[0], grid.lengths[0]
+    here = middle_row(problem) - grid.y_start
+    own = [places[rows == here].tolist() for rows, places in (found.ruptures, found.reformations)]
+    parts = grid.comm.allgather(own)
+    all_of = ([place for part in parts for place in part[k]] for k in (0, 1))
     if grid.periodic[0]:
-        found = ([start + (place - start) % L for place in places] for places in found)
-    first, second = (sorted(places) for places in found)
+        all_of = ([start + (place - start) % L for place in places] for places in all_of)
+    first, second = (sorted(places) for places in all_of)
     return first, second
+
+
+def cavitated_area(problem: LubricationProblem, found: Fronts | None, p: Array, r: Array) -> float:
+    """Area of the cavities, m2 (1D: length, m): cells of their points, and what lies between these and the fronts. Collective.
+
+    Across the flow a front lies where the pressure beside it, followed by its slope, is zero.
+    """
+    grid = problem.grid
+    cavity = cavity_sign(problem.reduce, p, r) < 0
+    area = problem.reduce.sum(cavity * point_weights(grid)) * grid.cell
+    if found is None:
+        return area
+    stretch, dy = grid.stretch(grid.y), grid.spacing[1] if grid.dim == 2 else 1.0
+    more = found.shift[:, None] * line_weights(grid) * stretch * dy
+    if grid.dim == 2:
+        dry = grid.ghosted(cavity.astype(float), outside=0.0) > 0.0
+        frame, steps = grid.ghosted(p, outside=0.0), grid.steps(1)[:, None]
+        here, width = frame[1:-1, 1:-1], grid.widths(0) * grid.spacing[0] * stretch
+        sides_of = ((dry[:-2], frame[2:], steps[:-1], steps[1:]), (dry[2:], frame[:-2], steps[1:], steps[:-1]))
+        for beside, beyond, step, far in sides_of:
+            rise = (beyond[:, 1:-1] - here) / far
+            back = np.where(rise > 0.0, np.minimum(here / np.where(rise > 0.0, rise, 1.0), step), 0.5 * step)
+            front = beside[:, 1:-1] & ~dry[1:-1, 1:-1]
+            more = more + np.sum(np.where(front, (0.5 * step - back) * width, 0.0), axis=1, keepdims=True)
+        for end, rim, p_side in zip(sides(grid)[2:], grid.rims(1), problem.p_sides[2:], strict=True):
+            if p_side == 0.0:  # the cavity reaches up to it
+                at_side = np.where(end, 0.5 * rim * dy * width, 0.0) * cavity.reshape(grid.box)
+                more = more + np.sum(at_side, axis=1, keepdims=True)
+    return area + problem.reduce.sum(more)
 
 
 def first_cavity(grid: Grid, ruptures: list[float], reformations: list[float]) -> tuple[float | None, float | None]:

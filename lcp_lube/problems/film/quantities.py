@@ -9,9 +9,9 @@ from mpi4py import MPI
 
 from ...base.parallel import Array
 from .cavity import cavity_sign
-from .flows import friction, point_weights, side_flows
+from .flows import friction, side_flows
 from .forces import ambient, corner_flows, forces, open_pressures
-from .fronts import first_cavity, fronts
+from .fronts import cavitated_area, first_cavity, fronts, line_fronts
 from .supplies import supply_flows
 
 if TYPE_CHECKING:
@@ -63,7 +63,8 @@ def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any
     flow : out of each side, m3/s (`flows.side_flows`). side_leakage : south and north together (2D). flow_growth : of each when
     the spacings are halved, None if they converge (`forces.corner_flows`; 2D).
     min_h, min_h_at : thinnest film and where, m, sides included.
-    cavitated_fraction : share of the points (`cavity.cavity_sign`); cavitated_area : theirs, m2.
+    cavitated_fraction : share of the points (`cavity.cavity_sign`); cavitated_area : between the
+    fronts, m2 (`fronts.cavitated_area`).
     ruptures, reformations : x of all of them, m; in 2D on the middle line (`fronts.fronts`). rupture : the first one, None
     where absent. reformation : the first one behind it, or behind the void that enters.
     p_unit : Pa. supply_p, supply_flow : of each supply, absolute, Pa, and what it gives to the film, m3/s.
@@ -72,11 +73,11 @@ def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any
     grid, reduce = problem.grid, problem.reduce
     p_pa = p * problem.p_unit
     cavity = (cavity_sign(reduce, p, r) < 0).astype(float)
-    weight = point_weights(grid)
     flow = side_flows(problem, p, r)
     p_max, p_max_at = largest_pressure(problem, p_pa)
     min_h, min_h_at = thinnest(problem)
-    ruptures, reformations = fronts(problem, p, r)
+    ends = line_fronts(problem, p, r) if problem.U else None
+    ruptures, reformations = fronts(problem, ends)
     rupture, reformation = first_cavity(grid, ruptures, reformations)
     out: dict[str, Any] = {
         "p_max": p_max + problem.p_c,
@@ -86,7 +87,7 @@ def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any
         "friction": friction(problem, p_pa, r),
         "p_unit": problem.p_unit,
         "cavitated_fraction": reduce.sum(cavity) / grid.size,
-        "cavitated_area": reduce.sum(cavity * weight) * grid.cell,
+        "cavitated_area": cavitated_area(problem, ends, p, r),
         "rupture": rupture,
         "reformation": reformation,
         "ruptures": ruptures,
