@@ -9,10 +9,12 @@ from pydantic import Field, model_validator
 from ..problems.film.exact import ExactSolution, exact_solution
 from ..problems.film.forces import Shaft
 from ..problems.film.gaps import JournalGap, Raised
+from ..problems.film.lines import graded_across, graded_round
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model, Side
 from ..problems.film.supplies import Supply
 from ..problems.film.turning import Turning
+from ..problems.grid import Places
 from .published import LubricationScene
 from .scene import Positive
 from .supply import Place, SupplyTable, supplies_of
@@ -32,6 +34,9 @@ class JournalScene(LubricationScene):
     eccentricity: Annotated[float, Field(ge=0, lt=1, description="relative eccentricity")] = 0.5
     width_over_diameter: Positive = Field(1.0, description="B/D (2D)")
     round: Literal["groove", "periodic"] = Field("groove", description="at phi = 0: an axial groove, or nothing (2D)")
+    graded: bool = Field(
+        False, description="lines graded towards the thinnest film and the ends: eccentricities near 1 (2D, groove)"
+    )
     D: Positive = metres(0.1, "diameter")
     psi: Annotated[float, Field(gt=0, lt=1, description="relative clearance c/(D/2)")] = 1e-3
     omega: Positive = measured("rad/s", 100.0, "angular velocity")
@@ -65,6 +70,8 @@ class JournalScene(LubricationScene):
                 raise ValueError(f"{found}: without a groove (round = periodic) the ends feed the film: 2D, p_side > 0")
             if self.p_a or self.p_b:
                 raise ValueError(f"p_a = {self.p_a:g}, p_b = {self.p_b:g}: there is no groove (round = periodic)")
+        if self.graded and (self.dimension == 1 or self.round == "periodic"):
+            raise ValueError("graded = true: lines are graded in 2D, from the groove at the widest gap (round = groove)")
         self._supplies()
         return self
 
@@ -104,7 +111,16 @@ class JournalScene(LubricationScene):
     @property
     def model(self) -> Model:
         shaft = Shaft(0.5 * self.D, 0.0 if self.eccentricity else None)
-        return replace(super().model, shaft=shaft, supplies=self._supplies())
+        return replace(super().model, shaft=shaft, supplies=self._supplies(), places=self._places)
+
+    @property
+    def _places(self) -> Places | None:
+        """Graded lines, where they are asked for."""
+        if not self.graded:
+            return None
+        nx, ny = self.shape
+        reach = 0.5 * self.D * math.sqrt(2.0 * (1.0 - self.eccentricity) / max(self.eccentricity, 0.1))
+        return graded_round(nx, self.eccentricity, self.L), graded_across(ny, reach, self.width or self.L)
 
     def _bearing_numbers(self, values: dict[str, Any]) -> dict[str, Any]:
         """Sommerfeld number W psi^2/(B D mu omega), and in 2D the side leakage as Q/((D/2)^3 psi omega)."""

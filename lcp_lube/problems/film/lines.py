@@ -101,3 +101,24 @@ def _shared_out(stretches: Array, cut: Array, total: int, mirrored: bool) -> NDA
         counts[k] += step[k]
         heapq.heappush(heap, (-gain(k, int(step[k])), k))
     return np.concatenate([counts, counts[: size - half][::-1]]) if mirrored else counts
+
+
+def graded_round(n: int, eccentricity: float, L: float) -> Array:
+    """n lines round a journal from the groove at its widest gap to the same again, graded towards the thinnest film, m.
+
+    Half of them lie as Sommerfeld's angle psi has it, 1 + e cos(phi) = (1 - e^2)/(1 - e cos(psi)), in which the film's course
+    is spread out: their spacings go with the film. The other half lies evenly.
+    """
+    psi = np.linspace(0.0, 2.0 * np.pi, 200 * (n + 1) + 1)
+    wide = np.sqrt((1.0 + eccentricity) / (1.0 - eccentricity))
+    phi = 2.0 * np.arctan2(wide * np.sin(0.5 * psi), np.cos(0.5 * psi))
+    return np.interp(np.arange(1, n + 1) / (n + 1), (psi + phi) / (4.0 * np.pi), phi) * (L / (2.0 * np.pi))
+
+
+def graded_across(n: int, reach: float, width: float) -> Array:
+    """n lines across a film, graded towards both ends, where the pressure falls within `reach`; m."""
+    half = 0.5 * width
+    d = np.linspace(0.0, half, 200 * (n + 1) + 1)
+    share = 0.5 * (d / half + np.arctan(d / reach) / np.arctan(half / reach))
+    t = np.arange(1, n + 1) / (n + 1)
+    return np.where(t <= 0.5, np.interp(2.0 * t, share, d), width - np.interp(2.0 - 2.0 * t, share, d))
