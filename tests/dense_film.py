@@ -322,11 +322,11 @@ class Dense:
                 break
         return z
 
-    def solve(self, start: tuple[np.ndarray, np.ndarray] | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """p (Pa above p_c) and r; ArithmeticError where no sign pattern is its own."""
+    def solve(self, start: tuple[np.ndarray, np.ndarray] | None = None, exactly: bool = False) -> tuple[np.ndarray, np.ndarray]:
+        """p (Pa above p_c) and r; ArithmeticError where no sign pattern is its own. exactly: with 100 digits from the first."""
         y = np.ones(self.n, dtype=LONG) if start is None else start[0] * self.a.astype(LONG) - start[1] * self.b
         for step, many in ((self.step, 60), (self.exact_step, 20)):
-            if step == self.step and float(self.k.max() / self.k.min()) > BEYOND_LU:
+            if step == self.step and (exactly or float(self.k.max() / self.k.min()) > BEYOND_LU):
                 continue
             for _ in range(many):
                 new = step(y)
@@ -335,7 +335,7 @@ class Dense:
                 pressed = np.max(np.abs(new / self.a), initial=0)
                 flips = (new >= 0) != (y >= 0)
                 tiny = (np.abs(new) / self.a <= max(1e-12 * pressed, self.rounding)) & (np.abs(new) / self.b <= 1e-12)
-                if not np.any(flips & ~tiny):
+                if not np.any(flips & ~tiny if step == self.step else flips):
                     return self.fields(new)
                 y = new
             if not np.all(np.isfinite(y)):
