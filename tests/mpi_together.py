@@ -1,10 +1,13 @@
 """Run under mpiexec by the tests: the last rank, or rank 0, alone fails; every rank says on stderr what it was told.
 
-mpiexec -n 2 python tests/mpi_together.py helper|F|J|file|picture
+mpiexec -n 2 python tests/mpi_together.py CASE
 """
 
+import resource
+import signal
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -64,7 +67,80 @@ def picture():
     save(build, Path("x.png"), WORLD)
 
 
-CASES = {"helper": helper, "F": lambda: user("F"), "J": lambda: user("J"), "file": file, "table": table, "picture": picture}
+def viewer(name):
+    """The disk is full for one rank: for .npz and VTK for rank 0, which alone writes."""
+    with solved() as solution:
+        if LAST if name.endswith(".h5") else WORLD.rank == 0:
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (300, 300))
+        solution.save(name)
+
+
+def checkpoint(write):
+    """One rank finds no file."""
+    from lcp_lube.drivers import checkpoint_file
+
+    honest = checkpoint_file._transfer
+
+    def missing(grid, path, *more, **how):
+        return honest(grid, Path("/no/such/folder/x.ckpt") if LAST else path, *more, **how)
+
+    with solved() as solution:
+        grid, p = solution.problem.grid, solution.fields["p"]
+        header, start = {"arrays": []}, 0
+        if not write:
+            checkpoint_file.write(Path("x.ckpt"), grid, {}, [("p", p), ("again", p)])
+            header, start = checkpoint_file.read_header(Path("x.ckpt"), WORLD)
+            WORLD.barrier()
+            if WORLD.rank == 0:
+                Path("y.ckpt").write_bytes(Path("x.ckpt").read_bytes())
+                Path("x.ckpt").unlink()
+            WORLD.barrier()
+        checkpoint_file._transfer = missing
+        try:
+            if write:
+                checkpoint_file.write(Path("x.ckpt"), grid, {}, [("p", p), ("again", p)])
+            else:
+                checkpoint_file.read_arrays(Path("y.ckpt"), grid, header, start)
+        except OSError as error:
+            raise InputError(str(error)) from None
+        finally:
+            WORLD.barrier()
+            if WORLD.rank == 0:
+                Path("y.ckpt").unlink(missing_ok=True)
+
+
+def doctors():
+    """A self-check that fails on one rank, the others not waiting for it inside the solve."""
+    from lcp_lube.cli import doctor
+
+    honest = doctor.load_scene
+
+    def unreadable(name, changes):
+        if LAST:
+            raise ZeroDivisionError("on purpose")
+        return honest(name, changes)
+
+    doctor.load_scene, doctor.CHECKS, doctor.LOAD_TOL = unreadable, {"problem1": {"n": 20, "scheme": "face"}}, 1.0
+
+    def alone(scene: Any, comm: Any) -> Any:
+        return solve(scene, comm=PETSc.COMM_SELF)
+
+    doctor.solve = alone
+    checks = doctor.self_check(WORLD)
+    assert [check["passed"] for check in checks] == [False]
+    raise InputError(checks[0]["message"])
+
+
+def solved():
+    return solve("problem4", n=9, method="active-set")
+
+
+CASES = {
+    **{"helper": helper, "F": lambda: user("F"), "J": lambda: user("J"), "file": file, "table": table, "picture": picture},
+    **{"vts": lambda: viewer("x.vts"), "h5": lambda: viewer("x.h5"), "npz": lambda: viewer("x.npz"), "doctor": doctors},
+    **{"write": lambda: checkpoint(True), "read": lambda: checkpoint(False)},
+}
 try:
     CASES[sys.argv[1]]()
 except InputError as error:

@@ -2,11 +2,14 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from time import monotonic, sleep
 
 from mpi4py import MPI
 
 from ..errors import InputError
 
+PATIENCE = 5.0  # seconds that a rank which failed waits for the others, which may be a little behind
+FOREVER = 1e9
 EXPECTED: tuple[type[Exception], ...] = (InputError, OSError)
 
 
@@ -34,6 +37,16 @@ def on_all_ranks(comm: MPI.Comm, what: str = "", caught: tuple[type[Exception], 
     found = comm.allgather(reason)
     if first := next(filter(None, found), ""):
         raise InputError(f"{what}: {first}" if what else first) from failure
+
+
+def all_come(comm: MPI.Comm, seconds: float) -> bool:
+    """Whether all ranks call this within the time: one that failed inside PETSc or HDF5 may have left the others there."""
+    request, end = comm.Ibarrier(), monotonic() + seconds
+    while not request.Test():
+        if monotonic() > end:
+            return False
+        sleep(0.01)
+    return True
 
 
 def _reason(error: Exception) -> str:

@@ -20,6 +20,7 @@ from petsc4py import PETSc
 
 from .. import __version__
 from ..api import solve
+from ..base.together import all_come
 from ..output.table import table
 from ..registry import PACKAGE
 from ..scenes.scene import load_scene
@@ -30,6 +31,7 @@ CHECKS: dict[str, dict[str, Any]] = {"problem1": {"n": 400, "scheme": "face"}, "
 LOAD_TOL = 1e-4  # of problem 1 against its exact solution; its discretisation error is 1.2e-5
 RANKS_TOL = 1e-6  # of a load on two ranks against that on one
 LIMIT = 90.0  # seconds for the job of two ranks, which takes two on a machine that is free
+ALONE = 20.0  # seconds that a rank which failed waits for the others
 # What a job started from here needs: root may start it, and two ranks may share a core (Open MPI 4 and 5).
 MAY_START = {
     "OMPI_ALLOW_RUN_AS_ROOT": "1",
@@ -126,9 +128,23 @@ def self_check(comm: MPI.Comm) -> list[dict[str, Any]]:
                     check |= {"passed": False, "message": f"load off by {check['error']:.1e}, at most {LOAD_TOL:g} is right"}
             solution.destroy()
         except Exception as error:  # whatever it is, it is what the doctor has to tell
-            check |= {"message": f"{type(error).__name__}: {' '.join(str(error).split())[:300]}"}
+            check |= {"passed": False, "message": f"{type(error).__name__}: {' '.join(str(error).split())[:300]}"}
+        check |= _first_failure(comm, check)
         checks.append({**check, "seconds": round(perf_counter() - begin, 3)})
     return checks
+
+
+def _first_failure(comm: MPI.Comm, check: dict[str, Any]) -> dict[str, Any]:
+    """The lowest rank's failure, on all ranks. Collective.
+
+    Raises
+    ------
+    RuntimeError : this rank failed alone, and the others wait for it inside the solve: the job has to end.
+    """
+    if not all_come(comm, LIMIT if check["passed"] else ALONE):
+        raise RuntimeError(f"self-check, {check['scene']}: {check['message']}")
+    failed = [found for found in comm.allgather((check["passed"], check["message"])) if not found[0]]
+    return {"passed": False, "message": failed[0][1]} if failed else {}
 
 
 def two_ranks() -> list[dict[str, Any]]:

@@ -15,6 +15,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ..base.parallel import Array
+from ..base.together import on_all_ranks
 from ..errors import InputError
 from ..problems.grid import Grid
 
@@ -41,7 +42,7 @@ def write(path: Path, grid: Grid, header: dict[str, Any], arrays: list[tuple[str
     temporary, comm = path.with_name(f".{path.name}.new"), grid.comm
 
     def together(reason: str) -> None:
-        """Go on if no rank has a reason not to."""
+        """Go on if no rank has a reason not to. Collective."""
         if reason := max(comm.allgather(reason)):
             if comm.rank == 0:
                 temporary.unlink(missing_ok=True)
@@ -56,12 +57,7 @@ def write(path: Path, grid: Grid, header: dict[str, Any], arrays: list[tuple[str
         return ""
 
     together(on_rank_0(_reserve, temporary, head, 8 * grid.size * len(arrays)))
-    try:
-        _transfer(grid, temporary, len(head), [values for _, values in arrays], write=True)
-        reason = ""
-    except MPI.Exception as error:
-        reason = error.Get_error_string()
-    together(reason)
+    together(_transfer(grid, temporary, len(head), [values for _, values in arrays], write=True))
     together(on_rank_0(_settle, temporary, path))
 
 
@@ -91,13 +87,12 @@ def read_arrays(path: Path, grid: Grid, header: dict[str, Any], start: int) -> d
 
     Raises
     ------
-    InputError : they cannot be read, or are not what was written.
+    InputError : they cannot be read, or are not what was written; on every rank, whichever could not.
     """
     arrays = [np.empty(grid.local_size) for _ in header["arrays"]]
-    try:
-        _transfer(grid, path, start, arrays, write=False)
-    except MPI.Exception as error:
-        raise InputError(error.Get_error_string()) from None
+    with on_all_ranks(grid.comm):
+        if reason := _transfer(grid, path, start, arrays, write=False):
+            raise InputError(reason)
     for (name, checksum), values in zip(header["arrays"], arrays, strict=True):
         if _checksum(grid, values) != checksum:
             raise InputError(f"damaged: {name} is not what was written")
@@ -160,21 +155,29 @@ def _checksum(grid: Grid, values: Array) -> str:
     return f"{sum(grid.comm.allgather(own)) % 2**64:016x}"
 
 
-def _transfer(grid: Grid, path: Path, start: int, arrays: list[Array], write: bool) -> None:
-    """This rank's part of arrays that lie one behind the other in a file, in the natural order. Collective."""
+def _transfer(grid: Grid, path: Path, start: int, arrays: list[Array], write: bool) -> str:
+    """This rank's part of arrays that lie one behind the other in a file, in the natural order; why it failed, or nothing.
+
+    Every rank has the file to itself: where one fails, no other waits for it inside MPI.
+    """
     place = ((grid.shape[1] if grid.dim == 2 else 1), grid.shape[0]), grid.box, (grid.y_start, grid.x_start)
     box = MPI.DOUBLE.Create_subarray(*place).Commit()
-    # Absolute: Open MPI 4 fails on a name without a folder.
-    file = MPI.File.Open(grid.comm, str(path.absolute()), MPI.MODE_WRONLY if write else MPI.MODE_RDONLY)
     try:
-        for k, values in enumerate(arrays):
-            file.Set_view(start + 8 * k * grid.size, MPI.DOUBLE, box)
-            (file.Write_all if write else file.Read_all)([np.ascontiguousarray(values), MPI.DOUBLE])
-        if write:
-            file.Sync()
+        # Absolute: Open MPI 4 fails on a name without a folder.
+        file = MPI.File.Open(MPI.COMM_SELF, str(path.absolute()), MPI.MODE_WRONLY if write else MPI.MODE_RDONLY)
+        try:
+            for k, values in enumerate(arrays):
+                file.Set_view(start + 8 * k * grid.size, MPI.DOUBLE, box)
+                (file.Write if write else file.Read)([np.ascontiguousarray(values), MPI.DOUBLE])
+            if write:
+                file.Sync()
+        finally:
+            file.Close()
+    except MPI.Exception as error:
+        return error.Get_error_string()
     finally:
-        file.Close()
         box.Free()
+    return ""
 
 
 def _reserve(temporary: Path, head: bytes, rest: int) -> None:

@@ -15,7 +15,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..base.parallel import Array
-from ..base.together import on_all_ranks
+from ..base.together import FOREVER, PATIENCE, all_come, on_all_ranks
 from ..errors import InputError, nearest
 from ..problems.frame import Frame
 from ..problems.grid import Grid
@@ -142,28 +142,37 @@ def replacing(path: Path, comm: MPI.Comm) -> Iterator[str]:
 
     Raises
     ------
-    InputError : rank 0 could not write or rename (on every rank), or PETSc could not write (on the ranks that noticed).
+    InputError : a rank could not write, rank 0 could not rename; on every rank, but for those that still wait inside HDF5 for
+        one that failed there.
     """
     temporary = Path(comm.bcast(str(path.with_name(f".{path.stem}.{os.getpid()}{path.suffix.lower()}"))))
-    reason = ""
+    reason, failed = "", None
     with on_all_ranks(comm, f"{path}: could not be written"):  # PETSc's viewers would fail on rank 0 alone
         if comm.rank == 0:
             temporary.touch()
     try:
         yield str(temporary)
-        if comm.rank == 0:
-            os.replace(temporary, path)
     except OSError as error:
-        temporary.unlink(missing_ok=True)
         reason = error.strerror or str(error)
     except PETSc.Error as error:
-        temporary.unlink(missing_ok=True)
-        raise InputError(f"{path}: PETSc could not write it (its error code {error.ierr}); is the disk full?") from None
+        reason = f"PETSc's error code {error.ierr}; is the disk full?"
+        failed = error
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
-    if reason := comm.bcast(reason):
-        raise InputError(f"{path}: could not be written: {reason}")
+    if not all_come(comm, PATIENCE if failed else FOREVER):
+        temporary.unlink(missing_ok=True)
+        raise InputError(f"{path}: could not be written: {reason}") from failed
+    try:
+        with on_all_ranks(comm, f"{path}: could not be written"):
+            if reason:
+                raise InputError(reason)
+        with on_all_ranks(comm, f"{path}: could not be written"):
+            if comm.rank == 0:
+                os.replace(temporary, path)
+    except InputError:
+        temporary.unlink(missing_ok=True)
+        raise
 
 
 def _save_npz(solution: Solution, grid: Grid | Frame, fields: dict[str, Array], units: dict[str, str], target: str) -> None:
@@ -203,12 +212,21 @@ def _save_by_viewer(grid: Grid | Frame, fields: dict[str, Array], units: dict[st
             vec.setArray(values.ravel())
             _view(vec, name, viewer, units[name])
         viewer.destroy()
+        if not target.endswith(".h5") and comm.rank == 0 and not _ends_whole(Path(target)):
+            raise OSError("cut short; is the disk full?")  # PETSc does not tell
     except PETSc.Error:
         if viewer:
             viewer.incRef()  # never destroyed: PETSc would try to write once more, and leave an empty file
         raise
     finally:
         dm.destroy()
+
+
+def _ends_whole(path: Path) -> bool:
+    """Whether a VTK file has its last line."""
+    with path.open("rb") as file:
+        file.seek(max(0, path.stat().st_size - 100))
+        return b"</VTKFile>" in file.read()
 
 
 def _view(vec: PETSc.Vec, name: str, viewer: PETSc.Viewer, unit: str) -> None:

@@ -8,16 +8,21 @@ import pytest
 from conftest import ENVIRONMENT, TESTS
 
 
-@pytest.mark.parametrize("ranks", [2, 3])
 @pytest.mark.parametrize(
-    "case, reason",
+    "case, reason, ranks",
     [
-        ("helper", "here: bad on purpose"),
-        ("F", "F(x): ZeroDivisionError: on purpose"),
-        ("J", "J(x): ZeroDivisionError: on purpose"),
-        ("file", "no/such/folder/x.npz: could not be written: No such file or directory"),
-        ("table", "/proc/no/x.csv: No such file or directory"),
-        ("picture", "x.png: no figure"),
+        ("helper", "here: bad on purpose", 3),
+        ("F", "F(x): ZeroDivisionError: on purpose", 2),
+        ("F", "F(x): ZeroDivisionError: on purpose", 3),
+        ("J", "J(x): ZeroDivisionError: on purpose", 3),
+        ("file", "no/such/folder/x.npz: could not be written: No such file or directory", 2),
+        ("table", "/proc/no/x.csv: No such file or directory", 2),
+        ("picture", "x.png: no figure", 2),
+        ("vts", "x.vts: could not be written: cut short; is the disk full?", 2),
+        ("npz", "x.npz: could not be written: File too large", 2),
+        ("write", "MPI_ERR_NO_SUCH_FILE", 2),
+        ("read", "MPI_ERR_NO_SUCH_FILE", 2),
+        ("doctor", "ZeroDivisionError: on purpose", 2),
     ],
 )
 def test_every_rank_is_told(tmp_path, case, reason, ranks):

@@ -165,7 +165,7 @@ def cell_misfits(
             terms = k * abs(here) + w * abs(west) + e * abs(east) + s * abs(south) + n * abs(north)
             excess = abs(left) - 8 * 2.0**-53 * (terms + abs(b_C[j, i]) + abs(b_W[j, i]) + abs(c[j, i]))
             if excess > 0.0:
-                moved = k * p_max
+                moved = k * p_max if p_max > 0.0 else -b_C[j, i]  # all void: there is no other measure
                 if here < r[j + 1, i + 1] * p_max:
                     moved = min(moved, -b_C[j, i])
                 worst = max(worst, excess / moved if moved > 0.0 else np.inf)
@@ -195,7 +195,7 @@ def array_misfits(
     b, left = own + entering, a + own + entering - c
     terms = k * np.abs(here) + sum(k * np.abs(beside) for k, beside in pairs)
     excess = np.abs(left) - 8 * UNIT * (terms + np.abs(b_C) + np.abs(b_W) + np.abs(c))
-    moved = np.where(here < void_here * p_max, np.minimum(k * p_max, -b_C), k * p_max)
+    moved = np.where(here < void_here * p_max, np.minimum(k * p_max, -b_C), k * p_max if p_max > 0 else -b_C)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         worst = np.where(excess > 0, np.where(moved > 0, excess / moved, np.inf), 0.0)
     squares = [float(np.sum(np.square(term))) for term in (a, b, left, k * here)]
