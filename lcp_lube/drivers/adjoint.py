@@ -21,7 +21,7 @@ from ..scenes.scene import Scene
 from ..scenes.values import values_of, with_values
 from .coefficients import placed
 from .equations import MISFIT, Equations, cavity_of, check_film, fields_of
-from .linearised import Linear
+from .linearised import transposed
 
 CANCELLED = 1e-10
 SUPPLY = "supply.{}.p"  # the key of a supply's pressure, Pa above p_c
@@ -83,11 +83,7 @@ class Adjoint:
         eq = self.equations
         problem = eq.problem(self.p)
         entries = None if eq.law is None else eq.tangent(self.p, self.r).entries(problem.scheme)
-        linear = Linear(problem, self.cavity, entries, eq.held)
-        try:
-            return linear.solve_transposed(rows)
-        finally:
-            linear.destroy()
+        return transposed(problem, self.cavity, rows, entries, eq.held)
 
     def lagrangians(self, scene: Scene, pressures: Sequence[float] | None = None) -> Array:
         """L of every quantity and condition at a scene near by, the fields held. Collective.

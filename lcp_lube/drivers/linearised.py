@@ -5,17 +5,21 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ..base.options import recipe
 from ..base.parallel import Array
+from ..linear.cavity import CavitySystem
 from ..linear.krylov import Krylov
 from ..problems.facts import Facts
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.reynolds import assemble
+from ..registry import SMALL
 from .plan import default_recipe
 
 Entries = list[tuple[int, int, Array]]
+RTOL = 1e-11  # of iterations for lambda, whose error goes into a derivative with the residual of the equations alone
 
 
 class Linear:
@@ -92,6 +96,30 @@ class Linear:
         if self._krylov is not None:
             self._krylov.destroy()
         self.J.destroy()
+
+
+def transposed(
+    problem: LubricationProblem, cavity: NDArray[np.bool_], rows: Sequence[Array], entries: Entries | None, given: Any
+) -> list[Array]:
+    """J'^-1 b for each b: by the factors of `Linear`, in large films in the plane by multigrid on what elimination leaves.
+
+    entries, given : as `Linear` takes them. Collective.
+    """
+    grid = problem.grid
+    facts = Facts(problem.kind, grid.shape, grid.comm.size)
+    plain = entries is None and given is None and problem.held is None and not any(grid.periodic)
+    if plain and grid.dim == 2 and grid.size > SMALL and facts.whole_lines:
+        with recipe(default_recipe(facts, "cavity", large=True)[0]):
+            system = CavitySystem(problem)
+            try:
+                return system.solve_transposed(~cavity, rows, RTOL)
+            finally:
+                system.destroy()
+    linear = Linear(problem, cavity, entries, given)
+    try:
+        return linear.solve_transposed(rows)
+    finally:
+        linear.destroy()
 
 
 class Feed:
