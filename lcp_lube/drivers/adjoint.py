@@ -15,15 +15,20 @@ import numpy as np
 from ..base.differences import differences
 from ..base.parallel import Array
 from ..errors import InputError
+from ..problems.film.reynolds import sides
 from ..problems.solution import Solution
+from ..problems.transfer import Pick, numbers
+from ..registry import SMALL
 from ..scenes.grooved import GroovedJournalScene
 from ..scenes.scene import Scene
 from ..scenes.values import values_of, with_values
 from .coefficients import placed
 from .equations import MISFIT, Equations, cavity_of, check_film, fields_of
+from .film_part import Part
 from .linearised import transposed
 
 CANCELLED = 1e-10
+EVEN = 1e-12  # relative difference between both halves of what is symmetric
 SUPPLY = "supply.{}.p"  # the key of a supply's pressure, Pa above p_c
 
 
@@ -49,6 +54,7 @@ class Adjoint:
         self.equations = Equations(self.scene, solution.problem.grid.dm.comm, self.pressures, dry=self.dry)
         if self.equations.grid.shape != solution.problem.grid.shape:
             raise InputError(f"{scene.name}: the solution is on another grid than the scene")
+        self._reduction = solution.settings.get("details", {}).get("reduction")
         self.found, self.conditions = _found(scene, solution)
         supplies = self.equations.constant.held.supplies if self.equations.constant.held else ()
         free = [k for k, one in enumerate(supplies, start=1) if one.open]
@@ -83,7 +89,39 @@ class Adjoint:
         eq = self.equations
         problem = eq.problem(self.p)
         entries = None if eq.law is None else eq.tangent(self.p, self.r).entries(problem.scheme)
+        if self._halved:
+            return self._solve_half(rows)
         return transposed(problem, self.cavity, rows, entries, eq.held)
+
+    def _solve_half(self, rows: list[Array]) -> list[Array]:
+        """On half the width of a film that is symmetric about its middle, where what is asked of it is so too.
+
+        With P the symmetric extension J_half = P' J P/2, the lines on the mirror having half cells: J_half' mu = P' b/2.
+        """
+        eq, half = self.equations, Part(self.scene, "mirror")
+        small, whole = half.build(eq.grid.dm.comm), eq.constant
+        take = Pick(eq.grid, small.grid, *numbers(small.grid))
+        spread = Pick(small.grid, eq.grid, *half.places(eq.grid))
+        try:
+            if self.dry is not None:
+                small = small.revised(take(self.dry))
+            even = [np.abs(b - spread(take(b))) <= EVEN * eq.grid.reduce.max(np.abs(b)) for b in rows]
+            alike = eq.grid.reduce.min(np.array([float(one.all()) for one in even])) if rows else 1.0
+            if not alike or small.scheme.flow_unit != whole.scheme.flow_unit:
+                return transposed(whole, self.cavity, rows, None, None)
+            share = np.broadcast_to(np.where(sides(small.grid, ("mirror",))[3], 0.5, 1.0), small.grid.box).ravel()
+            cavity = take(self.cavity.astype(float)) > 0.5
+            return [spread(one) for one in transposed(small, cavity, [share * take(b) for b in rows], None, None)]
+        finally:
+            for made in (take, spread, small):
+                made.destroy()
+
+    @property
+    def _halved(self) -> bool:
+        """Whether the film was solved on half its width, and nothing stands in the way of doing so again."""
+        eq = self.equations
+        plain = eq.law is None and not eq.turned and eq.constant.held is None and eq.held is None
+        return plain and self.reported.grid.size > SMALL and self._reduction == "mirror"
 
     def lagrangians(self, scene: Scene, pressures: Sequence[float] | None = None) -> Array:
         """L of every quantity and condition at a scene near by, the fields held. Collective.

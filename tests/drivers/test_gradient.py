@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from lcp_lube import InputError, load_scene, solve
-from lcp_lube.drivers import attitude, supplies
+from lcp_lube.drivers import adjoint as adjoint_module
+from lcp_lube.drivers import attitude, linearised, supplies
 from lcp_lube.drivers.adjoint import Adjoint
 from lcp_lube.drivers.film_gradient import FilmGradient, areas
 from lcp_lube.drivers.gradient import gradients
@@ -285,3 +286,21 @@ def test_the_command(cli, tmp_path):
 def test_bad_input(cli, words, message):
     done = cli("sensitivity", *words)
     assert done.status == 2 and message in done.lines[0] and len(done.lines) == 1
+
+
+@pytest.mark.parametrize(("name", "halved"), [("dimpled_pad", False), ("problem4", True)])
+def test_large_films_have_the_same_adjoint(monkeypatch, name, halved):
+    """By multigrid on what elimination leaves, on half the width too, as by factors of the whole."""
+    scene = load_scene(name, nx=70, ny=61)
+    solution = solve(scene, method="fas") if not halved else solve(scene)
+    assert (solution.settings["details"].get("reduction") == "mirror") is halved
+    found = []
+    for least in (10**9, 100):
+        monkeypatch.setattr(linearised, "SMALL", least)
+        monkeypatch.setattr(adjoint_module, "SMALL", least)
+        adjoint = Adjoint(scene, solution, ["load", "friction", "flow_east", "flow_south"])
+        found.append(dict(adjoint.lambdas))
+        adjoint.destroy()
+    for part, exact in found[0].items():
+        assert found[1][part] == pytest.approx(exact, abs=1e-7 * np.abs(exact).max()), part
+    solution.destroy()
