@@ -9,11 +9,13 @@ SECTIONS: dict[str, list[str]] = {
     "Tutorial": ["docs/install", "docs/guide/first_steps", "docs/notebooks/*"],
     "How-to": [
         "docs/guide/README",
+        "docs/guide/tour",
         "docs/examples",
         "docs/explore",
         "docs/scene_files",
         "docs/data",
         "docs/coefficients",
+        "docs/gradients",
         "docs/guide/recipes",
         "docs/guide/parallel",
         "docs/guide/python",
@@ -26,10 +28,12 @@ SECTIONS: dict[str, list[str]] = {
         "docs/nonlinear_multigrid",
         "docs/theory/*",
         "docs/guaranteed_bounds",
+        "docs/accuracy",
+        "docs/model",
         "docs/extrapolation",
     ],
     "Reference": ["docs/reference/commands", "docs/guide/scenes", "docs/reference/api", "docs/numbers", "docs/guide/versions"],
-    "Measured": ["benchmarks/README", "benchmarks/results/CHARTS", "docs/comparison", "docs/processors"],
+    "Measured": ["docs/results", "benchmarks/README", "benchmarks/results/CHARTS", "docs/comparison", "docs/processors"],
     "Project": ["CONTRIBUTING", "docs/architecture", "docs/stability", "CHANGELOG"],
 }
 

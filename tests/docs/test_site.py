@@ -57,6 +57,13 @@ def test_programs(page, block, tmp_path, environment) -> None:
     assert done.returncode == 0, f"{done.stdout}\n{done.stderr}"
 
 
+def test_the_api_page_has_every_public_name() -> None:
+    import lcp_lube
+
+    page = (ROOT / "docs" / "reference" / "api.md").read_text(encoding="utf-8")
+    assert all(re.search(rf"lcp_lube\.{name}\b", page) for name in lcp_lube.__all__ if name != "__version__")
+
+
 def test_links_of_a_built_site(tmp_path: Path) -> None:
     broken = runpy.run_path(str(ROOT / "tools" / "links.py"))["broken"]
     (tmp_path / "a.html").write_text('<a href="b.html#there">b</a><a href="https://else.where">e</a><h1 id="top">a</h1>')
