@@ -75,6 +75,11 @@ GROUPS: dict[str, Group] = {
         [*DRAWING, "lcp_lube/scenes/problem4.toml"],
     ),
     "examples": Group(["tests/docs/test_examples.py"], "docs/pictures/*.png", ["docs/examples.md", *DRAWING]),
+    "model": Group(
+        ["-m", "lcp_lube", "solve", "lined_pad", "--plot-model", "docs/pictures/model_lined_pad.png"],
+        "docs/pictures/model_lined_pad.png",
+        ["lcp_lube/output/model_picture.py", "lcp_lube/output/style.py", "lcp_lube/scenes/lined_pad.toml"],
+    ),
     "explorer": Group(
         ["tools/explorer_picture.py", "docs/images/explore.png"],
         "docs/images/explore.png",
@@ -85,6 +90,7 @@ GROUPS: dict[str, Group] = {
         f"{RESULTS}/precision_*.png",
         [*study("precision_picture"), "lcp_lube/studies/precision_words.py", f"{RESULTS}/precision.csv"],
     ),
+    "rungs": Group(chart("rungs"), f"{RESULTS}/rungs.png", [*study("rungs"), f"{RESULTS}/rungs.csv"]),
     "scaling": Group(chart("scaling"), f"{RESULTS}/scaling.png", [*study("scaling_picture"), f"{RESULTS}/scaling.csv"]),
     "starts": Group(
         chart("stability", "starts"),

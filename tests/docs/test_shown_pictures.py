@@ -39,6 +39,7 @@ def test_every_picture_is_drawn_by_the_one_command() -> None:
     drawn = {path.resolve() for group in SCRIPT["GROUPS"].values() for path in ROOT.glob(group.pictures)}
     assert shown() <= drawn
     assert all(path.is_file() for path in shown())
+    assert {path.resolve() for folder in ("pictures", "images") for path in (ROOT / "docs" / folder).iterdir()} <= shown()
 
 
 def test_a_change_is_noticed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
