@@ -1,4 +1,4 @@
-"""Bratu, obstacle and squeeze scenes, reduced and whole, on the ranks that it is started on: by how much they differ."""
+"""Bratu and obstacle scenes, reduced and whole, on the ranks that it is started on: by how much they differ."""
 
 import json
 from typing import Any
@@ -8,18 +8,15 @@ from mpi4py import MPI
 from side_scenes import reduced_solve
 
 from lcp_lube import load_scene, solve
-from lcp_lube.drivers import time
 
 SCENES = {
     "bratu": {"nx": 17, "ny": 14},
     "obstacle_bratu": {"nx": 20, "ny": 21},
     "obstacle_bratu, multigrid": {"nx": 40, "ny": 49},
-    "squeeze": {"n": 31, "steps": 6},
 }
 
 
 def main() -> None:
-    time.SHORT = 1  # of a squeeze film that is too short to pay
     record = {}
     for name, changes in SCENES.items():
         scene = load_scene(name.split(",")[0], changes)

@@ -85,8 +85,12 @@ def parser_of_all() -> Parser:
     solve.add_argument("--quantity", metavar="NAME", help="what --accuracy is about: load (default), p_max, friction, ...")
     solve.add_argument("--output", action="append", default=[], metavar="FILE", help=".npz, .nc, .vts or .pvd (ParaView), .h5")
     solve.add_argument("--boundary", action="store_true", help="--output writes the points of the sides as well")
-    solve.add_argument("--plot", metavar="FILE.png", help="picture of p, r and h")
+    solve.add_argument("--plot", metavar="FILE.png", help="picture of p, r and h; of a film that moves: of the march, or .gif")
     solve.add_argument("--plot-model", metavar="FILE.png", help="picture of the effects that were kept and left out")
+    solve.add_argument("--history", metavar="FILE.csv", help="a row for each time step, as they come (films that move)")
+    solve.add_argument(
+        "--times", metavar="T,T,...", help="times (s), or their number, of the frames of --plot FILE.gif and --output FILE.pvd"
+    )
     solve.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")
     solve.add_argument("--explain", action="store_true", help="say on stderr what was chosen, and why")
     solve.add_argument("--monitor", action="store_true", help="a line an iteration on stderr")
@@ -151,7 +155,7 @@ def parser_of_all() -> Parser:
     verify.add_argument("--quick", action="store_true", help="one case in a moment")
     verify.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")
 
-    coefficients = command("coefficients", "stiffness and damping of a journal's film, x along the load")
+    coefficients = command("coefficients", "stiffness and damping of a journal's film, or of a pad's along its normal")
     _scene_options(coefficients)
     coefficients.add_argument("--method", default="auto", help="see 'lcp-lube list'; default auto")
     coefficients.add_argument("--recipe", help="inner solver of the film: options/NAME.opts")
@@ -162,6 +166,8 @@ def parser_of_all() -> Parser:
         "--speeds", metavar="FROM:TO:N", help="a csv row for each speed (rpm), in the columns and axes of rotor programs"
     )
     coefficients.add_argument("--output", type=Path, metavar="FILE.csv", help="of --speeds; default standard output")
+    coefficients.add_argument("--tilt", action="store_true", help="with the slopes of a journal's axis: 4 x 4, with moments")
+    coefficients.add_argument("--plot", metavar="FILE.png", help="of --speeds: K and C against S and the speed")
     coefficients.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")
 
     design_arguments.add(command, _scene_options, number, whole)

@@ -88,8 +88,10 @@ def ask_of(args: argparse.Namespace, monitor: Monitor | None = None) -> Ask:
     )
 
 
-def solution_of(args: argparse.Namespace, monitor: Monitor | None = None, progress: Progress | None = None) -> Solution:
-    """What `solve` with these arguments finds. Collective."""
+def solution_of(
+    args: argparse.Namespace, monitor: Monitor | None = None, progress: Progress | None = None, watching: Any = None
+) -> Solution:
+    """What `solve` with these arguments finds; watching : hears of time steps (`watching.Watching`). Collective."""
     scene = scene_of(args)
     return solve(
         scene,
@@ -104,6 +106,8 @@ def solution_of(args: argparse.Namespace, monitor: Monitor | None = None, progre
         reduction=args.reduction,
         memory_check=not args.no_memory_check,
         progress=progress,
+        watch=watching,
+        times=watching.args_times if watching is not None else (),
     )
 
 

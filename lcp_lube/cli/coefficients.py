@@ -1,4 +1,4 @@
-"""`lcp-lube coefficients`: stiffness, damping and stability of a journal's film."""
+"""`lcp-lube coefficients`: stiffness, damping and stability of a film."""
 
 import argparse
 import json
@@ -14,8 +14,11 @@ from ..base.options import check_unread
 from ..drivers.coefficients import Coefficients, coefficients, placed, stability
 from ..errors import InputError
 from ..output.console import say
-from ..output.files import replacing
+from ..output.files import check_target, replacing
 from ..output.results import as_dict, finite
+from ..problems.film.model import Model
+from ..problems.film.turning import Turning
+from ..scenes.moving import motion_of
 from ..scenes.scene import Scene, as_scene
 from .asked import ask_of, scene_of
 from .sweep import parse_axis
@@ -29,26 +32,27 @@ def run(args: argparse.Namespace) -> int:
 
     Raises
     ------
-    InputError : a scene without a journal, a frequency that is none.
+    InputError : a scene without a film, a frequency that is none.
     """
     scene = scene_of(args)
+    check_film(scene, args.tilt)
     try:
         frequencies = [float(word) for word in args.frequency.split(",")]
     except ValueError:
         raise InputError(f"--frequency {args.frequency}: numbers in rad/s are needed, with commas between them") from None
-    if getattr(scene, "turning", None) is None:
-        raise InputError(f"scene {scene.name}: coefficients are of journals; it has no part that could be displaced")
     if args.speeds is not None:
         return table(args, scene, frequencies)
     if args.output is not None:
         raise InputError(f"--output {args.output}: --speeds FROM:TO:N is needed too")
+    if args.plot is not None:
+        raise InputError(f"--plot {args.plot}: --speeds FROM:TO:N is needed too")
     solution = solve(scene, ask_of(args))
     try:
         check_unread()
         data = as_dict(solution)
         record = {key: data.get(key) for key in ("scene", "nx", "ny", "outcome", "converged", "message", *KEYS)}
         if solution.converged:
-            found = coefficients(scene, solution, frequencies)
+            found = coefficients(scene, solution, frequencies, args.tilt)
             record |= report(found, placed(scene, solution), data)
         say(json.dumps(finite(record)) if args.json else text(record))
     finally:
@@ -69,7 +73,10 @@ def table(args: argparse.Namespace, scene: Scene, frequencies: list[float]) -> i
     if "speed_rpm" not in type(scene).model_fields:
         raise InputError(f"--speeds: scene {scene.name} has no speed_rpm")
     speeds = parse_axis(f"speed_rpm={args.speeds}").values
-    rows, near, failed = [], None, 0
+    if args.plot is not None:
+        check_target(args.plot, plot=True)
+    rows: list[list[float]] = []
+    near, failed, drawn = None, 0, []
     for rpm in speeds:
         at = as_scene(scene, {"speed_rpm": float(rpm)})
         solution = solve(at, ask_of(args), start=near)
@@ -80,65 +87,103 @@ def table(args: argparse.Namespace, scene: Scene, frequencies: list[float]) -> i
             (one,) = coefficients(at, solution, frequencies[:1])
             turn = np.array([[0.0, -1.0], [1.0, 0.0]])  # our axes as columns, in theirs
             K, C = (turn.T @ matrix @ turn for matrix in (one.K, one.C))
-            values = [at.omega, *K.ravel(), *C.ravel()]  # type: ignore[attr-defined]
-            rows.append(",".join(f"{value:.9g}" for value in values))
+            rows.append([at.omega, *K.ravel(), *C.ravel()])  # type: ignore[attr-defined]
+            drawn.append(report([one], placed(at, solution), as_dict(solution)))
         failed += not solution.converged
         near = solution
     if near is not None:
         near.destroy()
-    lines = "\n".join([",".join(("frequency", *ROTOR)), *rows]) + "\n"
+    told = [",".join(f"{value:.9g}" for value in row) for row in rows]
+    lines = "\n".join([",".join(("frequency", *ROTOR)), *told]) + "\n"
     if args.output is None:
         say(lines.rstrip("\n"))
     else:
         with replacing(args.output, MPI.COMM_WORLD) as name:
             if MPI.COMM_WORLD.rank == 0:
                 Path(name).write_text(lines)
+    if args.plot is not None and rows:
+        from ..output.coefficients_picture import draw
+
+        draw(np.array(rows)[:, 0] * 30.0 / math.pi, drawn, scene.name, Path(args.plot))
     return 1 if failed else 0
+
+
+def check_film(scene: Scene, tilt: bool) -> None:
+    """Refuse before the solve what has no coefficients.
+
+    Raises
+    ------
+    InputError : names the scene, and why.
+    """
+    if not isinstance(getattr(scene, "model", None), Model):
+        raise InputError(f"scene {scene.name}: coefficients are of films; it has no part that could be displaced")
+    if motion_of(scene) is not None:
+        raise InputError(f"scene {scene.name}: coefficients are of films at rest in time; leave [motion] out")
+    if tilt and getattr(scene, "turning", None) is None:
+        raise InputError(f"scene {scene.name}: --tilt is of journals with a width")
 
 
 def report(found: list[Coefficients], scene: Scene, data: dict[str, Any]) -> dict[str, Any]:
     """The coefficients as the JSON has them, and what a rigid rotor on them does (at the first frequency)."""
-    turning = scene.turning  # type: ignore[attr-defined]
+    rows = [{"frequency": one.frequency, "motions": [*one.motions], "K": one.K.tolist(), "C": one.C.tolist()} for one in found]
+    turning: Turning | None = getattr(scene, "turning", None)
+    if turning is None:
+        return {"coefficients": rows}
     W = data["load"]
     scale = turning.c / W if W > 0 else math.nan  # nothing to measure by where nothing is carried
-    scaled = [(one.K * scale, one.C * scale * turning.omega) for one in found]
-    rows = [
-        {
-            "frequency": one.frequency,
-            "K": one.K.tolist(),
-            "C": one.C.tolist(),
-            "K_dimensionless": K.tolist(),
-            "C_dimensionless": C.tolist(),
-        }
-        for one, (K, C) in zip(found, scaled, strict=True)
-    ]
-    whirl, threshold = stability(*scaled[0]) if W > 0 else (None, None)
-    psi, D = turning.c / turning.R, 2.0 * turning.R
-    S = scene.mu * turning.omega / (2.0 * math.pi) * turning.B * D * scale / (turning.c * psi**2)  # type: ignore[attr-defined]
-    eccentricity = scene.eccentricity  # type: ignore[attr-defined]
-    return {"S": S, "eccentricity": eccentricity, "coefficients": rows, "whirl_ratio": whirl, "threshold": threshold}
+    scaled = [(one.K[:2, :2] * scale, one.C[:2, :2] * scale * turning.omega) for one in found]
+    for row, (K, C) in zip(rows, scaled, strict=True):
+        row |= {"K_dimensionless": K.tolist(), "C_dimensionless": C.tolist()}
+    turns = W > 0 and turning.omega > 0
+    whirl, threshold = stability(*scaled[0]) if turns else (None, None)
+    mass = threshold**2 * W / (turning.c * turning.omega**2) if threshold is not None else None
+    eccentricity = scene.eccentricity if hasattr(scene, "eccentricity") else float(np.hypot(*scene.place))  # type: ignore[attr-defined]
+    numbers = turning.numbers(W, scene.model.mu, eccentricity)  # type: ignore[attr-defined]
+    return {
+        "S": numbers["S"] if turns else None,
+        "eccentricity": numbers["eccentricity"],
+        "coefficients": rows,
+        "whirl_ratio": whirl,
+        "threshold": threshold,
+        "threshold_mass": mass,
+    }
 
 
 def text(record: dict[str, Any]) -> str:
     """A few lines for people."""
     if "coefficients" not in record:
         return f"{record['scene']}: {record['outcome']}: {record['message']}"
-    lines = [
-        f"{record['scene']} ({record['nx']} x {record['ny']}): eccentricity {record['eccentricity']:.6g}, attitude "
-        f"{record['attitude_deg']:.5g} deg, load {record['load']:.6g} N, S {record['S']:.5g}",
-        "x along the load, y a quarter of a turn ahead; in brackets K c/W and C c omega/W",
-    ]
+    one_d = record["ny"] is None
+    size, per = (f"n = {record['nx']}", "/m") if one_d else (f"{record['nx']} x {record['ny']}", "")
+    journal = "threshold" in record
+    if journal:
+        attitude = "" if record["attitude_deg"] is None else f"attitude {record['attitude_deg']:.5g} deg, "
+        S = "" if record["S"] is None else f", S {record['S']:.5g}"
+        head = f"eccentricity {record['eccentricity']:.6g}, {attitude}load {record['load']:.6g} N{per}{S}"
+        axes = "x along the load, y a quarter of a turn ahead; in brackets K c/W and C c omega/W"
+    else:
+        head, axes = f"load {record['load']:.6g} N{per}", "z along the film's normal, walls apart"
+    lines = [f"{record['scene']} ({size}): {head}", axes]
     for one in record["coefficients"]:
         lines.append(f"at {one['frequency']:g} rad/s")
-        for name, unit in (("K", "N/m"), ("C", "N s/m")):
+        for name, unit in (("K", f"N/m{per}"), ("C", f"N s/m{per}")):
             for i, row in enumerate(one[name]):
-                plain = one[f"{name}_dimensionless"][i]
-                cells = "  ".join(f"{name}{'xy'[i]}{'xy'[j]} {row[j]:12.5g} [{plain[j]:9.5f}]" for j in (0, 1))
+                if len(row) > 2:
+                    lines.append(f"  {name} {one['motions'][i]:<12}" + "  ".join(f"{value:12.5g}" for value in row))
+                    continue
+                plain = one.get(f"{name}_dimensionless")
+                told = [f"{value:12.5g}" + (f" [{plain[i][j]:9.5f}]" if plain else "") for j, value in enumerate(row)]
+                labels = [f"{name}{one['motions'][i]}{one['motions'][j]}" if journal else name for j in range(len(row))]
+                cells = "  ".join(f"{label} {value}" for label, value in zip(labels, told, strict=True))
                 lines.append(f"  {cells}  {unit}")
+    if not journal:
+        return "\n".join(lines)
     if record["threshold"] is None:
         lines.append("no threshold of stability" if record["load"] > 0 else "nothing is carried: no numbers in brackets")
     else:
         lines.append(
-            f"rigid rotor: whirl ratio {record['whirl_ratio']:.4g}, unstable beyond omega sqrt(c/g) = {record['threshold']:.4g}"
+            f"rigid rotor: whirl ratio {record['whirl_ratio']:.4g}, unstable beyond omega sqrt(c/g) = "
+            f"{record['threshold']:.4g}, "
+            f"at this speed with more than {record['threshold_mass']:.5g} kg{per} on the bearing"
         )
     return "\n".join(lines)

@@ -35,10 +35,14 @@ def run_solve(args: argparse.Namespace) -> int:
     if args.boundary and not args.output:
         raise InputError("--boundary: --output FILE is needed")
     from ..output import files
+    from .watching import Watching
 
-    for path in args.output:
+    watching = Watching(args, scene_of(args))
+    moves = watching.table is not None
+    outputs = [path for path in args.output if not (moves and path.lower().endswith(".pvd"))]
+    for path in outputs:
         files.check_target(path)
-    for path in filter(None, (args.plot, args.plot_model)):
+    for path in filter(None, (None if moves else args.plot, args.plot_model)):
         files.check_target(path, plot=True)
 
     def monitor(k: int, step: Step) -> None:
@@ -49,9 +53,11 @@ def run_solve(args: argparse.Namespace) -> int:
 
     line = Line()
     try:
-        solution = solution_of(args, monitor, None if args.monitor or MPI.COMM_WORLD.rank else line)
+        quiet = args.monitor or MPI.COMM_WORLD.rank or moves  # a march has a bar of its own
+        solution = solution_of(args, monitor, None if quiet else line, watching if moves else None)
     finally:
         line.end()
+        watching.close()
     try:
         check_unread()
         if args.explain and MPI.COMM_WORLD.rank == 0:
@@ -62,7 +68,7 @@ def run_solve(args: argparse.Namespace) -> int:
                 print(f"lcp-lube: warning: {doubt}", file=sys.stderr, flush=True)
         say(json.dumps(finite(data)) if args.json else coloured(summary(data), data["outcome"], data["converged"]))
         failed = []  # a file that cannot be written costs neither the result nor the other files
-        for path in args.output:
+        for path in outputs:
             try:
                 files.save(solution, path, args.boundary)
             except InputError as error:
@@ -71,7 +77,7 @@ def run_solve(args: argparse.Namespace) -> int:
             from ..output.plot import plot
 
             try:
-                plot(solution, args.plot)
+                watching.draw(solution) if moves else plot(solution, args.plot)
             except InputError as error:
                 failed.append(str(error))
         if args.plot_model:

@@ -1,6 +1,6 @@
 """What the caller of `solve` wants, beyond the scene: one value that every driver reads and hands down."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -51,8 +51,11 @@ class Ask:
     rescue : whether other methods may take over where the one asked for fails: `Solution.method` says which.
     reduction : solve no more than symmetry leaves (`symmetry`).
     memory_check : refuse a run that needs more memory than there is, by an estimate (`memory`).
+    implied : method and options are a driver's choice, and nobody has named them.
     monitor : called after every step with its number and record.
     progress : told by the loops over grids, levels and time steps how far they have come.
+    watch : called after every time step of a march with its `time.Moment`; collective.
+    times : when a march is to end a step, s, where an error estimate says how long these are.
     comm : communicator of petsc4py or mpi4py; default all ranks.
     """
 
@@ -74,8 +77,11 @@ class Ask:
     rescue: bool = True
     reduction: bool = True
     memory_check: bool = True
+    implied: bool = False
     monitor: Monitor | None = None
     progress: Progress | None = None
+    watch: Callable[[Any], None] | None = None
+    times: tuple[float, ...] = ()
     comm: PETSc.Comm | None = None
 
     def __post_init__(self) -> None:
@@ -99,7 +105,7 @@ class Ask:
     def named(self) -> bool:
         """Whether a method, a matrix or an inner solver was named: those of the whole scene are meant."""
         chosen = (self.method, self.system) != ("auto", "auto") or self.recipe or self.options
-        return bool(chosen or wants_ksp())
+        return bool((chosen and not self.implied) or wants_ksp())
 
     @property
     def choices(self) -> tuple[Any, ...]:

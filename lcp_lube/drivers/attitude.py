@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from ..problems.solution import Outcome, Solution
 from ..scenes.grooved import GroovedJournalScene
+from ..scenes.moving import motion_of
 from ..scenes.scene import Solvable
 from .ask import Ask
 from .compose import Inner
@@ -16,7 +17,8 @@ STEEPEST, FLATTEST = 2.0, 0.3  # slope of the force's angle over the attitude; w
 
 def applies(scene: Solvable, ask: Ask) -> bool:
     """Whether the attitude is left open."""
-    return isinstance(scene, GroovedJournalScene) and scene.attitude_deg is None and scene.balance is None
+    open_ = isinstance(scene, GroovedJournalScene) and scene.attitude_deg is None and scene.balance is None
+    return open_ and motion_of(scene) is None
 
 
 def half_film_attitude(e: float) -> float:

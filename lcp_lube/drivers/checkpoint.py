@@ -104,7 +104,7 @@ class Checkpointer:
         self._grid: Grid | None = None
         self._since = 0
         self._saved = False
-        self._signal = 0
+        self.told = 0
 
     def begin(self, scene: Solvable, choices: tuple[Any, ...]) -> None:
         """What is solved and how: the values of CHOICES."""
@@ -139,7 +139,7 @@ class Checkpointer:
         self._run, self._grid, self.steps = run, grid, list(before)
         self._reached = {f"reached.{name}": values for name, values in (reached or {}).items()}
         self.record |= record
-        with self._listening():
+        with self.listening():
             return iterate(run, stopping, self._watching(monitor), before)
 
     def _watching(self, monitor: Monitor | None) -> Monitor:
@@ -150,7 +150,7 @@ class Checkpointer:
                 monitor(k, step)
             self.steps.append(step)
             self._since += 1
-            told = self.comm.allreduce(self._signal, MPI.MAX)
+            told = self.comm.allreduce(self.told, MPI.MAX)
             if told or self._since >= self.every:
                 self.save()
             if told == signal.SIGTERM:
@@ -161,16 +161,16 @@ class Checkpointer:
         return watch
 
     @contextmanager
-    def _listening(self) -> Iterator[None]:
+    def listening(self) -> Iterator[None]:
         """SIGINT, and SIGTERM as batch systems send it ahead of time, let the step end and be saved; a second one does not."""
         if threading.current_thread() is not threading.main_thread():
             yield
             return
 
         def note(number: int, _: Any) -> None:
-            if self._signal:
+            if self.told:
                 raise KeyboardInterrupt
-            self._signal = number
+            self.told = number
 
         before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
         try:

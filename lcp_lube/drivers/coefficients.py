@@ -1,13 +1,6 @@
-"""Stiffness and damping of a journal's film, by exact linearisation of the mass-conserving equations.
+"""Stiffness and damping of a film: of a journal in its bush, with tilt too, and of a flat film along its normal.
 
-In the film h(x, y, t) a cell's balance is A(h) p + B(h) r - c(h) + 2 dx d/dt[h (1 - r)] = 0. Let z be p in the full film and -r
-in the cavity, J the matrix of the steady problem at its solution, and e exp(i nu t) a small displacement of the journal. At the
-signs of z
-
-    (J + i nu M) z' = -dG/de - i nu S,     M = 2 dx h in the cavity, 0 in the full film,     S = 2 dx (1 - r) dh/de,
-
-with G = A p + B r - c, and K + i nu C = -d(force)/de comes from p'. M is the void that is stored and carried: it makes Cxy and
-Cyx differ where film forms again inside. At nu = 0 these are two solves with one matrix: J z0' = -dG/de, J z1' = -(S + M z0').
+`response` has the derivation. K + i nu C = -d(force)/de, exact at the discrete solution, at any frequency nu.
 """
 
 import math
@@ -18,75 +11,109 @@ import numpy as np
 
 from ..base.parallel import Array
 from ..errors import InputError
+from ..problems.film.grooves import GroovedProblem
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
-from ..problems.solution import Solution
+from ..problems.film.turned import TurnedProblem
+from ..problems.film.turning import Turning
+from ..problems.solution import Fields, Solution
 from ..scenes.effects.table import without
-from ..scenes.scene import Scene
+from ..scenes.moving import motion_of
+from ..scenes.scene import Scene, Solvable
 from ..scenes.tilting import TiltingPadScene
 from .grooves import pad_films, pick_pad
-from .impedance import displacements, impedance
+from .impedance import impedance
 from .pads import JournalPads
+from .response import Change, Response
+
+JOURNAL, TILTED, FLAT = ("x", "y"), ("x", "y", "tilt", "tilt_across"), ("z",)  # names of the motions
 
 
 @dataclass(frozen=True)
 class Coefficients:
-    """K (N/m) and C (N s/m) at one frequency (rad/s), shape (2, 2), x along the load and y a quarter of a turn ahead.
+    """K and C at one frequency (rad/s), shape (motions, motions), in N/m and N s/m; with tilt also N, N m and their rates.
 
-    In 1D per metre of width.
+    Motions of a journal: x along the load, y a quarter of a turn ahead, and its axis' slopes in the planes of both, whose
+    forces are the moments about the middle of the width. Of a flat film: z along its normal, apart. In 1D per metre of width.
     """
 
     frequency: float
     K: Array
     C: Array
+    motions: tuple[str, ...] = JOURNAL
 
 
-def coefficients(scene: Scene, solution: Solution, frequencies: Sequence[float] = (0.0,)) -> list[Coefficients]:
-    """K and C of a converged solution of a journal. Collective.
+def motions_of(turning: Turning | None, tilt: bool, middle: float, along: float = 0.0) -> list[Change]:
+    """dh/de of each motion; along : angle of the load, rad from where theta is counted."""
+    if turning is None:
+        return [lambda x, y: np.ones(np.broadcast_shapes(x.shape, y.shape))]
+    changes: list[Change] = [_towards(turning, along + shift) for shift in (0.0, 0.5 * math.pi)]
+    return changes + [_times_distance(change, middle) for change in changes] if tilt else changes
+
+
+def _towards(turning: Turning, angle: float) -> Change:
+    return lambda x, y: -np.cos(turning.theta(x) - angle) + 0.0 * y
+
+
+def _times_distance(change: Change, middle: float) -> Change:
+    return lambda x, y: (y - middle) * change(x, y)
+
+
+def coefficients(
+    scene: Scene, solution: Solution, frequencies: Sequence[float] = (0.0,), tilt: bool = False, stored: bool = True
+) -> list[Coefficients]:
+    """K and C of a converged solution. Collective.
 
     Parameters
     ----------
-    scene : the scene at which the solution was found; it has `turning`, which says where the film lies around the journal.
+    scene : the scene at which the solution was found; where it has `turning`, that says where its film lies around a journal.
     frequencies : of the motion, rad/s, >= 0; 0: the limit of slow motion.
+    tilt : with the slopes of a journal's axis, 4 x 4 (2D).
+    stored : False: as if void were not stored in the cavity; what others leave out (above 0 rad/s).
 
     Raises
     ------
-    InputError : a scene without a journal, a fluid that depends on the pressure, a frequency below zero.
+    InputError : a scene without a film, or whose wall moves to smaller x, a fluid that depends on the pressure, a frequency
+        below zero, tilt of what has no axis.
     """
     scene = placed(scene, solution)
-    turning = getattr(scene, "turning", None)
-    if turning is None:
-        raise InputError(f"scene {scene.name}: coefficients are of journals; it has no part that could be displaced")
-    model: Model = scene.model  # type: ignore[attr-defined]
-    if supplies := solution.settings.get("supply_pressures"):
-        model = replace(model, supplies=tuple(replace(one, p=p) for one, p in zip(model.supplies, supplies, strict=True)))
+    model: Model | None = getattr(scene, "model", None)
+    if not isinstance(model, Model):
+        raise InputError(f"scene {scene.name}: coefficients are of films; it has no part that could be displaced")
+    if motion_of(scene) is not None:
+        raise InputError(f"scene {scene.name}: coefficients are of films at rest in time; leave [motion] out")
+    model = supplied(model, solution)
     if model.law is not None or model.effects:
         raise InputError(f"scene {scene.name}: coefficients are of fluids with constant viscosity and density")
+    if isinstance(solution.problem, TurnedProblem):
+        raise InputError(f"scene {scene.name}: its wall moves to smaller x; give its mirror image, with -U")
+    turning: Turning | None = getattr(scene, "turning", None)
+    if tilt and (turning is None or len(model.lengths) == 1 or isinstance(scene, TiltingPadScene)):
+        raise InputError(f"scene {scene.name}: --tilt is of journals with a width")
     for nu in frequencies:
         if not (math.isfinite(nu) and nu >= 0):
             raise InputError(f"--frequency {nu:g}: a number of at least 0 rad/s is needed")
     ring = solution.problem
-    total = np.zeros((len(frequencies), 2, 2), dtype=complex)
+    assert isinstance(ring, LubricationProblem)  # as a scene with a `model` has
+    along = 0.0
+    if turning is not None:
+        fx, fy = turning.force(ring, solution.fields["p"])
+        along = math.atan2(-fy, -fx)
+    motions = motions_of(turning, tilt, 0.5 * model.lengths[-1], along)
+    names = FLAT if turning is None else TILTED if tilt else JOURNAL
+    total = np.zeros((len(frequencies), len(motions), len(motions)), dtype=complex)
     if isinstance(scene, TiltingPadScene):
-        total += _of_pads(scene, solution, frequencies)
-    elif model.grooves:
-        dx = model.lengths[0] / scene.shape[0]
-        for pad, film in pad_films(scene):
-            problem = film.build(ring.grid.dm.comm)
-            take = pick_pad(ring.grid, problem.grid, pad.first)
-            fields = {name: take(values) for name, values in solution.fields.items()}
-            modes = displacements(turning, (pad.first - 0.5) * dx)
-            total += impedance(problem, film.model, fields, modes, frequencies)
+        turn = np.array([[math.cos(along), -math.sin(along)], [math.sin(along), math.cos(along)]])
+        total += turn.T @ _of_pads(scene, solution, frequencies) @ turn
+    for problem, part, fields, first in films(scene, model, ring, solution.fields):
+        response = Response(problem, part, fields, motions, first)
+        for k, nu in enumerate(frequencies):
+            total[k] += response.at(nu, stored) if nu else response.stiffness() + 1j * response.damping()
+        response.destroy()
+        if problem is not ring:
             problem.destroy()
-    else:
-        assert isinstance(ring, LubricationProblem)  # as a scene with `turning` has
-        total += impedance(ring, model, solution.fields, displacements(turning, 0.0), frequencies)
-    fx, fy = turning.force(ring, solution.fields["p"])
-    along = math.atan2(-fy, -fx)  # the load, from where theta is counted
-    turn = np.array([[math.cos(along), -math.sin(along)], [math.sin(along), math.cos(along)]])
-    total = turn.T @ total @ turn
     return [
-        Coefficients(nu, found.real, found.imag / nu if nu > 0 else found.imag)
+        Coefficients(nu, found.real, found.imag / nu if nu > 0 else found.imag, names)
         for nu, found in zip(frequencies, total, strict=True)
     ]
 
@@ -128,11 +155,40 @@ def placed(scene: Scene, solution: Solution) -> Scene:
     return scene.model_copy(update={**found, "balance": None}) if found else scene
 
 
+def supplied(model: Model, solution: Solution) -> Model:
+    """The model with its supplies at the pressures that the solution found."""
+    found = solution.settings.get("supply_pressures")
+    if not found:
+        return model
+    return replace(model, supplies=tuple(replace(one, p=p) for one, p in zip(model.supplies, found, strict=True)))
+
+
+def films(
+    scene: Solvable, model: Model, ring: LubricationProblem, fields: Fields
+) -> list[tuple[LubricationProblem, Model, Fields, float]]:
+    """The problems that were solved, with their fields and the x where each begins: pads between grooves, or the whole.
+
+    Collective; what is not `ring` is the caller's to free.
+    """
+    if isinstance(scene, TiltingPadScene):
+        return []  # see `_of_pads`
+    if not isinstance(ring, GroovedProblem):
+        return [(ring, model, fields, 0.0)]
+    dx = model.lengths[0] / scene.shape[0]
+    found: list[Any] = []
+    for pad, film in pad_films(scene):
+        problem = film.build(ring.grid.dm.comm)
+        take = pick_pad(ring.grid, problem.grid, pad.first)
+        found.append((problem, film.model, {name: take(values) for name, values in fields.items()}, (pad.first - 0.5) * dx))
+        take.destroy()
+    return found
+
+
 def stability(K: Array, C: Array) -> tuple[float | None, float | None]:
     """Whirl ratio and threshold ws = omega sqrt(c/g) of a rigid rotor, from K c/W and C c omega/W; None where it is stable.
 
     ke = (Kxx Cyy + Kyy Cxx - Kxy Cyx - Kyx Cxy)/(Cxx + Cyy), whirl^2 = ((ke - Kxx)(ke - Kyy) - Kxy Kyx)/(Cxx Cyy - Cxy Cyx),
-    ws = sqrt(ke)/whirl.
+    ws = sqrt(ke)/whirl. The threshold mass is ws^2 W/(c omega^2).
     """
     ke = (K[0, 0] * C[1, 1] + K[1, 1] * C[0, 0] - K[0, 1] * C[1, 0] - K[1, 0] * C[0, 1]) / (C[0, 0] + C[1, 1])
     square = ((ke - K[0, 0]) * (ke - K[1, 1]) - K[0, 1] * K[1, 0]) / (C[0, 0] * C[1, 1] - C[0, 1] * C[1, 0])

@@ -52,8 +52,6 @@ CANNOT = (
     ("pads", "resume", "its many solves make one answer; give the place and the tilts that were found for one solve"),
     ("position", "checkpoint", "its many solves make one answer; give the eccentricity that was found for one solve"),
     ("position", "resume", "its many solves make one answer; give the eccentricity that was found for one solve"),
-    ("time", "checkpoint", "it goes on in time, and holds its own memory of earlier steps"),
-    ("time", "resume", "it goes on in time, and holds its own memory of earlier steps"),
     ("time", "certify", "it goes on in time, and the theorem is of one steady film"),
     ("time", "nested", "it goes on in time, each step from the one before, on one grid"),
     ("grooves", "checkpoint", "its films are solved one by one"),

@@ -25,6 +25,7 @@ from ..problems.film.tangent import Tangent, effective, tangent
 from ..problems.film.turned import TurnedProblem
 from ..problems.grid import Grid, Places
 from ..problems.solution import Fields, Solution
+from ..scenes.moving import motion_of
 from ..scenes.scene import Scene
 from .loop import Frozen
 from .turned import Mirrored
@@ -223,7 +224,7 @@ def check_film(scene: Scene) -> Model:
     InputError : no film, or one that goes on in time.
     """
     model = getattr(scene, "model", None)
-    if not isinstance(model, Model) or scene.transient:
+    if not isinstance(model, Model) or motion_of(scene) is not None:
         raise InputError(f"scene {scene.name}: gradients are of films with cavitation that stand still in time")
     return model
 

@@ -126,6 +126,8 @@ def promising(scene: Solvable) -> bool:
         return False
     if _at_rest(model):
         return True
+    if model.stored is not None and len(model.lengths) == 1:
+        return False
     kinds = [tuple(side.kind for side in model.sides[k : k + 2]) for k in (0, 2)]
     xs, *ys = (some_places(*side) for side in zip(scene.shape, model.lengths, kinds, SAMPLE, strict=False))
     y = ys[0][:, None] if ys else np.zeros((1, 1))
@@ -138,10 +140,11 @@ def promising(scene: Solvable) -> bool:
 
 
 def _at_rest(model: Model) -> bool:
-    """Whether neither the wall nor a difference of pressures moves the fluid."""
+    """Whether neither the wall, nor its motion, nor a difference of pressures moves the fluid."""
     return (
         not model.U
         and not model.supplies
+        and model.stored is None
         and len({side.p for side in model.sides[: 2 * len(model.lengths)] if side.kind == "open"}) == 1
     )
 
@@ -156,13 +159,8 @@ def part_of(scene: Solvable, problem: Problem) -> Part | None:
     pressures = {side.p for side in model.sides[: 2 * grid.dim] if side.kind == "open"}
     if _at_rest(model):
         return Part(scene, "constant")
-    if (
-        len(pressures) == 1
-        and not west.r
-        and not model.supplies
-        and "closed" not in (west.kind, east.kind)
-        and _is_constant(problem)
-    ):
+    still = model.stored is None and not model.supplies and not west.r and "closed" not in (west.kind, east.kind)
+    if len(pressures) == 1 and still and _is_constant(problem):
         return Part(scene, "constant")
     if grid.dim == 1:
         return None

@@ -74,7 +74,8 @@ def plan(facts: Facts, ask: Ask, scene: str) -> Plan:
     large = facts.dim == 2 and facts.size > small
     if system == "auto":
         system = entry.systems[0]
-        if large and "cavity" in entry.systems and facts.whole_lines and not any(facts.periodic) and not facts.held:
+        whole = facts.whole_lines and not any(facts.periodic) and not facts.held and not facts.moving
+        if large and "cavity" in entry.systems and whole:
             system = "cavity"
             why.append(
                 "system cavity: with the cavitated cells eliminated and its near-null vector scaled out, multigrid holds"
@@ -95,7 +96,7 @@ def plan(facts: Facts, ask: Ask, scene: str) -> Plan:
 
 def _suits_multigrid(facts: Facts) -> bool:
     """Whether nonlinear multigrid is the fastest: in 2D, its loops compiled, nobody having asked for an inner solver."""
-    plane = facts.kind == "lubrication" and facts.dim == 2 and not any(facts.periodic) and not facts.held
+    plane = facts.kind == "lubrication" and facts.dim == 2 and not any(facts.periodic) and not (facts.held or facts.moving)
     return plane and find_spec("numba") is not None and not wants_ksp()
 
 

@@ -126,7 +126,8 @@ def solve_part(part: Part, problem: Problem, ask: Ask, inner: Inner) -> Solution
     start = None
     if ask.start is not None:
         small = part.build(problem.grid.dm.comm)
-        near = problem.prolong(ask.start.problem, ask.start.fields, False)  # type: ignore[arg-type]
+        same = ask.start.problem.grid is problem.grid
+        near = ask.start.fields if same else problem.prolong(ask.start.problem, ask.start.fields, False)  # type: ignore[arg-type]
         take = Pick(problem.grid, small.grid, *numbers(small.grid))
         start = Start(small, {name: take(values) for name, values in near.items()}, ask.start.settings)
         take.destroy()

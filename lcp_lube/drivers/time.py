@@ -1,54 +1,24 @@
-"""Time steps: a complementarity problem each, solved by the methods of the steady one, from the answer of the step before.
+"""Time steps: a complementarity problem each, solved by the methods of the steady one, from the answers of the steps before.
 
-The film is symmetric about the middle of its line: half of it is solved, spread out and certified on the whole. Where that
-fails, this step and those after it are solved whole.
+`marching` takes the steps; `march` has the formulas, `step` one step's film, `rotor` a journal that is free, `march_file` what
+a run is taken up from.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
-from petsc4py import PETSc
-
 from ..errors import InputError
-from ..problems.certificate import Certificate
-from ..problems.facts import Facts
-from ..problems.film.squeeze import SqueezeProblem
-from ..problems.film.squeeze_step import HalfLine, SqueezeStep
-from ..problems.solution import Fields, Outcome, Solution, Step
-from ..scenes.scene import Derived, Solvable
-from .ask import Ask, Start
+from ..problems.solution import Outcome, Solution
+from ..scenes.moving import Moving, motion_of
+from ..scenes.scene import Solvable
+from .ask import Ask
 from .compose import Inner
-from .plan import plan
-from .symmetry import why_not
-
-# Points below which spreading and certifying a half costs more than the banded solve saves (1999: 0.9 of the time, 199: 1.4).
-SHORT = 1500
-HALF = "half of the line is solved: gap and pressures at the ends are symmetric about its middle"
-
-
-@dataclass(frozen=True)
-class TimeStep(Derived):
-    """One step of a march."""
-
-    step: SqueezeStep
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        return self.step.grid.shape
-
-    def with_shape(self, shape: tuple[int, ...]) -> "TimeStep":
-        raise NotImplementedError("a step is on its march's grid")
-
-    def facts(self, comm: PETSc.Comm | None = None) -> Facts:
-        return replace(self.whole.facts(comm), shape=self.shape)
-
-    def build(self, comm: PETSc.Comm | None = None) -> SqueezeStep:
-        return self.step
+from .marching import Run
 
 
 def applies(scene: Solvable, ask: Ask) -> bool:
     """Whether the scene goes on in time."""
-    return getattr(scene, "transient", False)
+    return motion_of(scene) is not None
 
 
 def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
@@ -56,93 +26,73 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
 
     Returns
     -------
-    Solution : fields of the last step; `steps` are the iterations of all time steps, one after another. Its start is cold:
-        every march begins with the full film.
+    Solution : fields of the last step; `steps` are the iterations of all time steps, one after another; `history` has a row for
+        each. settings['details']: time_steps, t_end, step_min, step_max, iterations_per_step, mass_defect_run.
 
     Raises
     ------
-    InputError : a system that is made for the steady problem alone.
+    InputError : a system that is made for the steady problem alone; a wall that touches, a content that becomes negative:
+        with the time and the place.
     """
     if ask.system == "cavity":
-        raise InputError(f"--system cavity: it needs a flow along x; scene {scene.name} has none; allowed are full, reduced")
-    reason = why_not(ask)
-    ask = replace(ask, nested=False, reduction=False)
-    chosen = plan(scene.facts(ask.comm), ask, scene.name)
-    if chosen.method == "active-set":  # the step before has the front to within a cell or two
-        ask = replace(ask, options={"sweeps": 0, **ask.options})
-    ask = replace(ask, method=chosen.method, start=None)
-    problem: SqueezeProblem = scene.build(ask.comm)  # type: ignore[assignment]
-    if not reason and problem.grid.size < max(SHORT, 2 * problem.grid.comm.size):
-        reason = "half of so short a line costs more than it saves"
-    half = None if reason else HalfLine(problem.grid)
-    near: Fields | None = None  # of the step before
-    record: list[Step] = []
-    certificates: list[Certificate] = []
-    times: dict[str, float] = {}
-    rescuer: str | None = None
-    outcome = Outcome.CONVERGED
-    while problem.steps > len(certificates) and outcome is Outcome.CONVERGED:
-        step = problem.next_step()
-        if half is not None:
-            solution = _on_half(scene, step, half, near, ask, inner)
-            if not solution.converged:
-                reason = f"half of it gave no answer of the whole at time step {len(certificates) + 1}, nor was it asked again"
-                half.destroy()
-                half = None
-        if half is None:
-            solution = inner(TimeStep(scene, step), replace(ask, start=Start(problem, near) if near else None))
-        outcome, message = solution.outcome, solution.message
-        if not certificates:
-            settings: dict[str, Any] = solution.settings
-        rescuer = solution.method if solution.took_over else rescuer
-        certificates.append(solution.certificate)
-        record += solution.steps
-        times = {name: times.get(name, 0.0) + seconds for name, seconds in solution.times.items()}
-        if solution.converged:
-            problem.accept(step, solution.fields)
-        near = solution.fields
-        solution.destroy()
-        done = len(certificates)
-        ask.tell("time", f"time step {done} of {problem.steps}", done / problem.steps)
-    if outcome is Outcome.CONVERGED:
-        message = f"{problem.steps} time steps, {len(record) / problem.steps:.1f} iterations each"
+        raise InputError("--system cavity: cells of a film that moves store liquid; allowed are full, reduced")
+    assert isinstance(scene, Moving)
+    model: Any = getattr(scene, "model", None)
+    if model is not None and (model.effects or (model.law is not None and model.law.dowson_higginson)):
+        raise InputError(
+            f"scene {scene.name}: [motion]: of the fluid's laws fluid.barus alone goes on in time, and no effect on the film"
+        )
+    run = Run(scene, ask, inner)
+    with run.file.listening():
+        while run.outcome is Outcome.CONVERGED and not run.done:
+            run.advance()
+    return answer(run)
+
+
+def answer(run: Run) -> Solution:
+    """The solution of the whole march."""
+    solution, march = run.last, run.march
+    if solution is None:
+        raise InputError(f"{run.scene.name}: the march has come to t = {march.t:g} s, its end; a later motion.t_end goes on")
+    problem: Any = solution.problem
+    if problem.shares_grid:
+        problem.shares_grid = False
     else:
-        message = f"time step {len(certificates)} of {problem.steps}, t = {problem.time + problem.dt:.6g}: {message}"
-    if half is not None:
-        half.destroy()
-    worst = {name: max((c.measures[name] for c in certificates), key=_badness) for name in certificates[0].measures}
-    lowest = {name: min(c.extremes[name] for c in certificates) for name in certificates[0].extremes}
+        march.grid.destroy()
+    count = len(run.history)
+    if run.outcome is Outcome.CONVERGED:
+        solves = f"{run.solves / max(count, 1):.1f} solves each, " if run.solves > count else ""
+        run.message = f"{count} time steps, {solves}{len(run.steps) / max(run.solves, 1):.1f} iterations a solve"
+    if run.seen is not None:
+        problem = run.seen.answer(problem)
+    details = {
+        **run.settings["details"],
+        "time_steps": count,
+        "t_end": march.t,
+        "step_min": run.lengths[0] if count else None,
+        "step_max": run.lengths[1] if count else None,
+        "solves_per_step": run.solves / max(count, 1),
+        "iterations_per_step": len(run.steps) / max(run.solves, 1),
+        "mass_defect_run": march.defect,
+    }
+    if run.rotor is not None or run.course is not None:
+        details["journal"] = [float(a) for a in (run._given(march.t) or (0.0, 0.0))]
     return replace(
         solution,
         problem=problem,
-        outcome=outcome,
-        message=message,
-        certificate=Certificate(worst, certificates[0].tol, lowest),
-        steps=record,
+        outcome=run.outcome,
+        message=run.message,
+        certificate=run.worst(),
+        steps=run.steps,
         settings={
-            **settings,
-            "method": rescuer or chosen.method,
-            "took_over": chosen.method if rescuer else None,
+            **run.settings,
+            "method": run.rescuer or run.chosen.method,
+            "took_over": run.chosen.method if run.rescuer else None,
             "start": "cold",
-            "why": [f"the whole line: {reason}" if reason else HALF, *chosen.why],
-            "details": {**settings["details"], **({} if reason else {"reduction": "mirror"})},
+            "why": [*dict.fromkeys([f"in time by {run.table.scheme}, {count} steps", *run.chosen.why, *run.settings["why"]])],
+            "details": details,
         },
-        times=times,
+        times=run.times_s,
         levels=[],
+        history=run.history,
     )
-
-
-def _on_half(scene: Solvable, step: SqueezeStep, half: HalfLine, near: Fields | None, ask: Ask, inner: Inner) -> Solution:
-    """A step's solution from that of its half, certified on the whole. Collective."""
-    part = half.step(step)
-    start = Start(part, {name: half.take(values) for name, values in near.items()}) if near else None
-    solution = inner(TimeStep(scene, part), replace(ask, start=start))
-    part.destroy()
-    fields = {name: half.spread(values) for name, values in solution.fields.items()}
-    certificate = step.certify(fields, solution.settings["eps1"])
-    return replace(solution, problem=step, fields=fields, certificate=certificate).judged()
-
-
-def _badness(measure: float) -> float:
-    """NaN is the worst."""
-    return measure if measure == measure else float("inf")

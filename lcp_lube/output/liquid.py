@@ -44,12 +44,12 @@ def void_at_faces(problem: LubricationProblem, r: Array, sign: Array) -> Array:
     r, sign = r.reshape(grid.box), sign.reshape(grid.box)
     moves = np.abs(s.couette_E) > 0.0  # nothing passes a closed side or a wall at rest
     full = np.where(moves, s.couette_E, 1.0)
-    void = np.where(moves, -s.b_C * r / full, r)
+    void = np.where(moves, -s.b_E * r / full, r)
     way = ahead(problem)
     at, downstream = way[grid.x_start : grid.x_end], way.max() > 0.0
     h = np.broadcast_to(problem.film(grid.x + at, grid.y), grid.box)
     speed = problem.U / s.flow_unit * stream_weights(grid) * h
-    layer = (s.couette_E + s.b_C * r) / np.where(moves, speed, 1.0)
+    layer = (s.couette_E + s.b_E * r) / np.where(moves, speed, 1.0)
     framed = grid.ghosted(sign.ravel())[1:-1]
     beyond = (framed[:, 2:] if downstream else framed[:, :-2]) if way.any() else sign
     inside = moves & (sign < 0.0) & (beyond < 0.0)

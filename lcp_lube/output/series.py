@@ -1,6 +1,6 @@
 """Many answers as one animation of ParaView: a .pvd that names a .vts for each."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
@@ -25,12 +25,21 @@ def save_series(solutions: Mapping[float, Solution], path: str | Path, boundary:
     path = Path(path)
     if path.suffix.lower() != ".pvd" or not solutions:
         raise InputError(f"{path}: a name that ends in .pvd, and one solution at least, are needed")
-    lines = []
+    entries = []
     for k, (time, solution) in enumerate(solutions.items()):
         name = f"{path.stem}_{k:04d}.vts"
         files.save(solution, path.with_name(name), boundary)
-        lines.append(f'    <DataSet timestep="{float(time)!r}" part="0" file={quoteattr(name)}/>')
-    text = "\n".join(
+        entries.append((float(time), name))
+    comm = next(iter(solutions.values())).problem.grid.comm
+    with files.replacing(path, comm) as temporary, on_all_ranks(comm, str(path)):
+        if comm.rank == 0:
+            Path(temporary).write_text(collection(entries), encoding="utf-8")
+
+
+def collection(entries: Sequence[tuple[float, str]]) -> str:
+    """The text of a .pvd, from times and names of files beside it."""
+    lines = [f'    <DataSet timestep="{time!r}" part="0" file={quoteattr(name)}/>' for time, name in entries]
+    return "\n".join(
         [
             '<?xml version="1.0"?>',
             '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">',
@@ -40,7 +49,3 @@ def save_series(solutions: Mapping[float, Solution], path: str | Path, boundary:
             "</VTKFile>\n",
         ]
     )
-    comm = next(iter(solutions.values())).problem.grid.comm
-    with files.replacing(path, comm) as temporary, on_all_ranks(comm, str(path)):
-        if comm.rank == 0:
-            Path(temporary).write_text(text, encoding="utf-8")

@@ -16,6 +16,7 @@ class Facts:
     periodic : whether the domain closes in x, and in y.
     dense : whether the Jacobian is a dense matrix.
     held : whether supplies hold cells inside at their pressures.
+    moving : whether the film's cells store liquid: a time step.
     """
 
     kind: str
@@ -24,6 +25,7 @@ class Facts:
     periodic: tuple[bool, ...] = (False, False)
     dense: bool = False
     held: bool = False
+    moving: bool = False
 
     @property
     def dim(self) -> int:

@@ -160,6 +160,7 @@ class Solution(Shown):
     levels : nested iteration's grids, coarse to fine: nx, ny, iterations, linear_iterations, time_s; the last is this one.
     enclosure : the band that `certify` asked for.
     solved_scene : the scene as it was solved, on the last grid and with the value that a balance found.
+    history : of a march in time, a row for each step: t, dt, load, p_max, min_h, flows ...
     """
 
     problem: Problem
@@ -173,6 +174,7 @@ class Solution(Shown):
     levels: list[dict[str, Any]] = field(default_factory=list)
     enclosure: Enclosure | None = None
     solved_scene: Any = None
+    history: list[dict[str, Any]] = field(default_factory=list)
 
     @property
     def method(self) -> str:

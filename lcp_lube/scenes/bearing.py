@@ -3,7 +3,7 @@
 import cmath
 import math
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from petsc4py import PETSc
@@ -16,12 +16,14 @@ from ..problems.film.fluid import Law
 from ..problems.film.forces import Shaft
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import NAMES, OPPOSITE, Model, Side
-from ..problems.film.shapes import Block, Sum
+from ..problems.film.shapes import Block, Shape, Sum
 from ..problems.film.supplies import Supply
 from ..problems.film.turned import exact_either_way
 from .balance import BalanceTable
 from .effects.table import WithEffects, effects_of
 from .film import Extent, FilmPart, JournalPart
+from .motion import MotionTable
+from .moving_film import check_motion, moving_film, place_of, turning_of
 from .scene import Count, Finite, Positive
 from .supply import Place, SupplyTable, supplies_of
 from .units import Measured, is_quantity, measured, metres
@@ -94,6 +96,7 @@ class BearingScene(WithEffects):
     p_unit: Positive | None = measured("Pa", None, "pressure unit of the equations; default from mu U L/h^2")
     h_offset: Finite = metres(0.0, "added to the film everywhere: its level")
     balance: BalanceTable | None = Field(None, description="load to carry, and what is found for it")
+    motion: MotionTable | None = Field(None, description="how the film goes on in time")
     n: Count = Field(100, description="points a side")
     nx: Count | None = Field(None, description="points in x; default n")
     ny: Count | None = Field(None, description="points in y; default n (2D)")
@@ -123,6 +126,7 @@ class BearingScene(WithEffects):
             if getattr(self.sides, name).kind == "periodic" and getattr(self.sides, OPPOSITE[name]).kind != "periodic":
                 raise ValueError(f"sides.{name} is periodic, sides.{OPPOSITE[name]} is not: both of them or none")
         self._supplies()
+        check_motion(self)
         return self
 
     def _supplies(self) -> tuple[Supply, ...]:
@@ -187,9 +191,21 @@ class BearingScene(WithEffects):
     @property
     def gap(self) -> Sum:
         """The film h(x, y) in metres."""
-        extent = Extent(self.side_lengths, self._folder or Path())
+        return self.sum_of([table.part(self.extent) for table in self.film])
+
+    @property
+    def extent(self) -> Extent:
+        """What its shapes need of it."""
+        return Extent(self.side_lengths, self._folder or Path())
+
+    def sum_of(self, parts: list[Shape]) -> Sum:
+        """The film of these shapes."""
         level = [Block(self.h_offset, (-math.inf, math.inf), (-math.inf, math.inf))] if self.h_offset else []
-        return Sum([*(table.part(extent) for table in self.film), *level], self.h_floor)
+        return Sum([*parts, *level], self.h_floor)
+
+    models: ClassVar[Any] = moving_film
+    place: ClassVar[Any] = property(place_of)
+    turning: ClassVar[Any] = property(turning_of)
 
     @property
     def model(self) -> Model:

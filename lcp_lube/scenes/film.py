@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import reduce
-from math import inf, radians
+from math import atan2, hypot, inf, pi, radians
 from operator import or_
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import Field, model_validator
 
 from ..problems.film.profile import read_profile
-from ..problems.film.shapes import Along, Block, DimpleArray, Herringbone, Journal, RandomSurface, Scaled, Shape
+from ..problems.film.shapes import Along, Block, DimpleArray, Herringbone, Journal, RandomSurface, Scaled, Shape, Travelling
 from ..registry import SHAPES
 from .formula import Formula
 from .units import Measured, metres
@@ -23,10 +23,16 @@ UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
 
 @dataclass(frozen=True)
 class Extent:
-    """What a shape may need of its scene: side lengths (m), and the folder that file names are relative to."""
+    """What a shape may need of its scene: side lengths (m), and the folder that file names are relative to.
+
+    t : time, s; travel : of the wall since t = 0, m; journal : [X, Y] of the journal in its clearance, if it moves.
+    """
 
     lengths: tuple[float, ...]
     folder: Path
+    t: float = 0.0
+    travel: float = 0.0
+    journal: tuple[float, float] | None = None
 
     @property
     def both(self) -> tuple[float, float]:
@@ -35,6 +41,8 @@ class Extent:
 
 class Part(Measured):
     """A shape; its heights in metres are added to the others'."""
+
+    moves: bool = Field(False, description="[motion]: it travels with the wall, going on periodically over the length L")
 
     @model_validator(mode="after")
     def _spans(self) -> "Part":
@@ -47,6 +55,16 @@ class Part(Measured):
     def part(self, extent: Extent) -> Shape:
         """The shape as a function h(x, y)."""
         raise NotImplementedError
+
+    def placed(self, extent: Extent) -> Shape:
+        """The shape where it is at the extent's time."""
+        shape = self.part(extent)
+        return Travelling(shape, extent.travel, extent.lengths[0]) if self.moves and extent.travel else shape
+
+    @property
+    def changes(self) -> bool:
+        """Whether it is another one at another time."""
+        return self.moves
 
 
 class Constant(Part):
@@ -156,7 +174,15 @@ class JournalPart(Part):
     widest: Finite = metres(0.0, "x of the widest gap")
 
     def part(self, extent: Extent) -> Shape:
-        return Journal(self.c, self.eccentricity, extent.lengths[0], self.widest)
+        L = extent.lengths[0]
+        if extent.journal is None:
+            return Journal(self.c, self.eccentricity, L, self.widest)
+        x, y = extent.journal  # the film is thinnest there
+        return Journal(self.c, hypot(x, y), L, (0.5 + atan2(y, x) / (2.0 * pi)) * L)
+
+    @property
+    def changes(self) -> bool:
+        return True
 
 
 class HerringbonePart(Part):
@@ -194,7 +220,7 @@ class Roughness(Part):
 
 
 class FormulaPart(Part):
-    """A formula in x and y (metres): numbers, + - * / ^, comparisons, elementary functions, `a if x < 0.5 else b`."""
+    """A formula in x and y (metres), with [motion] in t (s) too: numbers, + - * / ^, functions, `a if x < 1 else b`."""
 
     shape: Literal["formula"]
     h: str = Field(..., description="the formula, as text")
@@ -202,11 +228,15 @@ class FormulaPart(Part):
 
     @model_validator(mode="after")
     def _readable(self) -> "FormulaPart":
-        Formula(self.h)
+        Formula(self.h, ("x", "y", "t"))
         return self
 
     def part(self, extent: Extent) -> Shape:
-        return Scaled(Formula(self.h), UNITS[self.unit])
+        return Scaled(Formula(self.h, ("x", "y", "t")), UNITS[self.unit], extent.t)
+
+    @property
+    def changes(self) -> bool:
+        return self.moves or "t" in Formula(self.h, ("x", "y", "t")).depends
 
 
 class ProfilePart(Part):

@@ -18,6 +18,8 @@ from ..problems.film.turning import Turning
 from .balance import BalanceTable
 from .effects.table import WithEffects, effects_of
 from .film import Extent, FilmPart
+from .motion import MotionTable
+from .moving import Models
 from .scene import Count, Finite, NotNegative, Positive
 from .supply import Place, SupplyTable, supplies_of
 from .units import measured, metres
@@ -60,6 +62,7 @@ class GroovedJournalScene(WithEffects):
     p_c: Finite = measured("Pa", 0.0, "cavitation pressure")
     supply: list[SupplyTable] = Field([], description="supplies inside the film, beside the grooves; pressures are absolute")
     balance: BalanceTable | None = Field(None, description="load to carry; eccentricity and attitude are found for it")
+    motion: MotionTable | None = Field(None, description="how the journal moves in time")
     scheme: str | None = Field("face", description="form of the Couette flux: face")
     n: Count = Field(360, description="points around, and an odd number near a sixteenth of them across")
     nx: Count | None = Field(None, description="points around; default n")
@@ -78,6 +81,13 @@ class GroovedJournalScene(WithEffects):
         default = type(self).model_fields["mu"].default
         if self.mu != default and self.temperature is not None and self.temperature.own_mu:
             raise ValueError(f"mu = {self.mu:g} and the viscosities of [temperature] are both given: one of them")
+        for k, table in enumerate(self.film, start=1):
+            if table.changes:
+                raise ValueError(f"film.{k}: shapes of this family do not change with time; family = bearing has such")
+        if self.motion is not None and self.balance is not None:
+            raise ValueError("balance and motion are both given: one of them; a load in time is that of motion.free")
+        if self.motion is not None and self.attitude_deg is None and not self.motion.moves_journal:
+            raise ValueError("motion: attitude_deg, or where the journal is (motion.journal, file or free), is needed")
         if self.preload and len(places) < 2:
             raise ValueError(f"preload = {self.preload:g}: lobes lie between at least two grooves")
         if not places and not self.p_end > 0 and not self.supply:
@@ -127,6 +137,22 @@ class GroovedJournalScene(WithEffects):
         first = math.radians((self.grooves_deg or [180.0])[0] - 0.5 * (self.groove_deg if self.grooves_deg else 0.0))
         start = first - math.pi / self.shape[0]
         return Turning(0.5 * self.D, self.clearance, self.L_over_D * self.D, self.omega, start)
+
+    @property
+    def place(self) -> tuple[float, float]:
+        """[X, Y] of the journal, in parts of the clearance."""
+        phi = math.radians(self.attitude_deg or 0.0)
+        return self.eccentricity * math.cos(phi), self.eccentricity * math.sin(phi)
+
+    def models(self) -> Models:
+        """The film with the journal at [X, Y] of its clearance; nothing else of it moves."""
+
+        def at(t: float, journal: tuple[float, float] | None) -> Model:
+            x, y = journal if journal is not None else self.place
+            found = {"eccentricity": math.hypot(x, y), "attitude_deg": math.degrees(math.atan2(y, x))}
+            return self.model_copy(update=found).model
+
+        return at
 
     @property
     def gap(self) -> Bore:

@@ -65,11 +65,10 @@ class Derived:
 class Scene(Measured):
     """What every scene has; a family (registry.FAMILIES) adds its data and builds its problem.
 
-    problem_kind : of the discrete problem. transient : it goes on in time.
+    problem_kind : of the discrete problem.
     """
 
     problem_kind: ClassVar[str] = "lubrication"
-    transient: ClassVar[bool] = False
     family: str = "slider"
     name: str = ""
     scheme: str | None = None

@@ -6,15 +6,19 @@ from typing import Annotated, ClassVar, Literal
 from petsc4py import PETSc
 from pydantic import Field, model_validator
 
-from ..problems.film.squeeze import SqueezeProblem
-from ..problems.grid import Grid
+from ..problems.film.lubrication import LubricationProblem
+from ..problems.film.model import Model, Side
+from ..problems.film.shapes import Block, Sum
+from ..problems.film.squeeze import Squeeze
+from ..problems.film.turning import Turning
+from .motion import MotionTable
+from .moving import Models
 from .scene import Count, NotNegative, Positive, Scene
 
 
 class SqueezeScene(Scene):
     """Parallel plates, h = h_mean + h_amplitude cos(2 pi cycles t), 0 <= x <= 1, p = p_wall at both ends; dimensionless."""
 
-    transient: ClassVar[bool] = True
     scheme: Literal["bdf2", "euler"] = Field("bdf2", description="time: two-step backward difference, or implicit Euler")
     h_mean: Positive = Field(0.375, description="mean gap")
     h_amplitude: NotNegative = Field(0.125, description="amplitude of the gap, less than the mean")
@@ -44,19 +48,33 @@ class SqueezeScene(Scene):
         """h at time t."""
         return self.h_mean + self.h_amplitude * math.cos(2.0 * math.pi * self.cycles * t)
 
-    def build(self, comm: PETSc.Comm | None = None) -> SqueezeProblem:
-        """The march. Collective.
+    @property
+    def motion(self) -> MotionTable:
+        """The march: from a full film, in equal steps."""
+        return MotionTable(t_end=self.t_end, steps=self.steps, scheme=self.scheme, start="full")
+
+    turning: ClassVar[Turning | None] = None
+    place: ClassVar[tuple[float, float]] = (0.0, 0.0)
+
+    def models(self) -> Models:
+        """The film at the time t: d/dx(h^3 dp/dx) = 2 d(h theta)/dt is that of a viscosity of 1/6.
 
         Raises
         ------
-        InputError : more ranks than the grid can be dealt to.
+        InputError : data whose coefficients overflow or vanish.
         """
-        return SqueezeProblem(
-            Grid((self.n,), (1.0,), comm),
-            self.gap,
-            p_wall=self.p_wall,
-            t_end=self.t_end,
-            steps=self.steps,
-            second_order=self.scheme == "bdf2",
-            front_time=self.front_time,
-        )
+        p_wall, unit = Side(p=self.p_wall), self.p_wall or 1.0
+
+        def at(t: float, journal: object) -> Model:
+            h = Block(self.gap(t), (-math.inf, math.inf), (-math.inf, math.inf))
+            return Model((1.0,), (p_wall, p_wall, p_wall, p_wall), Sum([h]), 1.0 / 6.0, 0.0, 0.0, unit, "face")
+
+        return at
+
+    def observer(self) -> Squeeze:
+        """Who reads the events off the steps."""
+        return Squeeze(self.p_wall, self.front_time)
+
+    def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
+        """The full film at t = 0. Collective."""
+        return self.models()(0.0, None).build(self.shape, comm)

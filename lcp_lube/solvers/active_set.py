@@ -141,7 +141,7 @@ class ActiveSet(Method):
         """Where the film counts as full: by the sign of z; a ring that is empty all round, which no solution is and whose
         matrix is singular, is full where it is least empty."""
         full, grid = self.z >= 0, self.problem.grid
-        if grid.periodic[0] and grid.box[1] == grid.shape[0]:
+        if grid.periodic[0] and grid.box[1] == grid.shape[0] and self.problem.scheme.storage is None:
             z = self.z.reshape(grid.box)
             empty = np.flatnonzero(~full.reshape(grid.box).any(axis=1))
             full.reshape(grid.box)[empty, np.argmax(z[empty], axis=1)] = True

@@ -203,7 +203,10 @@ def test_text_and_bad_input(cli):
     done = cli("coefficients", "journal", "--nx", 60, "--ny", 15)
     assert done.status == 0 and "Kxy" in done.out and "whirl ratio" in done.out
     for words, message in (
-        (("problem1",), "coefficients are of journals"),
+        (("problem1", "--tilt"), "--tilt is of journals"),
+        (("squeeze",), "coefficients are of films"),
+        (("dynamic_journal",), "leave [motion] out"),
+        (("problem1", "--plot", "a.png"), "--speeds FROM:TO:N"),
         (("journal", "--frequency", "-1"), "--frequency -1"),
         (("journal", "--speeds", "1:2:2"), "has no speed_rpm"),
         (("journal", "--frequency", "a"), "numbers in rad/s"),

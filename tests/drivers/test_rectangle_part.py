@@ -1,4 +1,4 @@
-"""Half or a quarter of a rectangle, or of a squeeze film's line: the answer is the whole's, and so is what is said of it."""
+"""Half or a quarter of a rectangle: the answer is the whole's, and so is what is said of it."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,6 @@ from side_scenes import reduced_solve
 from lcp_lube import load_scene, solve
 from lcp_lube.drivers import rectangle_part
 from lcp_lube.drivers.rectangle_part import Quarter, part_of
-from lcp_lube.problems.film.squeeze_step import SqueezeStep
 
 FEW = settings(max_examples=12, deadline=None)
 CUBIC = {"family": "manufactured_cubic", "lambda": 2.0, "peak": 3.0, "name": "cubic"}
@@ -200,50 +199,3 @@ def test_on_several_ranks(script, ranks):
     assert job.status == 0, job.err
     for name, record in job.json.items():
         assert record["converged"] and record["reduction"] and record["difference"] < 1e-9, (name, record)
-
-
-SQUEEZE = [{"n": 60}, {"n": 61}, {"n": 2}, {"n": 3}, {"n": 20, "scheme": "euler"}, {"n": 21, "p_wall": 0}]
-
-
-@pytest.mark.parametrize("changes", SQUEEZE, ids=str)
-def test_squeeze(changes):
-    """Half of the line a step; its events are read off the whole."""
-    scene = load_scene("squeeze", {"steps": 60, **changes})
-    part, whole = solve(scene), solve(scene, reduction=False)
-    assert part.converged and whole.converged and part.settings["details"]["reduction"] == "mirror"
-    assert "half of the line" in part.settings["why"][0] and "no reduction" in whole.settings["why"][0]
-    for name, field in whole.fields.items():
-        np.testing.assert_allclose(part.fields[name], field, rtol=0, atol=1e-9 * max(np.abs(field).max(), 1.0))
-    seen = part.problem.quantities(part.fields)
-    for key, value in whole.problem.quantities(whole.fields).items():
-        assert seen[key] == pytest.approx(value, rel=1e-9, abs=1e-9) if value is not None else seen[key] is None, key
-    for solution in (part, whole):
-        solution.destroy()
-
-
-def test_squeeze_is_solved_whole_where_the_half_fails(monkeypatch):
-    """From the step on whose half's answer the whole's certificate refuses."""
-    certify, refused = SqueezeStep.certify, []
-
-    def doubtful(self, fields, eps1):
-        found = certify(self, fields, eps1)
-        if self.grid.shape == (21,) and self.weight > 30 and not refused:  # BDF2: after the first step
-            refused.append(True)
-            found.measures["residual"] = 1.0
-        return found
-
-    scene = load_scene("squeeze", {"n": 21, "steps": 20})
-    whole = solve(scene, reduction=False)
-    monkeypatch.setattr(SqueezeStep, "certify", doubtful)
-    solution = solve(scene)
-    assert refused and solution.converged and "reduction" not in solution.settings["details"]
-    assert "time step 2" in solution.settings["why"][0]
-    np.testing.assert_allclose(solution.fields["p"], whole.fields["p"], rtol=0, atol=1e-9)
-    for one in (solution, whole):
-        one.destroy()
-
-
-def test_who_names_how_marches_on_the_whole_line():
-    solution = solve(load_scene("squeeze", {"n": 20, "steps": 10}), method="active-set")
-    assert "was named" in solution.settings["why"][0] and "reduction" not in solution.settings["details"]
-    solution.destroy()

@@ -3,6 +3,7 @@
 import re
 from pathlib import Path
 
+import marches
 import pytest
 
 from lcp_lube import load_scene, solve
@@ -10,7 +11,12 @@ from lcp_lube.output.results import as_dict
 from lcp_lube.registry import scene_names
 
 PAGE = Path(__file__).parents[2] / "docs" / "numbers.md"
-SMALL = {"textured_slider": {"K": 1}, "squeeze": {"n": 19, "steps": 8}}
+SMALL = {
+    "textured_slider": {"K": 1},
+    "squeeze": {"n": 19, "steps": 8},
+    "moving_texture": {"n": 19, **marches.SMALL["moving_texture"]},
+    "dynamic_journal": marches.SMALL["dynamic_journal"],
+}
 
 
 def explained():

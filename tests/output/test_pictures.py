@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+import marches
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -226,6 +227,8 @@ SMALL = {
     "pocketed_pad_2d": {"nx": 19, "ny": 9},
     "rough": {"n": 15},
     "squeeze": {"n": 9, "steps": 20},
+    "moving_texture": {"n": 15, **marches.SMALL["moving_texture"]},
+    "dynamic_journal": marches.SMALL["dynamic_journal"],
 }
 
 

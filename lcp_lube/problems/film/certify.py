@@ -11,6 +11,7 @@ from ...base.parallel import Array
 from ..certificate import Certificate, certificate_tol
 from .graded import GradedJacobian, Pivots, within_reach
 from .reynolds import side_points
+from .stored import storing
 from .supplies import supply_defect, supply_flows
 
 if TYPE_CHECKING:
@@ -214,9 +215,9 @@ def mass_defect(problem: "LubricationProblem", p: Array, r: Array) -> float:
     flows = west, east, south, north = problem.boundary_flows(p, r)
     # Halves of these in m3/s, as are the supplies' flows.
     supplied = [2.0 * flow / (grid.spacing[1] if grid.dim == 2 else 1.0) for flow in supply_flows(problem, p, r)]
-    net = abs(west - east + south - north + sum(supplied))
+    net = abs(west - east + south - north + sum(supplied) - storing(problem, r))
     inflow = max(west, 0.0) + max(-east, 0.0) + max(south, 0.0) + max(-north, 0.0) + sum(max(q, 0.0) for q in supplied)
-    dragged = s.flow_unit * (reduce.min(-s.b_C) if problem.U else 0.0) * (grid.shape[1] if grid.dim == 2 else 1)
+    dragged = s.flow_unit * (reduce.min(-s.b_E) if problem.U else 0.0) * (grid.shape[1] if grid.dim == 2 else 1)
     at = np.abs(p).reshape(grid.box)
     driven = reduce.norm(problem.c) > 0  # or else p = 0, and p_unit measures what is left of it
     at = at if driven else at + 1.0
@@ -226,6 +227,10 @@ def mass_defect(problem: "LubricationProblem", p: Array, r: Array) -> float:
     flow = max(inflow, dragged, IDLE * pressed if driven else pressed)
     if s.held is not None:
         pressed += s.flow_unit * reduce.sum(np.where(s.held, s.diagonal * at, 0.0))
+    if s.storage is not None:  # in the middle of a stroke nothing flows: rounding is measured by what is stored
+        held = s.flow_unit * reduce.sum(s.storage)
+        flow = max(flow, abs(storing(problem, r)), certificate_tol(0.0) * held)
+        pressed += held
     inside = UNIT * s.flow_unit * reduce.sum((s.k_W + s.k_E + s.k_S + s.k_N) * at)
     rounding = 8 * UNIT * (pressed + sum(map(abs, [*flows, *supplied]))) + min(inside, UNEVEN * flow)
     excess = net - rounding  # NaN stays NaN

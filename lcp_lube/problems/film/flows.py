@@ -49,7 +49,7 @@ def side_flows(problem: LubricationProblem, p: Array, r: Array) -> dict[str, flo
     if grid.dim == 1:
         return {"west": -0.5 * west, "east": 0.5 * east}
     at_west, at_east, *at_ends = sides(grid)
-    leaving = s.couette_E + s.b_C * r.reshape(grid.box)
+    leaving = s.couette_E + s.b_E * r.reshape(grid.box)
     total = lambda flows: s.flow_unit * problem.reduce.sum(flows)  # noqa: E731
     strips = [  # enters at the west, leaves at the east
         (
@@ -99,7 +99,7 @@ def drag(problem: LubricationProblem, scheme: BoxScheme, p_pa: Array, r: Array, 
     h_west, *west = sheared_faces(problem, grid.x - before / 2, lifted)
     h_east, resting, h_moving = sheared_faces(problem, grid.x + behind / 2, lifted)
     passes = ~np.broadcast_to(walls[1], grid.box)  # the east face
-    liquid = 1.0 + s.b_C * r / np.where(passes & (s.couette_E != 0.0), s.couette_E, np.inf)
+    liquid = 1.0 + s.b_E * r / np.where(passes & (s.couette_E != 0.0), s.couette_E, np.inf)
     east = np.where(passes, resting + liquid / h_moving, 0.0)
     own = np.where(first, before / behind * (west[0] + 1.0 / west[1]), 0.0)
     for wall, share in zip(walls, (0.5 * before / behind, 0.5), strict=True):

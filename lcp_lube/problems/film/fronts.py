@@ -52,7 +52,7 @@ def line_fronts(problem: LubricationProblem, p: Array, r: Array) -> Fronts:
     if grid.dim == 1 and opens[0]:
         Q = np.full(grid.box, problem.boundary_flows(p, r)[0])
     else:
-        Q = s.flow_unit * (s.couette_E + s.b_C * r.reshape(grid.box)) / stream_weights(grid)
+        Q = s.flow_unit * (s.couette_E + s.b_E * r.reshape(grid.box)) / stream_weights(grid)
     row, i = np.nonzero(cavity[:, 1:-1] & ~cavity[:, :-2])
     x, y = grid.x[0], grid.y[:, 0]
     before = (x - 2.0 * behind)[i]

@@ -21,6 +21,7 @@ from .forces import Shaft
 from .lifted import LiftedFilm
 from .quantities import open_pressures, quantities, units
 from .reynolds import BoxScheme, assemble, side_points, sides
+from .stored import rates
 from .supplies import Held, Supply, pressed
 
 
@@ -46,6 +47,7 @@ class LubricationProblem:
     """
 
     kind = "lubrication"
+    shares_grid = False  # a time step's with those of the others
 
     def __init__(
         self,
@@ -140,8 +142,8 @@ class LubricationProblem:
         if self.grid.dim == 2:
             pressed += s.k_N * (p - p_N) - s.k_S * (p_S - p)
         # The difference first: it may be small, and the pressures too, where the flows themselves are large.
-        dragged = (s.couette_E + s.b_C * r) - (s.couette_W - s.b_W * frame_r[1:-1, :-2])
-        return (pressed + dragged - self._sources).ravel()
+        dragged = (s.couette_E + s.b_E * r) - (s.couette_W - s.b_W * frame_r[1:-1, :-2])
+        return (pressed + dragged + rates(self, r)).ravel()
 
     @cached_property
     def _at_sides(self) -> tuple[Any, ...]:
@@ -186,7 +188,7 @@ class LubricationProblem:
 
         return (
             total(s.couette_W[west] + s.k_W[west] * (p_W - p[west])),
-            total(s.couette_E[east] + s.b_C[east] * r[east] + s.k_E[east] * (p[east] - p_E)),
+            total(s.couette_E[east] + s.b_E[east] * r[east] + s.k_E[east] * (p[east] - p_E)),
             total(s.k_S[south] * (p_S - p[south])),
             total(s.k_N[north] * (p[north] - p_N)),
         )
@@ -216,7 +218,7 @@ class LubricationProblem:
         if name in self.more_fields:
             return np.full(np.broadcast(x, y).shape, np.nan)
         grid = self.grid
-        total, count = np.zeros(np.broadcast(x, y).shape), np.zeros(np.broadcast(x, y).shape)
+        total = count = np.zeros(np.broadcast(x, y).shape)
         for k, p in enumerate(open_pressures(self)):
             if p is not None:
                 at = (x, y)[k // 2] == grid.origin[k // 2] + (k % 2) * grid.lengths[k // 2]
@@ -280,9 +282,10 @@ class LubricationProblem:
         self._own.free()
 
     def destroy(self) -> None:
-        """Free the PETSc objects. Collective."""
+        """Free the PETSc objects, but for a grid that others use too. Collective."""
         self.free_matrices()
-        self.grid.destroy()
+        if not self.shares_grid:
+            self.grid.destroy()
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in self.__dict__.items() if name not in (*self._own.names, "_own")}

@@ -22,6 +22,7 @@ from .grooves import Groove, GroovedProblem, Pad, pads_between
 from .lines import on_edges
 from .lubrication import LubricationProblem
 from .reynolds import BoxScheme, Film, box_scheme
+from .stored import Stored
 from .supplies import Supply, hold
 from .turned import MirroredFilm, TurnedProblem
 
@@ -74,6 +75,7 @@ class Model:
     polar: Polar | None = None  # of a sector (`Grid.polar`)
     places: Places | None = None  # of the lines of points; None: on the film's straight edges, if it has any
     effects: tuple[Effect, ...] = ()  # what else makes its coefficients depend on the answer; `build` leaves them out
+    stored: Stored | None = None  # by the cells, in a time step
 
     def __post_init__(self) -> None:
         used = dict(zip(NAMES, self.sides, strict=True) if len(self.lengths) == 2 else zip(NAMES[:2], self.sides, strict=False))
@@ -88,8 +90,6 @@ class Model:
             raise InputError("no side has a pressure: without one the level of p is open; give at least one side a p")
         if self.U < 0 and self.grooves:
             raise InputError(f"U = {self.U:g}: a film with axial grooves moves to larger x; turn it round")
-        if self.U and self.sides[0].kind == "periodic" and not max(pressures) > 0 and not self.grooves:
-            raise InputError("periodic along the flow, and no side above the cavitation pressure: nothing feeds the film")
 
     @property
     def film(self) -> Film:
@@ -103,7 +103,8 @@ class Model:
     def facts(self, shape: Sequence[int], comm: PETSc.Comm | None = None) -> Facts:
         """The problem on (nx,) or (nx, ny) points, in numbers."""
         periodic = tuple(self.sides[2 * k].kind == "periodic" for k in range(len(self.lengths)))
-        return Facts("lubrication", tuple(shape), (comm or PETSc.COMM_WORLD).getSize(), periodic, held=bool(self.supplies))
+        ranks, held = (comm or PETSc.COMM_WORLD).getSize(), bool(self.supplies)
+        return Facts("lubrication", tuple(shape), ranks, periodic, held=held, moving=self.stored is not None)
 
     @property
     def mirrored(self) -> "Model":
@@ -115,6 +116,7 @@ class Model:
         supplies = tuple(replace(one, region=one.region.mirrored(self.lengths[0])) for one in self.supplies)
         changed: dict[str, Any] = {"sides": (east, west, *ends), "supplies": supplies, "places": places}
         changed["effects"] = tuple(effect.mirrored(self.lengths[0]) for effect in self.effects)
+        changed["stored"] = self.stored.mirrored if self.stored else None
         return replace(self, gap=gap, U=-self.U, exact=None, **changed)  # type: ignore[arg-type]
 
     def lines(self, shape: Sequence[int]) -> Places:
@@ -131,19 +133,22 @@ class Model:
         )
         return (None if self.grooves else x), y  # grooves are columns of an even grid
 
-    def build(self, shape: Sequence[int], comm: PETSc.Comm | None = None) -> LubricationProblem:
-        """The discrete problem on (nx,) or (nx, ny) points. Collective.
+    def build(self, shape: Sequence[int], comm: PETSc.Comm | None = None, grid: Grid | None = None) -> LubricationProblem:
+        """The discrete problem on (nx,) or (nx, ny) points, or on a grid that others use too. Collective.
 
         Raises
         ------
-        InputError : more ranks than the grid can be dealt to, a film that is not positive.
+        InputError : more ranks than the grid can be dealt to, a film that is not positive, one that nothing feeds.
         """
+        fed = self.grooves or self.stored or self.supplies or any(side.kind == "open" and side.p > 0 for side in self.sides)
+        if self.U and self.sides[0].kind == "periodic" and not fed:
+            raise InputError("periodic along the flow, and no side above the cavitation pressure: nothing feeds the film")
         kind = GroovedProblem if self.grooves else LubricationProblem
         if self.U < 0:
             return TurnedProblem(self.mirrored.build(shape, comm), self.exact)
         west, east, south, north = self.sides
-        ends = ((west.kind, east.kind), (south.kind, north.kind))
-        grid = Grid(shape, self.lengths, comm, ends=ends, places=self.lines(shape), polar=self.polar)
+        shared, ends = grid is not None, ((west.kind, east.kind), (south.kind, north.kind))
+        grid = grid or Grid(shape, self.lengths, comm, ends=ends, places=self.lines(shape), polar=self.polar)
         p_sides = tuple(side.p if side.kind == "open" else 0.0 for side in self.sides)
         film = self.film
         coefficients = partial(box_scheme, grid, self.gap, **self._data)
@@ -163,6 +168,7 @@ class Model:
             r_in=west.r if west.kind == "open" else 0.0,
             held=held,
         )
+        problem.shares_grid = shared
         if isinstance(problem, GroovedProblem):
             problem.grooves = self.grooves
         if getattr(self.gap, "rims", ()) and not self.supplies and self.law is None:
@@ -174,7 +180,7 @@ class Model:
         """What the box scheme is told beside grid and film."""
         p_sides = tuple(side.p if side.kind == "open" else 0.0 for side in self.sides)
         given = {name: getattr(self, name) for name in ("mu", "U", "scheme", "p_unit", "mean_cubes")}
-        return {**given, "p_sides": p_sides, "r_in": self.sides[0].r}
+        return {**given, "p_sides": p_sides, "r_in": self.sides[0].r, "stored": self.stored}
 
     def film_slopes(self, problem: LubricationProblem) -> BoxScheme:
         """Derivatives of the coefficients of a problem that was built from this (U >= 0) by its film. Collective."""
@@ -190,7 +196,9 @@ class Model:
             sides = (Side(p=pad.west), Side(p=pad.east), *self.sides[2:])
             # Its x = 0 is the last column of the groove before it.
             gap = _Moved(self.gap, (pad.first - 0.5) * dx, self.lengths[0])
-            films.append((pad, replace(self, lengths=lengths, sides=sides, gap=gap, exact=None, grooves=(), places=places)))
+            stored = self.stored.starting(pad.first) if self.stored else None
+            film = replace(self, lengths=lengths, sides=sides, gap=gap, exact=None, grooves=(), places=places, stored=stored)
+            films.append((pad, film))
         return films
 
 

@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
@@ -12,7 +11,9 @@ from ...base.parallel import Array
 from ...errors import InputError
 from ..grid import Grid
 from .edges import face_film
+from .positive import check_film
 from .rims import rims_across_x, rims_across_y
+from .stored import Stored
 
 SCHEMES = ("nodal", "face", "upwind")
 Film = Callable[[Array, Array], Array]
@@ -46,11 +47,19 @@ class BoxScheme:
     h: Array  # film at the points, m
     flow_unit: float = 1.0  # of all of them but h, m2/s: a power of 2
     held: NDArray[np.bool_] | None = None  # cells at a given pressure (`supplies`): their rows of A have the diagonal alone
+    storage: Array | None = None  # of a time step: what a full cell comes to store is storage - kept; b_C has -storage in it
+    kept: Array | None = None
 
     @property
     def arrays(self) -> list[str]:
         """Names of the coefficients and of h."""
-        return [field.name for field in fields(self) if field.name not in ("flow_unit", "held")]
+        given = [field.name for field in fields(self) if field.name not in ("flow_unit", "held")]
+        return [name for name in given if getattr(self, name) is not None]
+
+    @property
+    def b_E(self) -> Array:
+        """What of b_C r leaves by the east face: all of it in a steady film."""
+        return self.b_C if self.storage is None else self.b_C + self.storage
 
     @property
     def diagonal(self) -> Array:
@@ -93,6 +102,7 @@ def box_scheme(
     mean_cubes: bool = False,
     r_in: float = 0.0,
     cavity: Array | None = None,
+    stored: Stored | None = None,
 ) -> BoxScheme:
     """Coefficients of the box scheme on the owned points; the grid's ends say what its sides are.
 
@@ -109,18 +119,20 @@ def box_scheme(
     mean_cubes : take h^3 at a face as the mean of the nodal values (scene 5) instead of the film at the face.
     r_in : void fraction that enters at an open west side.
     cavity : 1 at the owned points that are taken to be cavitated where round edges cut a face (`rims`), else 0; default 0.
+    stored : what the cells store, in a time step.
 
     Raises
     ------
     InputError : a film that is not positive, or data so large or small that a coefficient overflows or vanishes.
     """
     with np.errstate(all="ignore"):
-        box = _coefficients(grid, film, mu, U, scheme, p_sides, p_unit, mean_cubes, r_in, cavity)
+        box = _coefficients(grid, film, mu, U, scheme, p_sides, p_unit, mean_cubes, r_in, cavity, stored)
     reduce = grid.reduce
     faces = [box.k_W, box.k_E] + ([box.k_S, box.k_N] if grid.dim == 2 else [])
     walls = zip(sides(grid, ("closed", "mirror")), faces, strict=False)
+    stores = [] if box.storage is None else [box.storage]
     conducting = [np.where(wall, np.inf, k) if wall.any() else k for wall, k in walls]
-    smallest = min(map(reduce.min, [box.h, *conducting]))
+    smallest = min(map(reduce.min, [box.h, *conducting, *stores]))
     largest = max(map(reduce.max, [*faces, np.abs(box.b_C), np.abs(box.c)]))
     if not (smallest > 1 / LARGE and largest < LARGE):
         with np.errstate(all="ignore"):
@@ -135,23 +147,6 @@ def box_scheme(
     return replace(box, **{name: getattr(box, name) / unit for name in box.arrays if name != "h"}, flow_unit=float(unit))
 
 
-def check_film(grid: Grid, film: Film) -> None:
-    """Raise InputError with the place where the film is thinnest, unless it is positive on all nodes and faces. Collective."""
-    x_nodes, x_faces = grid.nodes_and_faces(0)
-    y_nodes, y_faces = grid.nodes_and_faces(1) if grid.dim == 2 else (np.zeros(1), np.zeros(1))
-    lowest = (np.inf, 0.0, 0.0)
-    for x, y in ((x_nodes, y_nodes), (x_faces, y_nodes), (x_nodes, y_faces)):
-        x, y = x[None, :], y[:, None]
-        h = np.nan_to_num(np.broadcast_to(film(x, y), (y.size, x.size)), nan=-np.inf, posinf=np.inf, neginf=-np.inf)
-        j, i = np.unravel_index(np.argmin(h), h.shape)
-        lowest = min(lowest, (float(h[j, i]), float(x[0, i]), float(y[j, 0])))
-    h_min, at_x, at_y = grid.comm.allreduce(lowest, MPI.MIN)
-    if not h_min > 0:
-        where = f"x = {at_x:g}" + (f", y = {at_y:g}" if grid.dim == 2 else "")
-        found = f"{h_min:g} m" if np.isfinite(h_min) else "no number"
-        raise InputError(f"film {found} at {where} m: it must be positive everywhere")
-
-
 def _coefficients(
     grid: Grid,
     film: Film,
@@ -163,6 +158,7 @@ def _coefficients(
     mean_cubes: bool,
     r_in: float,
     cavity: Array | None,
+    stored: Stored | None = None,
 ) -> BoxScheme:
     dx, (ny, nx) = grid.steps(0), grid.box
     x_share, y_share = grid.widths(0), grid.widths(1)[:, None] if grid.dim == 2 else np.ones((1, 1))
@@ -211,8 +207,8 @@ def _coefficients(
     first = (np.arange(grid.x_start, grid.x_end) == 0)[None, :]
     h_W = h_x[:, :-2]
     if U == 0.0:
-        # No void is carried, and there is none: any speed keeps B regular.
-        U_r, r_in = grid.reduce.max(np.real(k_x)) / grid.reduce.max(np.real(h)), 0.0
+        # No void is carried, and there is none: any speed keeps B regular, as what cells store does.
+        U_r, r_in = 0.0 if stored else grid.reduce.max(np.real(k_x)) / grid.reduce.max(np.real(h)), 0.0
     else:
         U_r = U
     if scheme == "upwind":
@@ -240,7 +236,11 @@ def _coefficients(
     c = couette_W - couette_E
     for conductance, points, p_side in zip((k_W, k_E, k_S, k_N), side_points(grid), p_sides, strict=True):
         c[points] += conductance[points] * (p_side / p_unit)
-    return BoxScheme(k_W, k_E, k_S, k_N, b_C, b_W, c, couette_W, couette_E, h)
+    box = BoxScheme(k_W, k_E, k_S, k_N, b_C, b_W, c, couette_W, couette_E, h)
+    if stored is None:
+        return box
+    # Twice a cell's area over the mean dy.
+    return replace(box, **stored.terms(grid, film, 2.0 * grid.spacing[0] * x_share * y_share * m, b_C, c))  # type: ignore[arg-type]
 
 
 def sides(grid: Grid, kinds: Sequence[str] = ("open",)) -> tuple[NDArray[np.bool_], ...]:

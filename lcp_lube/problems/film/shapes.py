@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -197,13 +198,35 @@ class RandomSurface:
 
 @dataclass(frozen=True)
 class Scaled:
-    """A function of x and y in metres, in other units than metres: a formula."""
+    """A function of x, y in metres and t in seconds, in other units than metres: a formula."""
 
-    function: Shape
+    function: Callable[[Array, Array, float], Array]
     unit: float
+    t: float = 0.0
 
     def __call__(self, x: Array, y: Array) -> Array:
-        return self.unit * self.function(x, y)
+        return self.unit * self.function(x, y, self.t)
+
+
+@dataclass(frozen=True)
+class Travelling:
+    """A shape that the wall has carried along x by `travel`; it goes on periodically over L."""
+
+    shape: Shape
+    travel: float
+    L: float
+
+    def __call__(self, x: Array, y: Array) -> Array:
+        return self.shape((x - self.travel) % self.L, y)
+
+    def __getattr__(self, name: str) -> Any:
+        if name == "rims":
+            return [lambda x, y, rim=rim: rim((x - self.travel) % self.L, y) for rim in self.shape.rims]  # type: ignore[attr-defined]
+        if name != "jumps":  # a shape without them has no such attribute
+            raise AttributeError(name)
+        jumps = self.shape.jumps  # type: ignore[attr-defined]
+        shifted = lambda axis: tuple(sorted((x + self.travel) % self.L for x in jumps("x")))  # noqa: E731
+        return lambda axis: shifted(axis) if axis == "x" else jumps(axis)
 
 
 @dataclass(frozen=True)

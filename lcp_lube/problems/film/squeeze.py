@@ -1,19 +1,21 @@
-"""Squeeze film between parallel plates that oscillate: the march through time steps (`squeeze_step`), and what it shows."""
+"""What the march of a squeeze film shows: parallel plates that oscillate, a cavity that opens and fills again.
 
-from collections.abc import Callable
+    d/dx(h^3 dp/dx) = 2 d(h theta)/dt on (0, 1),   theta = 1 - r,   p r = 0,   p, r >= 0,   p = p_wall at both ends,
+
+dimensionless; h(t) does not depend on x, theta = 1 at t = 0 (Optasanu and Bonneau; Ausas, Jai and Buscaglia 2009). The steps
+are those of any film that moves (`drivers.time`); here their events are read off.
+"""
+
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
-from ...base.parallel import Array
-from ...errors import InputError
+from ...base.parallel import Array, Reduce
 from ..certificate import Certificate
 from ..grid import Grid
 from ..solution import Fields
 from .cavity import VOID
-from .reynolds import LARGE
-from .squeeze_step import SqueezeStep
 
 
 @dataclass
@@ -30,88 +32,47 @@ class History:
     p_max_time: float = 0.0
 
 
-class SqueezeProblem:
-    """The whole march from t = 0 to t_end.
+class Squeeze:
+    """What a march shows of a squeeze film: it hears of every step, and in the end answers in the last one's place.
 
     Parameters
     ----------
-    gap : h(t), positive.
-    steps : of equal length.
-    second_order : the two-step backward difference (BDF2, its first step implicit Euler), otherwise implicit Euler.
-    front_time : when `front` is told.
+    grid : of the march. p_wall : pressure at both ends. front_time : when `front` is told.
     """
 
     kind = "lubrication"  # as every step is
     units: ClassVar[dict[str, str]] = {}
+    exact = None  # the events are known exactly, not the fields
 
-    def __init__(
-        self,
-        grid: Grid,
-        gap: Callable[[float], float],
-        *,
-        p_wall: float,
-        t_end: float,
-        steps: int,
-        second_order: bool,
-        front_time: float,
-    ):
-        self.grid, self.gap, self.p_wall, self.t_end, self.steps = grid, gap, p_wall, t_end, steps
-        self.second_order, self.front_time = second_order, front_time
-        self.reduce = grid.reduce
-        self._check(gap(0.0))
-        self.exact = None  # the events are known exactly, not the fields
+    def __init__(self, p_wall: float, front_time: float):
+        self.p_wall, self.front_time = p_wall, front_time
         self.history = History()
-        self._m = 0
-        self._contents = [np.full(grid.local_size, gap(0.0))] * 2  # M of the last step, and of the one before it
-        self._r = np.zeros(grid.local_size)  # of the last step
+        self.step: Any = None  # the last step's problem
+        self.time, self.dt, self._m = 0.0, 0.0, 0
         self._pressures: list[Array] = []  # of the last steps in the full film
         self._fronts: list[tuple[float, float]] = []  # (time, front) since rupture
         self._void: list[float] = []
 
-    def _check(self, h: float) -> None:
-        """Raise InputError for data whose coefficients overflow or vanish."""
-        dx, smallest = self.grid.spacing[0], min(h, self.gap(0.5 * self.t_end), self.gap(self.t_end))
-        with np.errstate(all="ignore"):
-            sizes = np.array([(self.p_wall or 1.0) * smallest**3 / dx, self.p_wall * h**3 / dx, 2.0 * dx * h / self.dt])
-        if not np.all((sizes[[0, 2]] > 1 / LARGE) & (sizes[[0, 2]] < LARGE) & (sizes[1] < LARGE)):
-            raise InputError(
-                f"gap {h:g} at t = 0, p_wall = {self.p_wall:g}, {self.steps} steps up to t_end = {self.t_end:g}: coefficients "
-                f"{np.min(sizes[[0, 2]]):g} to {np.max(sizes):g}, allowed are {1 / LARGE:g} to {LARGE:g}"
-            )
+    @property
+    def grid(self) -> Grid:
+        return self.step.grid
+
+    @property
+    def reduce(self) -> Reduce:
+        return self.step.reduce
 
     @property
     def unknowns(self) -> int:
-        return 2 * self.grid.size
+        return self.step.unknowns
 
-    @property
-    def dt(self) -> float:
-        return self.t_end / self.steps
-
-    @property
-    def time(self) -> float:
-        """Of the last step taken."""
-        return self._m * self.dt
-
-    def next_step(self) -> SqueezeStep:
-        """The problem of the next time step."""
-        last, before = self._contents
-        if self.second_order and self._m:
-            weight, old = 1.5 / self.dt, (2.0 * last - 0.5 * before) / self.dt
-        else:
-            weight, old = 1.0 / self.dt, last / self.dt
-        return SqueezeStep(self.grid, self.gap((self._m + 1) * self.dt), weight, old, self.p_wall)
-
-    def accept(self, step: SqueezeStep, fields: Fields) -> None:
-        """Take a step's solution over and note what it shows. Collective."""
-        p, r, seen = fields["p"] * step.p_unit, fields["r"], self.history
+    def accept(self, step: Any, fields: Fields, time: float, dt: float) -> None:
+        """Note what a step shows. Collective."""
+        self.step, self.time, self.dt, seen = step, time, dt, self.history
         self._m += 1
-        self._contents = [step.h * (1.0 - r), self._contents[0]]
+        p, r = fields["p"] * step.p_unit, self._void_of(step, fields)
         p_max = self.reduce.max(p)
-        # An interior method leaves a trace of void in the full film.
-        r = np.where((p <= max(p_max, self.p_wall) * r) & (r > VOID), r, 0.0)
         if p_max > seen.p_max:
             seen.p_max, seen.p_max_time = p_max, self.time
-        self._r = r
         void = self.reduce.sum(r) * self.grid.cell
         if seen.rupture_time is None:
             if self.reduce.max(r) > 0:
@@ -123,8 +84,25 @@ class SqueezeProblem:
             else:
                 self._fronts.append((self.time, self.front(p, r)))
                 self._void.append(void)
-        if self._m == self.steps or seen.reformation_time is not None:
-            self._look_back()
+
+    def _void_of(self, step: Any, fields: Fields) -> Array:
+        """r; an interior method leaves a trace of void in the full film."""
+        p, r = fields["p"] * step.p_unit, fields["r"]
+        return np.where((p <= max(self.reduce.max(p), self.p_wall) * r) & (r > VOID), r, 0.0)
+
+    def answer(self, step: Any) -> "Squeeze":
+        """In the place of the last step's problem. Collective."""
+        self.step = step
+        self._look_back()
+        return self
+
+    def state(self) -> tuple[dict[str, Any], list[Array]]:
+        """What a checkpoint holds: numbers, and arrays of the grid."""
+        return {**vars(self), "history": vars(self.history), "step": None, "_pressures": None}, self._pressures
+
+    def restore(self, numbers: dict[str, Any], arrays: list[Array]) -> None:
+        """Put back what `state` gave."""
+        vars(self).update({**numbers, "history": History(**numbers["history"]), "_pressures": arrays})
 
     def _rupture(self, r: Array) -> None:
         """When: the pressure at the cavity's middle, as it was falling, reaches zero. Collective."""
@@ -201,24 +179,24 @@ class SqueezeProblem:
         return {
             **vars(seen),
             "half_width": None if seen.sigma is None else seen.sigma - 0.5,
-            "cavitated_fraction": self.reduce.sum((self._r > 0).astype(float)) / self.grid.size,
+            "cavitated_fraction": self.reduce.sum((self._void_of(self.step, fields) > 0).astype(float)) / self.grid.size,
             "t_end": self.time,
-            "steps": self._m,
         }
 
     def physical(self, fields: Fields) -> dict[str, tuple[Array, str]]:
         """Pressure, void fraction and gap at the end, dimensionless."""
-        h = np.full(self.grid.local_size, self.gap(self.time))
-        return {"p": (fields["p"] * (self.p_wall or 1.0), ""), "r": (fields["r"], ""), "h": (h, "")}
+        return {"p": (fields["p"] * self.step.p_unit, ""), "r": (fields["r"], ""), "h": (self.step.scheme.h.ravel(), "")}
 
     def at_sides(self, name: str, x: Array, y: Array) -> Array:
         """p_wall, the gap, and no void unless p_wall = 0."""
         void = 0.0 if self.p_wall else np.nan
-        return np.full(np.broadcast(x, y).shape, {"p": self.p_wall, "r": void, "h": self.gap(self.time)}[name])
+        if name == "h":
+            return np.array(self.step.film(x, y))
+        return np.full(np.broadcast(x, y).shape, {"p": self.p_wall, "r": void}[name])
 
     def prolong(self, coarse: Any, fields: Fields, interior: bool) -> Fields:
         """Nothing: every march begins with the full film."""
         return {}
 
     def destroy(self) -> None:
-        self.grid.destroy()
+        self.step.destroy()

@@ -70,6 +70,8 @@ class TurnedProblem(LubricationProblem):
         s = moving.scheme
         turned = {name: self._here(getattr(s, name).ravel()).reshape(own.box) for name in s.arrays}
         turned |= {"k_W": turned["k_E"], "k_E": turned["k_W"], "b_C": -turned["b_C"], "b_W": -turned["b_W"]}
+        if s.storage is not None:
+            turned |= {name: -turned[name] for name in ("storage", "kept")}
         # couette_E: of the face downstream, as in the mirror image.
         turned |= {"couette_W": -turned["couette_W"], "couette_E": -turned["couette_E"]}
         west, east, *ends_y = moving.p_sides

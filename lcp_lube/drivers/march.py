@@ -1,0 +1,162 @@
+"""The memory of a march in time: contents of the film's cells, fields, and what a difference formula makes of them.
+
+Implicit Euler, or BDF2 with steps of any length: with w = dt/(step before)
+
+    d/dt u ~ [ (1 + 2 w)/(1 + w) u_new - (1 + w) u_last + w^2/(1 + w) u_before ] / dt.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..base.parallel import Array
+from ..problems.film.cavity import cavity_sign
+from ..problems.film.flows import point_weights
+from ..problems.film.grooves import GroovedProblem
+from ..problems.film.lubrication import LubricationProblem
+from ..problems.film.stored import Stored
+from ..problems.film.supplies import supply_flows
+from ..problems.grid import Grid
+from ..problems.solution import Fields
+
+LONGEST, SHORTEST, SAFETY = 1.5, 0.2, 0.9  # a step in parts of the one before
+
+
+@dataclass(frozen=True)
+class Formula:
+    """d/dt u ~ weight u_new - last u_last - before u_before, 1/s."""
+
+    weight: float
+    last: float
+    before: float = 0.0
+
+    def old(self, values: list[Any]) -> Any:
+        """What it has of earlier values, the newest first."""
+        return self.last * values[0] + (self.before * values[1] if self.before else 0.0)
+
+
+@dataclass
+class March:
+    """Where the film has got.
+
+    Attributes
+    ----------
+    grid : of all steps. second : BDF2 in place of Euler's formula.
+    t, dts : the time, and the lengths of the last steps; contents : h (1 - r) of the last times, m; fields, full : theirs, and
+        which cells were full. All of them with the newest first.
+    volumes : sums of contents, 2 dx m2; flowed, stored, moved : of the whole run, in time: what came in, what was stored, and
+        the larger of all that passed and all that was stored.
+    """
+
+    grid: Grid
+    second: bool
+    t: float = 0.0
+    dts: list[float] = field(default_factory=list)
+    contents: list[Array] = field(default_factory=list)
+    fields: list[Fields] = field(default_factory=list)
+    full: list[Any] = field(default_factory=list)
+    volumes: list[float] = field(default_factory=list)
+    flowed: float = 0.0
+    stored: float = 0.0
+    moved: float = 0.0
+    rates: float = 0.0  # largest so far: what drives the film, 2 dx sums
+
+    def begin(self, contents: Array, fields: Fields | None) -> None:
+        """At t = 0."""
+        self.contents = [contents]
+        self.volumes = [self._sum(contents)]
+        if fields is not None:
+            self.fields = [fields]
+
+    def formula(self, dt: float) -> Formula:
+        """For a step of this length."""
+        if not (self.second and self.dts):
+            return Formula(1.0 / dt, 1.0 / dt)
+        w = dt / self.dts[0]
+        return Formula((1.0 + 2.0 * w) / ((1.0 + w) * dt), (1.0 + w) / dt, -w * w / ((1.0 + w) * dt))
+
+    def term(self, formula: Formula) -> Stored:
+        """What the step adds to the film's balance."""
+        return Stored(formula.weight, formula.old(self.contents), self.grid)
+
+    def guess(self, dt: float) -> Fields | None:
+        """Fields at the step's end, as they went on in the last step: z = p or -r in a line, but where a front passed."""
+        if len(self.fields) < 2 or len(self.full) < 2:
+            return self.fields[0] if self.fields else None
+        w = np.where(self.full[0] == self.full[1], min(dt / self.dts[0], 1.0), 0.0)
+        last, before = self.fields
+        ahead = {name: (1.0 + w) * last[name] - w * before[name] for name in ("p", "r")}
+        P, R = (self.grid.reduce.max(last[name]) or 1.0 for name in ("p", "r"))
+        z = ahead["p"] / P - ahead["r"] / R
+        return {"p": P * np.maximum(z, 0.0), "r": R * np.maximum(-z, 0.0)}
+
+    def accept(self, dt: float, problem: LubricationProblem, fields: Fields, contents: Array) -> dict[str, float]:
+        """Take a step over; returns its flows: in and out, m2/s or m3/s, as volumes. Collective."""
+        formula = self.formula(dt)
+        p, r = fields["p"], fields["r"]
+        west, east, south, north = problem.boundary_flows(p, r)
+        into = [west, -east, south, -north]
+        if isinstance(problem, GroovedProblem):
+            balance = problem.scheme.flow_unit * problem.flow(p, r)
+            into += [problem.reduce.sum(np.where(inside, balance, 0.0)) for inside in problem.columns]
+        size = 0.5 * (self.grid.spacing[1] if self.grid.dim == 2 else 1.0)
+        into += [flow / size for flow in supply_flows(problem, p, r)]
+        volume = self._sum(contents)
+        rate = formula.weight * volume - formula.old(self.volumes)
+        self.flowed += dt * sum(into)
+        self.stored += dt * rate
+        self.moved += dt * max(sum(map(abs, into)), abs(rate))
+        self.t += dt
+        self.volumes = [volume, *self.volumes[:1]]
+        self.dts = [dt, *self.dts[:2]]
+        self.contents = [contents, *self.contents[:2]]
+        self.fields = [fields, *self.fields[:1]]
+        self.full = [cavity_sign(problem.reduce, p, r) >= 0, *self.full[:3]]
+        return {
+            "volume": size * volume,
+            "inflow": size * sum(max(a, 0.0) for a in into),
+            "outflow": -size * sum(min(a, 0.0) for a in into),
+        }
+
+    @property
+    def defect(self) -> float:
+        """What was lost or made in the whole run, in parts of what passed or was stored."""
+        lost = abs(self.flowed - self.stored)
+        held = 1e-3 * max(map(abs, self.volumes), default=0.0)  # of a film that hardly moves
+        return lost / max(self.moved, held) if lost else 0.0
+
+    def error(self, dt: float, problem: LubricationProblem, contents: Array) -> float | None:
+        """Estimated relative error of the rates d/dt h (1 - r) of a step not yet accepted; None before there are enough.
+
+        Of cells that were full, or cavitated, all the while: in those that a front crosses no formula has an order. Collective.
+        """
+        order = 2 if self.second else 1
+        s, known = problem.scheme, len(self.dts)
+        drag = s.flow_unit * problem.reduce.sum(np.abs(s.couette_E - s.couette_W))
+        rate = self.formula(dt).weight * contents - self.formula(dt).old(self.contents)
+        self.rates = max(self.rates, drag + self._sum(np.abs(rate)))
+        if known < order or not self.rates:
+            return None
+        steps = [dt, *self.dts][: order + 1]
+        times = -np.concatenate([[0.0], np.cumsum(steps)])  # of the contents known, from the new one back
+        used = [contents, *self.contents][: order + 2]
+        if len(used) < order + 2:
+            return None
+        # The divided difference of order + 1, times the derivative of the formula's error.
+        weights = [1.0 / np.prod([times[k] - other for j, other in enumerate(times) if j != k]) for k in range(order + 2)]
+        high = sum(weight * values for weight, values in zip(weights, used, strict=True))
+        factor = dt * (dt + self.dts[0]) if order == 2 else dt
+        now = self.full[0]
+        steady = np.logical_and.reduce([full == now for full in self.full[: order + 1]])
+        return self._sum(np.where(steady, np.abs(factor * high), 0.0)) / self.rates
+
+    def next_step(self, dt: float, error: float | None, tol: float) -> float:
+        """The length of the next step, or of the same once more."""
+        if error is None:
+            return dt
+        power = 1.0 / (2 if self.second else 1)
+        return dt * min(max(SAFETY * (tol / max(error, 1e-300)) ** power, SHORTEST), LONGEST)
+
+    def _sum(self, values: Array) -> float:
+        return 2.0 * self.grid.spacing[0] * self.grid.reduce.sum(point_weights(self.grid) * values)

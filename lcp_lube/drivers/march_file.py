@@ -1,0 +1,128 @@
+"""Checkpoints of a march in time: what its next step starts from, written after every so many steps (`checkpoint_file`)."""
+
+import signal
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import astuple
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from .. import __version__
+from ..errors import InputError
+from ..problems.certificate import Certificate
+from ..problems.grid import Grid
+from ..problems.solution import Step
+from . import checkpoint_file
+from .ask import Ask
+from .checkpoint import Checkpointer, scene_record
+
+NUMBERS = ("t", "dts", "volumes", "flowed", "stored", "moved", "rates")  # of a `March`
+ARRAYS = ("contents", "full")
+RUN = ("history", "solves", "lengths", "step", "rescuer", "times_s", "settings")  # of what takes the steps
+
+
+class MarchFile:
+    """Writes a run's checkpoints, and takes one up. Every method is collective.
+
+    Raises
+    ------
+    InputError : a file that cannot be written.
+    """
+
+    def __init__(self, ask: Ask, scene: Any):
+        self.keeper = Checkpointer(ask.checkpoint, ask.every, ask.mpi)
+        self.resume = None if ask.resume is None else Path(ask.resume)
+        self.scene, self._since = scene_record(scene), 0
+        self.scene.get("motion", {}).pop("t_end", None)  # a march may go on beyond its first end
+        self.comm = ask.mpi
+
+    def listening(self) -> AbstractContextManager[None]:
+        """SIGINT and SIGTERM let the step end and be saved, where there is a file."""
+        return self.keeper.listening() if self.keeper.active else nullcontext()
+
+    def after(self, run: Any) -> None:
+        """A step was taken: write the file if it is due, or if the run was told to end.
+
+        Raises
+        ------
+        InputError : it cannot be written; the last one is still there then.
+        KeyboardInterrupt, SystemExit : SIGINT or SIGTERM came.
+        """
+        if not self.keeper.active:
+            return
+        self._since += 1
+        told = self.comm.allreduce(self.keeper.told, MPI.MAX)
+        if told or run.done or self._since >= self.keeper.every:
+            self._write(run)
+        if told == signal.SIGTERM:
+            raise SystemExit(128 + told)
+        if told:
+            raise KeyboardInterrupt(f"--resume {self.keeper.path} goes on")
+
+    def _write(self, run: Any) -> None:
+        march, rotor = run.march, run.rotor
+        arrays = [(f"{name}.{k}", np.asarray(a, dtype=float)) for name in ARRAYS for k, a in enumerate(getattr(march, name))]
+        arrays += [(f"fields.{k}.{name}", a) for k, fields in enumerate(march.fields) for name, a in fields.items()]
+        seen, more = run.seen.state() if run.seen is not None else ({}, [])
+        arrays += [(f"seen.{k}", a) for k, a in enumerate(more)]
+        worst = run.worst()
+        header = {
+            "version": __version__,
+            "scene": self.scene,
+            "march": {name: getattr(march, name) for name in NUMBERS},
+            "rotor": None if rotor is None else {
+                "places": [[*map(float, e)] for e in rotor.places],
+                "speeds": [[*map(float, e)] for e in rotor.speeds],
+                "size": rotor.size,
+            },
+            "worst": [worst.measures, worst.tol, worst.extremes],
+            "steps": [astuple(step) for step in run.steps],
+            "seen": seen,
+            "run": {name: getattr(run, name) for name in RUN},
+        }  # fmt: skip
+        try:
+            checkpoint_file.write(self.keeper.path, march.grid, header, arrays)
+        except OSError as error:
+            raise InputError(f"--checkpoint {self.keeper.path}: could not be written: {error}") from None
+        self._since = 0
+
+    def restore(self, run: Any, grid: Grid) -> bool:
+        """Put the run where the file has it; False without one.
+
+        Raises
+        ------
+        InputError : no checkpoint of this march, one cut short or damaged.
+        """
+        if self.resume is None:
+            return False
+        try:
+            header, start = checkpoint_file.read_header(self.resume, self.comm)
+            if "march" not in header:
+                raise InputError("no checkpoint of a march in time")
+            if header["version"] != __version__:
+                raise InputError(f"written by lcp_lube {header['version']}, this is {__version__}")
+            old = header["scene"]
+            if changed := [key for key in {**old, **self.scene} if key != "name" and old.get(key) != self.scene.get(key)]:
+                raise InputError(f"a checkpoint of another scene: its {changed[0]} is not the one here")
+            arrays = checkpoint_file.read_arrays(self.resume, grid, header, start)
+        except InputError as error:
+            raise InputError(f"--resume {self.resume}: {error}") from None
+        for name, value in header["march"].items():
+            setattr(run.march, name, value)
+        run.march.contents = [a for name, a in arrays.items() if name.startswith("contents.")]
+        run.march.full = [a > 0.5 for name, a in arrays.items() if name.startswith("full.")]
+        count = sum(name.startswith("fields.") for name in arrays) // 2
+        run.march.fields = [{name: arrays[f"fields.{k}.{name}"] for name in ("p", "r")} for k in range(count)]
+        if run.rotor is not None:
+            for name in ("places", "speeds"):
+                setattr(run.rotor, name, [np.array(e) for e in header["rotor"][name]])
+            run.rotor.size = header["rotor"]["size"]
+        if run.seen is not None:
+            run.seen.restore(header["seen"], [a for name, a in arrays.items() if name.startswith("seen.")])
+        run.certificates = [Certificate(*header["worst"])]
+        run.steps = [Step(*step) for step in header["steps"]]
+        for name, value in header["run"].items():
+            setattr(run, name, value)
+        return True

@@ -1,0 +1,264 @@
+"""The steps of a march in time, one after another: what `time` begins, and ends with an answer."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..problems.certificate import Certificate
+from ..problems.film.lubrication import LubricationProblem
+from ..problems.film.model import Model
+from ..problems.grid import EVEN
+from ..problems.solution import Outcome, Solution, Step
+from ..scenes.motion import MotionTable
+from ..scenes.moving import motion_of
+from .ask import Ask, Start
+from .coefficients import films, motions_of, supplied
+from .compose import Inner
+from .march import March
+from .march_file import MarchFile
+from .plan import plan
+from .response import Response
+from .rotor import Rotor
+from .step import TimeStep, check_content, contents
+
+SOME = 0.37  # of t_end: when edges are looked at that may have moved
+FIRST = 1e-3  # of t_end: the first step, where an error estimate says how long the others are
+LEAST = 1e-9  # of t_end: the shortest step
+RECENT, MANY, SWEEPS = 10, 2.0, 16  # steps that are looked at, iterations a solve that are many, sweeps that then come first
+REPEAT = 2.0  # times the tolerance: the error beyond which a step is taken again
+TOLD = ("load", "force", "moment", "p_max", "min_h", "cavitated_fraction", "friction")  # of a step, for the history
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A step that was taken: what those hear who watch a march. row : its line of the history."""
+
+    t: float
+    t_end: float
+    problem: LubricationProblem
+    fields: dict[str, Any]
+    row: dict[str, Any]
+    count: int
+
+
+class Run:
+    """A march under way: `advance` until it is `done`, or `outcome` is no longer converged. Every method is collective."""
+
+    def __init__(self, scene: Any, ask: Ask, inner: Inner):
+        self.scene, self.inner = scene, inner
+        table = motion_of(scene)
+        assert table is not None
+        self.table: MotionTable = table
+        self.models, self.course = scene.models(), table.course(scene._folder)
+        self.file = MarchFile(ask, scene)
+        self.rotor = Rotor.of(table, scene.turning.c, scene.place) if table.free else None
+        self.watch, self.seen = ask.watch, getattr(scene, "observer", lambda: None)()
+        self.times = sorted({t for t in ask.times if 0 < t < table.t_end})
+        ask = replace(ask, nested=None if ask.nested else False, checkpoint=None, resume=None, every=1, watch=None, start=None)
+        first = self.models(0.0, self._given(0.0))
+        later = self.models(SOME * table.t_end, self._given(0.0))
+        if any(set(_jumps(first, axis)) != set(_jumps(later, axis)) for axis in "xy"):
+            first = replace(first, places=EVEN)  # its edges move: no line of points can lie on them
+        problem = self._at(0.0, lambda: first.build(scene.shape, ask.comm))
+        problem.shares_grid = True
+        self.march = March(problem.grid, table.scheme == "bdf2")
+        problem.destroy()
+        chosen = plan(replace(first.facts(scene.shape, ask.comm), moving=True), ask, scene.name)
+        self.chosen, self.may_sweep, named = chosen, False, ask.named
+        if chosen.method == "active-set":  # the steps before have the front to within a cell or two: see `_sweeps`
+            self.may_sweep = "sweeps" not in ask.options
+            ask = replace(ask, options={"sweeps": 0, **ask.options})
+        self.ask = replace(ask, method=chosen.method, implied=not named)
+        self.steps: list[Step] = []
+        self.certificates: list[Certificate] = []
+        self.times_s: dict[str, float] = {}
+        self.history: list[dict[str, Any]] = []
+        self.lengths = [np.inf, 0.0]
+        self.rescuer: str | None = None
+        self.last: Solution | None = None
+        self.settings: dict[str, Any] = {}
+        self.outcome, self.message = Outcome.CONVERGED, ""
+        self.step, self.solves = table.step or FIRST * table.t_end, 0
+        if not self.file.restore(self, self.march.grid):
+            self._begin(first, ask)
+
+    def _given(self, t: float) -> tuple[float, float] | None:
+        """Where the journal is, if it moves."""
+        if self.rotor is not None:
+            x, y = self.rotor.places[0]
+            return float(x), float(y)
+        return self.course(t) if self.course is not None else None
+
+    def _at(self, t: float, call: Callable[[], Any]) -> Any:
+        """A call's result; bad input is told with the time."""
+        try:
+            return call()
+        except InputError as error:
+            text = str(error).removeprefix(f"{self.scene.name}: ")
+            raise InputError(f"{self.scene.name}: t = {t:.6g} s: {text}") from None
+
+    def _begin(self, model: Any, ask: Ask) -> None:
+        """The film at t = 0."""
+        if self.table.start == "full":
+            self.march.begin(contents(self.march.grid, model, None), None)
+            return
+        solution = self.inner(TimeStep(self.scene, model, self.march.grid), ask)
+        if not solution.converged:
+            raise InputError(f"{self.scene.name}: no steady film at t = 0: {solution.message}; motion.start = full needs none")
+        self.march.begin(contents(self.march.grid, model, solution.fields), solution.fields)
+        solution.destroy()
+
+    @property
+    def done(self) -> bool:
+        return self.march.t >= self.table.t_end * (1.0 - 1e-12)
+
+    def _next(self) -> float:
+        """Length of the next step."""
+        t, end = self.march.t, self.table.t_end
+        if self.table.step is not None:  # from its number: sums of steps have rounding
+            count = round(t / self.table.step) + 1
+            return min(count * self.table.step, end) - t
+        targets = [time for time in self.times if time > t * (1.0 + 1e-12)] + [end]
+        left = targets[0] - t
+        return left if left <= 1.01 * self.step else 0.5 * left if left < 2.0 * self.step else self.step
+
+    def advance(self) -> None:
+        """One more step, or the reason why there is none in `outcome`."""
+        march = self.march
+        while True:
+            dt = self._next()
+            t = march.t + dt
+            solution, place, why, solves = self._step(t, dt)
+            problem: Any = solution.problem
+            if why or not solution.converged:
+                if self.table.step is None and 0.5 * dt > LEAST * self.table.t_end:
+                    self.step = 0.5 * dt
+                    solution.destroy()
+                    continue
+                self.outcome = solution.outcome if not solution.converged else Outcome.MAX_ITERATIONS
+                self.message = f"time step {len(self.history) + 1}, t = {t:.6g}: {why or solution.message}"
+                self._keep(solution, solves)
+                return
+            model = self.model
+            new = contents(march.grid, model, solution.fields)
+            error = None
+            if self.table.step is None:
+                error = march.error(dt, problem, new)
+                if self.rotor is not None:
+                    thinnest = problem.reduce.min(problem.scheme.h)
+                    other = self.rotor.error(place, dt, march.dts, thinnest)
+                    error = max(filter(None, (error, other)), default=None)
+                self.step = march.next_step(dt, error, self.table.tolerance)
+                too_large = error is not None and error > REPEAT * self.table.tolerance
+                negative = march.grid.reduce.max(solution.fields["r"]) > 1.0
+                if (too_large or negative) and 0.5 * dt > LEAST * self.table.t_end:
+                    self.step = min(self.step, 0.5 * dt)
+                    solution.destroy()
+                    continue
+            check_content(march.grid, solution.fields["r"], t, dt, self.scene.name)
+            break
+        formula = march.formula(dt)
+        if self.rotor is not None:
+            self.rotor.accept(place, formula)
+        flows = march.accept(dt, problem, solution.fields, new)
+        self._keep(solution, solves)
+        if self.seen is not None:
+            self.seen.accept(problem, solution.fields, march.t, dt)
+        row = self._row(solution, dt, flows, place, solves)
+        self.history.append(row)
+        self._sweeps()
+        self.lengths = [min(self.lengths[0], dt), max(self.lengths[1], dt)]
+        if self.watch is not None:
+            self.watch(Moment(march.t, self.table.t_end, problem, solution.fields, row, len(self.history)))
+        self.file.after(self)
+
+    def _step(self, t: float, dt: float) -> tuple[Solution, Any, str, list[list[Step]]]:
+        """The film at the step's end, where the journal is, why it has no place, and each solve's steps. Collective."""
+        march, formula = self.march, self.march.formula(dt)
+        term, near = march.term(formula), march.guess(dt)
+        solves: list[Solution] = []
+
+        def film_at(e: Any) -> Solution:
+            model = self.models(t, None if e is None else (float(e[0]), float(e[1])))
+            self.model = replace(model, stored=term, places=march.grid.places)
+            found = near if not solves else solves[-1].fields
+            problem = self.last.problem if self.last is not None else None
+            known = self.last.settings if self.last is not None else {}
+            start = Start(problem, found, known) if problem is not None and found is not None else None
+            step = TimeStep(self.scene, self.model, march.grid)
+            solves.append(self._at(t, lambda: self.inner(step, replace(self.ask, start=start))))
+            return solves[-1]
+
+        def stiffness(solution: Solution) -> Any:
+            whole = TimeStep(self.scene, self.model, march.grid)
+            total = np.zeros((2, 2))
+            ring: Any = solution.problem
+            for problem, part, fields, first in films(whole, supplied(whole.model, solution), ring, solution.fields):
+                response = Response(problem, part, fields, motions_of(self.scene.turning, False, 0.0), first)
+                total += response.stiffness()
+                response.destroy()
+                if problem is not ring:
+                    problem.destroy()
+            return total
+
+        if self.rotor is None:
+            place, why = self._at(t, lambda: self._given(t)), ""
+            solution = film_at(place)
+        else:
+            guess = self.rotor.guess(dt, march.dts)
+            solution, place, why = self.rotor.settle(t, formula, guess, film_at, stiffness)
+        return solution, place, why, [one.steps for one in solves]
+
+    def _keep(self, solution: Solution, solves: list[list[Step]]) -> None:
+        """Note what a step was, and hold it in place of the one before."""
+        self.settings = self.settings or solution.settings
+        self.rescuer = solution.method if solution.took_over else self.rescuer
+        self.certificates.append(solution.certificate)
+        self.steps += [step for steps in solves for step in steps]
+        self.solves += len(solves)
+        self.times_s = {name: self.times_s.get(name, 0.0) + seconds for name, seconds in solution.times.items()}
+        if self.last is not None:
+            self.last.destroy()
+        self.last = solution
+
+    def _sweeps(self) -> None:
+        """Fronts that run by several cells a step are put right by sweeps, which a few steps alone would not pay for."""
+        late = self.history[-RECENT:]
+        many = len(late) == RECENT and sum(row["solves"] for row in late) * MANY < sum(row["iterations"] for row in late)
+        if many and self.may_sweep:
+            self.may_sweep = False
+            self.ask = replace(self.ask, options={**self.ask.options, "sweeps": SWEEPS})
+
+    def _row(self, solution: Solution, dt: float, flows: dict[str, float], place: Any, solves: list[Any]) -> dict[str, Any]:
+        """A step's line of the history."""
+        found = solution.problem.quantities(solution.fields)
+        row: dict[str, Any] = {"t": self.march.t, "dt": dt}
+        if place is not None:
+            row |= {"journal_x": float(place[0]), "journal_y": float(place[1])}
+        for name in TOLD:
+            value = found.get(name)
+            if isinstance(value, list):
+                row |= dict(zip((f"{name}_x", f"{name}_y"), value, strict=True))
+            elif value is not None:
+                row[name] = value
+        row |= flows | {"mass_defect": solution.certificate.measures["mass_defect"]}
+        return row | {"iterations": sum(map(len, solves)), "solves": len(solves)}
+
+    def worst(self) -> Certificate:
+        """Of all steps."""
+        found = self.certificates
+        measures = {name: max((c.measures[name] for c in found), key=_badness) for name in found[0].measures}
+        lowest = {name: min(c.extremes[name] for c in found) for name in found[0].extremes}
+        return Certificate(measures, found[0].tol, lowest)
+
+
+def _jumps(model: Model, axis: str) -> tuple[float, ...]:
+    return getattr(model.gap, "jumps", lambda axis: ())(axis)
+
+
+def _badness(measure: float) -> float:
+    """NaN is the worst."""
+    return measure if measure == measure else float("inf")

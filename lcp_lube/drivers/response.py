@@ -1,0 +1,158 @@
+"""How a film's force answers to small motions of its walls: the exact derivative of the mass-conserving equations.
+
+In the film h(x, y, t) a cell's balance is A(h) p + B(h) r - c(h) + 2 dx d/dt[h (1 - r)] = 0. Let z be p in the full film and -r
+in the cavity, J the matrix of the problem at its solution, and e exp(i nu t) a small rigid motion. At the signs of z
+
+    (J + i nu M) z' = -dG/de - i nu S,     M = 2 dx h in the cavity, 0 in the full film,     S = 2 dx (1 - r) dh/de,
+
+with G = A p + B r - c. A motion e_k moves the wall by dh/de_k; its force is F_k = Int p dh/de_k, and K + i nu C = -dF/de comes
+from p'. M is the void that is stored and carried. At nu = 0 these are two solves with one matrix: J z0' = -dG/de,
+J z1' = -(S + M z0'). Of a time step J has the storage in it, and z0' alone says how the force answers to where the wall is at
+the step's end.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..base.parallel import Array
+from ..problems.film.cavity import cavity_sign
+from ..problems.film.flows import point_weights
+from ..problems.film.lubrication import LubricationProblem
+from ..problems.film.model import Model
+from ..problems.film.stored import Stored
+from ..problems.film.supplies import supply_flows
+from ..problems.solution import Fields
+from .linearised import Feed, Linear
+
+STEP = 0.125  # of the thinnest film: G is a cubic in the displacement, which four values give exactly whatever the step
+Change = Callable[[Array, Array], Array]  # dh/de at x and y (m) of the scene's film
+
+
+@dataclass(frozen=True)
+class Moved:
+    """A film whose wall has moved by e in a rigid motion; first : x of the scene where this film's x is 0, m."""
+
+    film: Any
+    change_: Change
+    e: float
+    first: float
+
+    def change(self, x: ArrayLike, y: ArrayLike | None = None) -> Array:
+        """dh/de."""
+        return self.change_(np.asarray(x, dtype=float) + self.first, np.asarray(0.0 if y is None else y, dtype=float))
+
+    def __call__(self, x: ArrayLike, y: ArrayLike | None = None, /) -> Array:
+        return self.film(x, y) + self.e * self.change(x, y)
+
+    def __getattr__(self, name: str) -> Any:
+        if name != "jumps":
+            raise AttributeError(name)
+        return self.film.jumps
+
+
+class Response:
+    """The film of one problem at its solution, linearised. Collective, until `destroy`.
+
+    Parameters
+    ----------
+    problem : solved by `fields`; model : what it is the discretisation of.
+    motions : dh/de of each.
+    first : x of the scene where this film's x is 0, m.
+    cavity : cells whose void answers, in place of those of the fields. counted : cells whose pressure counts in the force.
+    """
+
+    def __init__(
+        self,
+        problem: LubricationProblem,
+        model: Model,
+        fields: Fields,
+        motions: Sequence[Change],
+        first: float = 0.0,
+        cavity: Any = None,
+        counted: Any = None,
+    ):
+        grid, self.p, self.r = problem.grid, fields["p"], fields["r"]
+        self.problem = problem
+        stored = model.stored and Stored(model.stored.weight, model.stored.on(grid).ravel(), grid)
+        self.model = replace(model, stored=stored, exact=None)
+        self.cavity = cavity_sign(problem.reduce, self.p, self.r) < 0 if cavity is None else cavity
+        self._moved = [Moved(model.gap, motion, 0.0, first) for motion in motions]
+        self.changes = [np.broadcast_to(moved.change(grid.x, grid.y), grid.box).ravel() for moved in self._moved]
+        counted = ~self.cavity if counted is None else counted
+        size = point_weights(grid)
+        weight = grid.cell * problem.p_unit * size * np.where(counted, 1.0, 0.0)  # cavitated cells have no p'
+        self._sides = [weight * change for change in self.changes]
+        unit = 2.0 * grid.spacing[0] / problem.scheme.flow_unit * size
+        self._M = np.where(self.cavity, unit * problem.scheme.h.ravel(), 0.0)
+        self._S = [unit * (1.0 - self.r) * change for change in self.changes]
+        self._solver, held = Linear(problem, self.cavity), problem.held
+        supplies = held.supplies if held is not None else ()
+        taken = supply_flows(problem, self.p, self.r)
+        self._sources = np.array([one.misfit(one.p, q)[1:] for one, q in zip(supplies, taken, strict=True)])
+        free = [one.open for one in supplies]
+        self._feed = Feed(problem, self.cavity, free) if any(free) else None
+        self._answers: dict[float, list[Any]] = {}
+        swept = (lambda S: S) if held is None else (lambda S: np.where(held.mask.ravel(), 0.0, S))  # type: ignore[union-attr]
+        self._swept = [swept(S) for S in self._S]
+        self._dG, self._raw = zip(*(self._derivative(moved) for moved in self._moved), strict=True)
+        self._slow = [self._settled(self._solver.solve(-dG), raw, 0.0) for dG, raw in zip(self._dG, self._raw, strict=True)]
+
+    def _settled(self, z: Any, raw: Any, nu: float) -> Any:
+        """z with the change of the supplies' pressures that follow."""
+        if self._feed is None:
+            return z
+        if nu not in self._answers:
+            pushed, none = [self._feed.pushed(t) for t in self._feed.free], np.zeros_like(self._M)
+            at = (lambda b: self._solver.at(nu, self._M, b, none)) if nu else self._solver.solve
+            self._answers[nu] = [at(b) for b in pushed]
+        return self._feed.corrected(z, raw, self._answers[nu], self._sources)
+
+    def stiffness(self) -> Array:
+        """-dF/de with nothing but e changed, shape (motions, motions)."""
+        return self._forces(self._slow).real
+
+    def damping(self) -> Array:
+        """-dF/d(de/dt) in the limit of slow motion."""
+        steps = zip(self._S, self._swept, self._slow, strict=True)
+        found = [self._settled(self._solver.solve(-(swept + self._M * z)), S, 0.0) for S, swept, z in steps]
+        return self._forces(found).real
+
+    def at(self, nu: float, stored: bool = True) -> Any:
+        """K + i nu C at this frequency, rad/s > 0; stored = False: as if the cavity's void were not stored (M = 0)."""
+        M, found = self._M if stored else 0.0 * self._M, []
+        for dG, raw, S, swept in zip(self._dG, self._raw, self._S, self._swept, strict=True):
+            found.append(self._settled(self._solver.at(nu, M, -dG, -nu * swept), raw + 1j * nu * S, nu))
+        return self._forces(found)
+
+    def _forces(self, found: Any) -> Any:
+        """-F of each motion's answer, shape (motions, motions)."""
+        dot = self.problem.reduce.dot
+        return np.array([[-complex(dot(row, z.real), dot(row, z.imag)) for z in found] for row in self._sides])
+
+    def _derivative(self, moved: Moved) -> tuple[Array, Array]:
+        """dG/de at fixed fields, and that of the cells' own balances, were none held: exact, as G is a cubic in e (conductances
+        in h^3, Couette and stored terms in h)."""
+        size = self.problem.reduce.max(np.abs(moved.change(self.problem.grid.x, self.problem.grid.y)))
+        step = STEP * self.problem.reduce.min(self.problem.scheme.h) / (size or 1.0)
+        values, grid = [], self.problem.grid
+        for part in (-2.0, -1.0, 1.0, 2.0):
+            other = replace(self.model, gap=replace(moved, e=part * step)).build(grid.shape, grid.dm.comm, grid)
+            if self.problem.dry is not None and other.coefficients_for is not None:
+                other = other.revised(self.problem.dry)
+            balance = other.balance(self.p, self.r)
+            raw = balance if other.held is None else other.face_flows(self.p, self.r)
+            values.append(np.stack([balance, raw]) * (other.scheme.flow_unit / self.problem.scheme.flow_unit))
+            other.destroy()
+        a, b, c, d = values
+        dG, raw = (8.0 * (c - b) - (d - a)) / (12.0 * step)
+        return dG, raw
+
+    def destroy(self) -> None:
+        """Free the PETSc objects. Collective."""
+        self._solver.destroy()
+        if self._feed is not None:
+            self._feed.destroy()

@@ -1,0 +1,65 @@
+"""One time step: the film at its end, with what its cells store, as a scene that the inner drivers solve."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from petsc4py import PETSc
+
+from ..base.parallel import Array
+from ..errors import InputError
+from ..problems.facts import Facts
+from ..problems.film.lubrication import LubricationProblem
+from ..problems.film.model import Model
+from ..problems.film.stored import mean_film
+from ..problems.grid import Grid
+from ..problems.solution import Fields
+from ..scenes.scene import Derived
+
+FULLEST = 1.0 + 1e-9  # void fraction beyond which a cell's content is negative
+
+
+@dataclass(frozen=True)
+class TimeStep(Derived):
+    """The film of a scene at the time t, on the march's grid."""
+
+    model: Model
+    grid: Grid
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return self.grid.shape
+
+    def with_shape(self, shape: tuple[int, ...]) -> "TimeStep":
+        raise NotImplementedError("a step is on its march's grid")
+
+    def facts(self, comm: PETSc.Comm | None = None) -> Facts:
+        return self.model.facts(self.shape, comm)
+
+    def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
+        """The discrete problem; on the march's own grid, unless the wall moves to smaller x. Collective."""
+        return self.model.build(self.shape, comm, self.grid if self.model.U >= 0 else None)
+
+
+def contents(grid: Grid, model: Model, fields: Fields | None) -> Array:
+    """h (1 - r) of the owned cells, m, times the density over that at p_c; without fields the full film's. Collective."""
+    h = mean_film(grid, model.film).ravel()
+    if fields is None:
+        return h
+    density = model.law.density(fields["p"] * model.p_unit) if model.law else 1.0
+    return h * (1.0 - fields["r"]) * density
+
+
+def check_content(grid: Grid, r: Array, t: float, dt: float, name: str) -> None:
+    """Raise InputError, with time and place, where a cell's content is negative. Collective."""
+    largest = grid.reduce.max(r)
+    if not largest > FULLEST:
+        return
+    box = r.reshape(grid.box)
+    own = np.argwhere(box == largest)
+    found = [(float(grid.x[0, i]), float(grid.y[j, 0])) for j, i in own[:1]]
+    x, y = next(place for places in grid.comm.allgather(found) for place in places)
+    where = f"x = {x:g}" + (f", y = {y:g}" if grid.dim == 2 else "")
+    raise InputError(
+        f"{name}: t = {t:g} s: the content at {where} m is negative ({1 - largest:.2g} of the film): the step of {dt:g} s is "
+        "too large; take more steps, or motion.tol"
+    )

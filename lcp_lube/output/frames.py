@@ -1,0 +1,161 @@
+"""What is kept of a march in time while it goes on: its history as a csv, fields at chosen times, frames to draw."""
+
+import csv
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import ceil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..base.parallel import Array
+from ..base.together import on_all_ranks
+from ..errors import InputError
+from ..problems.film.fronts import middle_row
+from ..problems.solution import Outcome, Solution
+from .files import check_target, coordinates, gather, replacing, save, taken
+from .series import collection
+
+MOST = {1: 1000, 2: 160}  # points a direction of a frame
+LINE, LINES = 400, 600  # points, and times, of the middle line
+
+
+class HistoryFile:
+    """A csv with a row for each time step, appended as they come. Collective.
+
+    Parameters
+    ----------
+    resumed : the march was taken up again: rows up to there stay.
+
+    Raises
+    ------
+    InputError : the file cannot be written.
+    """
+
+    def __init__(self, path: Path, comm: Any, resumed: bool):
+        self.path, self.comm, self.resumed = path, comm, resumed
+        self._file: Any = None
+        with on_all_ranks(comm, f"--history {path}"):
+            if comm.rank == 0:
+                if path.is_dir() or (path.exists() and not path.is_file()):
+                    raise InputError("is no ordinary file")
+                with path.open("a"):
+                    pass
+
+    def add(self, row: dict[str, Any], dt: float) -> None:
+        """Append a row; the first one begins the file, or follows those before it."""
+        with on_all_ranks(self.comm, f"--history {self.path}"):
+            if self.comm.rank == 0:
+                if self._file is None:
+                    kept = self._kept(row["t"] - 0.5 * dt) if self.resumed else []
+                    self._begin([*row], kept)
+                csv.writer(self._file, lineterminator="\n").writerow(_told(value) for value in row.values())
+                self._file.flush()
+
+    def _kept(self, before: float) -> list[list[str]]:
+        """Rows of the file up to a time; one cut short by a kill is not among them."""
+        lines = list(csv.reader(self.path.read_text().splitlines()))
+        width = len(lines[0]) if lines else 0
+        return [line for line in lines[1:] if len(line) == width and float(line[0]) < before]
+
+    def _begin(self, columns: list[str], kept: list[list[str]]) -> None:
+        temporary = self.path.with_name(f".{self.path.name}.{os.getpid()}")
+        with temporary.open("w", newline="") as file:
+            csv.writer(file, lineterminator="\n").writerows([columns, *kept])
+        os.replace(temporary, self.path)
+        self._file = self.path.open("a", newline="")
+
+    def close(self) -> None:
+        if self._file is not None:
+            self._file.close()
+
+
+def _told(value: Any) -> str:
+    return f"{value:.12g}" if isinstance(value, float) else str(value)
+
+
+class Series:
+    """Fields at chosen times: a .pvd, which lists a .vts for each. Collective.
+
+    Raises
+    ------
+    InputError : the files cannot be written.
+    """
+
+    def __init__(self, path: Path, boundary: bool):
+        check_target(path.with_suffix(".vts"))
+        self.path, self.boundary, self._files = path, boundary, list[tuple[float, str]]()
+
+    def add(self, moment: Any) -> None:
+        """Write the fields of a step, and the list anew."""
+        comm = moment.problem.grid.comm
+        target = self.path.with_name(f"{self.path.stem}_{moment.count:06d}.vts")
+        solution = Solution(moment.problem, moment.fields, Outcome.CONVERGED, "", None, [])  # type: ignore[arg-type]
+        save(solution, target, self.boundary)
+        self._files.append((float(f"{moment.t:.12g}"), target.name))
+        with replacing(self.path, comm) as temporary, on_all_ranks(comm, str(self.path)):
+            if comm.rank == 0:
+                Path(temporary).write_text(collection(self._files), encoding="utf-8")
+
+
+@dataclass
+class Frames:
+    """On rank 0: p (Pa), r and h at some times, thinned to a picture's size; and p and r of the middle line at many."""
+
+    times: list[float] = field(default_factory=list)
+    fields: list[dict[str, Array]] = field(default_factory=list)
+    line_times: list[float] = field(default_factory=list)
+    lines: list[dict[str, Array]] = field(default_factory=list)
+    x: Array = field(default_factory=lambda: np.empty(0))
+    y: Array = field(default_factory=lambda: np.empty(0))
+    line_x: Array = field(default_factory=lambda: np.empty(0))
+    lengths: tuple[float, ...] = ()
+    journal: bool = False
+    _every: int = 1
+
+    def add(self, moment: Any) -> None:
+        """Keep a frame. Collective."""
+        problem, grid = moment.problem, moment.problem.grid
+        stride = tuple(ceil(n / MOST[grid.dim]) for n in (*grid.shape, 1)[:2])
+        physical = problem.physical(moment.fields)
+        kept = {name: gather(grid, physical[name][0], stride) for name in ("p", "r", "h")}
+        self.x, *y = coordinates(grid, stride)
+        self.y, self.lengths, self.journal = (y[0] if y else self.y), grid.lengths, problem.shaft is not None
+        if grid.comm.rank == 0:
+            self.times.append(moment.t)
+            self.fields.append(kept)
+
+    def add_line(self, moment: Any) -> None:
+        """Keep the middle line; of very many steps every second one, and so on. Collective."""
+        if moment.count % self._every:
+            return
+        problem, grid = moment.problem, moment.problem.grid
+        step = ceil(grid.shape[0] / LINE)
+        physical, row = problem.physical(moment.fields), middle_row(problem)
+        rows = np.arange(grid.shape[1] if grid.dim == 2 else 1)
+        kept = {}
+        for name in ("p", "r"):
+            own = (rows >= grid.y_start) & (rows < grid.y_end) & (rows == row)
+            values = physical[name][0].reshape(grid.box)[own[grid.y_start : grid.y_end]]
+            line = np.zeros(grid.shape[0])
+            line[grid.x_start : grid.x_end] = values[0] if len(values) else 0.0
+            kept[name] = grid.comm.allreduce(line)[taken(grid.shape[0], step)].astype(np.float32)
+        self.line_x, self.lengths, self.journal = (
+            grid.lines[0][taken(grid.shape[0], step)],
+            grid.lengths,
+            problem.shaft is not None,
+        )
+        self.line_times.append(moment.t)
+        self.lines.append(kept)
+        if len(self.lines) > LINES:
+            self._every *= 2
+            self.line_times, self.lines = self.line_times[1::2], self.lines[1::2]
+
+
+def due(targets: Sequence[float], t: float, dt: float, done: int) -> int:
+    """How many of the targets a step that ends at t has reached, with those that were reached before."""
+    while done < len(targets) and targets[done] <= t + 0.5 * dt:
+        done += 1
+    return done

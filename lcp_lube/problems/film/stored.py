@@ -1,0 +1,108 @@
+"""What the cells of a moving film store: the term that a time step adds to the balance of the steady film.
+
+    A p + B r - c + 2 dx d/dt[h (1 - r)] = 0,     d/dt u ~ weight u - old     (implicit Euler, BDF2)
+
+puts -2 dx weight h on r's diagonal and 2 dx (old - weight h) to c. -B gains a positive diagonal: a step is of the same M-matrix
+family as the steady problem, and what holds for that one holds for it.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...base.parallel import Array
+from ..grid import Grid
+from ..transfer import Pick, numbers
+from .edges import GAUSS, _pieces
+
+if TYPE_CHECKING:
+    from .lubrication import LubricationProblem
+
+
+@dataclass(frozen=True)
+class Stored:
+    """A difference formula, and what it has of the contents h (1 - r) of earlier times.
+
+    Parameters
+    ----------
+    weight : of the contents sought, 1/s.
+    old : m/s, at this rank's points of `grid`, that of the whole march.
+    first, step : the film that is solved is a part of that one: its column i is column first + step i there, counted round.
+    """
+
+    weight: float
+    old: Array
+    grid: Grid
+    first: int = 0
+    step: int = 1
+
+    def on(self, grid: Grid) -> Array:
+        """`old` at the owned points of the film's own grid, shape `grid.box`. Collective."""
+        if grid is self.grid:
+            return self.old.reshape(grid.box)
+        j, i = numbers(grid)
+        take = Pick(self.grid, grid, j, (self.first + self.step * i) % self.grid.shape[0])
+        values = take(self.old)
+        take.destroy()
+        return values.reshape(grid.box)
+
+    def terms(self, grid: Grid, film: Any, share: Array, b_C: Array, c: Array) -> dict[str, Array]:
+        """What it makes of a scheme; share : twice the area that a row of the balance has for each m of film."""
+        storage, kept = share * self.weight * mean_film(grid, film), share * self.on(grid)
+        return {"b_C": b_C - storage, "c": c + kept - storage, "storage": storage, "kept": kept}
+
+    @property
+    def mirrored(self) -> "Stored":
+        """Of the mirror image in x of the whole film."""
+        return replace(self, first=-1 - self.first, step=-self.step)
+
+    def starting(self, first: int) -> "Stored":
+        """Of the part that begins at this column."""
+        return replace(self, first=self.first + self.step * first)
+
+
+def rates(problem: "LubricationProblem", r: Array) -> Array:
+    """What the cells come to store with the void r, shape `box`: nothing in a steady film."""
+    s = problem.scheme
+    return -problem._sources if s.storage is None or s.kept is None else s.storage * (1.0 - r) - s.kept
+
+
+def storing(problem: "LubricationProblem", r: Array) -> float:
+    """What all cells come to store, as `boundary_flows` has flows; 0 in a steady film. Collective."""
+    if problem.scheme.storage is None:
+        return 0.0
+    return problem.scheme.flow_unit * problem.reduce.sum(rates(problem, r.reshape(problem.grid.box)))
+
+
+def mean_film(grid: Grid, film: Any) -> Array:
+    """The film of each owned cell, m, shape `grid.box`: its value at the point, or where edges lie inside, its mean.
+
+    Else a pocket that travels would fill a whole cell at the moment when its edge passes the point.
+    """
+    h = np.array(np.broadcast_to(film(grid.x, grid.y), grid.box), dtype=float)
+    jumps = getattr(film, "jumps", lambda axis: ())
+    if not (jumps("x") or jumps("y")):
+        return h
+    x_faces, lines = grid.nodes_and_faces(0)[1], grid.y[:, 0]
+    columns, pieces = _pieces(x_faces[:-1], x_faces[1:], jumps("x"))
+
+    def along(y: Array) -> Array:
+        values = np.array(np.broadcast_to(film(grid.x, y[:, None]), (y.size, grid.box[1])))
+        if columns.size:
+            mean = 0.0
+            for a, b in pairwise(pieces):
+                for part in GAUSS:
+                    piece = np.broadcast_to(film((a + part * (b - a))[None, :], y[:, None]), (y.size, columns.size))
+                    mean = mean + 0.5 * (b - a) / (pieces[-1] - pieces[0]) * piece
+            values[:, columns] = mean
+        return values
+
+    h = along(lines)
+    if grid.dim == 2:
+        y_faces = grid.nodes_and_faces(1)[1]
+        rows, strips = _pieces(y_faces[:-1], y_faces[1:], jumps("y"))
+        if rows.size:
+            h[rows] = sum(((b - a) / (strips[-1] - strips[0]))[:, None] * along(0.5 * (a + b)) for a, b in pairwise(strips))
+    return h

@@ -1,0 +1,314 @@
+"""Films that go on in time: exact pressures, orders, balance, sides, ranks, checkpoints, journals that are free, bad input."""
+
+import csv
+import math
+import signal
+import subprocess
+import sys
+import time
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import ENVIRONMENT
+
+from lcp_lube import InputError, load_scene, solve
+
+PLATES = {
+    "family": "bearing",
+    "L": 1.0,
+    "U": 0.0,
+    "n": 40,
+    "p_unit": 1.0,
+    "fluid": {"mu": 1 / 6, "p_supply": 0.5},
+    "film": {"shape": "formula", "h": "0.375 + 0.125*cos(4*pi*t)"},
+    "motion": {"t_end": 0.4, "steps": 40, "start": "full"},
+}
+WEDGE: dict[str, Any] = {
+    "family": "bearing",
+    "L_mm": 10,
+    "U": 1.0,
+    "n": 30,
+    "fluid": {"mu": 0.01, "p_supply": 1e5},
+    "film": [
+        {"shape": "sinusoid", "h_min_um": 1, "h_max_um": 3, "waves": 2},
+        {"shape": "formula", "unit": "um", "h": "0.4*sin(300*t)"},
+    ],
+    "motion": {"t_end": 0.02, "steps": 20},
+}
+RING = {
+    "family": "bearing",
+    "dimension": 2,
+    "L": 0.3,
+    "width": 0.1,
+    "U": 10.0,
+    "nx": 24,
+    "ny": 5,
+    "fluid": {"mu": 0.02, "p_supply": 1e5},
+    "film": {"shape": "journal", "c": 1e-4, "eccentricity": 0.5},
+    "sides": {"west": "periodic", "east": "periodic"},
+}
+
+
+def march(scene, **changes):
+    solution = solve(load_scene(scene, changes))
+    assert solution.converged, solution.message
+    solution.destroy()
+    return solution
+
+
+@pytest.mark.parametrize("scheme, order", [("euler", 1), ("bdf2", 2)])
+def test_the_pressure_between_plates(scheme, order):
+    """p = p_side - h' x (1 - x)/h^3, exact in x: what is left is the formula's error."""
+    errors = []
+    for steps in (20, 40, 80):
+        # Plates that approach: the film stays full.
+        film = {"film": {"shape": "formula", "h": "0.375 + 0.125*cos(2*pi*t)"}}
+        s = march(PLATES | film, **{"motion.scheme": scheme, "motion.steps": steps})
+        h, rate = 0.375 + 0.125 * math.cos(0.8 * math.pi), -0.25 * math.pi * math.sin(0.8 * math.pi)
+        x = np.arange(1, 41) / 41
+        errors.append(np.abs(s.fields["p"] - (0.5 - rate * x * (1 - x) / h**3)).max())
+    rates = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert rates == pytest.approx(order, abs=0.15) and errors[-1] < 0.15
+
+
+def test_plates_are_the_squeeze_scene():
+    s = march(PLATES, **{"fluid.p_supply": 0.025, "motion.steps": 60})
+    other = march("squeeze", n=40, steps=60, t_end=0.4)
+    assert s.fields["r"].max() > 0.1
+    np.testing.assert_allclose(s.fields["p"], other.fields["p"] * 0.025, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(s.fields["r"], other.fields["r"], rtol=0, atol=1e-11)
+
+
+def test_a_film_that_rests_stays_at_its_steady_answer():
+    still = WEDGE | {"film": WEDGE["film"][:1]}
+    s, steady = march(still), march(still | {"motion": None})
+    np.testing.assert_allclose(s.fields["p"], steady.fields["p"], rtol=0, atol=1e-9 * steady.fields["p"].max())
+    assert s.load == pytest.approx(steady.load, rel=1e-9) and s.iterations_per_step < 1.5
+    full = march(still | {"motion": {"t_end": 2.0, "steps": 60, "start": "full"}})  # however it began
+    assert full.load == pytest.approx(steady.load, rel=1e-6)
+
+
+SIDES = {
+    "open": {},
+    "closed": {"sides": {"east": "closed"}},
+    "to smaller x": {"U": -1.0},
+    "at rest": {"U": 0.0},
+    "periodic": {"sides": {"west": "periodic", "east": "periodic"}, "dimension": 2, "nx": 16, "ny": 6},
+    "mirror": {"dimension": 2, "width_mm": 8, "nx": 15, "ny": 7},
+    "symmetry": {"dimension": 2, "width_mm": 8, "nx": 15, "ny": 6, "sides": {"south": "symmetry"}},
+    "dimples": {"film": [{"shape": "constant", "h_um": 2}, {"shape": "dimples", "depth_um": 2, "size_mm": 1.1, "columns": 4,
+                          "form": "square", "moves": True}]},
+    "liquid": {"fluid": {"mu": 0.01, "p_supply": 1e5, "barus": 1e-9}},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SIDES)
+def test_balance(name):
+    """What comes in is stored, in every step and in the whole run; the content says so too, by itself."""
+    s = march(WEDGE | SIDES[name])
+    assert s.mass_defect <= 1e-10 and s.mass_defect_run <= 1e-10
+    assert max(row["cavitated_fraction"] for row in s.history) > 0.05
+    euler = march(WEDGE | SIDES[name], **{"motion.scheme": "euler"}).history
+    flowed = sum(row["dt"] * (row["inflow"] - row["outflow"]) for row in euler[1:])
+    gained = euler[-1]["volume"] - euler[0]["volume"]
+    assert gained == pytest.approx(flowed, rel=0, abs=1e-9 * euler[0]["volume"])
+
+
+def test_a_wall_that_moves_the_other_way_is_the_mirror_image():
+    moves = {"shape": "formula", "unit": "um", "h": "0.3*sin(300*t)*(x/0.01 - 0.5)"}
+    film = [{"shape": "linear", "h_start_um": 3, "h_end_um": 1}, moves]
+    there = march(WEDGE | {"film": film})
+    film = [{"shape": "linear", "h_start_um": 1, "h_end_um": 3}, {**moves, "h": "-0.3*sin(300*t)*(x/0.01 - 0.5)"}]
+    back = march(WEDGE | {"film": film, "U": -1.0})
+    np.testing.assert_allclose(back.fields["p"][::-1], there.fields["p"], rtol=0, atol=1e-9)
+    assert there.load == pytest.approx(back.load, rel=1e-9)
+
+
+def test_the_symmetric_half_is_the_whole():
+    scene = WEDGE | SIDES["mirror"]
+    half, whole = march(scene), solve(load_scene(scene), reduction=False)
+    assert half.settings["details"]["reduction"] == "mirror"
+    np.testing.assert_allclose(half.fields["p"], whole.fields["p"], rtol=0, atol=1e-9 * whole.fields["p"].max())
+    whole.destroy()
+
+
+def test_steps_as_long_as_their_error_allows():
+    fine = march(WEDGE, **{"motion.steps": 1600}).load
+    found = []
+    for tol in (3e-2, 5e-3):
+        s = march(WEDGE | {"motion": {"t_end": 0.02, "tol": tol}})
+        found.append((abs(s.load / fine - 1), len(s.history)))
+        assert s.step_min < 0.5 * s.step_max and s.history[-1]["t"] == pytest.approx(0.02, rel=1e-12)
+    (rough, few), (good, many) = found
+    assert good < 1e-2 and good < 0.5 * rough and few < many < 800
+
+
+def test_smooth_motion_takes_two_iterations_a_step_at_most():
+    for scene in (WEDGE | {"n": 200}, "moving_texture"):
+        assert march(scene, **{"motion.steps": 200}).iterations_per_step <= 2
+    assert march("squeeze").iterations_per_step <= 1.5
+
+
+def test_a_journal_moves_by_formulas_and_by_a_file(tmp_path):
+    given = RING | {"motion": {"t_end": 0.01, "steps": 10, "journal": ["0.3*cos(600*t)", "0.3*sin(600*t)"]}}
+    one = march(given)
+    t = np.linspace(0, 0.01, 401)
+    rows = np.column_stack([t, 0.3 * np.cos(600 * t), 0.3 * np.sin(600 * t)])
+    np.savetxt(tmp_path / "path.csv", rows, delimiter=",", header="t,X,Y", comments="")
+    two = march(RING | {"motion": {"t_end": 0.01, "steps": 10, "file": str(tmp_path / "path.csv")}})
+    assert two.load == pytest.approx(one.load, rel=1e-5)
+    assert one.journal == pytest.approx([0.3 * math.cos(6), 0.3 * math.sin(6)])
+    assert one.history[-1]["journal_x"] == one.journal[0]
+
+
+def test_a_free_journal_comes_to_where_the_load_holds_it():
+    """The limit of a static load is the static answer, in a ring and between grooves."""
+    small = {"nx": 48, "ny": 5}
+    balanced = solve(load_scene("two_groove_journal", **small, balance={"load": 1500.0}))
+    e, phi = balanced.settings["balance"]["value"], math.radians(balanced.settings["attitude_deg"])
+    balanced.destroy()
+    motion = {"t_end": 0.4, "tol": 3e-2, "free": True, "mass": 5.0, "load": ["1500", "0"], "position": [0.3, 0.3]}
+    s = march("two_groove_journal", **small, motion=motion)
+    assert s.journal == pytest.approx([e * math.cos(phi), e * math.sin(phi)], abs=1e-5)
+
+
+def test_an_orbit_is_of_second_order():
+    """Places at one moment of the dynamically loaded journal, from steps that halve."""
+    ends = []
+    for steps in (8, 16, 32, 64):
+        s = march("dynamic_journal", nx=16, ny=3, **{"motion.t_end": 0.002, "motion.steps": steps})
+        ends.append(np.array(s.journal))
+        assert s.mass_defect_run < 1e-10
+    errors = [np.hypot(*(b - a)) for a, b in pairwise(ends)]
+    assert errors[-1] < 1e-3 and errors[0] / errors[1] > 2.5 and errors[1] / errors[2] > 3
+
+
+def history(path):
+    return [{name: float(value) for name, value in row.items()} for row in csv.DictReader(path.read_text().splitlines())]
+
+
+def test_a_march_is_taken_up_where_it_was_killed(cli, tmp_path):
+    """kill -9: the history stands, and from the last checkpoint the run ends as if nothing had been."""
+    words = ["solve", "moving_texture", "--set", "motion.steps=400"]
+    whole = cli(*words, "--json")
+    assert whole.status == 0, whole.err
+    options = [*words, "--history", "h.csv", "--checkpoint", "c", "--every", "3"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "lcp_lube", *options], cwd=tmp_path, env=ENVIRONMENT, stderr=subprocess.DEVNULL
+    )
+    wait_for(lambda: (tmp_path / "c").exists() and len((tmp_path / "h.csv").read_text().splitlines()) > 12)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    kept = history(tmp_path / "h.csv")
+    assert 10 <= len(kept) < 400
+    again = cli(*options, "--resume", "c", "--json")
+    assert again.status == 0, again.err
+    for name in ("load", "p_max", "time_steps", "mass_defect_run"):
+        assert again.json[name] == pytest.approx(whole.json[name], rel=1e-9, abs=1e-12), name
+    rows = history(tmp_path / "h.csv")
+    assert len(rows) == 400 and np.all(np.diff([row["t"] for row in rows]) > 0)
+
+
+def wait_for(what):
+    for _ in range(600):
+        if what():
+            return
+        time.sleep(0.1)
+    raise AssertionError("it did not come to that")
+
+
+def test_an_orbit_is_taken_up(tmp_path):
+    small = {"nx": 16, "ny": 3, "motion.t_end": 0.001, "motion.steps": 12}
+    whole = march("dynamic_journal", **small)
+
+    class Stop(Exception):
+        pass
+
+    def watch(moment):
+        if moment.count == 8:
+            raise Stop
+
+    with pytest.raises(Stop):
+        solve(load_scene("dynamic_journal", small), checkpoint=tmp_path / "c", every=2, watch=watch)
+    solution = solve(load_scene("dynamic_journal", small), resume=tmp_path / "c")
+    assert [row["t"] for row in solution.history] == [row["t"] for row in whole.history]
+    assert solution.journal == pytest.approx(whole.journal, abs=1e-8) and solution.load == pytest.approx(whole.load, rel=1e-6)
+    solution.destroy()
+
+
+def test_told_to_end_a_march_saves_its_step(cli, tmp_path):
+    words = ["solve", "squeeze", "--set", "steps=4000", "--checkpoint", "c", "--every", "100000"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "lcp_lube", *words, "--history", "h.csv"], cwd=tmp_path, env=ENVIRONMENT, stderr=subprocess.PIPE
+    )
+    wait_for(lambda: (tmp_path / "h.csv").exists() and len((tmp_path / "h.csv").read_text().splitlines()) > 5)
+    process.send_signal(signal.SIGINT)
+    assert b"--resume c goes on" in process.communicate()[1] and process.returncode == 130
+    assert (tmp_path / "c").exists()
+    other = cli("solve", "squeeze", "--set", "steps=4001", "--resume", "c")
+    assert other.status == 2 and "another scene" in other.lines[0]
+
+
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_ranks(cli, ranks):
+    words = ("solve", "dynamic_journal", "--set", "nx=24", "--set", "ny=6", "--set", "motion.steps=4")
+    words += ("--set", "motion.t_end=0.0008", "--history", "h.csv", "--json")
+    alone, together = cli(*words), cli(*words, ranks=ranks)
+    assert alone.status == together.status == 0, together.err
+    assert together.json["journal"] == pytest.approx(alone.json["journal"], abs=1e-7)
+    assert together.json["load"] == pytest.approx(alone.json["load"], rel=1e-5)
+
+
+def test_what_is_kept_of_a_march(cli, tmp_path):
+    run = cli("solve", "moving_texture", "--set", "motion.steps=20", "--plot", "a.gif", "--output", "a.pvd", "--times", 4)
+    assert run.status == 0 and "20 time steps" in run.out, run.err
+    text = (tmp_path / "a.pvd").read_text()
+    names = sorted(path.name for path in tmp_path.glob("*.vts"))
+    assert len(names) == 4 and all(name in text for name in names) and 'timestep="0.0025"' in text
+    Image = pytest.importorskip("PIL.Image")
+    with Image.open(tmp_path / "a.gif") as image:
+        assert image.n_frames == 4
+
+
+def test_bad_input(cli, tmp_path):
+    ring = tmp_path / "ring.toml"
+    text = """
+        family = "bearing"
+        dimension = 2
+        L = 0.3
+        width = 0.1
+        U = 10.0
+        nx = 24
+        ny = 5
+        fluid = {mu = 0.02, p_supply = 1e5}
+        film = {shape = "journal", c = 1e-4, eccentricity = 0.5}
+        sides = {west = "periodic", east = "periodic"}
+        [motion]
+        t_end = 0.1
+        steps = 20"""
+    ring.write_text(text + '\njournal = ["18*t", "0"]\n')
+    run = cli("solve", "ring.toml", "--history", "h.csv")
+    assert run.status == 2 and "t = 0.06 s: film -8e-06 m at x = 0, y =" in run.lines[-1] and len(run.lines) == 1, run.err
+    assert len(history(tmp_path / "h.csv")) == 11
+    for words, message in (
+        (("squeeze", "--set", "h_amplitude=0.374", "--set", "steps=4", "--set", "t_end=0.5"), "content at x ="),
+        (("problem1", "--history", "h.csv"), "does not go on in time"),
+        (("problem1", "--plot", "a.gif"), "does not go on in time"),
+        (("squeeze", "--times", "0.1,9"), "--times 0.1,9"),
+        (("moving_texture", "--set", "motion.dt=1"), "steps and dt are both given"),
+        (("moving_texture", "--set", "motion.free=true"), "load is missing"),
+        (("moving_texture", "--set", 'motion.journal=["t","0"]'), "the shape 'journal'"),
+        (("moving_texture", "--set", "balance.load=3"), "balance and motion"),
+        (("dynamic_journal", "--set", 'motion.load=["log(0-1)", "0"]'), "no number at t ="),
+        (("pocketed_pad", "--set", "film.pocket.moves=true"), "a table [motion] is needed"),
+        (("moving_texture", "--set", "fluid.density=dowson-higginson"), "fluid.barus alone goes on in time"),
+    ):
+        run = cli("solve", *words)
+        assert run.status == 2 and message in run.lines[-1] and len(run.lines) == 1, (words, run.err)
+
+
+def test_a_step_that_is_too_large_is_said_to_be():
+    with pytest.raises(InputError, match=r"t = .* the content at x = .* is negative"):
+        solve(load_scene("squeeze", {"h_amplitude": 0.374, "steps": 4, "t_end": 0.5}))
