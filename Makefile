@@ -1,6 +1,8 @@
 # `make demo` and `make test` install what they need on Debian 12 and Ubuntu 24.04; for other systems see README.md.
 
 BIN := .venv/bin
+# A process a core; a file's tests stay in one, which share what their fixtures have solved.
+PYTEST = $(BIN)/python -m pytest -q -n auto --dist loadfile
 READY := .venv/.ready
 
 # Open MPI: root may start it (containers), and a test may start more ranks than there are cores (releases 4 and 5).
@@ -27,10 +29,10 @@ demo: $(READY) ## solve problem 4 and draw it: problem4.png
 	$(BIN)/lcp-lube solve problem4 --n 100 --plot problem4.png
 
 test: lint ## ruff, mypy, then all tests with their coverage
-	$(BIN)/python -m pytest -q --cov=lcp_lube --cov-report=term
+	$(PYTEST) --cov=lcp_lube --cov-report=term
 
 test-rounding: $(READY) ## the tests that rounding may move, under the kernels of other processors
-	for kernel in Haswell Prescott; do OPENBLAS_CORETYPE=$$kernel NUMBA_CPU_NAME=generic $(BIN)/python -m pytest -q -m rounding || exit; done
+	for kernel in Haswell Prescott; do OPENBLAS_CORETYPE=$$kernel NUMBA_CPU_NAME=generic $(PYTEST) -m rounding || exit; done
 
 test-petsc-new: ## the tests with the newest PETSc of PyPI, without hypre; compiles it the first time
 	tools/petsc_new.sh
@@ -38,7 +40,7 @@ test-petsc-new: ## the tests with the newest PETSc of PyPI, without hypre; compi
 
 # Machine code that was compiled without the checks must not be taken from a cache.
 boundscheck: $(READY) ## the tests with every index of the compiled loops checked
-	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(CURDIR)/.numba_boundscheck_cache $(BIN)/python -m pytest -q
+	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(CURDIR)/.numba_boundscheck_cache $(PYTEST)
 
 mutations: $(READY) ## 2,000 damaged scenes, options and files; every recipe by method, system, sides and ranks
 	LCP_LUBE_MUTATIONS=2000 $(BIN)/python -m pytest -q tests/whole/test_mutations.py tests/whole/test_combinations.py --timeout 3000
