@@ -38,9 +38,14 @@ class Row:
         if not self.errors[-1] <= self.reference.tol:  # NaN is wrong too
             return f"{self.errors[-1]:.1e} > {self.reference.tol:.0e}"
         needed = self.reference.order
-        if needed is None or self.errors[-1] <= ROUNDING or (self.order is not None and self.order >= needed):
+        if needed is None or self.errors[-1] <= ROUNDING or self.steady or (self.order is not None and self.order >= needed):
             return ""
         return f"order {self.order:.2f}" if self.order is not None else "no order"
+
+    @property
+    def steady(self) -> bool:
+        """Whether all grids give one value: the reference's own digits are what is left."""
+        return bool(np.ptp(self.values) <= ROUNDING * abs(self.values[-1]))
 
     @property
     def passed(self) -> bool:
@@ -133,7 +138,7 @@ def table(verdicts: Sequence[Verdict]) -> str:
     """Ours, reference, errors by grid, order and verdict, for people."""
     cells = [["quantity", "ours", "reference", "relative error by grid", "order (needed)", "verdict"]]
     for row in (row for verdict in verdicts for row in verdict.rows):
-        order = "-" if row.order is None or row.errors[-1] <= ROUNDING else f"{row.order:.2f}"
+        order = "-" if row.order is None or row.errors[-1] <= ROUNDING or row.steady else f"{row.order:.2f}"
         needed = f"({row.reference.order:g})" if row.reference.order else ""
         numbers = (f"{row.values[-1]:.9g}", f"{row.reference.value:.9g}", " ".join(f"{error:8.1e}" for error in row.errors))
         verdict_word = "ok" if row.passed else f"FAIL: {row.fault}"

@@ -18,7 +18,7 @@ from ..scenes.scene import Solvable
 from ..solvers.newton import Stopping
 from .ask import Ask
 from .compose import Inner
-from .estimate import misplaced_film, relative_error
+from .estimate import QUADRATURE, Estimate, estimate, known_numbers, misplaced_film, scalars
 from .memory import DENSE, available
 from .plan import SMALL
 
@@ -57,8 +57,10 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
 
     Returns
     -------
-    Solution : on the last grid. settings['accuracy_estimate'] is the estimated relative error, `levels` has every grid with its
-        value and estimate. Where grids end before the estimate is below the tolerance: outcome ACCURACY.
+    Solution : on the last grid. The quantity among its numbers is the best value: this grid's, or the one extrapolated from all
+        (settings['accuracy_extrapolated']; 'accuracy_grid_value' is the grid's own). settings['accuracy_estimate'] is its
+        estimated relative error, 'estimates' has value, error (in its unit) and extrapolated of all numbers, `levels` every
+        grid with its own value and the estimate. Where grids end before the estimate is below the tolerance: outcome ACCURACY.
 
     Raises
     ------
@@ -69,11 +71,12 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     begin = perf_counter()
     shape = first_shape(scene.shape, ask.mpi.size)
     solution: Solution | None = None
-    values: list[float] = []
+    history: list[dict[str, float]] = []
     misplaced: list[float] = []
     levels: list[dict[str, Any]] = []
     times: dict[str, float] = {}
-    end = ""
+    known = known_numbers(scene, ask.comm)
+    end, best = "", Estimate(np.nan, inf)
     while not end:
         level_begin, before = perf_counter(), solution
         near = ask.start if before is None else _start(before, prod(shape)) if ask.nested is not False else None
@@ -82,36 +85,51 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         if before is not None:
             before.destroy()
         problem = solution.problem
-        found = problem.quantities(solution.fields)
+        found = dict(solution.numbers)
         if balance := solution.settings.get("balance"):  # what is sought is the number; the load is given
-            found = {balance["vary"]: balance["value"], **found}
+            found, known = {balance["vary"]: balance["value"], **found}, None
             quantity = quantity or balance["vary"]
         quantity = quantity or next((name for name in DEFAULT_QUANTITY if name in found), "")
-        values.append(find_value(found, quantity, scene) if solution.converged else np.nan)
+        value = find_value(found, quantity, scene)
+        history.append({**scalars(found), quantity: value} if solution.converged else {})
         misplaced.append(misplaced_film(problem))
-        estimate = relative_error(values, misplaced)
+        best = _best(quantity, history, misplaced, known)
         levels.append(
             {
                 **dict(zip(("nx", "ny"), problem.grid.shape, strict=False)),
                 "iterations": solution.iterations,
                 "linear_iterations": solution.total("linear_iterations"),
                 "time_s": perf_counter() - level_begin,
-                "value": values[-1],
-                "estimate": estimate,
+                "value": history[-1].get(quantity, np.nan),
+                "estimate": best.relative,
             }
         )
         seconds_by_level = [float(level["time_s"]) for level in levels]
-        ask.tell("accuracy", f"{quantity} to {estimate:.0e}", of_ladder(seconds_by_level, estimate, tol, 2.0 ** len(shape)))
+        ask.tell(
+            "accuracy", f"{quantity} to {best.relative:.0e}", of_ladder(seconds_by_level, best.relative, tol, 2.0 ** len(shape))
+        )
         times = {name: times.get(name, 0.0) + seconds for name, seconds in solution.times.items()}
         shape = tuple(int(n + meshes) for n, meshes in zip(shape, problem.grid.meshes, strict=True))  # half the spacing
+        values = [level["value"] for level in levels]
         end = _end([level["estimate"] for level in levels], values, tol, problem.grid.size) or _no_room(
-            solution, shape, finest, estimate, tol
+            solution, shape, finest, best.relative, tol
         )
     assert solution is not None and quantity is not None  # for the type checker: there is a first grid
-    if solution.converged and not estimate <= tol:
+    if solution.converged and not best.relative <= tol:
         solution.outcome = Outcome.ACCURACY
-        solution.message = f"{quantity} to {estimate:.1e} only, {tol:g} was asked for: {end}"
-    solution.settings |= {"accuracy": tol, "accuracy_quantity": quantity, "accuracy_estimate": estimate}
+        solution.message = f"{quantity} to {best.relative:.1e} only, {tol:g} was asked for: {end}"
+    solution.settings |= {
+        "accuracy": tol,
+        "accuracy_quantity": quantity,
+        "accuracy_estimate": best.relative,
+        "accuracy_extrapolated": best.extrapolated,
+        "accuracy_grid_value": history[-1].get(quantity),
+        "estimates": {
+            name: vars(one) for name in history[-1] if isfinite((one := _best(name, history, misplaced, known)).error)
+        },
+    }
+    if best.extrapolated and quantity in solution.numbers:
+        solution.numbers[quantity] = best.value
     solution.settings["why"] = [*solution.settings["why"], *ladder(levels, quantity, tol)]
     solution.levels = levels
     solution.times = {**times, "total": perf_counter() - begin}
@@ -127,6 +145,18 @@ def first_shape(shape: tuple[int, ...], ranks: int = 1) -> tuple[int, ...]:
     while enough(half := tuple((n - 1) // 2 for n in shape)):
         shape = half
     return shape
+
+
+def _best(
+    name: str, history: Sequence[Mapping[str, float]], misplaced: Sequence[float], known: Mapping[str, float] | None
+) -> Estimate:
+    """The best value of a number and its error: from what is known of a line, or from its values on all grids."""
+    value = history[-1].get(name, np.nan)
+    truth = np.nan if known is None else known.get(name, np.nan)
+    if np.isfinite(truth):
+        above = max(1.0, abs(value / truth)) if truth else 1.0  # relative to the truth, not to a value that is too large
+        return Estimate(value, above * abs(value - truth) + QUADRATURE * abs(value))
+    return estimate([found.get(name, np.nan) for found in history], misplaced)
 
 
 def ladder(levels: list[dict[str, Any]], quantity: str, tol: float) -> list[str]:
@@ -176,7 +206,7 @@ def _start(before: Solution | None, points: int) -> Solution | None:
 
 def find_value(found: dict[str, Any], quantity: str, scene: Solvable) -> float:
     """The quantity among those found; NaN where it has no value on this grid, a front that is not there, say."""
-    numbers = [name for name, value in found.items() if isinstance(value, int | float) and not isinstance(value, bool)]
+    numbers = list(scalars({name: value for name, value in found.items() if value is not None}))
     if quantity not in found or not (found[quantity] is None or quantity in numbers):
         near = nearest(quantity, numbers)
         raise InputError(

@@ -19,6 +19,7 @@ from ..problems.film import slopes
 from ..problems.film.cavity import VOID, cavity_sign
 from ..problems.film.forces import attitude
 from ..problems.film.grooves import GroovedProblem
+from ..problems.film.line import known_fields
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.tangent import Tangent, effective, tangent
@@ -120,6 +121,9 @@ class Equations:
         """`slopes.numbers` as the scene has them. Collective."""
         problem = self.problem(p)
         found = slopes.numbers(problem, p / problem.p_unit, r)
+        if (fields := known_fields(problem)) is not None:  # a line's numbers are free of the grid's error (`film.line`)
+            told, discrete = _flat(problem.quantities(fields)), slopes.numbers(problem, fields["p"], fields["r"])
+            found = {name: value + (told.get(name, discrete[name]) - discrete[name]) for name, value in found.items()}
         return self._flipped(found) if self.turned else found
 
     def _flipped(self, found: dict[str, float]) -> dict[str, float]:
@@ -189,6 +193,12 @@ class Equations:
 
     def destroy(self) -> None:
         self.constant.destroy()
+
+
+def _flat(told: dict[str, Any]) -> dict[str, Any]:
+    """Quantities by the names of `slopes.numbers`."""
+    parts = {f"flow_{side}": value for side, value in told["flow"].items()}
+    return {**told, **parts, **dict(zip(("force_x", "force_y"), told.get("force", ()), strict=False))}
 
 
 def _followed(grid: Grid, before: Model, after: Model) -> Places | None:

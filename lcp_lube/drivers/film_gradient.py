@@ -2,7 +2,8 @@
 
 The same lambda as for the scene's numbers (`gradient`), times the derivatives of the scheme's coefficients by the film at their
 faces and points, which a complex step through the code of the scheme gives. What belongs to a face is dealt to its two points:
-the film between them is then understood as their mean, as interpolation between points has it.
+the film between them is then understood as their mean, as interpolation between points has it. In 1D the field is that of the
+discrete equations, whose numbers differ from those told by the grid's error (`problems/film/line`).
 """
 
 from dataclasses import replace

@@ -77,7 +77,7 @@ class Part(Derived):
         assert model is not None  # as `applies` found
         x, y = model.lines(self.whole.shape) if len(self.whole.shape) == 2 else EVEN
         if self.kind == "line":
-            return replace(model, lengths=model.lengths[:1], exact=None, places=(x, None)), self.shape
+            return replace(model, lengths=model.lengths[:1], exact=None, places=(x, None), integrals=False), self.shape
         nx, ny = self.shape
         y = None if y is None else y[: (ny + 1) // 2]
         west, east, south, _ = model.sides

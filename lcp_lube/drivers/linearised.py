@@ -13,8 +13,8 @@ from ..base.parallel import Array
 from ..linear.cavity import CavitySystem
 from ..linear.krylov import Krylov
 from ..problems.facts import Facts
+from ..problems.film.assembly import assemble
 from ..problems.film.lubrication import LubricationProblem
-from ..problems.film.reynolds import assemble
 from ..registry import SMALL
 from .plan import default_recipe
 

@@ -7,8 +7,8 @@ from petsc4py import PETSc
 from ..base.owned import Owned
 from ..base.parallel import Array
 from ..base.stages import Stages
+from ..problems.film.assembly import coo, csr
 from ..problems.film.lubrication import LubricationProblem
-from ..problems.film.reynolds import coo, csr
 from .krylov import Krylov
 
 TINY = 1e-10  # entries that are far from PETSc's zero pivot, 2e-14, on one side

@@ -17,8 +17,8 @@ from petsc4py import PETSc
 from ..base.owned import Owned
 from ..base.parallel import Array
 from ..base.stages import Stages
+from ..problems.film.assembly import coo, csr
 from ..problems.film.lubrication import LubricationProblem
-from ..problems.film.reynolds import coo, csr
 from .krylov import Krylov
 
 

@@ -16,6 +16,15 @@ from ..problems.solution import Solution
 from ..scenes.doubts import too_high
 from .units import place, quantity
 
+ACCURACY = (
+    "accuracy",
+    "accuracy_quantity",
+    "accuracy_estimate",
+    "accuracy_extrapolated",
+    "accuracy_grid_value",
+    "estimates",
+)
+
 
 @np.errstate(over="ignore", invalid="ignore")
 def as_dict(solution: Solution) -> dict[str, Any]:
@@ -47,8 +56,7 @@ def as_dict(solution: Solution) -> dict[str, Any]:
         **certificate.measures,
         "certificate_tol": certificate.tol,
         **(solution.enclosure.as_dict() if solution.enclosure else {}),
-        **{key: settings[key] for key in ("accuracy", "accuracy_quantity", "accuracy_estimate") if key in settings},
-        **{key: settings[key] for key in ("balance", "model") if key in settings},
+        **{key: settings[key] for key in (*ACCURACY, "balance", "model") if key in settings},
         **settings.get("details", {}),
         **({"levels": solution.levels} if solution.levels else {}),
         "warnings": [*settings.get("warnings", []), *too_high(quantities)],
@@ -202,7 +210,8 @@ def summary(data: dict[str, Any]) -> str:
     if "accuracy_estimate" in data:
         lines.append(
             f"{data['accuracy_quantity']}: estimated relative error {data['accuracy_estimate']:.1e} "
-            f"({data['accuracy']:g} was asked for), {len(data['levels'])} grids"
+            f"({data['accuracy']:g} was asked for), {len(data['levels'])} grid{'s' * (len(data['levels']) > 1)}"
+            + (f"; extrapolated, this grid's own is {data['accuracy_grid_value']:.9g}" if data["accuracy_extrapolated"] else "")
         )
     if data.get("certified"):
         lines.append(

@@ -11,7 +11,8 @@ from ..base.owned import Owned, made
 from ..base.parallel import Array, Reduce
 from ..errors import InputError
 from .certificate import Certificate, certificate_tol
-from .film.reynolds import assemble, sides
+from .film.assembly import assemble
+from .film.reynolds import sides
 from .fold import FOLDED, column_shares, line_shares
 from .grid import Grid
 from .solution import Fields

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from ..errors import InputError
 from ..problems.film.profile import read_profile
 from ..problems.film.shapes import Along, Block, DimpleArray, Herringbone, Journal, RandomSurface, Scaled, Shape, Travelling
 from ..registry import SHAPES
@@ -18,6 +19,7 @@ from .units import Measured, metres
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Span = tuple[Finite, Finite]
 Unit = Literal["m", "mm", "um"]
+SLACK = 1e-9  # relative: dimples that touch do not overlap
 UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
 
 
@@ -162,6 +164,14 @@ class Dimples(Part):
     def part(self, extent: Extent) -> Shape:
         x = self.x or (0.0, extent.lengths[0])
         y = self.y or ((0.0, extent.lengths[1]) if len(extent.lengths) == 2 else (-inf, inf))
+        cells = {"x": (x[1] - x[0]) / self.columns, "y": (y[1] - y[0]) / self.rows}
+        for axis, cell in cells.items():
+            if self.size > cell * (1.0 + SLACK):
+                many = f"{self.columns if axis == 'x' else self.rows} along {axis}"
+                raise InputError(
+                    f"film: dimples of size {1e3 * self.size:g} mm in cells of {1e3 * cell:g} mm ({many}) would overlap; "
+                    f"at most {1e3 * cell:g} mm is allowed"
+                )
         return DimpleArray(self.form, self.depth, self.size, self.columns, self.rows, x, y)
 
 

@@ -39,9 +39,8 @@ def test_what_is_covered():
 
 def test_orders_of_exact_cases(verdicts):
     """Second order where no front moves in its cell; on average, from grids 16 apart, where one does."""
-    orders = {(v.case.name, row.quantity): row.order for v in verdicts for row in v.rows}
-    assert 1.9 < orders["pocketed pad, slow", "p_max"] < 2.1
-    assert 1.8 < orders["long journal, eps = 0.5", "rupture_deg"] < 2.5
+    exact = [row for v in verdicts if v.case.name in ("pocketed pad", "long journal, eps = 0.5") for row in v.rows]
+    assert sum(row.steady for row in exact) >= 8  # scheme face in 1D: every grid has the film's own numbers
     rows = [row for v in verdicts for row in v.rows if v.case.scene.startswith("problem")]
     fronts = [row.order for row in rows if row.errors[-1] > verify.ROUNDING]
     assert len(fronts) >= 13

@@ -43,7 +43,7 @@ def found(scene):
     return values
 
 
-@pytest.mark.parametrize("name", ["problem1", "problem2", "problem3", "long_journal"])
+@pytest.mark.parametrize("name", ["problem1", "problem2", "problem3"])
 def test_friction_is_of_second_order_on_average(name):
     """The void is known at the faces, not at the points: there the drag of a cavity would be of first order."""
     drag, _ = exact_drag(load_scene(name))
@@ -156,7 +156,7 @@ PER_WIDTH = ("load", "friction", "pressure_integral", "power_loss", "cavitated_a
 
 def on_sides(shape, film, sides, width=WIDTH):
     """Quantities of a film with sides of any kind; all of them per whole width where half of it is modelled."""
-    model = Model((L, width)[: len(shape)], sides, film, MU, U, 0.0, 1e6, "face")
+    model = Model((L, width)[: len(shape)], sides, film, MU, U, 0.0, 1e6, "face", integrals=False)
     problem = model.build(shape)
     run = build(Job(problem, Stages(), "reduced"))
     outcome, message, _ = iterate(run, Stopping())

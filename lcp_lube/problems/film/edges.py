@@ -11,6 +11,7 @@ an edge inside a cell, only the part before it resists, which the coefficients c
 
 from collections.abc import Callable, Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,15 @@ from ...base.parallel import Array
 
 GAUSS = (0.5 - 0.5 / np.sqrt(3.0), 0.5 + 0.5 / np.sqrt(3.0))
 MARGIN = 1e-9  # of a spacing: an edge so near a point, or a face's end, is on it
+
+
+def marks_of(film: Any) -> tuple[float, ...]:
+    """x (m) where a film, or a part of one, jumps or has a kink, as far as it tells: `marks`, `breakpoints` or `jumps`."""
+    for name, axis in (("marks", ()), ("breakpoints", ()), ("jumps", ("x",))):
+        tell = getattr(film, name, None)
+        if tell is not None:
+            return tuple(tell(*axis))
+    return ()
 
 
 def face_film(

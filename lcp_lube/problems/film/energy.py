@@ -17,10 +17,11 @@ import numpy as np
 from petsc4py import PETSc
 
 from ...base.parallel import Array
+from .assembly import assemble
 from .cavity import cavity_sign
 from .effects import Answer, around, framed_by
 from .flows import line_weights, point_weights
-from .reynolds import assemble, sides
+from .reynolds import sides
 
 RTOL = 1e-13  # of the linear solves
 SAME = 1e-300

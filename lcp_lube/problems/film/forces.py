@@ -14,7 +14,10 @@ from .flows import line_weights, point_weights
 from .reynolds import sides
 
 if TYPE_CHECKING:
+    from .line import Known
     from .lubrication import LubricationProblem
+
+Weight = Callable[[Array, Array], Array]
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,7 @@ def ambient(problem: LubricationProblem) -> float:
     return min(at_sides or [supply.p for supply in problem.held.supplies])  # type: ignore[union-attr]
 
 
-def forces(problem: LubricationProblem, p_pa: Array) -> dict[str, Any]:
+def forces(problem: LubricationProblem, p_pa: Array, known: Known | None = None) -> dict[str, Any]:
     """Load, force and moment, N and N m (1D: N/m and N): the keys of `docs/numbers.md`. Collective.
 
     A flat film: `load`, the integral of p - p_ambient, and `moment` about the middle of the film, [about x, about y], of that
@@ -53,27 +56,35 @@ def forces(problem: LubricationProblem, p_pa: Array) -> dict[str, Any]:
 
     Parameters
     ----------
-    p_pa : owned points, Pa above p_c.
+    p_pa : owned points, Pa above p_c. known : of a line, from which follows what the grid gets wrong.
     """
     grid, shaft, reference = problem.grid, problem.shaft, ambient(problem)
     middle = [start + 0.5 * length for start, length in zip(grid.origin, grid.lengths, strict=False)]
 
-    def over(weight: Callable[[Array, Array], Array], above: float = reference) -> float:
-        return integral(problem, p_pa, above, weight)
+    def over(weight: Weight, whole: Callable[[Array], Array] = np.asarray, above: float = reference) -> float:
+        """Of a weight; on a line `whole` is its antiderivative."""
+        found = integral(problem, p_pa, above, weight)
+        if known is None:
+            return found
+        return found + (known.line.integral(whole, above) - integral(problem, known.p_pa, above, weight))
 
-    out: dict[str, Any] = {"pressure_integral": over(lambda x, y: np.ones(1), 0.0)}
+    out: dict[str, Any] = {"pressure_integral": over(lambda x, y: np.ones(1), above=0.0)}
     if shaft is None and grid.polar is not None:
         return out | _of_sector(grid.polar, over)
     if shaft is None:
         out["load"] = over(lambda x, y: np.ones(1))
-        about_y = -over(lambda x, y: x - middle[0])
+        about_y = -over(lambda x, y: x - middle[0], lambda x: 0.5 * (x - middle[0]) ** 2)
         out["moment"] = [over(lambda x, y: y - middle[1]), about_y] if grid.dim == 2 else about_y
         return out
 
     def phi(x: Array) -> Array:
         return shaft_angle(problem, shaft, x)
 
-    force = [-over(lambda x, y: np.cos(phi(x))), -over(lambda x, y: np.sin(phi(x)))]
+    R = shaft.radius
+    force = [
+        -over(lambda x, y: np.cos(phi(x)), lambda x: R * np.sin(phi(x))),
+        -over(lambda x, y: np.sin(phi(x)), lambda x: -R * np.cos(phi(x))),
+    ]
     out |= {"load": hypot(*force), "force": force, "attitude_deg": None}
     if shaft.widest is not None and 0 < out["load"] < inf:
         out["attitude_deg"] = attitude(shaft.widest, force, problem.U)
@@ -108,7 +119,7 @@ def _of_sector(polar: tuple[float, float], integral: Callable[..., float]) -> di
     return {"load": load, "moment": moment, "pressure_centre": centre}
 
 
-def integral(problem: LubricationProblem, p_pa: Array, above: float, weight: Callable[[Array, Array], Array]) -> float:
+def integral(problem: LubricationProblem, p_pa: Array, above: float, weight: Weight) -> float:
     """Integral of (p - above) weight(x, y): trapezoidal to the open sides, a corner having the mean of its two; cells end at
     the others. Collective."""
     grid = problem.grid

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...errors import InputError
+from .edges import marks_of
 
 Array = NDArray[np.float64]
 
@@ -129,6 +130,10 @@ class Raised:
     def __call__(self, x: ArrayLike, y: ArrayLike | None = None, /) -> Array:
         """Return h (m) at x and y (m), with the broadcast shape of both."""
         return self.film(x, y) + self.offset
+
+    def marks(self) -> tuple[float, ...]:
+        """Return those of the film."""
+        return marks_of(self.film)
 
     def breakpoints(self) -> tuple[float, ...]:
         """Return those of the film."""

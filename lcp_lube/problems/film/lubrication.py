@@ -15,12 +15,14 @@ from ..certificate import Certificate
 from ..grid import Grid
 from ..solution import Fields
 from ..transfer import Transfer
+from .assembly import assemble
 from .certify import certify
 from .exact import ExactSolution
 from .forces import Shaft
+from .integrals import LineIntegrals
 from .lifted import LiftedFilm
 from .quantities import open_pressures, quantities, units
-from .reynolds import BoxScheme, assemble, side_points, sides
+from .reynolds import BoxScheme, side_points, sides
 from .stored import rates
 from .supplies import Held, Supply, pressed
 
@@ -40,14 +42,14 @@ class LubricationProblem:
     p_sides : pressures above p_c at west, east, south, north in Pa.
     p_c : cavitation pressure in Pa, added to the pressures that are reported.
     film : h(x, y) in metres.
-    exact : gives the exact 1D solution, where one is known.
-    shaft : what the film is wrapped round; None for a flat one.
+    exact : gives the exact 1D solution, where one is known. shaft : what the film is wrapped round; None for a flat one.
     r_in : void fraction that enters at the west.
-    held : the supplies whose cells the scheme holds.
+    held : the supplies whose cells the scheme holds. integrals : of the film of a line whose fluxes are made of them.
     """
 
     kind = "lubrication"
     shares_grid = False  # a time step's with those of the others
+    plain = True  # whether the coefficients are those of the film alone
 
     def __init__(
         self,
@@ -64,10 +66,11 @@ class LubricationProblem:
         shaft: Shaft | None = None,
         r_in: float = 0.0,
         held: Held | None = None,
+        integrals: LineIntegrals | None = None,
     ):
         self.grid, self.scheme, self.film = grid, scheme, film
         self.mu, self.U, self.p_unit, self.p_sides, self.p_c = mu, U, p_unit, p_sides, p_c
-        self.exact, self.shaft, self.r_in, self.held = exact, shaft, r_in, held
+        self.exact, self.shaft, self.r_in, self.held, self.integrals = exact, shaft, r_in, held, integrals
         self.coefficients_for: Callable[..., BoxScheme] | None = None  # of a film with rims: by which points are cavitated
         self.dry: Array | None = None  # the points for which they have been made, 1 or 0; None: no revision yet
         self.extras: Callable[[dict[str, Any]], dict[str, Any]] | None = None
@@ -267,13 +270,13 @@ class LubricationProblem:
         other.scheme, other.c, other.mu, other.exact = scheme, scheme.c.ravel(), mu, None  # type: ignore[assignment]
         other.p_sides, other.held = p_sides or self.p_sides, held or self.held
         other.more, other.more_fields, other.more_measures, other.cells = {}, {}, {}, {}
-        other.coefficients_for = None  # which are those without the effects
+        other.plain, other.coefficients_for = False, None  # which are those without the effects
         return other
 
     def with_lift(self, lift: Array) -> Self:
         """The problem with the film thicker by `lift` at the owned points, m: what is told of it, not its coefficients."""
         other = copy(self)
-        other.scheme = replace(self.scheme, h=self.scheme.h + lift.reshape(self.grid.box))
+        other.plain, other.scheme = False, replace(self.scheme, h=self.scheme.h + lift.reshape(self.grid.box))
         other.film = LiftedFilm.of(self.film, self.grid, lift)
         return other
 

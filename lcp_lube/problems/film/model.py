@@ -13,12 +13,14 @@ from ...base.parallel import Array
 from ...errors import InputError
 from ..facts import Facts
 from ..grid import EVEN, Grid, Places, Polar
+from .edges import marks_of
 from .effects import Effect
 from .exact import ExactSolution
 from .film_slopes import film_slopes
 from .fluid import Law
 from .forces import Shaft
 from .grooves import Groove, GroovedProblem, Pad, pads_between
+from .integrals import line_integrals
 from .lines import on_edges
 from .lubrication import LubricationProblem
 from .reynolds import BoxScheme, Film, box_scheme
@@ -73,6 +75,7 @@ class Model:
     supplies: tuple[Supply, ...] = ()
     law: Law | None = None  # a fluid that depends on the pressure; `build` makes the problem of the constant one
     polar: Polar | None = None  # of a sector (`Grid.polar`)
+    integrals: bool = True  # fluxes of a line (1D, scheme face) are exact where full; not so one that stands for a plane
     places: Places | None = None  # of the lines of points; None: on the film's straight edges, if it has any
     effects: tuple[Effect, ...] = ()  # what else makes its coefficients depend on the answer; `build` leaves them out
     stored: Stored | None = None  # by the cells, in a time step
@@ -151,7 +154,9 @@ class Model:
         grid = grid or Grid(shape, self.lengths, comm, ends=ends, places=self.lines(shape), polar=self.polar)
         p_sides = tuple(side.p if side.kind == "open" else 0.0 for side in self.sides)
         film = self.film
-        coefficients = partial(box_scheme, grid, self.gap, **self._data)
+        exact = self.integrals and grid.dim == 1 and self.scheme == "face" and not self.mean_cubes and not self.stored
+        integrals = line_integrals(grid, film) if exact and "mirror" not in grid.ends[0] else None
+        coefficients = partial(box_scheme, grid, self.gap, **self._data, integrals=integrals)
         scheme = coefficients()
         scheme, held = hold(grid, scheme, self.supplies, self.p_unit) if self.supplies else (scheme, None)
         problem = kind(
@@ -167,6 +172,7 @@ class Model:
             shaft=self.shaft,
             r_in=west.r if west.kind == "open" else 0.0,
             held=held,
+            integrals=integrals,
         )
         problem.shares_grid = shared
         if isinstance(problem, GroovedProblem):
@@ -184,7 +190,7 @@ class Model:
 
     def film_slopes(self, problem: LubricationProblem) -> BoxScheme:
         """Derivatives of the coefficients of a problem that was built from this (U >= 0) by its film. Collective."""
-        slopes = film_slopes(problem.grid, self.gap, self._data, problem.scheme.flow_unit, problem.dry)
+        slopes = film_slopes(problem, self.gap, self._data)
         return hold(problem.grid, slopes, self.supplies, self.p_unit)[0] if self.supplies else slopes
 
     def pads(self, shape: Sequence[int]) -> list[tuple[Pad, "Model"]]:
@@ -235,6 +241,9 @@ class _Inside:
         for side, (length, periodic) in enumerate(zip(self.lengths, self.periodic, strict=True)):
             places[side] = places[side] % length if periodic else np.clip(places[side], 0.0, length)
         return self.gap(*places)
+
+    def marks(self) -> tuple[float, ...]:
+        return marks_of(self.gap)
 
     def jumps(self, axis: str) -> tuple[float, ...]:
         return getattr(self.gap, "jumps", lambda axis: ())(axis)

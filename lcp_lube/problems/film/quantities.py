@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from .cavity import cavity_sign
 from .flows import friction, side_flows
 from .forces import ambient, corner_flows, forces, open_pressures
 from .fronts import cavitated_area, first_cavity, fronts, line_fronts
+from .line import Line, known_of
 from .supplies import supply_flows
 
 if TYPE_CHECKING:
@@ -36,6 +38,8 @@ UNITS = {
     **dict.fromkeys(("temperature_max", "temperature_effective", "temperature_out"), "K"),
     "attitude_deg": "deg",
 }
+SAME = 1e-3  # of p_max, and of 1: how near fields are to the discrete solution whose fronts are theirs
+LEAST = 1e-3  # Pa: pressures are rounding where a film carries nothing
 PER_WIDTH = {"N": "N/m", "W": "W/m", "m3/s": "m2/s", "m2": "m"}
 
 
@@ -73,21 +77,24 @@ def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any
     grid, reduce = problem.grid, problem.reduce
     p_pa = p * problem.p_unit
     cavity = (cavity_sign(reduce, p, r) < 0).astype(float)
-    flow = side_flows(problem, p, r)
-    p_max, p_max_at = largest_pressure(problem, p_pa)
     min_h, min_h_at = thinnest(problem)
-    ends = line_fronts(problem, p, r) if problem.U else None
-    ruptures, reformations = fronts(problem, ends)
+    known = known_of(problem)
+    read = _read(problem, p_pa, r)
+    if known is not None:
+        off = reduce.max(np.abs(p_pa - known.p_pa)), reduce.max(np.abs(r - known.r))
+        same = off[0] <= SAME * reduce.max(known.p_pa) + LEAST and off[1] <= SAME
+        read = read.corrected(_read(problem, known.p_pa, known.r), known.line, same)
+    ruptures, reformations, flow = read.ruptures, read.reformations, read.flow
     rupture, reformation = first_cavity(grid, ruptures, reformations)
     out: dict[str, Any] = {
-        "p_max": p_max + problem.p_c,
-        "p_max_at": p_max_at,
-        **forces(problem, p_pa),
+        "p_max": read.p_max + problem.p_c,
+        "p_max_at": read.p_max_at,
+        **forces(problem, p_pa, known),
         "p_ambient": ambient(problem) + problem.p_c,
-        "friction": friction(problem, p_pa, r),
+        "friction": read.friction,
         "p_unit": problem.p_unit,
         "cavitated_fraction": reduce.sum(cavity) / grid.size,
-        "cavitated_area": cavitated_area(problem, ends, p, r),
+        "cavitated_area": read.cavitated_area,
         "rupture": rupture,
         "reformation": reformation,
         "ruptures": ruptures,
@@ -106,6 +113,48 @@ def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any
     out["friction_coefficient"] = out["friction"] / out["load"] if out["load"] > 0 else None
     out["power_loss"] = out["friction"] * problem.U
     return out | (problem.extras(out) if problem.extras else {})
+
+
+@dataclass(frozen=True)
+class _Read:
+    """What fields say by themselves, in the units of `quantities`; p_max above p_c."""
+
+    p_max: float
+    p_max_at: list[float] | None
+    friction: float
+    flow: dict[str, float]
+    cavitated_area: float
+    ruptures: list[float]
+    reformations: list[float]
+
+    def corrected(self, discrete: _Read, line: Line, same_fronts: bool) -> _Read:
+        """With the difference between the line as its film has it and the discrete solution.
+
+        same_fronts : the fields are those of the discrete solution, and have the line's fronts.
+        """
+        top, place = line.largest
+        flows = {"west": -0.5 * line.Q, "east": 0.5 * line.Q}
+        return _Read(
+            self.p_max + (top - discrete.p_max),
+            [place] if np.isfinite(self.p_max) else None,
+            self.friction + (line.friction - discrete.friction),
+            {side: value + (flows[side] - discrete.flow[side]) for side, value in self.flow.items()},
+            self.cavitated_area + (line.cavitated - discrete.cavitated_area),
+            *(line.fronts if same_fronts else (self.ruptures, self.reformations)),
+        )
+
+
+def _read(problem: LubricationProblem, p_pa: Array, r: Array) -> _Read:
+    """Collective."""
+    p = p_pa / problem.p_unit
+    ends = line_fronts(problem, p, r) if problem.U else None
+    return _Read(
+        *largest_pressure(problem, p_pa),
+        friction(problem, p_pa, r),
+        side_flows(problem, p, r),
+        cavitated_area(problem, ends, p, r),
+        *fronts(problem, ends),
+    )
 
 
 def largest_pressure(problem: LubricationProblem, p_pa: Array) -> tuple[float, list[float] | None]:

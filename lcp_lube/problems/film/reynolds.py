@@ -1,16 +1,16 @@
 """Box scheme of the steady Reynolds equation with cavitation: film -> coefficients of A p + B r = c."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from petsc4py import PETSc
 
 from ...base.parallel import Array
 from ...errors import InputError
 from ..grid import Grid
 from .edges import face_film
+from .integrals import LineIntegrals
 from .positive import check_film
 from .rims import rims_across_x, rims_across_y
 from .stored import Stored
@@ -102,6 +102,7 @@ def box_scheme(
     mean_cubes: bool = False,
     r_in: float = 0.0,
     cavity: Array | None = None,
+    integrals: LineIntegrals | None = None,
     stored: Stored | None = None,
 ) -> BoxScheme:
     """Coefficients of the box scheme on the owned points; the grid's ends say what its sides are.
@@ -120,13 +121,14 @@ def box_scheme(
     r_in : void fraction that enters at an open west side.
     cavity : 1 at the owned points that are taken to be cavitated where round edges cut a face (`rims`), else 0; default 0.
     stored : what the cells store, in a time step.
+    integrals : of a line's film (1D): fluxes between its points are exact for a full film; default: from the film at the faces.
 
     Raises
     ------
     InputError : a film that is not positive, or data so large or small that a coefficient overflows or vanishes.
     """
     with np.errstate(all="ignore"):
-        box = _coefficients(grid, film, mu, U, scheme, p_sides, p_unit, mean_cubes, r_in, cavity, stored)
+        box = _coefficients(grid, film, mu, U, scheme, p_sides, p_unit, mean_cubes, r_in, cavity, integrals, stored)
     reduce = grid.reduce
     faces = [box.k_W, box.k_E] + ([box.k_S, box.k_N] if grid.dim == 2 else [])
     walls = zip(sides(grid, ("closed", "mirror")), faces, strict=False)
@@ -158,6 +160,7 @@ def _coefficients(
     mean_cubes: bool,
     r_in: float,
     cavity: Array | None,
+    integrals: LineIntegrals | None,
     stored: Stored | None = None,
 ) -> BoxScheme:
     dx, (ny, nx) = grid.steps(0), grid.box
@@ -178,7 +181,10 @@ def _coefficients(
     k = p_unit / (6.0 * mu)
     edges = (lambda axis: ()) if mean_cubes else getattr(film, "jumps", lambda axis: ())
     x_jumps, y_jumps, across = edges("x"), edges("y"), grid.steps(1) if grid.dim == 2 else np.ones(2)
-    if x_jumps or y_jumps:
+    if integrals is not None:
+        own = slice(grid.x_start, grid.x_end + 1)
+        cubes_x, h_face = dx / integrals.parts[2][None, own], integrals.films[None, own]
+    elif x_jumps or y_jumps:
         cubes_x, h_face = face_film(film, x_nodes, x_faces, y[:, 0], x_jumps, y_jumps, across)
     else:
         cubes_x = cubes(h_face.T, h_x.T).T
@@ -258,43 +264,3 @@ def side_points(grid: Grid) -> tuple[tuple[slice | NDArray, slice | NDArray], ..
     west, east, south, north = (np.flatnonzero(mask) for mask in sides(grid))
     every = slice(None)
     return (every, west), (every, east), (south, every), (north, every)
-
-
-def coo(grid: Grid, entries: Sequence[tuple[int, int, NDArray]]) -> Iterator[tuple[NDArray, NDArray, NDArray]]:
-    """Global rows, columns and values of stencil entries; neighbours outside the domain are left out."""
-    number = grid.neighbours()
-    ny, nx = grid.box
-    rows = number[1:-1, 1:-1]
-    for dj, di, values in entries:
-        columns = number[1 + dj : 1 + dj + ny, 1 + di : 1 + di + nx]
-        inside = columns >= 0
-        yield rows[inside], columns[inside], np.broadcast_to(values, grid.box)[inside]
-
-
-def csr(rows: NDArray, columns: NDArray, first: int, count: int) -> tuple[NDArray, NDArray, NDArray]:
-    """CSR structure of COO entries in `count` owned rows from `first` on.
-
-    Returns row pointers, columns (sorted in each row), and the order that takes COO values to CSR values.
-    """
-    order = np.lexsort((columns, rows))
-    pointers = np.zeros(count + 1, dtype=PETSc.IntType)
-    np.cumsum(np.bincount(rows - first, minlength=count), out=pointers[1:])
-    return pointers, columns[order].astype(PETSc.IntType), order
-
-
-def assemble(grid: Grid, entries: list[tuple[int, int, Array]]) -> PETSc.Mat:
-    """A distributed n-by-n AIJ matrix from stencil entries."""
-    number = grid.neighbours().astype(PETSc.IntType)
-    ny, nx = grid.box
-    # Columns ascend with (dj, di) inside a rank; only at its edges do they have to be sorted.
-    ordered = sorted(entries, key=lambda entry: entry[:2])
-    columns = np.stack([number[1 + dj : 1 + dj + ny, 1 + di : 1 + di + nx] for dj, di, _ in ordered], axis=-1)
-    values = np.stack([np.broadcast_to(values, grid.box) for *_, values in ordered], axis=-1)
-    if grid.comm.size > 1 or any(grid.periodic):
-        order = np.argsort(columns, axis=-1)
-        columns, values = np.take_along_axis(columns, order, axis=-1), np.take_along_axis(values, order, axis=-1)
-    inside = columns >= 0
-    pointers = np.zeros(ny * nx + 1, dtype=PETSc.IntType)
-    np.cumsum(inside.sum(axis=-1).ravel(), out=pointers[1:])
-    size = (grid.local_size, grid.size)
-    return PETSc.Mat().createAIJWithArrays((size, size), (pointers, columns[inside], values[inside]), comm=grid.dm.comm)

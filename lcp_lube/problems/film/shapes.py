@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...base.parallel import Array
+from .edges import marks_of
 
 Shape = Callable[[Array, Array], Array]
 EDGE = 1e-12  # relative: a point so near an edge is on it, whatever its coordinate's rounding; edges belong to the recess
@@ -259,6 +260,9 @@ class Sum:
         """Distances (m) from the curved edges of round dimples and domes, as functions of x and y; negative inside."""
         found = (part for part in self.parts if isinstance(part, DimpleArray) and part.form != "square")
         return tuple(part.rim for part in found if np.isfinite(part.y).all())
+
+    def marks(self) -> tuple[float, ...]:
+        return tuple(t for part in self.parts for t in marks_of(part))
 
     def breakpoints(self) -> tuple[float, ...]:
         """x (m) of all jumps, kinks and extrema at y = 0; those extrema that no part has by itself are searched for."""

@@ -17,6 +17,7 @@ from ..certificate import Certificate
 from ..grid import Grid
 from ..solution import Fields
 from ..transfer import Pick
+from .edges import marks_of
 from .exact import ExactSolution, exact_solution
 from .lubrication import LubricationProblem
 
@@ -37,6 +38,9 @@ class MirroredFilm:
 
     def breakpoints(self) -> tuple[float, ...]:
         return tuple(sorted(self.L - x for x in self.film.breakpoints()))
+
+    def marks(self) -> tuple[float, ...]:
+        return tuple(sorted(self.L - x for x in marks_of(self.film)))
 
     def __getattr__(self, name: str) -> Any:
         if name == "rims":

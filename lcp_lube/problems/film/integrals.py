@@ -1,0 +1,154 @@
+"""Integrals of 1/h, 1/h^2, 1/h^3 along a line: they make the fluxes between its points exact, whatever the film between them.
+
+Where a film is full and one Q flows, p' = 6 mu (U h - Q)/h^3, so that between two points a distance d apart
+
+    Q = U H - C (p_2 - p_1)/(6 mu d),    C = d / Int h^-3,    H = Int h^-2 / Int h^-3 :
+
+resistances in series. The line is cut into panels, at the points and at the film's edges, and each panel halved until Gauss'
+rule and its halves agree: a kink, a ramp, a ridge between two points counts as what it is. What no edge tells of is looked for
+on some thousands of places, however coarse the grid.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from copy import copy
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.parallel import Array
+from ...errors import InputError
+from ..grid import Grid
+from .edges import marks_of
+
+_XI, _WEIGHT = np.polynomial.legendre.leggauss(8)
+TOL = 1e-11  # of a panel's Int h^-3; less would chase the rounding of h
+FIRST = 512  # panels at least before any is halved: a ridge of a thousandth of the line meets a Gauss point
+PANELS = 200_000  # beyond the first ones, about the most
+HALVINGS = 42  # a jump that no edge tells of is then as near as the rounding of x
+SAME = 1e-13  # of the line: points so near one another are one
+
+
+class LineIntegrals:
+    """Int h^-1, h^-2 and h^-3 along a line.
+
+    Parameters
+    ----------
+    film : h(x, y) in m for arrays that broadcast. points : x of two points and more, ascending, m. edges : x of the film's
+        jumps and kinks, m; those outside are not heeded.
+
+    Attributes
+    ----------
+    parts : the three integrals between neighbouring points, shape (3, points - 1), in 1, 1/m, 1/m2.
+
+    Raises
+    ------
+    InputError : a film that is not positive somewhere between the points.
+    """
+
+    def __init__(self, film: Callable[[Array, Array], Array], points: Array, edges: Iterable[float] = ()):
+        self.film, self.points = film, points
+        self.ends = self._panels(np.asarray(list(edges), dtype=float))
+        self.at_gauss = _gauss_points(self.ends[:-1], self.ends[1:])  # shape (panels, 8)
+        self.h = self.film_at(self.at_gauss)
+        self.first = np.searchsorted(self.ends, points)  # the panel behind each point
+        self._of_panels = self._integrals(self.ends[:-1], self.ends[1:], self.h)
+        self.parts = np.add.reduceat(self._of_panels, self.first[:-1], axis=1)
+
+    def film_at(self, x: Array) -> Array:
+        """h at places of the line, m."""
+        return np.broadcast_to(self.film(x, np.zeros(1)), x.shape)
+
+    def _panels(self, edges: Array) -> Array:
+        """Ends of the panels; each point among them, to the bit."""
+        points = self.points
+        length = points[-1] - points[0]
+        edges = np.unique(edges[(edges > points[0]) & (edges < points[-1])])
+        nearest = np.clip(np.searchsorted(points, edges), 1, points.size - 1)
+        apart = np.minimum(edges - points[nearest - 1], points[nearest] - edges)
+        ends = np.sort(np.concatenate([points, edges[apart > SAME * length]]))
+        if (parts := -(-FIRST // points.size)) > 1:
+            inner = ends[:-1, None] + np.diff(ends)[:, None] * (np.arange(1, parts) / parts)
+            ends = np.sort(np.concatenate([ends, inner.ravel()]))
+        found, a, b = [ends], ends[:-1], ends[1:]
+        total = 0
+        for _ in range(HALVINGS):
+            middle = 0.5 * (a + b)
+            whole, left, right = (self._cubes(*pair) for pair in ((a, b), (a, middle), (middle, b)))
+            bad = ~(np.abs(whole - left - right) <= TOL * (left + right)) & (b - a > SAME * length)
+            total += int(np.count_nonzero(bad))
+            if not bad.any() or total > PANELS:
+                break
+            found.append(middle[bad])
+            a, b = np.concatenate([a[bad], middle[bad]]), np.concatenate([middle[bad], b[bad]])
+        return np.sort(np.concatenate(found))
+
+    def _cubes(self, a: Array, b: Array) -> Array:
+        x = _gauss_points(a, b)
+        h = self.film_at(x)
+        if not np.all(h > 0):
+            at = np.unravel_index(np.argmin(np.nan_to_num(h, nan=-np.inf)), h.shape)
+            found = f"{h[at]:g} m" if np.isfinite(h[at]) else "no number"
+            raise InputError(f"film {found} at x = {x[at]:g} m: it must be positive everywhere")
+        return 0.5 * (b - a) * (h**-3.0 @ _WEIGHT)
+
+    @staticmethod
+    def _integrals(a: Array, b: Array, h: Array) -> Array:
+        inverse = 1.0 / h
+        return 0.5 * (b - a) * np.stack([inverse @ _WEIGHT, inverse**2 @ _WEIGHT, inverse**3 @ _WEIGHT])
+
+    def lifted(self, by: complex) -> LineIntegrals:
+        """Those of the film with a number added."""
+        out = copy(self)
+        h: Any = self.h + by
+        out.parts = np.add.reduceat(self._integrals(self.ends[:-1], self.ends[1:], h), self.first[:-1], axis=1)
+        return out
+
+    @property
+    def films(self) -> Array:
+        """H between neighbouring points, m."""
+        return self.parts[1] / self.parts[2]
+
+    @cached_property
+    def _sums(self) -> Array:
+        return np.concatenate([np.zeros((3, 1)), np.cumsum(self._of_panels, axis=1)], axis=1)
+
+    def upto(self, x: Array) -> Array:
+        """The three integrals from the first point up to each x, shape (3, x.size)."""
+        k = np.clip(np.searchsorted(self.ends, x, side="right") - 1, 0, self.ends.size - 1)
+        a, at = self.ends[k], np.array(self._sums[:, k])
+        inside = x > a  # at an end nothing is added: the film beyond is not asked for
+        a, x = a[inside], x[inside]
+        at[:, inside] += self._integrals(a, x, self.film_at(_gauss_points(a, x)))
+        return at
+
+    @property
+    def interval(self) -> NDArray[np.int64]:
+        """For each panel the number of the point before it."""
+        return np.searchsorted(self.first, np.arange(self.ends.size - 1), side="right") - 1
+
+    def weigh(self, at_gauss: Array) -> Array:
+        """Integrals over the panels of what has these values at the Gauss points, shape (panels, 8)."""
+        return 0.5 * np.diff(self.ends) * (at_gauss @ _WEIGHT)
+
+
+def line_integrals(grid: Grid, film: Any) -> LineIntegrals:
+    """Those between all points of a line, from the place beside the first to that beside the last: a side, or round the ring.
+
+    Every rank has all of them. Raises what `LineIntegrals` raises.
+    """
+    (x,), start, length = grid.lines, grid.origin[0], grid.lengths[0]
+    edges = np.array(marks_of(film))
+    if not grid.periodic[0]:
+        return LineIntegrals(film, np.concatenate([[start], x, [start + length]]), edges)
+    points = np.concatenate([[x[-1] - length], x, [x[0] + length]])
+    found = LineIntegrals(film, points, np.concatenate([edges - length, edges, edges + length]))
+    found.parts[:, -1] = found.parts[:, 0]  # the same face, to the last bit
+    return found
+
+
+def _gauss_points(a: Array, b: Array) -> Array:
+    return (0.5 * (a + b))[:, None] + (0.5 * (b - a))[:, None] * _XI
