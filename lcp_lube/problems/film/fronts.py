@@ -124,7 +124,7 @@ def cavitated_area(problem: LubricationProblem, found: Fronts | None, p: Array, 
             if p_side == 0.0:  # the cavity reaches up to it
                 at_side = np.where(end, 0.5 * rim * dy * width, 0.0) * cavity.reshape(grid.box)
                 more = more + np.sum(at_side, axis=1, keepdims=True)
-    return area + problem.reduce.sum(more)
+    return max(area + problem.reduce.sum(more), 0.0)  # of a cavity of one point the two fronts may cross
 
 
 def first_cavity(grid: Grid, ruptures: list[float], reformations: list[float]) -> tuple[float | None, float | None]:
