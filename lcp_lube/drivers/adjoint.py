@@ -19,6 +19,7 @@ from ..problems.film.reynolds import sides
 from ..problems.solution import Solution
 from ..problems.transfer import Pick, numbers
 from ..registry import SMALL
+from ..scenes.effects.table import without
 from ..scenes.grooved import GroovedJournalScene
 from ..scenes.scene import Scene
 from ..scenes.values import values_of, with_values
@@ -45,6 +46,8 @@ class Adjoint:
     def __init__(self, scene: Scene, solution: Solution, quantities: Sequence[str], flip: bool = False):
         if not solution.converged:
             raise InputError(f"{scene.name}: {solution.outcome.sentence}: no solution, no derivatives")
+        left_out = solution.settings.get("model", {}).get("left_out", {})
+        scene = without(scene, left_out) if left_out else scene
         check_film(scene)
         self.scene, self.reported = placed(scene, solution), solution.problem
         self.p, self.r = fields_of(solution)

@@ -26,12 +26,17 @@ from ..problems.film.tangent import Tangent, effective, tangent
 from ..problems.film.turned import TurnedProblem
 from ..problems.grid import Grid, Places
 from ..problems.solution import Fields, Solution
+from ..registry import DRIVERS
 from ..scenes.moving import motion_of
 from ..scenes.scene import Scene
+from .ask import Ask
 from .loop import Frozen
 from .turned import Mirrored
 
 FLIPPED = {"flow_west": "flow_east", "flow_east": "flow_west"}
+# What is found around a film that derivatives know of; of what is coupled, a fluid's law alone.
+THROUGH = {"decision", "accuracy", "balance", "position", "attitude", "turned", "supplies", "warm", "coupling"}
+THROUGH |= {"grooves", "symmetry", "direct"}
 DRAGS = ("friction", "friction_torque")
 MISFIT = "supply_misfit_"  # by which a supply's source and film disagree, 0 at the solution
 STEP = 1e-3  # relative, of the numbers that another one is made of: five values give its derivatives to rounding
@@ -231,11 +236,14 @@ def check_film(scene: Scene) -> Model:
 
     Raises
     ------
-    InputError : no film, or one that goes on in time.
+    InputError : no film, one that goes on in time, or one around which something is found that derivatives do not know of.
     """
     model = getattr(scene, "model", None)
     if not isinstance(model, Model) or motion_of(scene) is not None:
         raise InputError(f"scene {scene.name}: gradients are of films with cavitation that stand still in time")
+    for name, entry in DRIVERS.items():
+        if name not in THROUGH and entry.load().applies(scene, Ask()):
+            raise InputError(f"scene {scene.name}: derivatives do not go through its '{name}' yet: {entry.line}")
     return model
 
 

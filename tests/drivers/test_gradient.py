@@ -285,6 +285,7 @@ def test_the_command(cli, tmp_path):
         (("pocketed_pad", "--quantity", "fricton"), "nearest is friction"),
         (("bratu",), "gradients are of films"),
         (("squeeze",), "gradients are of films"),
+        (("tilting_pad_thrust",), "do not go through its 'pads' yet"),
         (("pocketed_pad", "--plot", "a.npz"), "--plot"),
     ],
 )
