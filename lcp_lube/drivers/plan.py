@@ -17,6 +17,7 @@ from .ask import Ask
 # solved in the same way.
 FEW = 10_000
 SMALL_RING = 200_000  # the same for a film that is periodic along the flow
+LARGE_RING = 60_000  # points from which such a film is solved by multigrid, in as many cycles as an open one and three more
 DIN_ONLY = {"r0", "mu", "conditions"}  # flags that only an interior method has a use for
 
 
@@ -96,8 +97,11 @@ def plan(facts: Facts, ask: Ask, scene: str) -> Plan:
 
 def _suits_multigrid(facts: Facts) -> bool:
     """Whether nonlinear multigrid is the fastest: in 2D, its loops compiled, nobody having asked for an inner solver."""
-    plane = facts.kind == "lubrication" and facts.dim == 2 and not any(facts.periodic) and not (facts.held or facts.moving)
-    return plane and find_spec("numba") is not None and not wants_ksp()
+    plane = facts.kind == "lubrication" and facts.dim == 2 and not (facts.held or facts.moving)
+    # A ring's coarser grids need even numbers of points; one that is hardly fed is better off with a direct solver.
+    ring = facts.periodic == (True, False) and facts.size > LARGE_RING and facts.shape[0] % 8 == 0
+    suits = plane and (ring or not any(facts.periodic))
+    return suits and find_spec("numba") is not None and not wants_ksp()
 
 
 def default_recipe(facts: Facts, system: str, large: bool) -> tuple[str, str]:

@@ -348,3 +348,17 @@ def test_any_number_of_ranks(tmp_path: Path, serial, ranks):
             for field, whole in values.items():
                 tolerance = 1e-7 * max(np.abs(whole).max(), 1e-3)
                 np.testing.assert_allclose(fields[f"{name}_{field}"], whole, rtol=0, atol=tolerance, err_msg=name)
+
+
+@pytest.mark.parametrize("scene", ["ring_journal", "herringbone_journal"])
+def test_rings_take_hardly_more_cycles_than_open_films(scene):
+    """A film that closes on itself: cycles do not grow with the grid, and the answer is the direct solver's."""
+    cycles = []
+    for nx, ny in ((128, 15), (256, 31)):
+        keys = {"nx": nx, "ny": ny, "attitude_deg": 50.0}
+        with solve(scene, method="fas", **keys) as solution, solve(scene, method="active-set", **keys) as direct:
+            assert solution.converged and solution.method == "fas"
+            cycles.append(solution.iterations)
+            loads = [one.problem.quantities(one.fields)["load"] for one in (solution, direct)]
+            assert loads[0] == pytest.approx(loads[1], rel=1e-6)
+    assert max(cycles) <= 16 and cycles[1] <= cycles[0] + 3
