@@ -164,7 +164,8 @@ def part_of(scene: Solvable, problem: Problem) -> Part | None:
         return Part(scene, "constant")
     if grid.dim == 1:
         return None
-    if "open" not in (ends[0].kind, ends[1].kind) and not model.supplies and _all_lines_are_one(problem):
+    rims = problem.coefficients_for is not None  # faces see round edges that no point or middle of a face may lie in
+    if "open" not in (ends[0].kind, ends[1].kind) and not model.supplies and not rims and _all_lines_are_one(problem):
         return Part(scene, "line")
     faces = not (model.mean_cubes and model.scheme == "upwind")  # whether the discretisation asks for the film there
     if ends[0] == ends[1] and grid.shape[1] // 2 >= grid.comm.size and _is_symmetric(problem, faces):

@@ -3,6 +3,7 @@
 f(v) = A v - b - dx dy g(v), A the five-point formula times dx dy, (4, -1) where dx = dy, and b the values on the boundary.
 """
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from .transfer import Transfer
 # Largest lambda for which -Lap v = lambda e^v, v = 0 on the boundary of the unit square, has a solution; the five-point
 # formula's is smaller by 1.5 h^2 (6.80674, 6.80777, 6.80803 for n = 32, 64, 128).
 TURNING_POINT, FIVE_POINT = 6.808124, 1.5
+LEFT = 1e-3  # part of a start that is as good as none
 COARSEST = 8  # points a side of the whole rectangle on multigrid's coarsest grid, at least
 
 
@@ -109,6 +111,19 @@ class ObstacleProblem(BoxProblem):
         self._coarser: ObstacleProblem | None = None
         self._transfer: Transfer | None = None
         super().__init__(grid, equations, l, u, start)
+
+    @cached_property
+    def _idle(self) -> tuple[float, float]:
+        """Scales of v and f where nothing drives: v = 0 is then the answer, and what is left of it is measured by the start."""
+        zero = self.reduce.max(self.lower) <= 0.0 <= self.reduce.min(self.upper)
+        if self.lam != 0.0 or not self.homogeneous or not zero:
+            return 0.0, 0.0
+        start = self.v0 if self.reduce.max(np.abs(self.v0)) > 0 else np.ones_like(self.v0)
+        return LEFT * self.reduce.max(np.abs(start)), LEFT * self.equations.scale(start)
+
+    def scales(self, v: Array) -> tuple[float, float]:
+        (v_scale, f_scale), (v_least, f_least) = super().scales(v), self._idle
+        return max(v_scale, v_least), max(f_scale, f_least)
 
     def quantities(self, fields: Fields) -> dict[str, Any]:
         """max_v, sum_v = dx dy sum v, the contact counts, and the turning point where it is known. Collective."""

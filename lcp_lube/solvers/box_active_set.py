@@ -54,7 +54,7 @@ class BoxActiveSet(Method):
         self.D = np.where(diagonal > 0, diagonal, 1.0)
         self.f = problem.residual(self.v)
         self.R = problem.natural_residual(self.v, self.f, f_scale=self.D)
-        self._scale = problem.equations.scale(self.v)
+        self._scale = problem.scales(self.v)[1]
         self.norm = self._norm()
 
     @property
@@ -90,7 +90,7 @@ class BoxActiveSet(Method):
             self.v, self.f, self.R = trial(alpha)
             step_norm = reduce.max(np.abs(self.v - v)) / (reduce.max(np.abs(self.v)) or 1.0)
             if step_norm > NEAR:
-                self._scale = problem.equations.scale(self.v)
+                self._scale = problem.scales(self.v)[1]
             self.norm = self._norm()
         return Step(self.norm, step_norm, alpha, iterations, backtracking=cuts, rtol=rtol)
 

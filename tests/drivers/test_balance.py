@@ -263,3 +263,15 @@ def test_a_load_that_cavitation_limits():
         assert found["carried"] == pytest.approx(part * top if part < 1 else top, rel=2e-6 if part < 1 else 0.1)
         assert found["solves"] <= MOST_SOLVES
         solution.destroy()
+
+
+def test_the_range_may_have_a_unit():
+    """That of the key that varies."""
+    from lcp_lube import InputError, load_scene
+
+    for ends in ([1e-6, 40e-6], ["1um", "0.04 mm"], ["1um", 40e-6]):
+        scene = load_scene("pocketed_pad", {"balance.load": 3e4, "balance.vary": "h_offset", "balance.range": ends})
+        assert scene.balance.range == (1e-6, 40e-6)
+    for vary, ends in (("h_offset", ["1 s", "2 s"]), ("film.journal.eccentricity", ["1um", "2um"])):
+        with pytest.raises(InputError, match="is needed, not a"):
+            load_scene("pocketed_pad", {"balance.load": 2e3, "balance.vary": vary, "balance.range": ends})

@@ -74,3 +74,18 @@ def test_exact_solution_of_the_other_direction():
     p = back.fields["p"] * problem.p_unit
     assert np.abs(p - exact.p(problem.grid.x[0])).max() < 0.02 * exact.p_max
     back.destroy()
+
+
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_the_other_direction_on_several_ranks(cli, tmp_path, ranks):
+    """U < 0: the mirror image is dealt to the ranks, and what is told is turned back on each."""
+    (tmp_path / "pad.toml").write_text(
+        'family = "bearing"\ndimension = 2\nL = 0.01\nwidth = 0.008\nU = -1.0\nnx = 17\nny = 11\n[fluid]\nmu = 0.01\n'
+        '[[film]]\nshape = "linear"\nh_start = 1e-6\nh_end = 3e-6\n[sides]\nwest = 2e5\neast = 1e5\n'
+    )
+    alone, several = (cli("solve", tmp_path / "pad.toml", "--json", ranks=n) for n in (1, ranks))
+    assert alone.status == several.status == 0, several.err
+    for name in ("load", "friction", "p_max", "cavitated_fraction"):
+        assert several.json[name] == pytest.approx(alone.json[name], rel=1e-9), name
+    assert several.json["p_max_at"] == alone.json["p_max_at"]
+    assert several.json["flow"]["west"] == pytest.approx(alone.json["flow"]["west"], rel=1e-7)

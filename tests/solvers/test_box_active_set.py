@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from box_problems import BOTH, affine, obstacle
 
+from lcp_lube.api import solve
 from lcp_lube.base.options import recipe
 from lcp_lube.errors import InputError
 from lcp_lube.linear.box import BoxSystem
@@ -161,3 +162,11 @@ def test_ranks_agree(cli, ranks, n, how):
         assert many[key] == pytest.approx(one[key], rel=1e-8)
     if how:
         assert abs(many["linear_iterations"] - one["linear_iterations"]) <= 6
+
+
+@pytest.mark.parametrize("n, lower", [(20, 0.0), (64, 0.0), (63, "-inf"), (20, -1.0)])
+@pytest.mark.parametrize("method", ["auto", "semismooth"])
+def test_where_nothing_drives_zero_is_the_answer(n, lower, method):
+    """lambda = 0, v = 0 on the boundary: what is left of v is measured by the start, not by itself."""
+    with solve("obstacle_bratu", **{"n": n, "lambda": 0.0, "v_lower": float(lower)}, method=method) as s:
+        assert s.converged and abs(s.max_v) < 1e-6, s.message

@@ -50,6 +50,7 @@ ONCE_FAILED = [
     (5016902, "conductances of 3e14"),
     (5000819, "pressures of 1e-199"),
     (880676270, "lines on edges round a ring: one face, seen from both ends"),
+    (6017007, "round dimples that no point lies in"),
     (6004666, "empty all over"),
     (6015374, "empty all over, a ring's misfit of one rounding"),
     *CERTIFIED_WRONG_ONCE,
