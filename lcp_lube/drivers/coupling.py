@@ -128,7 +128,7 @@ def _told(scene: Solvable, ask: Ask, loop: Loop) -> Solution:
         return solution
     at = loop.answer
     problem = at.problem
-    if solution.converged and not np.isfinite(reduce.max(at.p)):
+    if solution.converged and (loop.beyond or not np.isfinite(reduce.max(at.p))):
         outcome = Outcome.NO_SOLUTION
         message = f"no pressure carries the flow: viscosity grows without bound (barus = {law.barus:g} 1/Pa)"
     elif loop.effects:

@@ -23,6 +23,7 @@ MEMORY = 30  # answers that Anderson's method combines; -coupling_snes_anderson_
 CYCLE = 25  # steps after which it begins anew: its least squares see no changes 1e-8 of the largest that they remember
 LONGEST = 1.0  # relative change of a coefficient in one step, before answers are combined
 LEAST_LIFT = -0.9  # of the rigid film, of an iterate
+STEEPEST = 0.9  # of q, over 1/b, where the pressure is without bound: of an iterate, whose viscosity is then 10 times mu
 WIDEST = 40.0  # of the logarithm of a viscosity over mu, of an iterate
 
 
@@ -86,6 +87,7 @@ class Loop:
         self.rescued: Solution | None = None
         self.solves, self.work, self.change = 0, 0, np.inf
         self.answer: Answer | None = None
+        self.beyond = False  # whether no pressure carries the last film's flow
         self.start: Solution | Start | None = ask.start
 
     def vector(self, cells: Cells) -> Array:
@@ -124,7 +126,11 @@ class Loop:
         if not new.converged:
             return False
         unit = new.problem.p_unit  # type: ignore[attr-defined]
-        p = self.law.pressure(new.fields["p"] * unit)
+        q, b = new.fields["p"] * unit, self.law.barus
+        self.beyond = bool(b) and not self.base.reduce.max(b * q) < 1.0
+        if self.beyond and "viscosity" in self.names:  # of an iterate: hotter oil may carry what this one cannot
+            q = np.minimum(q, STEEPEST / b)
+        p = self.law.pressure(q)
         with np.errstate(all="ignore"):
             self.answer = answer(self.base, self.law, cells, by, p, new.fields["r"], self.p_sides)
         return bool(np.isfinite(self.base.reduce.max(p)))

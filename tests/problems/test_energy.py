@@ -101,6 +101,21 @@ def test_power_in_is_heat_out(name):
         assert s.problem.reduce.min(s.field("T")) >= 313.15 - 1e-6 and s.heat_power > 0
 
 
+@pytest.mark.parametrize("name", ["wide", "pocket", "closed", "symmetry", "backwards"])
+def test_the_power_is_the_drags(name):
+    """Where all sides have one pressure nothing is pumped: `power_loss`, but for cavities, whose fronts share a cell.
+
+    The viscosity is constant here: the drag at the first face takes the one of its cell, which heat knows better.
+    """
+    data = {"family": "bearing", "L": 0.1, "U": 5.0, "n": 40, "fluid": {"mu": 0.02}, **FILMS[name]}
+    data.setdefault("film", [{"shape": "linear", "h_start": 4e-5, "h_end": 2e-5}])
+    if name == "pocket":
+        data["fluid"] = {"mu": 0.02, "p_supply": 5e6}  # full
+    with solve({**data, "temperature": {"T_in": 313.15, "beta": 0.0}}, model="full") as s:
+        assert s.converged
+        assert s.heat_power == pytest.approx(abs(s.power_loss), rel=2e-2 if s.cavitated_fraction else 1e-9)
+
+
 def test_adiabatic_journal_of_ross():
     """Eccentricity .6114, 8380 W in the pads, 345.1 K (a program with Reynolds' condition and temperatures across the film).
 
@@ -169,3 +184,11 @@ def test_laws_pass_through_their_points():
 def test_refused(table, message):
     with pytest.raises(InputError, match=message):
         load_scene({**plates(), "temperature": table})
+
+
+def test_hot_oil_carries_what_cold_oil_cannot():
+    """The loop goes on where no pressure carries the first film's flow, whose oil has the viscosity of T_in."""
+    data = {"family": "bearing", "L": 0.1, "U": 20.0, "n": 60, "fluid": {"mu": 0.5, "barus": 1e-8}}
+    data["film"] = [{"shape": "linear", "h_start": 4e-5, "h_end": 2e-5}]
+    with solve(data) as cold, solve({**data, "temperature": {"beta": 0.05, "T_in": 320.0}}, model="full") as hot:
+        assert cold.outcome == "no_solution" and hot.converged and hot.p_max < 1e8

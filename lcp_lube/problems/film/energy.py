@@ -20,10 +20,13 @@ from ...base.parallel import Array
 from .assembly import assemble
 from .cavity import cavity_sign
 from .effects import Answer, around, framed_by
-from .flows import line_weights, point_weights
+from .flows import line_weights, point_weights, sheared_faces
+from .forces import open_pressures
 from .reynolds import sides
 
 RTOL = 1e-13  # of the linear solves
+NOTHING = 1e-24  # of that: the square of rounding
+STILL = 1e-11  # of the largest flow out of a cell: what is less is rounding
 SAME = 1e-300
 
 
@@ -73,14 +76,18 @@ def carried(at: Answer) -> Carried:
     # Where the end is closed or a mirror nothing beyond takes its half, and nothing flows.
     shear, drag = _shear(at, dy, other_free)
     power_shear = float(problem.reduce.sum(np.where(free, shear, 0.0)))
+    pressures = problem.reduce.sum(np.sum(k, axis=0)) * problem.reduce.max(np.abs(at.p)) ** 2  # what they could turn into heat
+    if not problem.U and not problem.reduce.sum(np.abs(heat)) > NOTHING * pressures:
+        heat = np.zeros(box)  # rounding
     push = float(problem.reduce.sum(np.where(free, drag * (beside[1] - p), 0.0)))
     west, *_ = sides(grid)
     first_west = (west | ~other_free[0]) & free
     push += float(problem.reduce.sum(np.where(first_west, -dragged[0] * (p - beside[0]), 0.0)))
-    pumped = 0.0
+    # No oil is lost: the pumps' work may be counted from any level of pressure, best from one that is among theirs.
+    pumped, least = 0.0, min((a for a in open_pressures(problem) if a is not None), default=0.0)
     for flow, near, is_free in zip(q, beside, other_free, strict=True):
         at_edge = free & ~is_free
-        pumped -= float(problem.reduce.sum(np.where(at_edge, flow * near, 0.0)))
+        pumped -= float(problem.reduce.sum(np.where(at_edge, flow * (near - least), 0.0)))
     return Carried(
         q, free, np.where(free, heat + shear, 0.0), power_shear + push + pumped, grid.cell * point_weights(grid).reshape(box)
     )
@@ -93,7 +100,7 @@ def _shear(at: Answer, dy: float, other_free: list[Any]) -> tuple[Array, Array]:
     closed side h^2 dp/dx = 6 mu U where it is full.
     """
     problem, grid = at.problem, at.grid
-    s, film, box = problem.scheme, problem.film, at.grid.box
+    s, box = problem.scheme, at.grid.box
     _, _, south, north = sides(grid)
     closed = sides(grid, ("closed",))[:2]
     r = at.r.reshape(box)
@@ -102,17 +109,17 @@ def _shear(at: Answer, dy: float, other_free: list[Any]) -> tuple[Array, Array]:
     mu_west = grid.ghosted(np.ascontiguousarray(mu_east).ravel())[1:-1, :-2]
     mu_west = np.where(np.isnan(mu_west), at.mu.reshape(box), mu_west)
     before, behind = grid.steps(0)[:-1], grid.steps(0)[1:]
-    h_west, h_east = (np.broadcast_to(film(grid.x + step, grid.y), box) for step in (-before / 2, behind / 2))
+    faces = [sheared_faces(problem, grid.x + step)[1:] for step in (-before / 2, behind / 2)]
     liquid = 1.0 + s.b_C * r / np.where(s.couette_E != 0.0, s.couette_E, np.inf)
     liquid_west = grid.ghosted(np.ascontiguousarray(liquid).ravel(), outside=1.0)[1:-1, :-2]
     rims = grid.rims(1) if grid.dim == 2 else (0.0, 0.0)
     rows = problem.U**2 * dy * (line_weights(grid) + 0.5 * (rims[0] * south + rims[1] * north))
     shear = np.zeros(box)
     for mu, h, share, is_free, wall, dx in (
-        (mu_west, h_west, liquid_west, other_free[0], closed[0], before),
-        (mu_east, h_east, liquid, other_free[1], closed[1], behind),
+        (mu_west, faces[0], liquid_west, other_free[0], closed[0], before),
+        (mu_east, faces[1], liquid, other_free[1], closed[1], behind),
     ):
-        inner = np.where(is_free, 0.5, 1.0) * share / h
+        inner = np.where(is_free, 0.5, 1.0) * (h[0] + share / h[1])
         at_wall = 0.5 * np.where(full, 4.0, 1.0 - r) / s.h
         shear = shear + dx * mu * np.where(wall, at_wall, inner)
     unit = 0.5 * dy * s.flow_unit
@@ -145,16 +152,20 @@ def heated(at: Answer, flow: Carried, rho_c: float, exchange: float, wall: float
     leaves, enters = [np.maximum(a, 0.0) for a in q], [np.maximum(-a, 0.0) for a in q]
     inside = _inside(at, free)
     H = exchange * flow.area
-    diagonal = np.where(free, rho_c * sum(leaves) + H, 1.0)  # type: ignore[operator]
-    diagonal = np.where(diagonal > SAME, diagonal, 1.0)
+    diagonal = np.where(free, rho_c * sum(leaves) + H, 0.0)  # type: ignore[operator]
+    still = diagonal <= STILL * reduce.max(diagonal)  # grooves, and cells whose liquid does not go on, an empty film's say
+    diagonal = np.where(still, 1.0, diagonal)
     offsets = ((0, -1), (0, 1), (-1, 0), (1, 0))
     entries = [(0, 0, diagonal)]
     for (dj, di), a, near in list(zip(offsets, enters, inside, strict=True))[: 2 * grid.dim]:
-        entries.append((dj, di, np.where(free, -rho_c * a * near, 0.0)))
+        entries.append((dj, di, np.where(still, 0.0, -rho_c * a * near)))
     solver = _Transport(assemble(grid, entries))
-    heat = np.where(free, flow.dissipation + H * wall, 0.0).ravel()
+    heat = np.where(still, 0.0, flow.dissipation + H * wall).ravel()
+    left = reduce.sum(np.where(free & still, np.maximum(flow.dissipation, 0.0), 0.0))
+    nowhere = left > STILL * reduce.sum(np.abs(flow.dissipation))  # heat that no liquid carries away
     try:
         theta, residual = solver(heat)
+        theta = np.full_like(theta, np.inf) if nowhere else theta
         mixers = _mixers(at, flow, carry_over)
         if mixers:
             responses = [solver(rho_c * (into * free).ravel())[0] for _, into, _ in mixers]
