@@ -56,8 +56,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         if known is None:
             coarse = _coarser(scene, ask, inner, loop)
             known = _taken(loop, coarse.problem) if coarse is not None else None
-        eps1 = ask.stopping_for((1e-8, 1e-8)).eps1
-        loop.settle(known or cells, SETTLED * eps1)
+        loop.settle(known or cells, _settled(ask))
         if coarse is not None:
             coarse.destroy()
     return _told(scene, ask, loop)
@@ -110,6 +109,11 @@ def _coarser(scene: Solvable, ask: Ask, inner: Inner, loop: Loop) -> Solution | 
     return found
 
 
+def _settled(ask: Ask) -> float:
+    """Relative change of the coefficients at which they count as found: by the eps1 asked for, not by a method's own."""
+    return SETTLED * ask.stopping_for((1e-8, 1e-8)).eps1
+
+
 def _loose(ask: Ask) -> dict:
     """A start's tolerances."""
     given = ask.stopping_for((1e-8, 1e-8))
@@ -132,7 +136,6 @@ def _told(scene: Solvable, ask: Ask, loop: Loop) -> Solution:
         outcome = Outcome.NO_SOLUTION
         message = f"no pressure carries the flow: viscosity grows without bound (barus = {law.barus:g} 1/Pa)"
     elif loop.effects:
-        tol = SETTLED * eps1
         with np.errstate(all="ignore"):
             for effect in loop.effects:
                 told = effect.report(at)
@@ -143,7 +146,7 @@ def _told(scene: Solvable, ask: Ask, loop: Loop) -> Solution:
         problem.more_measures["coupling"] = loop.change
         if failure:
             outcome, message = Outcome.NO_SOLUTION, failure
-        elif solution.converged and not loop.change <= tol:
+        elif solution.converged and not loop.change <= _settled(ask):
             outcome = Outcome.MAX_ITERATIONS
             message = f"the coefficients still change by {loop.change:.1e} after {loop.solves} films ({', '.join(loop.names)})"
         elif not solution.converged:
