@@ -188,7 +188,7 @@ def test_refused(table, message):
 
 def test_hot_oil_carries_what_cold_oil_cannot():
     """The loop goes on where no pressure carries the first film's flow, whose oil has the viscosity of T_in."""
-    data = {"family": "bearing", "L": 0.1, "U": 20.0, "n": 60, "fluid": {"mu": 0.5, "barus": 1e-8}}
+    data = {"family": "bearing", "L": 0.1, "U": 20.0, "n": 60, "fluid": {"mu": 0.5, "barus": 3e-9}}
     data["film"] = [{"shape": "linear", "h_start": 4e-5, "h_end": 2e-5}]
     with solve(data) as cold, solve({**data, "temperature": {"beta": 0.05, "T_in": 320.0}}, model="full") as hot:
         assert cold.outcome == "no_solution" and hot.converged and hot.p_max < 1e8

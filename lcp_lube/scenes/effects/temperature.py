@@ -96,7 +96,8 @@ class Heat(Plain):
     wall: float
 
     def apply(self, at: Answer, out: Cells) -> None:
-        T = np.clip(self._temperature(at)[0], oils.LOWEST, oils.HIGHEST)
+        coldest = self.table.T_in + min(self.wall, 0.0)  # heat arises only: an iterate that is colder is no film's
+        T = np.clip(self._temperature(at)[0], coldest, oils.HIGHEST)
         out["viscosity"] *= self.law(T) / self.mu
 
     def _temperature(self, at: Answer) -> tuple[Array, dict[str, float], float]:
