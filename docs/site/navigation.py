@@ -15,6 +15,7 @@ SECTIONS: dict[str, list[str]] = {
         "docs/scene_files",
         "docs/data",
         "docs/coefficients",
+        "docs/motion",
         "docs/gradients",
         "docs/guide/recipes",
         "docs/guide/parallel",
