@@ -66,7 +66,9 @@ def test_the_short_bearing_with_half_a_film():
     assert K[0, 1] * K[1, 0] < 0 and C[0, 1] == pytest.approx(C[1, 0], rel=1e-3)
 
 
-@pytest.mark.parametrize("row", list(csv.DictReader(TABLE.read_text().splitlines())), ids=lambda row: f"{row['eps']}-{row['B_over_D']}")
+@pytest.mark.parametrize(
+    "row", list(csv.DictReader(TABLE.read_text().splitlines())), ids=lambda row: f"{row['eps']}-{row['B_over_D']}"
+)
 def test_a_journal_that_is_squeezed(row):
     """Butenschoen's So = P psi^2/(B D eta |eps'|) of a journal that moves along its eccentricity, by one short step."""
     eps, B = float(row["eps"]), 0.1 * float(row["B_over_D"])
@@ -117,7 +119,10 @@ def test_time_steps_answer_as_the_linearisation_says():
 
 def test_both_thresholds_of_lund_and_thomsen():
     """2.35 for L/D = 0.5, S = 1.656, and 2.10 for L/D = 1, by our own coefficients."""
-    for changes, expected in (({"L_over_D": 0.5, "eccentricity": 0.244}, 2.35), ({"L_over_D": 1.0, "eccentricity": 0.15}, 2.10)):
+    for changes, expected in (
+        ({"L_over_D": 0.5, "eccentricity": 0.244}, 2.35),
+        ({"L_over_D": 1.0, "eccentricity": 0.15}, 2.10),
+    ):
         scene = load_scene("two_groove_journal", n=180, **changes)
         with solve(scene) as solution:
             (one,) = coefficients(scene, solution)
