@@ -46,6 +46,8 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     with run.file.listening():
         while run.outcome is Outcome.CONVERGED and not run.done:
             run.advance()
+            t, end = run.march.t, run.table.t_end
+            ask.tell("time", f"t = {t:.4g} of {end:.4g}", min(t / end, 1.0))
     return answer(run)
 
 

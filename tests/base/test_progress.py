@@ -66,9 +66,9 @@ def test_loops_tell(scene: str, how: dict[str, object], loop: str) -> None:
         assert solution.converged
     assert {name for name, _, _ in told} <= set(ORDER) and all(0.0 <= part <= 1.0 for _, _, part in told)
     parts = [part for name, _, part in told if name == loop]
-    assert parts and (loop == "grids" or parts[-1] == 1.0)
+    assert parts and (loop == "grids" or parts[-1] == pytest.approx(1.0))
     if loop == "time":
-        assert parts == sorted(parts) and len(parts) == 6
+        assert parts == sorted(parts) and len(parts) >= 6
 
 
 def test_colours_on_a_terminal_alone(monkeypatch: pytest.MonkeyPatch) -> None:
