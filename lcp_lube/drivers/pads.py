@@ -33,6 +33,7 @@ from .impedance import Mode, displacements, impedance
 MOST_SOLVES = 80
 MOMENTS = 1e-8  # of the load times the lever, about a pivot
 THINNER, THICKER = 0.7, 3.0  # parts of a film anywhere by which a step may change it
+THINNEST = 1e-6  # film over the clearance, below which no load is looked for
 NUDGES, NUDGE = 8, 0.5  # of a pad without stiffness: how often its inlet is opened, and by how much of its size of tilt
 
 
@@ -241,9 +242,10 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
             nudge = np.where(nudges >= NUDGES, NUDGE * bearing.sizes, 0.0)
             nudges, found, again = np.zeros_like(nudges), False, True
         step = _step(bearing, films, K, off, counts, nudge, bearing.free & (nudge == 0) & (nudges < NUDGES))
+        thin = min(film.problem.reduce.min(film.problem.scheme.h) for film in films) < THINNEST * bearing.sizes[0]
         for film in films:
             film.problem.destroy()
-        if found or count == MOST_SOLVES:
+        if found or thin or count == MOST_SOLVES:
             break
         q = q + step
     assert solution is not None
