@@ -178,3 +178,12 @@ def test_ranks(cli, ranks):
     one, more = cli(*arguments).json, cli(*arguments, ranks=ranks).json
     for name in ("load", "friction", "p_max", "rupture", "reformation"):
         assert more[name] == pytest.approx(one[name], rel=1e-9)
+
+
+@pytest.mark.parametrize("changes, cell", [({"columns": 5, "rows": 2}, "2 mm \\(5 along x\\)"), ({"rows": 8}, "1.25 mm")])
+def test_dimples_that_overlap_are_refused(changes, cell):
+    dimples = {"shape": "dimples", "depth_um": 2, "size_mm": 2.1, "columns": 2, "rows": 2, **changes}
+    film = [{"shape": "constant", "h_um": 2}, dimples]
+    scene = load_scene({"family": "bearing", "dimension": 2, "L_mm": 10, "U": 1.0, "fluid": {"mu": 0.02}, "film": film})
+    with pytest.raises(InputError, match=f"dimples of size 2.1 mm in cells of {cell}.* would overlap"):
+        scene.build()
