@@ -22,19 +22,16 @@ class PivotingOptions(MethodOptions):
 
 
 class Pivoting(Pivots, Method):
-    """`newton.iterate` runs it. `norm` is the share of cells whose sign is wrong.
+    """`newton.iterate` runs it, always from a full film: signs that rounding has made elsewhere are a poor start.
 
-    Parameters
-    ----------
-    start : fields p and r; default a full film.
+    `norm` is the share of cells whose sign is wrong.
     """
 
     state = ("p", "r", "full", "norm", "_fewest", "_patience")
 
-    def __init__(self, problem: LubricationProblem, stages: Stages, start: Fields | None = None):
+    def __init__(self, problem: LubricationProblem, stages: Stages):
         ones = np.ones(problem.grid.local_size)
-        usable = start is not None and np.isfinite(problem.reduce.norm(*start.values()))
-        super().__init__(problem, *((start["p"], start["r"]) if start and usable else (ones, 0.0 * ones)))
+        super().__init__(problem, ones, 0.0 * ones)
         self.stages, self.norm = stages, 1.0
 
     @property
@@ -65,4 +62,4 @@ def build(job: Job) -> Pivoting:
     InputError : an option.
     """
     make_options(PivotingOptions, "pivoting", job.options)
-    return Pivoting(job.problem, job.stages, job.start)
+    return Pivoting(job.problem, job.stages)
