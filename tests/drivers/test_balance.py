@@ -63,10 +63,10 @@ def test_films_round_trip(level, name):
 
 
 def test_the_exact_long_bearing():
-    """The load of the exact solution at eccentricity 0.5 (So 3.22777817) gives it back, second order in the grid."""
+    """The load of the exact solution at eccentricity 0.5 (So 3.22777817) gives it back on any grid, to the load's digits."""
     load = 3.22777817 * 0.1 * 0.02 * 100 / 1e-3**2
-    errors = [abs(balance("long_journal", {"n": n, "balance.load": load})[0]["value"] - 0.5) for n in (50, 100, 200)]
-    assert errors[-1] < 1e-4 and errors[0] / errors[-1] > 8
+    errors = [abs(balance("long_journal", {"n": n, "balance.load": load})[0]["value"] - 0.5) for n in (20, 50)]
+    assert max(errors) < 1e-7
 
 
 @pytest.mark.parametrize("vary, interval", [("mu", [1e-3, 1.0]), ("omega", [1.0, 1e4]), ("psi", [1e-4, 1e-2])])
