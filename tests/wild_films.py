@@ -176,7 +176,8 @@ def judge(seed: int, folder: Path, **how_to: Any) -> Verdict:
     how: Any = {"message": solution.message, "method": str(solution.settings["method"])}
     p, r, converged, outcome = solution.fields["p"] * problem.p_unit, solution.fields["r"], solution.converged, solution.outcome
     p_sides, p_unit = problem.p_sides, problem.p_unit
-    if getattr(scene.model.gap, "rims", ()) and scene.model.scheme == "face":  # its faces are made for the cavities found
+    # Faces made for the cavities found, or by quadrature in 1D, have tests of their own: here it is solvers that are judged.
+    if scene.model.scheme == "face" and (getattr(scene.model.gap, "rims", ()) or len(scene.shape) == 1):
         moving = getattr(problem, "moving", None)
         dense = Dense(scene, moving or problem)
         if moving is not None:  # the mirror image is what is solved
