@@ -177,7 +177,7 @@ def judge(seed: int, folder: Path, **how_to: Any) -> Verdict:
     p, r, converged, outcome = solution.fields["p"] * problem.p_unit, solution.fields["r"], solution.converged, solution.outcome
     p_sides, p_unit = problem.p_sides, problem.p_unit
     # Faces made for the cavities found, or by quadrature in 1D, have tests of their own: here it is solvers that are judged.
-    if scene.model.scheme == "face" and (getattr(scene.model.gap, "rims", ()) or len(scene.shape) == 1):
+    if scene.model.scheme == "face" and (bool(getattr(scene.model.gap, "rims", None)) or len(scene.shape) == 1):
         moving = getattr(problem, "moving", None)
         dense = Dense(scene, moving or problem)
         if moving is not None:  # the mirror image is what is solved

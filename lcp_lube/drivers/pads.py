@@ -289,8 +289,7 @@ def _tell(scene: Any, bearing: Bearing, solution: Solution, q: Array, found: boo
         solution.outcome = Outcome.LOAD_NOT_CARRIED
         solution.message = f"{wanted}no balance was found in {count} solves; the last: {place} carries {values['load']:.8g}"
     tilts = [float(tilt) for tilt in told["tilts"]]
-    before = solution.problem.extras  # type: ignore[attr-defined]
-    solution.problem.extras = lambda out: {**(before(out) if before else {}), "pad_tilts": tilts}  # type: ignore[attr-defined]
+    solution.problem.more |= {"pad_tilts": tilts}  # type: ignore[attr-defined]
     solution.settings |= {"coordinates": [float(one) for one in q]}
     solution.settings["why"] = [*solution.settings["why"], f"pads: {place}, found in {count} solves"]
     if "attitude_deg" in told:

@@ -35,7 +35,7 @@ def height(picture: Picture, count: int, width: float) -> float:
     ratio = shape(picture)
     if ratio < FLAT:
         return 0.3 + count * (0.6 + LONG * ratio)
-    return 1.25 + (HIGH if ratio > TALL else _side(count, width) * min(ratio, HIGHEST))
+    return 1.25 + 0.25 * (ratio > 1) + (HIGH if ratio > TALL else _side(count, width) * min(ratio, HIGHEST))
 
 
 def _side(count: int, width: float) -> float:

@@ -32,6 +32,21 @@ class _Times:
         return self.by * self.shape(x, y)
 
 
+@dataclass(frozen=True)
+class _Tilt:
+    """Rise of a sector's point, by its arc x at the mean radius and y beyond the inner one, about the radius at `at`; about the
+    circle of radius `about` if that is given."""
+
+    inner: float
+    mean: float
+    at: float
+    about: float | None = None
+
+    def __call__(self, x: Array, y: Array) -> Array:
+        radius, angle = self.inner + y, x / self.mean - self.at
+        return -radius * np.sin(angle) if self.about is None else radius * np.cos(angle) - self.about
+
+
 class ThrustScene(Scene):
     """A thrust bearing of equal sectors under a flat runner that turns towards larger angles; 2D, polar coordinates.
 
@@ -152,10 +167,7 @@ class ThrustScene(Scene):
         """dh of a tilt about the radius through the pivot that opens the inlet, and of one that opens the outer radius."""
         (L, _), (inner, mean) = self.side_lengths, self.radii
         at, radius = (self.pivot_part or 0.0) * L / mean, self.pivot_radius or mean
-        return (
-            lambda x, y: -(inner + y) * np.sin(x / mean - at),
-            lambda x, y: (inner + y) * np.cos(x / mean - at) - radius,
-        )
+        return _Tilt(inner, mean, at), _Tilt(inner, mean, at, radius)
 
     @property
     def model(self) -> Model:

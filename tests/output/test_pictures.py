@@ -226,6 +226,8 @@ SMALL = {
     "journal": {"nx": 31, "ny": 9},
     "pocketed_pad_2d": {"nx": 19, "ny": 9},
     "rough": {"n": 15},
+    "three_lobe_journal": {"nx": 90, "ny": 9},
+    "tilting_pad_journal": {"nx": 90, "ny": 9},
     "squeeze": {"n": 9, "steps": 20},
     "moving_texture": {"n": 15, **marches.SMALL["moving_texture"]},
     "dynamic_journal": marches.SMALL["dynamic_journal"],

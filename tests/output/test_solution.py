@@ -42,7 +42,8 @@ def test_a_misspelt_argument_is_said_to_be_one() -> None:
 
 
 def small(name: str) -> Solution:
-    return solve(name, **{"n": 24, **marches.SMALL.get(name, {})})
+    lobes = {"nx": 90, "ny": 5} if name in ("three_lobe_journal", "tilting_pad_journal") else {"n": 24}  # they need whole pads
+    return solve(name, **{**lobes, **marches.SMALL.get(name, {})})
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +85,7 @@ def test_fields_with_the_points_of_the_sides(name: str) -> None:
         inner = values.reshape(solution.problem.grid.box)
         whole = np.atleast_2d(solution.field(field, boundary=True))
         lines = slice(1, -1) if solution.problem.grid.dim == 2 else slice(None)
-        assert whole.shape[1] == 26 and np.all(np.isfinite(whole))
+        assert whole.shape[1] == inner.shape[1] + 2 and np.all(np.isfinite(whole))
         np.testing.assert_array_equal(whole[lines, 1:-1], inner)
         if field == "p" and type(solution.problem) is LubricationProblem and solution.problem.grid.ends[0][0] == "open":
             assert np.all(whole[lines, 0] == solution.problem.p_sides[0] + solution.problem.p_c)

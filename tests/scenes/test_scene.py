@@ -196,7 +196,7 @@ def test_any_values_make_a_scene_or_one_line(changes):
 
 @pytest.mark.parametrize("name", scene_names())
 def test_a_scene_changed_is_the_scene_loaded_with_the_change(name):
-    scene, changes = load_scene(name), {"n": 31}
+    scene, changes = load_scene(name), {"n": 90}
     assert as_scene(scene, changes) == as_scene(name, changes) == load_scene(name, **changes)
     assert as_scene(scene, {}) is scene
 

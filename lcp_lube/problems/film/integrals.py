@@ -23,6 +23,7 @@ from ...base.parallel import Array
 from ...errors import InputError
 from ..grid import Grid
 from .edges import marks_of
+from .positive import check_film
 
 _XI, _WEIGHT = np.polynomial.legendre.leggauss(8)
 TOL = 1e-11  # of a panel's Int h^-3; less would chase the rounding of h
@@ -138,8 +139,14 @@ class LineIntegrals:
 def line_integrals(grid: Grid, film: Any) -> LineIntegrals:
     """Those between all points of a line, from the place beside the first to that beside the last: a side, or round the ring.
 
-    Every rank has all of them. Raises what `LineIntegrals` raises.
+    Every rank has all of them.
+
+    Raises
+    ------
+    InputError : a film that is not positive, at a point or between them.
     """
+    with np.errstate(all="ignore"):
+        check_film(grid, film)
     (x,), start, length = grid.lines, grid.origin[0], grid.lengths[0]
     edges = np.array(marks_of(film))
     if not grid.periodic[0]:
