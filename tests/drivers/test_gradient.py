@@ -213,7 +213,8 @@ def test_the_scaling_law(name):
 
 
 def test_edges_on_points_have_a_derivative_to_each_side():
-    scene = load_scene("pocketed_pad", n=49)  # its first edge on a point, the second on another
+    # Its first edge on a point, the second on another; with scheme face the numbers of a line know edges to their place.
+    scene = load_scene("pocketed_pad", n=49, scheme="nodal")
     solution = solve(scene)
     load, friction = gradients(scene, solution, ["load", "friction"], ["film.pocket.x.1", "fluid.mu"])
     assert load.one_sided["film.pocket.x.1"] > 0 and "fluid.mu" not in load.one_sided
