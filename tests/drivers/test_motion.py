@@ -82,7 +82,7 @@ def test_plates_are_the_squeeze_scene():
 
 
 def test_a_film_that_rests_stays_at_its_steady_answer():
-    still = WEDGE | {"film": WEDGE["film"][:1]}
+    still = WEDGE | {"film": WEDGE["film"][:1], "scheme": "nodal"}  # face knows more of a line's film where nothing is stored
     s, steady = march(still), march(still | {"motion": None})
     np.testing.assert_allclose(s.fields["p"], steady.fields["p"], rtol=0, atol=1e-9 * steady.fields["p"].max())
     assert s.load == pytest.approx(steady.load, rel=1e-9) and s.iterations_per_step < 1.5
