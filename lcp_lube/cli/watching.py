@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from mpi4py import MPI
-from tqdm import tqdm
 
 from ..base.quantity import in_si
 from ..errors import InputError
@@ -49,6 +48,8 @@ class Watching:
         self.series = [Series(path, args.boundary) for path in series]
         self.frames = Frames() if self.picture is not None else None
         quiet = None if comm.rank == 0 else True
+        from tqdm import tqdm  # here: few scenes go on in time
+
         self._bar: Any = tqdm(total=self.table.t_end, unit="s", disable=quiet, file=sys.stderr, bar_format=BAR)
         self._done = 0
 

@@ -19,7 +19,6 @@ from importlib.util import find_spec
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
-from scipy.sparse import coo_array
 
 from ..base.parallel import Array
 from ..base.stages import Stages
@@ -187,6 +186,8 @@ class CavitySystem:
             columns.append(column[used])
             values.append(value[used])
         entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+        from scipy.sparse import coo_array  # here: it takes a while, and small films do without
+
         S = coo_array(entries, shape=(local, total)).tocsr()
         S.sort_indices()
         return S.indptr.astype(PETSc.IntType), S.indices.astype(PETSc.IntType), S.data
