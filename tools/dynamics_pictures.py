@@ -44,7 +44,7 @@ def axes_picture() -> None:
     axes.set(xlim=(-1.2, 1.75), ylim=(-1.25, 1.15), xticks=[], yticks=[])
     axes.set_aspect("equal")
     axes.spines[:].set_visible(False)
-    figure.savefig(PICTURES / "axes.png", dpi=110)
+    figure.savefig(PICTURES / "axes.png", dpi=150)
 
 
 def stored_void() -> None:

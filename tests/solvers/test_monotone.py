@@ -102,6 +102,7 @@ def test_last_resort_of_auto(film, monkeypatch):
     from lcp_lube.solvers.active_set import ActiveSet
     from lcp_lube.solvers.din_pc import DinPc
     from lcp_lube.solvers.fas.driver import Fas
+    from lcp_lube.solvers.pivoting import Pivoting
     from lcp_lube.solvers.steplength import StepLengthError
 
     def fail(self):
@@ -110,6 +111,7 @@ def test_last_resort_of_auto(film, monkeypatch):
     monkeypatch.setattr(ActiveSet, "advance", fail)
     monkeypatch.setattr(DinPc, "advance", fail)
     monkeypatch.setattr(Fas, "advance", fail)
+    monkeypatch.setattr(Pivoting, "advance", fail)
     solution = solve(load_scene(*HARD[film]))
     assert solution.converged, solution.message
     assert solution.settings["method"] == "monotone"
