@@ -4,9 +4,8 @@
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -22,7 +21,7 @@ from ..scenes.effects.table import without
 from ..scenes.moving import motion_of
 from ..scenes.scene import Scene, Solvable
 from ..scenes.tilting import TiltingPadScene
-from .grooves import pad_films, pick_pad
+from .grooves import films_of
 from .impedance import impedance
 from .pads import JournalPads
 from .response import Change, Response
@@ -106,13 +105,9 @@ def coefficients(
     if isinstance(scene, TiltingPadScene):
         turn = np.array([[math.cos(along), -math.sin(along)], [math.sin(along), math.cos(along)]])
         total += turn.T @ _of_pads(scene, solution, frequencies) @ turn
-    for problem, part, fields, first in films(scene, model, ring, solution.fields):
-        response = Response(problem, part, fields, motions, first)
+    for response in responses(scene, model, ring, solution.fields, motions):
         for k, nu in enumerate(frequencies):
             total[k] += response.at(nu, stored) if nu else response.stiffness() + 1j * response.damping()
-        response.destroy()
-        if problem is not ring:
-            problem.destroy()
     return [
         Coefficients(nu, found.real, found.imag / nu if nu > 0 else found.imag, names)
         for nu, found in zip(frequencies, total, strict=True)
@@ -164,25 +159,22 @@ def supplied(model: Model, solution: Solution) -> Model:
     return replace(model, supplies=tuple(replace(one, p=p) for one, p in zip(model.supplies, found, strict=True)))
 
 
-def films(
-    scene: Solvable, model: Model, ring: LubricationProblem, fields: Fields
-) -> list[tuple[LubricationProblem, Model, Fields, float]]:
-    """The problems that were solved, with their fields and the x where each begins: pads between grooves, or the whole.
+def responses(
+    scene: Solvable, model: Model, ring: LubricationProblem, fields: Fields, motions: Sequence[Change]
+) -> Iterator[Response]:
+    """Of the problems that were solved, films between grooves or the whole; each is freed when the next one is asked for.
 
-    Collective; what is not `ring` is the caller's to free.
+    None of tilting pads: see `_of_pads`. Collective.
     """
     if isinstance(scene, TiltingPadScene):
-        return []  # see `_of_pads`
-    if not isinstance(ring, GroovedProblem):
-        return [(ring, model, fields, 0.0)]
-    dx = model.lengths[0] / scene.shape[0]
-    found: list[Any] = []
-    for pad, film in pad_films(scene):
-        problem = film.build(ring.grid.dm.comm)
-        take = pick_pad(ring.grid, problem.grid, pad.first)
-        found.append((problem, film.model, {name: take(values) for name, values in fields.items()}, (pad.first - 0.5) * dx))
-        take.destroy()
-    return found
+        return
+    parts = films_of(scene, ring, fields) if isinstance(ring, GroovedProblem) else [(ring, model, fields, 0.0)]
+    for problem, part, own, first in parts:
+        response = Response(problem, part, own, motions, first)
+        yield response
+        response.destroy()
+        if problem is not ring:
+            problem.destroy()
 
 
 def stability(K: Array, C: Array) -> tuple[float | None, float | None]:

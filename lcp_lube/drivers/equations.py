@@ -119,7 +119,7 @@ class Equations:
     def terms(self, p: Array, r: Array) -> Array:
         """The size of the terms that G is the sum of, m2/s."""
         s, problem = self.problem(p).scheme, self.constant
-        k = (s.k_W + s.k_E + s.k_S + s.k_N).ravel() * p / problem.p_unit
+        k = s.diagonal.ravel() * p / problem.p_unit
         return (np.abs(k) + np.abs(s.couette_W).ravel() + np.abs(s.couette_E).ravel()) * s.flow_unit
 
     def numbers(self, p: Array, r: Array) -> dict[str, float]:

@@ -1,5 +1,6 @@
 """A ring with axial grooves: the films between the grooves are solved one by one, their fields put together and certified."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +13,7 @@ from ..problems.film.grooves import GroovedProblem, Pad
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.grid import Grid
-from ..problems.solution import Outcome, Solution
+from ..problems.solution import Fields, Outcome, Solution
 from ..problems.transfer import Pick, numbers
 from ..scenes.scene import Derived, Solvable
 from .ask import Ask, Start
@@ -57,6 +58,21 @@ def pad_films(scene: Solvable) -> list[tuple[Pad, PadFilm]]:
     """The films between the grooves, and where they lie."""
     model: Model = scene.model  # type: ignore[attr-defined]
     return [(pad, PadFilm(scene, film, (pad.n, *scene.shape[1:]), pad.first)) for pad, film in model.pads(scene.shape)]
+
+
+def films_of(
+    scene: Solvable, ring: LubricationProblem, fields: Fields
+) -> Iterator[tuple[LubricationProblem, Model, Fields, float]]:
+    """The films between the grooves of a solved ring, with their fields and the x where each begins. Collective.
+
+    The problems are the caller's to free.
+    """
+    for pad, film in pad_films(scene):
+        problem = film.build(ring.grid.dm.comm)
+        take = pick_pad(ring.grid, problem.grid, pad.first)
+        taken = {name: take(values) for name, values in fields.items()}
+        take.destroy()
+        yield problem, film.model, taken, (pad.first - 0.5) * ring.grid.lengths[0] / ring.grid.shape[0]
 
 
 def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:

@@ -15,12 +15,11 @@ from ..problems.solution import Outcome, Solution, Step
 from ..scenes.motion import MotionTable
 from ..scenes.moving import motion_of
 from .ask import Ask, Start
-from .coefficients import films, motions_of, supplied
+from .coefficients import motions_of, responses, supplied
 from .compose import Inner
 from .march import March
 from .march_file import MarchFile
 from .plan import plan
-from .response import Response
 from .rotor import Rotor
 from .step import TimeStep, check_content, contents
 
@@ -194,15 +193,10 @@ class Run:
 
         def stiffness(solution: Solution) -> Any:
             whole = TimeStep(self.scene, self.model, march.grid)
-            total = np.zeros((2, 2))
             ring: Any = solution.problem
-            for problem, part, fields, first in films(whole, supplied(whole.model, solution), ring, solution.fields):
-                response = Response(problem, part, fields, motions_of(self.scene.turning, False, 0.0), first)
-                total += response.stiffness()
-                response.destroy()
-                if problem is not ring:
-                    problem.destroy()
-            return total
+            motions = motions_of(self.scene.turning, False, 0.0)
+            found = responses(whole, supplied(whole.model, solution), ring, solution.fields, motions)
+            return sum((response.stiffness() for response in found), np.zeros((2, 2)))
 
         if self.rotor is None:
             place, why = self._at(t, lambda: self._given(t)), ""

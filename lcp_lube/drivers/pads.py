@@ -27,7 +27,7 @@ from ..scenes.thrust import ThrustScene
 from ..scenes.tilting import TiltingPadScene
 from .ask import Ask
 from .compose import Inner
-from .grooves import pad_films, pick_pad
+from .grooves import films_of
 from .impedance import Mode, displacements, impedance
 
 MOST_SOLVES = 80
@@ -111,12 +111,8 @@ class JournalPads:
         return self.scene.model_copy(update={**e, "tilts": [float(tilt) for tilt in q[2:]], "balance": None})
 
     def films(self, scene: Scene, solution: Solution) -> Iterator[PadFilm]:
-        turning, ring = self.scene.turning, solution.problem
-        for pad, film in pad_films(scene):
-            problem = film.build(ring.grid.dm.comm)
-            take = pick_pad(ring.grid, problem.grid, pad.first)
-            fields = {name: take(values) for name, values in solution.fields.items()}
-            first = (pad.first - 0.5) * turning.length / scene.shape[0]
+        turning = self.scene.turning
+        for problem, model, fields, first in films_of(scene, solution.problem, solution.fields):  # type: ignore[arg-type]
             middle = math.degrees(float(turning.theta(np.array(first + 0.5 * problem.grid.lengths[0]))))
             off = [
                 abs(math.remainder(middle - at - (0.5 - self.scene.pivot_part) * self.scene.pad_deg, 360.0))
@@ -128,7 +124,7 @@ class JournalPads:
             def tilt(x: Array, y: Array, first: float = first, pivot: float = pivot) -> Array:
                 return -turning.R * np.sin(turning.theta(x + first) - pivot) + 0.0 * y
 
-            yield PadFilm(problem, film.model, fields, [*displacements(turning, first), tilt], [0, 1, 2 + k])
+            yield PadFilm(problem, model, fields, [*displacements(turning, first), tilt], [0, 1, 2 + k])
 
     def misfit(self, solution: Solution, films: Sequence[PadFilm]) -> tuple[Array, Array]:
         fx, fy = solution.problem.quantities(solution.fields)["force"]

@@ -96,7 +96,7 @@ class FullSystem:
         A film ratio of 1e3 makes conductances differ by 1e9, and a solver that compares with a number takes small for zero.
         """
         s = self.problem.scheme
-        largest = np.maximum(s.k_W + s.k_E + s.k_S + s.k_N, -s.b_C).ravel()
+        largest = np.maximum(s.diagonal, -s.b_C).ravel()
         if not self.problem.reduce.min(largest) < TINY:
             return None
         return 2.0 ** -np.round(np.log2(largest))

@@ -43,7 +43,7 @@ class ReducedSystem:
             csr_arrays = (self._pointers, self._columns, self._a)
             self._own = Owned(self, grid.dm.comm)
             self.mat = self._own(PETSc.Mat().createAIJ((size, size), csr=csr_arrays, comm=grid.dm.comm))
-            self._diagonal_A = (scheme.k_W + scheme.k_E + scheme.k_S + scheme.k_N).ravel()
+            self._diagonal_A = scheme.diagonal.ravel()
             self._diagonal_B = -scheme.b_C.ravel()
             self._x, self._b = map(self._own, self.mat.createVecs())
             self.krylov = Krylov(self.mat)

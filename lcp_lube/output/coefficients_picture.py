@@ -6,9 +6,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from ..base.together import on_all_ranks
-from .files import replacing
-from .style import BLUE, GREY, RED, STYLE, new_figure
+from .style import BLUE, GREY, RED, new_figure, save_figure
 
 DOTS = 130
 LOOKS = ((BLUE, "-"), (RED, "-"), (RED, "--"), (BLUE, "--"))  # xx, xy, yx, yy
@@ -21,12 +19,7 @@ def draw(rpm: Any, rows: list[dict[str, Any]], name: str, path: Path, comm: MPI.
     ------
     InputError : the file cannot be written.
     """
-    with replacing(path, comm) as temporary, on_all_ranks(comm, str(path)):
-        if comm.rank == 0:
-            import matplotlib as mpl
-
-            with mpl.rc_context(STYLE):
-                _figure(rpm, rows, name).savefig(temporary, dpi=DOTS)
+    save_figure(lambda: _figure(rpm, rows, name), path, comm, DOTS)
 
 
 def _figure(rpm: Any, rows: list[dict[str, Any]], name: str) -> Any:

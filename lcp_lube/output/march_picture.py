@@ -6,10 +6,8 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from ..base.together import on_all_ranks
-from .files import replacing
 from .frames import Frames
-from .style import BLUE, GREY, MAPS, NAMES, RED, STYLE, new_figure
+from .style import BLUE, GREY, MAPS, NAMES, RED, new_figure, save_figure
 from .units import prefix
 
 DOTS = 130
@@ -22,13 +20,7 @@ def draw_march(frames: Frames, history: list[dict[str, Any]], title: str, path: 
     ------
     InputError : the file cannot be written.
     """
-    with replacing(path, comm) as temporary, on_all_ranks(comm, str(path)):
-        if comm.rank == 0:
-            import matplotlib as mpl
-
-            with mpl.rc_context(STYLE):
-                date = {".pdf": "CreationDate", ".svg": "Date"}.get(path.suffix.lower())
-                _figure(frames, history, title).savefig(temporary, dpi=DOTS, metadata={date: None} if date else None)
+    save_figure(lambda: _figure(frames, history, title), path, comm, DOTS)
 
 
 def _figure(frames: Frames, history: list[dict[str, Any]], title: str) -> Any:

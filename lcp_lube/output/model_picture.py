@@ -7,15 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 from mpi4py import MPI
 
-from ..base.together import on_all_ranks
 from ..errors import InputError
 from ..registry import RUNGS
-from .files import replacing
-from .style import BLUE, GREY, RED, STYLE, new_figure
+from .style import BLUE, GREY, RED, new_figure, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+DOTS = 160  # an inch
 LEAST = 1e-3  # of the part of the tolerance from which effects count: what is smaller is drawn as that
 
 
@@ -28,12 +27,7 @@ def plot_model(model: dict[str, Any], path: str | Path, comm: MPI.Comm = MPI.COM
     """
     if "quantity" not in model:
         raise InputError(f"--plot-model {path}: no decision was taken: {model['reason']}")
-    import matplotlib as mpl
-
-    with replacing(Path(path), comm) as temporary, on_all_ranks(comm, str(path)):
-        if comm.rank == 0:
-            with mpl.rc_context(STYLE):
-                _draw(model).savefig(temporary, dpi=160)
+    save_figure(lambda: _draw(model), Path(path), comm, DOTS)
 
 
 def _draw(model: dict[str, Any]) -> Figure:

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..base.together import on_all_ranks
 from ..errors import InputError
 from ..problems.solution import Solution
-from .files import replacing
 from .journal import journal
 from .maps import FLAT, height, outline, panels, shape
 from .panels import section
 from .picture import Picture, collect, title
-from .style import BLUE, NAMES, RED, STYLE, fewer_colours, new_figure
+from .style import BLUE, NAMES, RED, new_figure, save_figure
 from .units import prefix, quantity
 
 if TYPE_CHECKING:
@@ -36,19 +35,10 @@ def plot(solution: Solution, path: str | Path) -> None:
     ------
     InputError : matplotlib is missing, or the file cannot be written; then nothing is left behind.
     """
-    try:
-        import matplotlib as mpl
-    except ImportError:
-        raise InputError(f"--plot {path}: pictures need matplotlib: pip install lcp-lube[plot]") from None
+    if find_spec("matplotlib") is None:
+        raise InputError(f"--plot {path}: pictures need matplotlib: pip install lcp-lube[plot]")
     picture = collect(solution)
-    comm = solution.problem.grid.comm
-    with replacing(Path(path), comm) as temporary, on_all_ranks(comm, str(path)):
-        if picture is not None:
-            with mpl.rc_context(STYLE):
-                date = {".pdf": "CreationDate", ".svg": "Date"}.get(Path(path).suffix.lower())
-                draw(picture).savefig(temporary, dpi=DOTS, metadata={date: None} if date else None)
-            if Path(path).suffix.lower() == ".png":
-                fewer_colours(temporary)
+    save_figure(lambda: draw(picture), Path(path), solution.problem.grid.comm, DOTS, few_colours=True)  # type: ignore[arg-type]
 
 
 def draw(picture: Picture) -> Figure:

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.parallel import Array
-from ..base.together import on_all_ranks
 from ..drivers.gradient import Gradient
 from ..problems.solution import Solution
-from .files import gather, replacing
+from .files import gather
 from .maps import outline
 from .picture import Picture, collect
-from .style import BLUE, RED, STYLE, new_figure
+from .style import BLUE, RED, new_figure, save_figure
 from .table import table
 from .units import quantity
 
@@ -104,25 +103,24 @@ def plot(gradient: Gradient, solution: Solution, field: Array, path: str | Path)
     ------
     InputError : the file cannot be written; then nothing is left behind.
     """
-    import matplotlib as mpl
-
     grid = solution.problem.grid
     picture = collect(solution)
     stride = (1, 1) if picture is None else tuple(max(1, -(-n // m.size)) for n, m in _pairs(picture, grid))
     stride = grid.comm.bcast(stride)
     values = gather(grid, field, stride)
-    with replacing(Path(path), grid.comm) as temporary, on_all_ranks(grid.comm, str(path)):
-        if picture is not None:
-            with mpl.rc_context(STYLE):
-                keys = [key for key in gradient.ranked if gradient.elasticity[key]][:MOST_BARS]
-                figure = new_figure(10.4, max(3.6, 1.2 + 0.24 * len(keys)))
-                bars, film = figure.subplots(1, 2, width_ratios=[1.0, 1.25])
-                _bars(bars, gradient, keys)
-                own = unit_of(solution, gradient.quantity)
-                _film(figure, film, picture, gradient, values, own)
-                title = f"{solution.settings.get('scene', '')}: {gradient.quantity} {quantity(gradient.value, own)}".rstrip()
-                figure.suptitle(title, fontsize=10, x=0.01, ha="left")
-                figure.savefig(temporary, dpi=DOTS)
+
+    def figure() -> Any:
+        keys = [key for key in gradient.ranked if gradient.elasticity[key]][:MOST_BARS]
+        figure = new_figure(10.4, max(3.6, 1.2 + 0.24 * len(keys)))
+        bars, film = figure.subplots(1, 2, width_ratios=[1.0, 1.25])
+        _bars(bars, gradient, keys)
+        own = unit_of(solution, gradient.quantity)
+        _film(figure, film, picture, gradient, values, own)  # type: ignore[arg-type]
+        title = f"{solution.settings.get('scene', '')}: {gradient.quantity} {quantity(gradient.value, own)}".rstrip()
+        figure.suptitle(title, fontsize=10, x=0.01, ha="left")
+        return figure
+
+    save_figure(figure, Path(path), grid.comm, DOTS)
 
 
 def _pairs(picture: Picture, grid: Any) -> list[tuple[int, Array]]:

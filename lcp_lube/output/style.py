@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from mpi4py import MPI
+
+from ..base.together import on_all_ranks
+from .files import replacing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -30,6 +36,32 @@ def new_figure(width: float, height: float) -> Figure:
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")
+
+
+def save_figure(
+    build: Callable[[], Figure], path: Path, comm: MPI.Comm, dpi: int, style: Any = STYLE, few_colours: bool = False
+) -> None:
+    """Write a figure to a .png, .pdf or .svg; what is drawn alike gives the same file. Collective.
+
+    Parameters
+    ----------
+    build : makes it, under `style`; called on rank 0 alone.
+    few_colours : for a .png, see `fewer_colours`.
+
+    Raises
+    ------
+    InputError : the file cannot be written; then nothing is left behind.
+    """
+    kind = path.suffix.lower()
+    with replacing(path, comm) as temporary, on_all_ranks(comm, str(path)):
+        if comm.rank == 0:
+            import matplotlib as mpl
+
+            date = {".pdf": "CreationDate", ".svg": "Date"}.get(kind)
+            with mpl.rc_context(style):
+                build().savefig(temporary, dpi=dpi, metadata={date: None} if date else None)
+            if few_colours and kind == ".png":
+                fewer_colours(temporary)
 
 
 def fewer_colours(path: str) -> None:

@@ -10,7 +10,6 @@ from petsc4py import PETSc
 from pydantic import Field, field_validator, model_validator
 
 from ..errors import InputError
-from ..problems.facts import Facts
 from ..problems.film.exact import ExactSolution
 from ..problems.film.fluid import Law
 from ..problems.film.forces import Shaft
@@ -293,6 +292,3 @@ class BearingScene(WithEffects):
             return model.build(self.shape, comm)
         except InputError as error:
             raise InputError(f"{self.name}: {error}") from None
-
-    def facts(self, comm: PETSc.Comm | None = None) -> Facts:
-        return self.model.facts(self.shape, comm)

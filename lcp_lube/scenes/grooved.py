@@ -4,20 +4,18 @@ import math
 from pathlib import Path
 from typing import Annotated, Any
 
-from petsc4py import PETSc
 from pydantic import Field, model_validator
 
-from ..problems.facts import Facts
 from ..problems.film.bore import Bore, Dam
 from ..problems.film.forces import Shaft
 from ..problems.film.grooves import Groove
-from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model, Side
 from ..problems.film.supplies import Patch, Supply
 from ..problems.film.turning import Turning
 from .balance import BalanceTable
 from .effects.table import WithEffects, effects_of
 from .film import Extent, FilmPart
+from .film_scene import BearingNumbers
 from .motion import MotionTable
 from .moving import Models
 from .scene import Count, Finite, NotNegative, Positive
@@ -25,7 +23,7 @@ from .supply import Place, SupplyTable, supplies_of
 from .units import measured, metres
 
 
-class GroovedJournalScene(WithEffects):
+class GroovedJournalScene(WithEffects, BearingNumbers):
     """A journal under a vertical load, its film cut by axial grooves that hold a pressure; 2D.
 
     Angles are counted from the line of the load, in the sense of rotation. The film is h = c (1 - eccentricity cos(theta -
@@ -212,19 +210,5 @@ class GroovedJournalScene(WithEffects):
             supplies=self._supplies(),
         )
 
-    def facts(self, comm: PETSc.Comm | None = None) -> Facts:
-        return self.model.facts(self.shape, comm)
-
-    def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
-        """The discrete problem on this scene's grid. Collective.
-
-        Raises
-        ------
-        InputError : more ranks than the grid can be dealt to.
-        """
-        problem = self.model.build(self.shape, comm)
-        problem.extras = self._bearing_numbers
-        return problem
-
-    def _bearing_numbers(self, values: dict[str, Any]) -> dict[str, Any]:
+    def bearing_numbers(self, values: dict[str, Any]) -> dict[str, Any]:
         return self.turning.numbers(values["load"], self.mu_0, self.eccentricity)

@@ -10,18 +10,18 @@ from ..problems.film.exact import ExactSolution, exact_solution
 from ..problems.film.forces import Shaft
 from ..problems.film.gaps import JournalGap, Raised
 from ..problems.film.lines import graded_across, graded_round
-from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model, Side
 from ..problems.film.supplies import Supply
 from ..problems.film.turning import Turning
 from ..problems.grid import Places
+from .film_scene import BearingNumbers
 from .published import LubricationScene
 from .scene import Positive
 from .supply import Place, SupplyTable, supplies_of
 from .units import measured, metres
 
 
-class JournalScene(LubricationScene):
+class JournalScene(LubricationScene, BearingNumbers):
     """A journal of diameter D turning in a bush of width B: x = D phi/2 from the groove at h_max, y along the axis.
 
     h = c (1 + eccentricity cos phi), c = psi D/2; the groove keeps p = p_a = p_b and no void, the ends p = p_side. L, width, U
@@ -103,11 +103,6 @@ class JournalScene(LubricationScene):
             return None
         return exact_solution(Raised(self.gap, self.h_offset), self.L, self.mu, self.U, self.p_a, self.p_b)
 
-    def build(self, comm: Any = None) -> LubricationProblem:
-        problem = super().build(comm)
-        problem.extras = self._bearing_numbers
-        return problem
-
     @property
     def model(self) -> Model:
         shaft = Shaft(0.5 * self.D, 0.0 if self.eccentricity else None)
@@ -122,7 +117,7 @@ class JournalScene(LubricationScene):
         reach = 0.5 * self.D * math.sqrt(2.0 * (1.0 - self.eccentricity) / max(self.eccentricity, 0.1))
         return graded_round(nx, self.eccentricity, self.L), graded_across(ny, reach, self.width or self.L)
 
-    def _bearing_numbers(self, values: dict[str, Any]) -> dict[str, Any]:
+    def bearing_numbers(self, values: dict[str, Any]) -> dict[str, Any]:
         """Sommerfeld number W psi^2/(B D mu omega), and in 2D the side leakage as Q/((D/2)^3 psi omega)."""
         width = self.width if self.dimension == 2 and self.width else 1.0
         numbers = {"sommerfeld": values["load"] * self.psi**2 / (width * self.D * self.mu * self.omega)}

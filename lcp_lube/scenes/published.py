@@ -2,22 +2,20 @@
 
 from typing import Literal
 
-from petsc4py import PETSc
 from pydantic import Field, model_validator
 
-from ..problems.facts import Facts
 from ..problems.film.exact import ExactSolution
 from ..problems.film.gaps import Raised, Wave
-from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model, Side
 from ..problems.film.reynolds import Film
 from ..problems.film.turned import exact_either_way
 from .balance import BalanceTable
-from .scene import Count, Finite, NotNegative, Positive, Scene
+from .film_scene import FilmScene
+from .scene import Count, Finite, NotNegative, Positive
 from .units import measured, metres
 
 
-class LubricationScene(Scene):
+class LubricationScene(FilmScene):
     """A film over [0, L] or [0, L] x [0, width], in SI units; a family adds its film, `gap`.
 
     Pressures are above the cavitation pressure p_c, which is added to what is reported.
@@ -83,18 +81,6 @@ class LubricationScene(Scene):
             mean_cubes=self.mean_cubes,
             exact=self.exact,
         )
-
-    def facts(self, comm: PETSc.Comm | None = None) -> Facts:
-        return self.model.facts(self.shape, comm)
-
-    def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
-        """The discrete problem on this scene's grid. Collective.
-
-        Raises
-        ------
-        InputError : more ranks than the grid can be dealt to.
-        """
-        return self.model.build(self.shape, comm)
 
 
 class SliderScene(LubricationScene):

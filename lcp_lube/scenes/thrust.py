@@ -6,17 +6,15 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from petsc4py import PETSc
 from pydantic import Field, model_validator
 
 from ..base.parallel import Array
-from ..problems.facts import Facts
-from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model, Side
 from ..problems.film.shapes import Along, Block, Shape, SpiralGrooves, Sum
 from .balance import BalanceTable
 from .film import Extent, FilmPart
-from .scene import Count, Finite, NotNegative, Positive, Scene
+from .film_scene import BearingNumbers
+from .scene import Count, Finite, NotNegative, Positive
 from .supply import Place, SupplyTable, supplies_of
 from .units import measured, metres
 
@@ -47,7 +45,7 @@ class _Tilt:
         return -radius * np.sin(angle) if self.about is None else radius * np.cos(angle) - self.about
 
 
-class ThrustScene(Scene):
+class ThrustScene(BearingNumbers):
     """A thrust bearing of equal sectors under a flat runner that turns towards larger angles; 2D, polar coordinates.
 
     Lines run along the angle: x is the arc at the mean radius from where the runner enters, y the radius beyond the inner one.
@@ -189,21 +187,7 @@ class ThrustScene(Scene):
             supplies=self._supplies(),
         )
 
-    def facts(self, comm: PETSc.Comm | None = None) -> Facts:
-        return self.model.facts(self.shape, comm)
-
-    def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
-        """The discrete problem of one sector on this scene's grid. Collective.
-
-        Raises
-        ------
-        InputError : more ranks than the grid can be dealt to, a film that is not positive.
-        """
-        problem = self.model.build(self.shape, comm)
-        problem.extras = self._whole
-        return problem
-
-    def _whole(self, values: dict[str, Any]) -> dict[str, Any]:
+    def bearing_numbers(self, values: dict[str, Any]) -> dict[str, Any]:
         """The whole bearing's numbers from one sector's."""
         n = self.pads
         flow = {side: n * value for side, value in values["flow"].items()}

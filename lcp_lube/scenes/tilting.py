@@ -3,22 +3,20 @@
 import math
 from typing import Annotated, Any
 
-from petsc4py import PETSc
 from pydantic import Field, model_validator
 
-from ..problems.facts import Facts
 from ..problems.film.bore import PadBore
 from ..problems.film.forces import Shaft
 from ..problems.film.grooves import Groove
-from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model, Side
 from ..problems.film.turning import Turning
 from .balance import BalanceTable
-from .scene import Count, Finite, NotNegative, Positive, Scene
+from .film_scene import BearingNumbers
+from .scene import Count, Finite, NotNegative, Positive
 from .units import measured, metres
 
 
-class TiltingPadScene(Scene):
+class TiltingPadScene(BearingNumbers):
     """A journal in pads that tilt about their pivots; 2D. Angles are counted from the load, in the sense of rotation.
 
     The pads' tilts are found at which no moment acts about any pivot, and with balance.load the journal's place at which the
@@ -131,19 +129,5 @@ class TiltingPadScene(Scene):
             grooves=self.grooves,
         )
 
-    def facts(self, comm: PETSc.Comm | None = None) -> Facts:
-        return self.model.facts(self.shape, comm)
-
-    def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
-        """The discrete problem on this scene's grid. Collective.
-
-        Raises
-        ------
-        InputError : more ranks than the grid can be dealt to, pads that touch the journal.
-        """
-        problem = self.model.build(self.shape, comm)
-        problem.extras = self._bearing_numbers
-        return problem
-
-    def _bearing_numbers(self, values: dict[str, Any]) -> dict[str, Any]:
+    def bearing_numbers(self, values: dict[str, Any]) -> dict[str, Any]:
         return self.turning.numbers(values["load"], self.mu, self.eccentricity)

@@ -25,7 +25,7 @@ class ZForm:
 
     def __init__(self, problem: LubricationProblem):
         self.problem, scheme = problem, problem.scheme
-        self.diagonal = (scheme.k_W + scheme.k_E + scheme.k_S + scheme.k_N).ravel()
+        self.diagonal = scheme.diagonal.ravel()
         self.s = self.diagonal / -scheme.b_C.ravel()
 
     def z(self, fields: Fields) -> Array:

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from mpi4py import MPI
 
-from ..base.together import on_all_ranks
-from ..output.files import replacing
+from ..output.style import save_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+DOTS = 200  # an inch, in a .png
 WIDTH = 7.2  # inches: a page's text width, so that the type is read at the size it is set
 COLOURS = ("#0072B2", "#009E73", "#D55E00", "#CC79A7", "#E69F00", "#56B4E9")  # Okabe and Ito's, but for black
 MARKERS = ("o", "s", "^", "v", "D", "P", "*", "<", ">")
@@ -44,12 +44,7 @@ def save(build: Callable[[], Figure], path: Path, comm: MPI.Comm) -> None:
     ------
     InputError : the file cannot be written.
     """
-    import matplotlib as mpl
-
-    with replacing(path, comm) as temporary, on_all_ranks(comm, str(path)):
-        if comm.rank == 0:
-            with mpl.rc_context(STYLE):
-                build().savefig(temporary, dpi=200)
+    save_figure(build, path, comm, DOTS, STYLE)
 
 
 def new_figure(height: float, sentence: str) -> Figure:

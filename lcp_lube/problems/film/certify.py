@@ -47,7 +47,7 @@ def certify(problem: "LubricationProblem", p: Array, r: Array, eps1: float) -> C
     rounding = 2 * UNIT * (diagonal + red.norm(s.b_C.ravel()))
     scale = pressure + void + driven
     if not driven:
-        scale += red.norm((s.k_W + s.k_E + s.k_S + s.k_N).ravel())
+        scale += red.norm(s.diagonal.ravel())
     over_all = np.maximum(residual - rounding, 0.0) / scale if scale != 0 else 0.0  # NaN stays NaN
     measures = {
         "residual": float(np.max([over_all, worst, supply_defect(problem, p, r)])),
@@ -109,7 +109,7 @@ def void_scale(problem: "LubricationProblem", p_max: float) -> Array:
     """
     s = problem.scheme
     with np.errstate(divide="ignore", over="ignore"):
-        pushed = (s.k_W + s.k_E + s.k_S + s.k_N) * p_max / -s.b_C
+        pushed = s.diagonal * p_max / -s.b_C
     return np.clip(pushed, LEAST, 1.0).ravel()
 
 
@@ -231,7 +231,7 @@ def mass_defect(problem: "LubricationProblem", p: Array, r: Array) -> float:
         held = s.flow_unit * reduce.sum(s.storage)
         flow = max(flow, abs(storing(problem, r)), certificate_tol(0.0) * held)
         pressed += held
-    inside = UNIT * s.flow_unit * reduce.sum((s.k_W + s.k_E + s.k_S + s.k_N) * at)
+    inside = UNIT * s.flow_unit * reduce.sum(s.diagonal * at)
     rounding = 8 * UNIT * (pressed + sum(map(abs, [*flows, *supplied]))) + min(inside, UNEVEN * flow)
     excess = net - rounding  # NaN stays NaN
     return 0.0 if excess <= 0 else excess / flow if flow != 0 else np.inf

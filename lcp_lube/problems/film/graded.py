@@ -88,7 +88,7 @@ class Pivots:
 
     def __init__(self, problem: "LubricationProblem", p: Array, r: Array):
         s, self.problem = problem.scheme, problem
-        self._a, self._b = (s.k_W + s.k_E + s.k_S + s.k_N).ravel(), -s.b_C.ravel()
+        self._a, self._b = s.diagonal.ravel(), -s.b_C.ravel()
         self.full = self._a * p >= self._b * r
         self.p, self.r = np.maximum(p, 0.0), np.maximum(r, 0.0)
         self._driven = problem.reduce.norm(problem.c) > 0  # or else all is zero, and signs are rounding

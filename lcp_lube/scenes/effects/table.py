@@ -12,7 +12,7 @@ from pydantic import Field, create_model
 from ...errors import InputError, nearest
 from ...problems.film.effects import Effect
 from ...registry import RUNGS
-from ..scene import Scene
+from ..film_scene import FilmScene
 from ..units import Measured
 
 FLUID = {"barus": 0.0, "density": "constant"}  # effects that are keys of the table [fluid], and their values without effect
@@ -28,14 +28,14 @@ class EffectTable(Measured):
 
 if TYPE_CHECKING:
 
-    class WithEffects(Scene):
+    class WithEffects(FilmScene):
         """A scene that may have a table for each effect."""
 
         temperature: Any = None
 else:  # whatever the registry has, lines from outside among them
     WithEffects = create_model(
         "WithEffects",
-        __base__=Scene,
+        __base__=FilmScene,
         **{
             name: (entry.load() | None, Field(None, description=entry.line))
             for name, entry in RUNGS.items()
