@@ -23,10 +23,18 @@ SMALL_BOX = 5_000  # the same where a contact area has to move by a cell a step
 
 @dataclass(frozen=True)
 class Entry:
-    """A name's code, imported when it is used, and a line that says what it is."""
+    """A name's code, imported when it is used, and a line that says what it is.
+
+    about : modules of what it is for; while none of them is loaded there is nothing for it to do, and it need not be either.
+    """
 
     target: str
     line: str
+    about: tuple[str, ...] = ()
+
+    @property
+    def idle(self) -> bool:
+        return bool(self.about) and not any(module in sys.modules for module in self.about)
 
     def load(self) -> Any:
         module, _, name = self.target.partition(":")
@@ -230,15 +238,17 @@ RUNGS: dict[str, Entry] = {
     "roughness": Entry("lcp_lube.scenes.effects.roughness:SurfaceRoughness", "roughness"),
 }
 
+PADS, JOURNALS = ("lcp_lube.scenes.thrust", "lcp_lube.scenes.tilting"), ("lcp_lube.scenes.grooved",)
+
 # A scene's way to an answer, outermost first; `drivers.compose` says what each of these modules offers.
 DRIVERS: dict[str, Entry] = {
     "decision": Entry("lcp_lube.drivers.decision", "effects that do not count are left out"),
     "accuracy": Entry("lcp_lube.drivers.accuracy", "finer and finer grids until a quantity is as good as asked for"),
+    "pads": Entry("lcp_lube.drivers.pads", "pads that tilt, and the place of what they carry, by Newton's method", PADS),
+    "position": Entry("lcp_lube.drivers.position", "where a journal lies under a load, by Newton's method", JOURNALS),
     "balance": Entry("lcp_lube.drivers.balance", "the film that carries the load asked for"),
-    "pads": Entry("lcp_lube.drivers.pads", "pads that tilt, and the place of what they carry, by Newton's method"),
-    "position": Entry("lcp_lube.drivers.position", "where a journal lies under a load, by Newton's method"),
-    "attitude": Entry("lcp_lube.drivers.attitude", "the attitude that follows from the load's direction"),
-    "time": Entry("lcp_lube.drivers.time", "step by step, where the film moves"),
+    "attitude": Entry("lcp_lube.drivers.attitude", "the attitude that follows from the load's direction", JOURNALS),
+    "time": Entry("lcp_lube.drivers.time", "step by step, where the film moves", ("lcp_lube.scenes.motion",)),
     "turned": Entry("lcp_lube.drivers.turned", "a wall that moves to smaller x, by the mirror image"),
     "supplies": Entry("lcp_lube.drivers.supplies", "pressures of supplies behind restrictors, or of given flow"),
     "warm": Entry("lcp_lube.drivers.warm", "from a neighbour's answer, or anew where that leads nowhere"),

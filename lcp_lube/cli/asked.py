@@ -89,10 +89,20 @@ def ask_of(args: argparse.Namespace, monitor: Monitor | None = None) -> Ask:
 
 
 def solution_of(
-    args: argparse.Namespace, monitor: Monitor | None = None, progress: Progress | None = None, watching: Any = None
+    args: argparse.Namespace,
+    monitor: Monitor | None = None,
+    progress: Progress | None = None,
+    watching: Any = None,
+    scene: Scene | None = None,
 ) -> Solution:
-    """What `solve` with these arguments finds; watching : hears of time steps (`watching.Watching`). Collective."""
-    scene = scene_of(args)
+    """What `solve` with these arguments finds. Collective.
+
+    Parameters
+    ----------
+    watching : hears of time steps (`watching.Watching`).
+    scene : `scene_of` the arguments, where that is at hand.
+    """
+    scene = scene or scene_of(args)
     return solve(
         scene,
         ask_of(args, monitor),

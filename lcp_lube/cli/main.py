@@ -37,7 +37,8 @@ def run_solve(args: argparse.Namespace) -> int:
     from ..output import files
     from .watching import Watching
 
-    watching = Watching(args, scene_of(args))
+    scene = scene_of(args)
+    watching = Watching(args, scene)
     moves = watching.table is not None
     outputs = [path for path in args.output if not (moves and path.lower().endswith(".pvd"))]
     for path in outputs:
@@ -54,7 +55,7 @@ def run_solve(args: argparse.Namespace) -> int:
     line = Line()
     try:
         quiet = args.monitor or MPI.COMM_WORLD.rank or moves  # a march has a bar of its own
-        solution = solution_of(args, monitor, None if quiet else line, watching if moves else None)
+        solution = solution_of(args, monitor, None if quiet else line, watching if moves else None, scene)
     finally:
         line.end()
         watching.close()

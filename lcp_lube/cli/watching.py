@@ -1,9 +1,11 @@
 """What `solve` does while a film goes on in time: a bar, a history, fields and frames; and the pictures at its end."""
 
+from __future__ import annotations
+
 import argparse
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mpi4py import MPI
 
@@ -12,9 +14,11 @@ from ..errors import InputError
 from ..output.files import check_target
 from ..output.frames import Frames, HistoryFile, Series, due
 from ..problems.solution import Solution
-from ..scenes.motion import MotionTable
 from ..scenes.moving import motion_of
 from ..scenes.scene import Scene
+
+if TYPE_CHECKING:
+    from ..scenes.motion import MotionTable
 
 GIF, FILES = 40, 10  # frames of an animation, times of a series of files
 

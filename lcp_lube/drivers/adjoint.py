@@ -19,7 +19,7 @@ from ..problems.film.reynolds import sides
 from ..problems.solution import Solution
 from ..problems.transfer import Pick, numbers
 from ..registry import SMALL
-from ..scenes.effects.table import without
+from ..scenes.effects.named import without
 from ..scenes.grooved import GroovedJournalScene
 from ..scenes.scene import Scene
 from ..scenes.values import values_of, with_values

@@ -14,9 +14,7 @@ from typing import Any
 from ..errors import InputError
 from ..problems.solution import Outcome, Solution
 from ..scenes.balance import BalanceTable
-from ..scenes.grooved import GroovedJournalScene
 from ..scenes.scene import Scene, Solvable, as_scene
-from . import pads
 from .ask import Ask
 from .compose import Inner
 from .levels import level_shapes
@@ -96,9 +94,8 @@ def _logit(e: float) -> float:
 
 
 def applies(scene: Solvable, ask: Ask) -> bool:
-    """Whether the scene has a load to carry."""
-    own = isinstance(scene, GroovedJournalScene) or pads.applies(scene, ask)  # see `position` and `pads`
-    return getattr(scene, "balance", None) is not None and not own
+    """Whether the scene has a load to carry; `pads` and `position` come first, for theirs."""
+    return getattr(scene, "balance", None) is not None
 
 
 def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:

@@ -17,7 +17,7 @@ from ..problems.film.model import Model
 from ..problems.film.turned import TurnedProblem
 from ..problems.film.turning import Turning
 from ..problems.solution import Fields, Solution
-from ..scenes.effects.table import without
+from ..scenes.effects.named import without
 from ..scenes.moving import motion_of
 from ..scenes.scene import Scene, Solvable
 from ..scenes.tilting import TiltingPadScene

@@ -28,6 +28,8 @@ class Driver(Protocol):
 def solve(scene: Solvable, ask: Ask, level: int = 0) -> Solution:
     """Solve through the drivers from this level on that the scene and the ask call for, outermost first. Collective."""
     for k, name in list(enumerate(DRIVERS))[level:]:
+        if DRIVERS[name].idle:
+            continue
         driver: Driver = DRIVERS[name].load()  # type: ignore[assignment]
         if driver.applies(scene, ask):
             return driver.solve(scene, ask, partial(solve, level=k + 1))

@@ -11,9 +11,8 @@ from typing import Any
 
 from ..errors import InputError
 from ..problems.solution import Solution
-from ..registry import RUNGS
-from ..scenes.effects.table import WithEffects, check_names, named, without
-from ..scenes.scene import Solvable
+from ..scenes.effects.named import check_names, named, sentence, without
+from ..scenes.scene import Scene, Solvable
 from .accuracy import DEFAULT_QUANTITY, find_value
 from .ask import Ask
 from .compose import Inner
@@ -28,7 +27,7 @@ COARSE_EPS1 = 1e-7
 
 def applies(scene: Solvable, ask: Ask) -> bool:
     """Whether the scene names effects, of which some may be left out."""
-    return (isinstance(scene, WithEffects) and bool(named(scene))) or ask.model not in ("auto", "full", "least")
+    return (isinstance(scene, Scene) and bool(named(scene))) or ask.model not in ("auto", "full", "least")
 
 
 def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
@@ -69,16 +68,6 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     }
     solution.settings |= {"model": model, "why": [*solution.settings["why"], f"model: {sentence(model)}"]}
     return solution
-
-
-def sentence(model: dict[str, Any]) -> str:
-    """'left out: density -0.004 %; kept: temperature -14 %'."""
-
-    def told(effects: dict[str, float | None]) -> str:
-        return ", ".join(RUNGS[name].line + ("" if e is None else f" {100 * e:+.2g} %") for name, e in effects.items())
-
-    parts = [f"{word}: {told(model[key])}" for word, key in (("left out", "left_out"), ("kept", "kept")) if model[key]]
-    return "; ".join(parts) + ("" if "quantity" in model else f" ({model['reason']})")
 
 
 def coarse_shape(shape: tuple[int, ...], solves: int) -> tuple[int, ...] | None:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..problems.solution import Outcome, Solution
-from ..scenes.effects.table import named, without
+from ..scenes.effects.named import named, without
 from ..scenes.grooved import GroovedJournalScene
 from ..scenes.scene import Solvable
 from .ask import Ask

@@ -11,9 +11,9 @@ import petsc4py
 from petsc4py import PETSc
 
 from .. import __version__
-from ..drivers.decision import sentence
 from ..problems.solution import Solution
 from ..scenes.doubts import too_high
+from ..scenes.effects.named import sentence
 from .units import place, quantity
 
 ACCURACY = (

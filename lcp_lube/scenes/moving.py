@@ -1,11 +1,15 @@
 """What the march in time asks of a scene that moves."""
 
-from typing import Any, Protocol, runtime_checkable
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from ..problems.film.model import Model
 from ..problems.film.turning import Turning
-from .motion import MotionTable
 from .scene import Solvable
+
+if TYPE_CHECKING:
+    from .motion import MotionTable
 
 
 class Models(Protocol):

@@ -18,7 +18,7 @@ from ..base.resumable import ResumableCsv, Row
 from ..drivers.decision import total_work
 from ..output.console import say
 from ..registry import RUNGS
-from ..scenes.effects.table import named
+from ..scenes.effects.named import named
 from ..scenes.scene import Scene, load_scene
 from .drawing import look, new_figure, save
 

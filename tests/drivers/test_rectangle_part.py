@@ -26,12 +26,6 @@ BOX = {
 SCENES = {"bratu": "bratu", "cubic": CUBIC, "box": BOX, "obstacle": "obstacle_bratu"}
 
 
-@pytest.fixture(autouse=True)
-def short_lines_too(monkeypatch):
-    """Where a half does not pay it must be right all the same."""
-    monkeypatch.setattr("lcp_lube.drivers.time.SHORT", 1)
-
-
 def axes_of(scene):
     problem = scene.build()
     part = part_of(scene, problem)
