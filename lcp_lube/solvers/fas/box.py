@@ -51,9 +51,9 @@ class BoxFas(Cycles):
     state: tuple[str, ...] = ("v", "norm", "_recent", "_first", "_taken")
 
     def __init__(self, problem: BoxProblem, stages: Stages, options: BoxFasOptions, start: Fields | None = None):
-        from . import box_kernels, kernels, levels
+        from . import box_kernels, fronts, levels, transfer
 
-        self._kernels, self._transfer, self._tools = box_kernels, kernels, levels
+        self._kernels, self._fronts, self._transfer, self._tools = box_kernels, fronts, transfer, levels
         equations = problem.equations
         if not isinstance(equations, ObstacleEquations):
             raise InputError("--method fas: for obstacle problems on a rectangle; use active-set")
@@ -157,7 +157,7 @@ class BoxFas(Cycles):
         arrays = (level.z, level.kx, level.ky, grid.bounds, grid.prepared)
         if near and o.front:
             touching = np.where((level.z <= grid.bounds[0]) | (level.z >= grid.bounds[1]), -1.0, 1.0)
-            spans, found = self._transfer.front_spans(touching, o.width)
+            spans, found = self._fronts.front_spans(touching, o.width)
             level.work += o.front * self._kernels.sweep_spans(*arrays, spans, found, o.front)
             level.share(level.z)
         for count in [1] * sweeps if level.split else [sweeps] * bool(sweeps):

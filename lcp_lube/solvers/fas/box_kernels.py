@@ -50,7 +50,7 @@ def sweep(v: Array, kx: Array, ky: Array, bounds: Array, prepared: Array, count:
 def sweep_spans(
     v: Array, kx: Array, ky: Array, bounds: Array, prepared: Array, spans: NDArray[np.int32], found: int, count: int
 ) -> int:
-    """`count` sweeps, to and fro, over runs of points (`kernels.front_spans`); returns how many points these are."""
+    """`count` sweeps, to and fro, over runs of points (`fronts.front_spans`); returns how many points these are."""
     points = 0
     for s in range(count):
         for k in range(found):

@@ -25,7 +25,7 @@ from ..newton import StalledError
 from .cycles import COARSEST_SWEEPS, WINDOW, CycleOptions, Cycles, need_numba
 
 EPS = float(np.finfo(float).eps)
-TRUNCATIONS = {"none": 0, "clip": 1, "points": 2}  # see `kernels.correct`
+TRUNCATIONS = {"none": 0, "clip": 1, "points": 2}  # see `transfer.correct`
 EXACT = (1200, 5000, 10_000)  # points of the coarsest grid once the cycles have stalled, and stalled again
 EXTREME = 1000.0  # film ratio above which a small ||G|| says little of p, and the corrections have to be small too
 SETTLED = 1e-8  # of the largest pressure: what they may then be in the mean
@@ -57,9 +57,9 @@ class Fas(Cycles):
         self, problem: LubricationProblem, stages: Stages, options: FasOptions, eps1: float, start: Fields | None = None
     ):
         # numba starts with this import, 0.4 s: only where the method is used.
-        from . import kernels, levels
+        from . import fronts, kernels, levels, transfer
 
-        self._kernels, self._tools = kernels, levels
+        self._kernels, self._fronts, self._transfer, self._tools = kernels, fronts, transfer, levels
         self.problem, self.stages, self.options, self.eps1 = problem, stages, options, eps1
         self._harmonic, self._truncation = options.weights == "harmonic", TRUNCATIONS[options.truncation]
         with stages("assembly"):
@@ -164,7 +164,7 @@ class Fas(Cycles):
         if k + 1 < self._depth:
             coarse = self._levels[k + 1]
             where = (level.first, level.by_x, level.by_y, self._harmonic)
-            self._kernels.interpolate(level.z, coarse.part(coarse.z), level.kx, level.ky, *where)
+            self._transfer.interpolate(level.z, coarse.part(coarse.z), level.kx, level.ky, *where)
             level.share(level.z)
 
     def _solve_coarsest(self, k: int) -> None:
@@ -178,7 +178,7 @@ class Fas(Cycles):
         level, coarse = self._levels[k], self._levels[k + 1]
         self._relax(level, self.options.pre, False)
         self._tools.restrict(level, coarse, coarse.c, self._harmonic)
-        self._kernels.inject(level.z, coarse.part(coarse.old), level.first, level.by_x, level.by_y)
+        self._transfer.inject(level.z, coarse.part(coarse.old), level.first, level.by_x, level.by_y)
         coarse.gather(coarse.old)
         coarse.z[:] = coarse.old
         self._kernels.add_balance(coarse.old, coarse.kx, coarse.ky, coarse.c)
@@ -187,13 +187,13 @@ class Fas(Cycles):
         o, level, coarse = self.options, self._levels[k], self._levels[k + 1]
         where = (level.first, level.by_x, level.by_y)
         fine = (level.z, coarse.part(coarse.z), coarse.part(coarse.old), level.kx, level.ky)
-        self._correction = self._kernels.correct(*fine, *where, self._harmonic, self._truncation)  # type: ignore[arg-type]
+        self._correction = self._transfer.correct(*fine, *where, self._harmonic, self._truncation)  # type: ignore[arg-type]
         level.share(level.z)
         if o.front:
             # What lies beyond a periodic side must be new at each sweep: else fronts that cross it wander for ever.
             parts = o.front if any(level.periodic) else 2 if level.split else 1
             for count in (o.front // parts + (n < o.front % parts) for n in range(parts)):
-                level.work += self._kernels.relax_front(level.z, level.kx, level.ky, level.c, count, o.width)
+                level.work += self._fronts.relax_front(level.z, level.kx, level.ky, level.c, count, o.width)
                 level.share(level.z)
         self._relax(level, o.post, True)
 

@@ -8,7 +8,8 @@ import numpy as np
 
 from ...base.compiled import kernel
 from ...base.parallel import Array
-from .kernels import balance_row, relax_pairs
+from .fronts import relax_pairs
+from .kernels import balance_row
 
 MOST_STEPS = 60
 MOST_SINGULAR = 8

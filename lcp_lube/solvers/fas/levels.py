@@ -12,7 +12,7 @@ from ...base.parallel import Array
 from ...errors import InputError
 from ...problems.film.lubrication import LubricationProblem
 from ...problems.grid import Grid
-from . import exact, kernels
+from . import exact, kernels, transfer
 
 FEWEST = 3  # points a side of the coarsest grid, at least
 FEWEST_LINES = 8  # of a rank; grids with fewer are held whole by every rank
@@ -237,8 +237,8 @@ def _coarser(fine: Level, harmonic: bool) -> Level | None:
     beyond_x = by_x and fine.nx % 2 == 0 and not fine.periodic[0]
     beyond_y = by_y and fine.ny % 2 == 0 and not fine.periodic[1] and last
     flags = (fine.first, by_x, by_y, harmonic)
-    kernels.coarsen_x_faces(fine.kx, fine.ky, coarse.part(coarse.kx), *flags, beyond_x)
-    kernels.coarsen_y_faces(fine.kx, fine.ky, coarse.part(coarse.ky), *flags, beyond_y)
+    transfer.coarsen_x_faces(fine.kx, fine.ky, coarse.part(coarse.kx), *flags, beyond_x)
+    transfer.coarsen_y_faces(fine.kx, fine.ky, coarse.part(coarse.ky), *flags, beyond_y)
     for a in (coarse.kx, coarse.ky):
         coarse.gather(a)
     restrict(fine, coarse, coarse.c, harmonic, fine.c)
@@ -268,5 +268,5 @@ def restrict(fine: Level, coarse: Level, out: Array, harmonic: bool, given: Arra
     out[:] = 0.0
     where = (fine.first, fine.by_x, fine.by_y, harmonic, fine.periodic[0], given is None)
     c = fine.c if given is None else given
-    kernels.restrict(fine.z, fine.kx, fine.ky, c, coarse.part(out), *where)  # type: ignore[arg-type]
+    transfer.restrict(fine.z, fine.kx, fine.ky, c, coarse.part(out), *where)  # type: ignore[arg-type]
     coarse.collect(out)

@@ -1,0 +1,143 @@
+"""Fronts, where the film ruptures or reforms: the points near them, and sweeps over these alone; arrays as in `kernels`."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.compiled import kernel
+from ...base.parallel import Array
+
+REACH = 8  # cells within which a cavity ends, if it does so at the front that is looked at
+
+
+@kernel
+def relax_pairs(z: Array, kx: Array, ky: Array, c: Array, m: int, start: int, end: int) -> None:
+    """`relax`, but a point of full film behind a cavitated one is solved for together with that one.
+
+    What flows back from it into the cavity returns as void: in a deep dimple that is much more than what flows on, and the
+    point by itself, which takes the void for given, would hardly move.
+    """
+    west = z[m, start - 1]
+    for i in range(start, end):
+        here = z[m, i]
+        k_W, k_E, k_S, k_N = kx[m, i], kx[m, i + 1], ky[m, i], ky[m + 1, i]
+        t = c[m, i] + k_E * max(z[m, i + 1], 0.0) + k_S * max(z[m - 1, i], 0.0) + k_N * max(z[m + 1, i], 0.0)
+        t += k_W * west if west > 0.0 else west
+        if here > 0.0 and west <= 0.0 and i > start:
+            p = (t - k_W * here) / (k_E + k_S + k_N) if k_E + k_S + k_N > 0.0 else 0.0
+            before = west + k_W * (p - here)
+            if p > 0.0 and before <= 0.0:
+                z[m, i - 1], z[m, i], west = before, p, p
+                continue
+        west = t / (k_W + k_E + k_S + k_N) if t > 0.0 else t
+        z[m, i] = west
+
+
+@kernel
+def relax_front(z: Array, kx: Array, ky: Array, c: Array, count: int, width: int) -> int:
+    """`count` sweeps, to and fro, over the points within `width` cells of a front; returns how many points were relaxed.
+
+    Where fronts are rare, and twice as wide a strip takes in less than a tenth of the points, it is that, swept twice as often.
+    """
+    spans, found = front_spans(z, 2 * width)
+    points = (spans[:found, 2] - spans[:found, 1]).sum()
+    if points > 0.1 * (z.shape[0] - 2) * (z.shape[1] - 2):
+        spans, found = front_spans(z, width)
+        points = (spans[:found, 2] - spans[:found, 1]).sum()
+    else:
+        count *= 2
+    for s in range(count):
+        for k in range(found):
+            at = found - 1 - k if s % 2 == 1 else k
+            relax_pairs(z, kx, ky, c, spans[at, 0], spans[at, 1], spans[at, 2])
+    return count * points
+
+
+@kernel
+def front_spans(z: Array, width: int) -> tuple[NDArray[np.int32], int]:
+    """Row, first column and last column + 1 of the runs of points within `width` cells of a front, and their number."""
+    ny, nx = z.shape[0] - 2, z.shape[1] - 2
+    rows, pad = 2 * width + 2, 2 * width + 8  # in the masks column i stands at i + pad
+    # Fronts to the east or north of the points of the last rows, and the first and last column that they take up.
+    ring = np.zeros((rows, nx + 2 * pad), dtype=np.uint8)
+    low, high = np.full(rows, nx + 1), np.zeros(rows, dtype=np.int64)
+    full, full_north = np.zeros(nx + 2, dtype=np.uint8), np.zeros(nx + 2, dtype=np.uint8)
+    crossed, near = np.zeros(nx + 2 * pad, dtype=np.uint8), np.zeros(nx + 2 * pad, dtype=np.uint8)
+    spans, found = np.empty((ny + 64, 3), dtype=np.int32), 0
+    positive(z[1], full)
+    for m in range(1, ny + width + 1):
+        new = m % rows
+        low[new], high[new] = nx + 1, 0
+        if m <= ny:
+            positive(z[min(m + 1, ny)], full_north)
+            if mark_changes(full, full_north, ring[new, pad:], nx):
+                low[new], high[new] = extent(ring[new, pad:], nx)
+            full, full_north = full_north, full
+        row, first, last = m - width, low.min(), high.max()
+        if row < 1 or first > last:
+            continue
+        start, end = first + pad - width, last + pad + width + 2  # columns that can be near
+        crossed[start - width : end + width] = 0
+        for r in range(rows):
+            if low[r] <= high[r]:
+                merge(ring[r, low[r] + pad : high[r] + pad + 1], crossed[low[r] + pad : high[r] + pad + 1])
+        near[start:end] = 0
+        for shift in range(-width, width + 2):
+            merge(crossed[start - shift : end - shift], near[start:end])
+        if found + nx // 2 + 1 > spans.shape[0]:
+            spans = np.concatenate((spans, np.empty((spans.shape[0] + nx, 3), dtype=np.int32)))
+        i, stop = max(first - width, 1), min(last + width + 1, nx)
+        while i <= stop:
+            if near[i + pad] == 0:
+                i += 1
+                continue
+            begin = i
+            while i <= stop and near[i + pad]:
+                i += 1
+            spans[found, 0], spans[found, 1], spans[found, 2] = row, begin, i
+            found += 1
+    return spans, found
+
+
+@kernel
+def positive(row: Array, out: NDArray[np.uint8]) -> None:
+    """1 where the film is full."""
+    for i in range(row.size):
+        out[i] = 1 if row[i] > 0.0 else 0
+
+
+@kernel
+def mark_changes(full: NDArray[np.uint8], north: NDArray[np.uint8], out: NDArray[np.uint8], nx: int) -> int:
+    """Mark the points with a front to the east or north of them; returns their number."""
+    total = 0
+    for i in range(1, nx):
+        out[i] = (full[i] ^ full[i + 1]) | (full[i] ^ north[i])
+        total += out[i]
+    out[nx] = full[nx] ^ north[nx]
+    return total + out[nx]
+
+
+@kernel
+def extent(mask: NDArray[np.uint8], nx: int) -> tuple[int, int]:
+    """First and last column that is marked, of at least one."""
+    first, last = 1, nx
+    while mask[first] == 0:
+        first += 1
+    while mask[last] == 0:
+        last -= 1
+    return first, last
+
+
+@kernel
+def merge(mask: NDArray[np.uint8], into: NDArray[np.uint8]) -> None:
+    """into |= mask."""
+    for i in range(mask.size):
+        into[i] |= mask[i]
+
+
+@kernel
+def reforms(z: Array, m: int, i: int) -> bool:
+    """Whether the film is full again soon to the east of point i of row m."""
+    east, last = i + 1, min(i + REACH, z.shape[1] - 2)
+    while east <= last and z[m, east] <= 0.0:
+        east += 1
+    return east <= last
