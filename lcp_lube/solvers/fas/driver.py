@@ -18,9 +18,10 @@ import numpy as np
 from ...base.parallel import Array
 from ...base.stages import Stages
 from ...problems.film.lubrication import LubricationProblem
+from ...problems.film.stored import storing
 from ...problems.solution import Fields, Step
 from ..job import Job
-from ..method_options import make_options, one_of
+from ..method_options import make_options, one_of, option
 from ..newton import StalledError
 from .cycles import COARSEST_SWEEPS, WINDOW, CycleOptions, Cycles, need_numba
 
@@ -29,16 +30,19 @@ TRUNCATIONS = {"none": 0, "clip": 1, "points": 2}  # see `transfer.correct`
 EXACT = (1200, 5000, 10_000)  # points of the coarsest grid once the cycles have stalled, and stalled again
 EXTREME = 1000.0  # film ratio above which a small ||G|| says little of p, and the corrections have to be small too
 SETTLED = 1e-8  # of the largest pressure: what they may then be in the mean
+SCALED = 1e-3  # the most by which all pressures and voids are scaled (`Fas._balance`)
 BORDER = 4  # lines on either side of the border between two ranks
 
 
 @dataclass(frozen=True)
 class FasOptions(CycleOptions):
     """As `CycleOptions`, the sweeps at fronts doubled where these are rare; truncation: of corrections at fronts, none, clip
-    or points; weights: of the interpolation, by the conductances of the faces (harmonic) or the same everywhere (linear)."""
+    or points; weights: of the interpolation, by the conductances of the faces (harmonic) or the same everywhere (linear);
+    rest: part of the residual of the guess that a time step may leave, where the certificate allows it."""
 
     truncation: str = one_of("clip", TRUNCATIONS)
     weights: str = one_of("harmonic", ("harmonic", "linear"))
+    rest: float = option(0.0, lambda rest: 0 <= rest < 1, "allowed are numbers from 0, below 1")
 
 
 class Fas(Cycles):
@@ -71,8 +75,11 @@ class Fas(Cycles):
         self._correction = 0.0
         if start is not None:
             self.z = start["p"] + problem.scheme.b_C.ravel() * start["r"]
-        self.norm = self._norm()
-        self._first = self.norm
+        self._rest, self._share = eps1, 0.1
+        self.norm = self._first = self._norm()
+        if start is not None and problem.scheme.storage is not None:
+            self._rest = max(eps1, min(options.rest * self.norm, eps1**0.5))
+            self._share = 0.5 if options.rest else 0.1
 
     @property
     def z(self) -> Array:
@@ -97,15 +104,29 @@ class Fas(Cycles):
         its mass defect or residual to a tenth of what may be.
         """
         level = self._levels[0]
-        sums = np.array(self._kernels.norms(level.z, level.kx, level.ky, level.c))
+        sums = np.array(self._kernels.norms(level.z, level.kx, level.ky, level.c, level.carry))
         if level.comm is not None:
             level.comm.Allreduce(sums.copy(), sums)
         residual, terms = np.sqrt(sums)
         norm = float(residual / (max(self._c_norm, 16 * EPS * terms / self.eps1) or 1.0))
-        if norm > self.eps1:
+        if norm > self._rest:
             return norm
         seen = self.problem.certify(self.fields, self.eps1)
-        return max(norm, self.eps1 * max(seen.measures["mass_defect"], seen.measures["residual"]) / (0.1 * seen.tol))
+        return max(norm, self._rest * max(seen.measures["mass_defect"], seen.measures["residual"]) / (self._share * seen.tol))
+
+    def _balance(self) -> None:
+        """Scale pressures up and voids down, or the reverse, so that what enters the film is what it stores. Collective.
+
+        Either takes liquid out: together they do wherever any can leave. They change far less than what a cycle leaves.
+        """
+        lost, fields = [], self.fields
+        for part in (0.0, 1.0):
+            p, r = (1.0 + part) * fields["p"], (1.0 - part) * fields["r"]
+            west, east, south, north = self.problem.boundary_flows(p, r)
+            lost.append(west - east + south - north - storing(self.problem, r))
+        part = lost[0] / (lost[0] - lost[1]) if lost[0] != lost[1] else 0.0
+        if abs(part) < SCALED:
+            self.z = self.z + part * np.abs(self.z)
 
     def advance(self) -> Step:
         """Full multigrid, or one cycle; the step is what the coarse grids corrected. Collective.
@@ -124,12 +145,16 @@ class Fas(Cycles):
                 )
             anew = not self.norm < self._first
         with self.stages("cycles"):
+            if self._taken == 1 and self._levels[0].carry is not None:
+                self._relax_fronts(self._levels[0])
             if anew:
                 self._full_multigrid()
             else:
                 self._cycle(0, self.options.cycle)
         self._count()
         with self.stages("norm"):
+            if self._levels[0].carry is not None and self.problem.held is None:
+                self._balance()
             self.norm = self._norm()
         if not np.isfinite(self.norm):
             self.z = np.zeros(self.problem.grid.local_size)  # as above
@@ -142,7 +167,7 @@ class Fas(Cycles):
             self.norm = (
                 max(self.norm, self.eps1 * size / (SETTLED * p_max * np.sqrt(self.problem.size))) if p_max > 0 else self.norm
             )
-        return Step(self.norm, size, 1.0)
+        return Step(self.norm, size, 1.0, enough=self._rest > self.eps1 and self.norm <= self._rest)
 
     def _retreat(self) -> bool:
         """Do without the coarsest grids, on which the film's cavities are too small to be seen; false if that has been tried.
@@ -164,8 +189,13 @@ class Fas(Cycles):
         if k + 1 < self._depth:
             coarse = self._levels[k + 1]
             where = (level.first, level.by_x, level.by_y, self._harmonic)
-            self._transfer.interpolate(level.z, coarse.part(coarse.z), level.kx, level.ky, *where)
+            self._transfer.interpolate(level.z, coarse.part(self._seen(coarse, coarse.z)), level.kx, level.ky, *where)
             level.share(level.z)
+
+    @staticmethod
+    def _seen(coarse: Any, z: Array) -> Array:
+        """A coarse grid's values as the finer one has them, whose cells store less void."""
+        return z if coarse.scale is None else np.where(z < 0.0, z / coarse.scale, z)
 
     def _solve_coarsest(self, k: int) -> None:
         level = self._levels[k]
@@ -180,22 +210,30 @@ class Fas(Cycles):
         self._tools.restrict(level, coarse, coarse.c, self._harmonic)
         self._transfer.inject(level.z, coarse.part(coarse.old), level.first, level.by_x, level.by_y)
         coarse.gather(coarse.old)
+        if coarse.scale is not None:
+            np.multiply(coarse.old, coarse.scale, out=coarse.old, where=coarse.old < 0.0)
         coarse.z[:] = coarse.old
-        self._kernels.add_balance(coarse.old, coarse.kx, coarse.ky, coarse.c)
+        self._kernels.add_balance(coarse.old, coarse.kx, coarse.ky, coarse.c, coarse.carry)
 
     def _ascend(self, k: int) -> None:
         o, level, coarse = self.options, self._levels[k], self._levels[k + 1]
         where = (level.first, level.by_x, level.by_y)
-        fine = (level.z, coarse.part(coarse.z), coarse.part(coarse.old), level.kx, level.ky)
+        new, old = (coarse.part(self._seen(coarse, z)) for z in (coarse.z, coarse.old))
+        fine = (level.z, new, old, level.kx, level.ky)
         self._correction = self._transfer.correct(*fine, *where, self._harmonic, self._truncation)  # type: ignore[arg-type]
         level.share(level.z)
         if o.front:
-            # What lies beyond a periodic side must be new at each sweep: else fronts that cross it wander for ever.
-            parts = o.front if any(level.periodic) else 2 if level.split else 1
-            for count in (o.front // parts + (n < o.front % parts) for n in range(parts)):
-                level.work += self._fronts.relax_front(level.z, level.kx, level.ky, level.c, count, o.width)
-                level.share(level.z)
+            self._relax_fronts(level)
         self._relax(level, o.post, True)
+
+    def _relax_fronts(self, level: Any) -> None:
+        """Sweeps near the fronts; in a time step, in which these have moved by some cells, twice as many twice as far."""
+        front, width = ((1 if level.carry is None else 2) * n for n in (self.options.front, self.options.width))
+        # What lies beyond a periodic side must be new at each sweep: else fronts that cross it wander for ever.
+        parts = front if any(level.periodic) else 2 if level.split else 1
+        for count in (front // parts + (n < front % parts) for n in range(parts)):
+            level.work += self._fronts.relax_front(level.z, level.kx, level.ky, level.c, count, width, level.carry)
+            level.share(level.z)
 
     def _relax(self, level: Any, sweeps: int, down: bool) -> None:
         """Sweeps without a word between them; then, where other ranks go on, once more over the lines that border on theirs.
@@ -203,12 +241,13 @@ class Fas(Cycles):
         That makes up for what these did not hear of: the factor is that of one rank, where without it it doubles.
         """
         for count in [1] * sweeps if level.periodic[0] else [sweeps] * bool(sweeps):
-            self._kernels.sweep(level.z, level.kx, level.ky, level.c, count, down)
+            self._kernels.sweep(level.z, level.kx, level.ky, level.c, count, down, level.carry)
             level.share(level.z)
         if sweeps and level.split:
             for first in (0, level.z.shape[0] - BORDER - 2):
                 rows, faces = slice(first, first + BORDER + 2), slice(first, first + BORDER + 3)
-                self._kernels.sweep(level.z[rows], level.kx[rows], level.ky[faces], level.c[rows], 1, down)
+                carry = None if level.carry is None else level.carry[rows]
+                self._kernels.sweep(level.z[rows], level.kx[rows], level.ky[faces], level.c[rows], 1, down, carry)
             level.share(level.z)
         level.work += sweeps * level.nx * (level.z.shape[0] - 2)
 

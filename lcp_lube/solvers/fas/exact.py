@@ -18,7 +18,7 @@ SWEEPS, RESCUE_SWEEPS, MOST_SWEEPS = 8, 32, 4096  # between two steps; where the
 
 
 @kernel
-def solve(z: Array, kx: Array, ky: Array, c: Array, ring_x: bool, ring_y: bool) -> bool:
+def solve(z: Array, kx: Array, ky: Array, c: Array, ring_x: bool, ring_y: bool, carry: Array | None = None) -> bool:
     """Solve G(z) = c in place, arrays as in `kernels`; returns whether the signs of z settled.
 
     Each step is followed by sweeps, which bring order into the signs where steps alone cycle. Where the signs do not settle,
@@ -28,7 +28,7 @@ def solve(z: Array, kx: Array, ky: Array, c: Array, ring_x: bool, ring_y: bool) 
     best, least, stalled, rescue, singular = z.copy(), np.inf, 0, RESCUE_SWEEPS, 0
     for _ in range(MOST_STEPS):
         full = z > 0.0
-        stepped = newton_step(z, kx, ky, c, ring_x, ring_y)
+        stepped = newton_step(z, kx, ky, c, ring_x, ring_y, carry)
         wrap(z, ring_x, ring_y)
         if stepped and (full == (z > 0.0)).all():
             return True
@@ -40,9 +40,9 @@ def solve(z: Array, kx: Array, ky: Array, c: Array, ring_x: bool, ring_y: bool) 
             sweeps, rescue, stalled = rescue, min(2 * rescue, MOST_SWEEPS), 0
         for s in range(sweeps):
             for m in range(ny):
-                relax_pairs(z, kx, ky, c, ny - m if s % 2 else m + 1, 1, nx + 1)
+                relax_pairs(z, kx, ky, c, ny - m if s % 2 else m + 1, 1, nx + 1, carry)
             wrap(z, ring_x, ring_y)
-        size = residual_square(z, kx, ky, c)
+        size = residual_square(z, kx, ky, c, carry)
         stalled = 0 if size < 0.8 * least else stalled + 1
         if size < least:
             best[:], least = z, size
@@ -60,11 +60,11 @@ def wrap(z: Array, ring_x: bool, ring_y: bool) -> None:
 
 
 @kernel
-def residual_square(z: Array, kx: Array, ky: Array, c: Array) -> float:
+def residual_square(z: Array, kx: Array, ky: Array, c: Array, carry: Array | None = None) -> float:
     """||c - G(z)||^2."""
     G, total = np.zeros(z.shape[1]), 0.0
     for m in range(1, z.shape[0] - 1):
-        balance_row(z, kx, ky, m, G)
+        balance_row(z, kx, ky, m, G, carry)
         for i in range(1, z.shape[1] - 1):
             total += (c[m, i] - G[i]) ** 2
     return total
@@ -79,7 +79,7 @@ def place(a: int, n: int, ring: bool) -> int:
 
 
 @kernel
-def newton_step(z: Array, kx: Array, ky: Array, c: Array, ring_x: bool, ring_y: bool) -> bool:
+def newton_step(z: Array, kx: Array, ky: Array, c: Array, ring_x: bool, ring_y: bool, carry: Array | None = None) -> bool:
     """z += J^-1 (c - G(z)) for the signs of z; False where J is singular: a line is cavitated all the way round.
 
     J is column diagonally dominant: no pivoting is needed. The shorter direction runs fastest, so that the band is narrow.
@@ -96,7 +96,7 @@ def newton_step(z: Array, kx: Array, ky: Array, c: Array, ring_x: bool, ring_y: 
             at[m, i] = place(s, slow, ring) * fast + f
     G = np.zeros(nx + 2)
     for m in range(1, ny + 1):
-        balance_row(z, kx, ky, m, G)
+        balance_row(z, kx, ky, m, G, carry)
         for i in range(1, nx + 1):
             here, full = at[m, i], z[m, i] > 0.0
             d[here] = c[m, i] - G[i]
@@ -104,7 +104,7 @@ def newton_step(z: Array, kx: Array, ky: Array, c: Array, ring_x: bool, ring_y: 
             J[here, b] += k_W + k_E + k_S + k_N if full else 1.0
             if i < nx or ring_x:
                 to = at[m, i + 1 if i < nx else 1]
-                J[to, here - to + b] -= k_E if full else 1.0
+                J[to, here - to + b] -= k_E if full else 1.0 if carry is None else carry[m, i]
             if full and (i > 1 or ring_x):
                 to = at[m, i - 1 if i > 1 else nx]
                 J[to, here - to + b] -= k_W

@@ -10,7 +10,7 @@ REACH = 8  # cells within which a cavity ends, if it does so at the front that i
 
 
 @kernel
-def relax_pairs(z: Array, kx: Array, ky: Array, c: Array, m: int, start: int, end: int) -> None:
+def relax_pairs(z: Array, kx: Array, ky: Array, c: Array, m: int, start: int, end: int, carry: Array | None = None) -> None:
     """`relax`, but a point of full film behind a cavitated one is solved for together with that one.
 
     What flows back from it into the cavity returns as void: in a deep dimple that is much more than what flows on, and the
@@ -21,9 +21,11 @@ def relax_pairs(z: Array, kx: Array, ky: Array, c: Array, m: int, start: int, en
         here = z[m, i]
         k_W, k_E, k_S, k_N = kx[m, i], kx[m, i + 1], ky[m, i], ky[m + 1, i]
         t = c[m, i] + k_E * max(z[m, i + 1], 0.0) + k_S * max(z[m - 1, i], 0.0) + k_N * max(z[m + 1, i], 0.0)
-        t += k_W * west if west > 0.0 else west
+        passed = 1.0 if carry is None else carry[m, i - 1]
+        t += k_W * west if west > 0.0 else passed * west
         if here > 0.0 and west <= 0.0 and i > start:
-            p = (t - k_W * here) / (k_E + k_S + k_N) if k_E + k_S + k_N > 0.0 else 0.0
+            over = k_E + k_S + k_N if carry is None else k_E + k_S + k_N + (1.0 - passed) * k_W
+            p = (t - passed * k_W * here) / over if over > 0.0 else 0.0
             before = west + k_W * (p - here)
             if p > 0.0 and before <= 0.0:
                 z[m, i - 1], z[m, i], west = before, p, p
@@ -33,7 +35,7 @@ def relax_pairs(z: Array, kx: Array, ky: Array, c: Array, m: int, start: int, en
 
 
 @kernel
-def relax_front(z: Array, kx: Array, ky: Array, c: Array, count: int, width: int) -> int:
+def relax_front(z: Array, kx: Array, ky: Array, c: Array, count: int, width: int, carry: Array | None = None) -> int:
     """`count` sweeps, to and fro, over the points within `width` cells of a front; returns how many points were relaxed.
 
     Where fronts are rare, and twice as wide a strip takes in less than a tenth of the points, it is that, swept twice as often.
@@ -48,7 +50,7 @@ def relax_front(z: Array, kx: Array, ky: Array, c: Array, count: int, width: int
     for s in range(count):
         for k in range(found):
             at = found - 1 - k if s % 2 == 1 else k
-            relax_pairs(z, kx, ky, c, spans[at, 0], spans[at, 1], spans[at, 2])
+            relax_pairs(z, kx, ky, c, spans[at, 0], spans[at, 1], spans[at, 2], carry)
     return count * points
 
 

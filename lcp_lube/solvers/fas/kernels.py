@@ -6,7 +6,9 @@ pressure, z < 0 minus the flow of void -b_C r that leaves the cell. With it the 
 
     G_i = sum of k (p_i - p_neighbour) - q_i + q_west,    p = max(z, 0), q = max(-z, 0):
 
-B has the entries -1 and 1, on every level. `fronts` has the loops near the cavities' edges, `transfer` those between grids.
+B has the entries -1 and 1, on every level. In a time step cells store void: z < 0 is minus all that becomes of it, and `carry`,
+its part that leaves for the next cell, takes the 1's place; steady films have carry = None, for which the loops are compiled
+without it. `fronts` has the loops near the cavities' edges, `transfer` those between grids.
 """
 
 import numpy as np
@@ -16,7 +18,7 @@ from ...base.parallel import Array
 
 
 @kernel
-def sweep(z: Array, kx: Array, ky: Array, c: Array, count: int, down: bool) -> None:
+def sweep(z: Array, kx: Array, ky: Array, c: Array, count: int, down: bool, carry: Array | None = None) -> None:
     """`count` nonlinear Gauss-Seidel sweeps in place, every x line along the flow, lines upwards or down.
 
     Three at a time: the second one follows the first a line and a point behind, the third one the second. The values are those
@@ -25,7 +27,7 @@ def sweep(z: Array, kx: Array, ky: Array, c: Array, count: int, down: bool) -> N
     ny, nx = z.shape[0] - 2, z.shape[1] - 2
     step, first = (-1, ny) if down else (1, 1)
     left = count
-    if nx > 3:
+    if carry is None and nx > 3:
         diagonals = np.empty((3, nx + 2))
         while left >= 3:
             for s in range(ny + 2):
@@ -38,11 +40,11 @@ def sweep(z: Array, kx: Array, ky: Array, c: Array, count: int, down: bool) -> N
                     continue
                 for lag in range(3):
                     if lag <= s < ny + lag:
-                        relax(z, kx, ky, c, m - lag * step, 1, nx + 1)
+                        relax(z, kx, ky, c, m - lag * step, 1, nx + 1, None)
             left -= 3
     for _ in range(left):
         for s in range(ny):
-            relax(z, kx, ky, c, first + step * s, 1, nx + 1)
+            relax(z, kx, ky, c, first + step * s, 1, nx + 1, carry)
 
 
 @kernel
@@ -58,8 +60,8 @@ def relax_three(
 ) -> None:
     """`relax` on the whole of rows m1, m2 and m3, each a point behind the one before; over: one over their diagonals."""
     nx = z.shape[1] - 2
-    relax(z, kx, ky, c, m1, 1, 3)
-    relax(z, kx, ky, c, m2, 1, 2)
+    relax(z, kx, ky, c, m1, 1, 3, None)
+    relax(z, kx, ky, c, m2, 1, 2, None)
     # Shifted so that one index serves all three; their own, southern and northern rows of z may be one another's.
     z1, z2, z3 = z[m1, 2:], z[m2, 1:], z[m3]
     e1, e2, e3 = z[m1, 3:], z[m2, 2:], z[m3, 1:]
@@ -84,24 +86,24 @@ def relax_three(
         w2 = t2 * (d2 if t2 > 0.0 else 1.0)
         w3 = t3 * (d3 if t3 > 0.0 else 1.0)
         z1[i], z2[i], z3[i] = w1, w2, w3
-    relax(z, kx, ky, c, m2, nx, nx + 1)
-    relax(z, kx, ky, c, m3, nx - 1, nx + 1)
+    relax(z, kx, ky, c, m2, nx, nx + 1, None)
+    relax(z, kx, ky, c, m3, nx - 1, nx + 1, None)
 
 
 @kernel
-def relax(z: Array, kx: Array, ky: Array, c: Array, m: int, start: int, end: int) -> None:
+def relax(z: Array, kx: Array, ky: Array, c: Array, m: int, start: int, end: int, carry: Array | None = None) -> None:
     """The points of row m in columns start to end - 1, one after the other: each balance has one solution."""
     west = z[m, start - 1]
     for i in range(start, end):
         k_W, k_E, k_S, k_N = kx[m, i], kx[m, i + 1], ky[m, i], ky[m + 1, i]
         t = c[m, i] + k_E * max(z[m, i + 1], 0.0) + k_S * max(z[m - 1, i], 0.0) + k_N * max(z[m + 1, i], 0.0)
-        t += k_W * west if west > 0.0 else west
+        t += k_W * west if west > 0.0 else west if carry is None else carry[m, i - 1] * west
         west = t / (k_W + k_E + k_S + k_N) if t > 0.0 else t
         z[m, i] = west
 
 
 @kernel
-def balance_row(z: Array, kx: Array, ky: Array, m: int, out: Array) -> None:
+def balance_row(z: Array, kx: Array, ky: Array, m: int, out: Array, carry: Array | None = None) -> None:
     """G of the points of row m into out[1:-1]."""
     for i in range(1, z.shape[1] - 1):
         k_W, k_E, k_S, k_N = kx[m, i], kx[m, i + 1], ky[m, i], ky[m + 1, i]
@@ -111,17 +113,17 @@ def balance_row(z: Array, kx: Array, ky: Array, m: int, out: Array) -> None:
         out[i] = (
             (k_W * (p - max(west, 0.0)) + k_E * (p - max(z[m, i + 1], 0.0)))
             + (k_S * (p - max(z[m - 1, i], 0.0)) + k_N * (p - max(z[m + 1, i], 0.0)))
-        ) + (min(here, 0.0) - min(west, 0.0))
+        ) + (min(here, 0.0) - (min(west, 0.0) if carry is None else carry[m, i - 1] * min(west, 0.0)))
 
 
 @kernel
-def norms(z: Array, kx: Array, ky: Array, c: Array) -> tuple[float, float]:
+def norms(z: Array, kx: Array, ky: Array, c: Array, carry: Array | None = None) -> tuple[float, float]:
     """Sums of squares over the rank's points: of the residual c - G, and of the size of its largest terms."""
     ny, nx = z.shape[0] - 2, z.shape[1] - 2
     G = np.zeros(nx + 2)
     residual, terms = 0.0, 0.0
     for m in range(1, ny + 1):
-        balance_row(z, kx, ky, m, G)
+        balance_row(z, kx, ky, m, G, carry)
         r, t = 0.0, 0.0
         for i in range(1, nx + 1):
             here = z[m, i]
@@ -135,22 +137,22 @@ def norms(z: Array, kx: Array, ky: Array, c: Array) -> tuple[float, float]:
 
 
 @kernel
-def add_balance(z: Array, kx: Array, ky: Array, c: Array) -> None:
+def add_balance(z: Array, kx: Array, ky: Array, c: Array, carry: Array | None = None) -> None:
     """c += G(z): the right-hand side whose solution z would be if the residual, which c holds, were zero."""
     G = np.zeros(z.shape[1])
     for m in range(1, z.shape[0] - 1):
-        balance_row(z, kx, ky, m, G)
+        balance_row(z, kx, ky, m, G, carry)
         for i in range(1, z.shape[1] - 1):
             c[m, i] += G[i]
 
 
 @kernel
-def lost_void(b_C: Array, b_W: Array) -> tuple[float, float]:
-    """The largest difference between the void's flow out of a cell and into the next one, and that flow itself, per void."""
+def lost_void(b_E: Array, b_W: Array, b_C: Array) -> tuple[float, float]:
+    """The largest difference between the void's flow out of a cell and into the next one, and the largest b_C, per void."""
     lost, most = 0.0, 0.0
     for j in range(b_C.shape[0]):
         for i in range(1, b_C.shape[1]):
-            lost = max(lost, abs(b_W[j, i] + b_C[j, i - 1]))
+            lost = max(lost, abs(b_W[j, i] + b_E[j, i - 1]))
             most = max(most, abs(b_C[j, i]))
     return lost, most
 

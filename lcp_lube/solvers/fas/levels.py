@@ -20,6 +20,7 @@ MOST_ENTRIES = 5_000_000  # of a banded matrix that is eliminated
 # Times the mean conductance of the other direction: then points are left out in the strong one alone. 8 costs 6 % less work on
 # six stretched films and 6 cycles more, on a rough one above all; 64 doubles both (benchmarks/constants.py).
 STRONG = 4.0
+LEAST = 1e-300
 
 
 @dataclass
@@ -34,6 +35,8 @@ class Level:
     comm : the ranks, None where this one holds the whole grid and need not tell anyone.
     whole : every rank holds the whole grid, though comm has several.
     by_x, by_y : which points the next coarser grid leaves out.
+    carry : of a time step (`kernels`); void : the part of it that b_C r is made of, what leaves and what is stored; scale : z
+        of a cavitated cell over that of the finer grid's, which is smaller.
     """
 
     nx: int
@@ -51,6 +54,9 @@ class Level:
     old: Array = field(default_factory=lambda: np.zeros((0, 0)))
     by_x: bool = False
     by_y: bool = False
+    carry: Array | None = None
+    void: tuple[Array, Array] | None = None
+    scale: Array | None = None
     visits: int = 0
     seconds: float = 0.0
     work: float = 0.0  # relaxed points
@@ -129,10 +135,22 @@ def finest(problem: LubricationProblem) -> Level:
     grid, s = problem.grid, problem.scheme
     if s.held is not None:
         raise InputError("--method fas: the cells of supplies are held, on which its grids have no word; use active-set")
-    lost, carried = kernels.lost_void(s.b_C, s.b_W)
+    lost, carried = kernels.lost_void(s.b_E, s.b_W, s.b_C)
     if grid.reduce.max(np.array([lost])) > 1e-12 * grid.reduce.max(np.array([carried])):
         raise InputError("--method fas: what leaves a cell of this scheme does not enter the next one; use active-set")
-    return level_of(grid, s.k_W, s.k_E, s.k_S, s.k_N, s.c)
+    level = level_of(grid, s.k_W, s.k_E, s.k_S, s.k_N, s.c)
+    if s.storage is not None:
+        level.void = np.zeros_like(level.z), np.zeros_like(level.z)
+        put(level, grid, level.void[0], -s.b_E)
+        put(level, grid, level.void[1], s.storage)
+        _carry(level)
+    return level
+
+
+def _carry(level: Level) -> None:
+    """What part of a cell's void leaves it, from `void`."""
+    leaves, stored = level.void  # type: ignore[misc]
+    level.carry = leaves / (leaves + stored + LEAST)
 
 
 def level_of(grid: Grid, k_W: Array, k_E: Array, k_S: Array, k_N: Array, c: Array) -> Level:
@@ -243,6 +261,15 @@ def _coarser(fine: Level, harmonic: bool) -> Level | None:
         coarse.gather(a)
     restrict(fine, coarse, coarse.c, harmonic, fine.c)
     coarse.f, coarse.old = coarse.c.copy(), np.zeros_like(coarse.z)
+    if fine.void is not None:
+        leaves, stored, before = (np.zeros_like(coarse.z) for _ in range(3))
+        for values, into in zip(fine.void, (leaves, before), strict=True):
+            transfer.inject(values, coarse.part(into), fine.first, by_x, by_y)
+            coarse.gather(into)
+        restrict(fine, coarse, stored, harmonic, fine.void[1])
+        coarse.void = leaves, coarse.share(stored)
+        _carry(coarse)
+        coarse.scale = (leaves + stored + LEAST) / (leaves + before + LEAST)
     return coarse
 
 
@@ -252,13 +279,14 @@ def solve(level: Level) -> bool:
     if level.nx * n * (4 * min(level.nx, n) + 1) > MOST_ENTRIES:  # odd numbers of points between periodic sides
         return False
     if comm is None or not level.split:
-        return exact.solve(level.z, level.kx, level.ky, level.c, *level.periodic)
+        return exact.solve(level.z, level.kx, level.ky, level.c, *level.periodic, level.carry)
     whole = _empty(level.nx, n, 0, n, None, False, level.periodic)
-    for name in ("z", "c", "kx", "ky"):
+    whole.carry = None if level.carry is None else np.zeros_like(whole.z)
+    for name in ("z", "c", "kx", "ky", *(["carry"] if whole.carry is not None else [])):
         mine, out = getattr(level, name), getattr(whole, name)
         rows = mine[1 if level.y0 else 0 : level.y1 - level.y0 + 1 if level.y1 < n else None]
         np.concatenate(comm.allgather(np.ascontiguousarray(rows)), out=out)
-    settled = exact.solve(whole.z, whole.kx, whole.ky, whole.c, *level.periodic)
+    settled = exact.solve(whole.z, whole.kx, whole.ky, whole.c, *level.periodic, whole.carry)
     level.z[:] = whole.z[level.y0 : level.y1 + 2]
     return settled
 
@@ -268,5 +296,5 @@ def restrict(fine: Level, coarse: Level, out: Array, harmonic: bool, given: Arra
     out[:] = 0.0
     where = (fine.first, fine.by_x, fine.by_y, harmonic, fine.periodic[0], given is None)
     c = fine.c if given is None else given
-    transfer.restrict(fine.z, fine.kx, fine.ky, c, coarse.part(out), *where)  # type: ignore[arg-type]
+    transfer.restrict(fine.z, fine.kx, fine.ky, c, coarse.part(out), *where, fine.carry)  # type: ignore[arg-type]
     coarse.collect(out)

@@ -29,6 +29,7 @@ def restrict(
     harmonic: bool,
     wrap: bool,
     residual: bool,
+    carry: Array | None = None,
 ) -> None:
     """Add to `out` what the rank's rows of the residual c - G(z), or of c, give to the coarse points.
 
@@ -41,7 +42,7 @@ def restrict(
     n_coarse = out.shape[1] - 2
     for m in range(1, ny + 1):
         if residual:
-            balance_row(z, kx, ky, m, r)
+            balance_row(z, kx, ky, m, r, carry)
             for i in range(1, nx + 1):
                 r[i] = c[m, i] - r[i]
         else:
