@@ -29,7 +29,7 @@ from lcp_lube.problems.film.lubrication import LubricationProblem
 from lcp_lube.studies import precision
 from lcp_lube.studies.compare import read_off
 from lcp_lube.studies.experiment import environment, open_store, scene_key
-from lcp_lube.studies.known import FilmScene, known_answer
+from lcp_lube.studies.known import RectangleScene, known_answer
 from lcp_lube.studies.precision_words import PEER
 
 NAMES = {
@@ -49,7 +49,7 @@ MOST = {
 STARTS = [(1.0, 0.1), (1.0, 0.0), (0.0, 0.0), (0.0, 0.1)]  # p in p_unit and r, everywhere
 
 
-def once(name: str, scene: FilmScene) -> tuple[dict[str, Any], dict[str, float | None]]:
+def once(name: str, scene: RectangleScene) -> tuple[dict[str, Any], dict[str, float | None]]:
     """A peer's row but for the errors, and the numbers that it found."""
     wall, cpu = perf_counter(), process_time()
     problem = scene.build()
@@ -79,7 +79,7 @@ def once(name: str, scene: FilmScene) -> tuple[dict[str, Any], dict[str, float |
         problem.destroy()
 
 
-def ranked(name: str, scene: FilmScene, starts: list[tuple[float, float]]) -> list[tuple[float, float]]:
+def ranked(name: str, scene: RectangleScene, starts: list[tuple[float, float]]) -> list[tuple[float, float]]:
     """The starts, those first that solve the scene in the fewest steps; the best so far stays first if it solves this one."""
     steps = {}
     for start in starts:

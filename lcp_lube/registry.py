@@ -195,12 +195,12 @@ SYSTEMS: dict[str, Entry] = {
 # A scene file's `family` names the model that validates it and builds its problem.
 FAMILIES: dict[str, Entry] = {
     "slider": Entry("lcp_lube.scenes.published:SliderScene", "slider with one wave of the film (the published problems)"),
-    "textured": Entry("lcp_lube.scenes.textured:TexturedScene", "flat slider with square dimples"),
+    "textured": Entry("lcp_lube.scenes.published:TexturedScene", "flat slider with square dimples"),
     "journal": Entry("lcp_lube.scenes.journal:JournalScene", "journal bearing with an axial groove at the widest gap"),
     "grooved_journal": Entry("lcp_lube.scenes.grooved:GroovedJournalScene", "journal with axial grooves under a vertical load"),
     "tilting_pad": Entry("lcp_lube.scenes.tilting:TiltingPadScene", "journal in separate pads, fixed or tilting about pivots"),
     "thrust": Entry("lcp_lube.scenes.thrust:ThrustScene", "thrust bearing: equal sectors with tapered lands, steps or spirals"),
-    "rough": Entry("lcp_lube.scenes.textured:RoughScene", "slider with one wave and a random surface"),
+    "rough": Entry("lcp_lube.scenes.published:RoughScene", "slider with one wave and a random surface"),
     "bearing": Entry("lcp_lube.scenes.bearing:BearingScene", "a bearing of any kind: film shapes added up, a condition a side"),
     "squeeze": Entry("lcp_lube.scenes.squeeze:SqueezeScene", "parallel plates that approach and part, in time"),
     "bratu": Entry("lcp_lube.scenes.semilinear:BratuScene", "Bratu's equation on the unit square"),

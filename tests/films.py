@@ -12,9 +12,12 @@ from pydantic import PrivateAttr
 from lcp_lube.problems.film.exact import ExactSolution, exact_solution
 from lcp_lube.problems.film.lubrication import LubricationProblem
 from lcp_lube.problems.film.reynolds import SCHEMES, box_scheme
+from lcp_lube.problems.film.shapes import Along, Sum
 from lcp_lube.problems.grid import Grid
 from lcp_lube.scenes.published import LubricationScene
 
+CD, DC = "convergent-divergent", "divergent-convergent"
+WAVES = ("sinusoid", "parabola")
 L, WIDTH, MU, U = 0.1, 0.07, 0.015, 5.0
 
 
@@ -28,6 +31,29 @@ class Knots:
     def __call__(self, x: Any, y: Any = 0.0, /) -> np.ndarray:
         knots = np.linspace(0, L, len(self.heights))
         return np.interp(x, knots, self.heights) * (1 + self.tilt * np.asarray(y) / WIDTH)
+
+
+@dataclass(frozen=True)
+class Wave:
+    """The film of a slider: one wave between start and start + length."""
+
+    shape: str
+    form: str
+    h_min: float
+    h_max: float
+    start: float
+    length: float
+
+    @property
+    def film(self) -> Sum:
+        heights = (self.h_min, self.h_max) if self.form == CD else (self.h_max, self.h_min)
+        return Sum([Along(self.shape, *heights, self.start, self.start + self.length)])
+
+    def __call__(self, x: Any, y: Any = None, /) -> np.ndarray:
+        return self.film(x, y)
+
+    def breakpoints(self) -> tuple[float, ...]:
+        return self.film.breakpoints()
 
 
 class FilmScene(LubricationScene):

@@ -17,6 +17,7 @@ from ..base.parallel import Array
 from ..errors import InputError, nearest
 from ..problems.film import slopes
 from ..problems.film.cavity import VOID, cavity_sign
+from ..problems.film.edges import jumps_of
 from ..problems.film.forces import attitude
 from ..problems.film.grooves import GroovedProblem
 from ..problems.film.line import known_fields
@@ -78,7 +79,6 @@ class Equations:
             self.constant: LubricationProblem = film.build(comm)
         else:
             self.constant = replace(self._model, places=places).build(near.grid.shape, comm)
-            self.constant.extras = near.constant.extras and getattr(scene, near.constant.extras.__name__)  # of this scene
         if dry is not None and self.constant.coefficients_for is not None:
             self.constant = self.constant.revised(dry)
         self.grid: Grid = self.constant.grid
@@ -223,7 +223,7 @@ def _followed(grid: Grid, before: Model, after: Model) -> Places | None:
 def _knots(model: Model, side: int, periodic: bool) -> Array:
     """The edges that lines of a grid follow, and the two ends."""
     axis, L = "xy"[side], model.lengths[side]
-    edges = [*getattr(model.gap, "jumps", lambda axis: ())(axis), *(t for s in model.supplies for t in s.region.edges(axis))]
+    edges = [*jumps_of(model.gap, axis), *(t for s in model.supplies for t in s.region.edges(axis))]
     within = np.unique([t for t in edges if 0.0 < t < L])
     if not within.size:
         return np.array([0.0, L])

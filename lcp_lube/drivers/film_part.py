@@ -9,7 +9,6 @@ mirror : the film is symmetric about the middle of the width, and the sides sout
     with a closed side in the middle. For an odd number of lines the middle one lies on that side and has half cells.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,6 +18,7 @@ from petsc4py import PETSc
 
 from ..base.parallel import Array
 from ..problems.facts import Facts
+from ..problems.film.edges import jumps_of
 from ..problems.film.effects import FaceFactors
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model, Side
@@ -175,7 +175,7 @@ def part_of(scene: Solvable, problem: Problem) -> Part | None:
 
 def _is_constant(problem: LubricationProblem) -> bool:
     """Whether all points and faces have one film thickness. Collective."""
-    if _edges(problem, "x") or _edges(problem, "y"):
+    if jumps_of(problem.film, "x") or jumps_of(problem.film, "y"):
         return False  # between points, where no one looks
     h, largest = problem.scheme.h, problem.reduce.max(problem.scheme.h)
     return _all_close(problem, [(h, largest)]) and _all_close(problem, [(faces, largest) for faces in _films(problem)])
@@ -183,7 +183,7 @@ def _is_constant(problem: LubricationProblem) -> bool:
 
 def _all_lines_are_one(problem: LubricationProblem) -> bool:
     """Whether the film does not depend on y. Collective."""
-    if _edges(problem, "y"):
+    if jumps_of(problem.film, "y"):
         return False
     grid, film = problem.grid, problem.film
     x_nodes, x_faces = grid.nodes_and_faces(0)
@@ -200,7 +200,7 @@ def _is_symmetric(problem: LubricationProblem, faces: bool) -> bool:
     mirror, y = 2 * grid.origin[1] + grid.lengths[1], grid.lines[1]
     if not np.allclose(y, mirror - y[::-1], rtol=0.0, atol=SAME * grid.lengths[1]):
         return False
-    edges = np.unique(_edges(problem, "y"))
+    edges = np.unique(jumps_of(problem.film, "y"))
     if not np.allclose(edges, np.sort(mirror - edges), rtol=0.0, atol=SAME * grid.lengths[1]):
         return False
     some = np.unique(np.linspace(0, grid.box[0] - 1, SAMPLE[1]).round().astype(int))  # most films that are not tell so at once
@@ -208,11 +208,6 @@ def _is_symmetric(problem: LubricationProblem, faces: bool) -> bool:
         return False
     pairs = list(zip(_films(problem), _films(problem, mirror), strict=True))
     return _all_close(problem, pairs if faces else pairs[:1])
-
-
-def _edges(problem: LubricationProblem, axis: str) -> Sequence[float]:
-    """Where the film jumps, inside a cell perhaps."""
-    return getattr(problem.film, "jumps", lambda axis: ())(axis)
 
 
 def _films(problem: LubricationProblem, mirror: float | None = None) -> list[Array]:

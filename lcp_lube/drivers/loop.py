@@ -57,7 +57,6 @@ class Frozen(Derived):
 
     def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
         problem = self.constant.build(self.shape, comm)
-        problem.extras = getattr(self.whole, "extras", None)
         problem.coefficients_for = None  # what is certified is another problem, made from this one
         return problem if self.by is None else self.by.film(problem)
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..problems.certificate import Certificate
+from ..problems.film.edges import jumps_of
 from ..problems.film.lubrication import LubricationProblem
-from ..problems.film.model import Model
 from ..problems.grid import EVEN
 from ..problems.solution import Outcome, Solution, Step
 from ..scenes.motion import MotionTable
@@ -60,7 +60,7 @@ class Run:
         ask = replace(ask, nested=None if ask.nested else False, checkpoint=None, resume=None, every=1, watch=None, start=None)
         first = self.models(0.0, self._given(0.0))
         later = self.models(SOME * table.t_end, self._given(0.0))
-        if any(set(_jumps(first, axis)) != set(_jumps(later, axis)) for axis in "xy"):
+        if any(set(jumps_of(first.gap, axis)) != set(jumps_of(later.gap, axis)) for axis in "xy"):
             first = replace(first, places=EVEN)  # its edges move: no line of points can lie on them
         problem = self._at(0.0, lambda: first.build(scene.shape, ask.comm))
         problem.shares_grid = True
@@ -250,10 +250,6 @@ class Run:
         measures = {name: max((c.measures[name] for c in found), key=_badness) for name in found[0].measures}
         lowest = {name: min(c.extremes[name] for c in found) for name in found[0].extremes}
         return Certificate(measures, found[0].tol, lowest)
-
-
-def _jumps(model: Model, axis: str) -> tuple[float, ...]:
-    return getattr(model.gap, "jumps", lambda axis: ())(axis)
 
 
 def _badness(measure: float) -> float:

@@ -25,6 +25,7 @@ from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.stored import Stored
 from ..problems.film.supplies import supply_flows
+from ..problems.film.views import View
 from ..problems.solution import Fields
 from .linearised import Feed, Linear
 
@@ -33,13 +34,13 @@ Change = Callable[[Array, Array], Array]  # dh/de at x and y (m) of the scene's 
 
 
 @dataclass(frozen=True)
-class Moved:
+class Moved(View):
     """A film whose wall has moved by e in a rigid motion; first : x of the scene where this film's x is 0, m."""
 
-    film: Any
     change_: Change
     e: float
     first: float
+    rims = ()  # faces at round edges stay as they are
 
     def change(self, x: ArrayLike, y: ArrayLike | None = None) -> Array:
         """dh/de."""
@@ -47,11 +48,6 @@ class Moved:
 
     def __call__(self, x: ArrayLike, y: ArrayLike | None = None, /) -> Array:
         return self.film(x, y) + self.e * self.change(x, y)
-
-    def __getattr__(self, name: str) -> Any:
-        if name != "jumps":
-            raise AttributeError(name)
-        return self.film.jumps
 
 
 class Response:

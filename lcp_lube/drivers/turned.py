@@ -45,7 +45,6 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     solution = inner(Mirrored(scene), ask)
     assert isinstance(solution.problem, LubricationProblem)  # as `applies` found
     problem = TurnedProblem(solution.problem, scene.model.exact)  # type: ignore[attr-defined]
-    problem.extras = getattr(scene, "extras", None)
     band = solution.enclosure
     if band is not None:
         band = replace(band, lower=problem.here(band.lower), upper=problem.here(band.upper))

@@ -9,6 +9,7 @@ import numpy as np
 from ..base.parallel import Array
 from ..problems.box import BoxProblem
 from ..problems.film.cavity import cavity_sign
+from ..problems.film.edges import jumps_of
 from ..problems.film.exact import ExactSolution
 from ..problems.film.fronts import middle_row
 from ..problems.film.lubrication import LubricationProblem
@@ -83,8 +84,7 @@ class Picture:
         """Places (m) along x close enough to draw the film, with two at each of its known edges."""
         problem: Any = self.solution.problem
         start, L = problem.grid.origin[0], problem.grid.lengths[0]
-        gap = getattr(problem.film, "gap", problem.film)
-        edges = np.array(getattr(gap, "jumps", lambda axis: ())("x"))
+        edges = np.array(jumps_of(problem.film, "x"))
         beside = np.concatenate([edges - NOISE * L, edges + NOISE * L])
         inside = beside[(beside > start) & (beside < start + L)]
         return np.unique(np.concatenate([np.linspace(start, start + L, FINE), inside]))

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from .published import LubricationScene
+from .film_scene import FilmScene
 from .scene import Scene
 
 THICK = 0.01  # h/L above which Reynolds' equation is in doubt
@@ -17,11 +17,11 @@ SAMPLES = 33  # points a side at which the film is looked at
 
 def doubts(scene: Scene) -> list[str]:
     """Sentences on the scene's data; none for scenes that are no films."""
-    if not (isinstance(scene, LubricationScene) or hasattr(scene, "side_lengths")):
+    if not isinstance(scene, FilmScene):
         return []
-    model = scene.model  # type: ignore[attr-defined]
+    model, film = scene.model, getattr(scene, "film", None)
     found = _of_the_film(model)
-    for k, part in enumerate(getattr(scene, "film", []) if hasattr(scene, "side_lengths") else [], start=1):
+    for k, part in enumerate(film if isinstance(film, list) else [], start=1):
         name = f"film {k} ({part.shape})"
         found += [f"{name}: {text}" for text in _of_a_shape(part, model.lengths)]
     return found + _of_profiles(model)

@@ -1,18 +1,18 @@
 """The [[film]] tables of a bearing's scene file: named shapes that are added up, each with its parameters."""
 
-from dataclasses import dataclass
 from functools import reduce
 from math import atan2, hypot, inf, pi, radians
 from operator import or_
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, model_validator
 
 from ..errors import InputError
 from ..problems.film.profile import read_profile
-from ..problems.film.shapes import Along, Block, DimpleArray, Herringbone, Journal, RandomSurface, Scaled, Shape, Travelling
+from ..problems.film.shapes import Along, Block, DimpleArray, Herringbone, Journal, RandomSurface, Scaled, Shape
+from ..problems.film.views import Travelling
 from ..registry import SHAPES
+from .film_scene import Extent
 from .formula import Formula
 from .units import Measured, metres
 
@@ -21,24 +21,6 @@ Span = tuple[Finite, Finite]
 Unit = Literal["m", "mm", "um"]
 SLACK = 1e-9  # relative: dimples that touch do not overlap
 UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
-
-
-@dataclass(frozen=True)
-class Extent:
-    """What a shape may need of its scene: side lengths (m), and the folder that file names are relative to.
-
-    t : time, s; travel : of the wall since t = 0, m; journal : [X, Y] of the journal in its clearance, if it moves.
-    """
-
-    lengths: tuple[float, ...]
-    folder: Path
-    t: float = 0.0
-    travel: float = 0.0
-    journal: tuple[float, float] | None = None
-
-    @property
-    def both(self) -> tuple[float, float]:
-        return self.lengths[0], self.lengths[-1]
 
 
 class Part(Measured):

@@ -1,22 +1,75 @@
-"""What all families of films share: one model, from which problem and facts are made, and numbers beyond the film's own."""
+"""What all families of films share: a model, from which facts and problem are made, and films over a rectangle."""
 
-from typing import Any
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
 
 from petsc4py import PETSc
+from pydantic import Field, model_validator
 
+from ..errors import InputError
 from ..problems.facts import Facts
+from ..problems.film.exact import ExactSolution
 from ..problems.film.lubrication import LubricationProblem
-from ..problems.film.model import Model
-from .scene import Scene
+from ..problems.film.model import Model, Side
+from ..problems.film.shapes import Block, Shape, Sum
+from ..problems.film.turned import exact_either_way
+from .balance import BalanceTable
+from .scene import Count, Finite, Positive, Scene
+from .units import measured, metres
+
+Sides = tuple[Side, Side, Side, Side]
+ALL = (-math.inf, math.inf)
+
+
+@dataclass(frozen=True)
+class Extent:
+    """What a shape may need of its scene: side lengths (m), and the folder that file names are relative to.
+
+    t : time, s; travel : of the wall since t = 0, m; journal : [X, Y] of the journal in its clearance, if it moves.
+    """
+
+    lengths: tuple[float, ...]
+    folder: Path
+    t: float = 0.0
+    travel: float = 0.0
+    journal: tuple[float, float] | None = None
+
+    @property
+    def both(self) -> tuple[float, float]:
+        return self.lengths[0], self.lengths[-1]
 
 
 class FilmScene(Scene):
-    """A scene that is a film; a family says which, in `model`."""
+    """A scene that is a film; a family says which, in `_model`."""
+
+    def _model(self) -> Model:
+        raise NotImplementedError
 
     @property
     def model(self) -> Model:
-        """What is discretised."""
+        """What is discretised.
+
+        Raises
+        ------
+        InputError : sides that contradict one another, a profile that cannot be read.
+        """
+        try:
+            return self._model()
+        except InputError as error:
+            raise self._named(error) from None
+
+    @property
+    def side_lengths(self) -> tuple[float, ...]:
+        """Of the rectangle that the film is unwrapped to, m."""
         raise NotImplementedError
+
+    @property
+    def extent(self) -> Extent:
+        """What its shapes need of it."""
+        return Extent(self.side_lengths, self._folder or Path())
 
     def facts(self, comm: PETSc.Comm | None = None) -> Facts:
         return self.model.facts(self.shape, comm)
@@ -26,19 +79,98 @@ class FilmScene(Scene):
 
         Raises
         ------
-        InputError : more ranks than the grid can be dealt to, a film that is not positive.
+        InputError : as `model`; more ranks than the grid can be dealt to, a film that is not positive.
         """
-        return self.model.build(self.shape, comm)
+        model = self.model
+        try:
+            return model.build(self.shape, comm)
+        except InputError as error:
+            raise self._named(error) from None
+
+    def _named(self, error: InputError) -> InputError:
+        return InputError(f"{self.name}: {error}") if self.name else error
 
 
-class BearingNumbers(FilmScene):
-    """A film whose bearing has numbers of its own."""
+class RectangleScene(FilmScene):
+    """A film over [0, L] or [0, L] x [0, width] under a wall that moves in x: shapes added up, and a condition a side."""
 
-    def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
-        problem = super().build(comm)
-        problem.extras = self.bearing_numbers
-        return problem
+    dimension: Literal[1, 2] = Field(1, description="1: a film h(x), per metre of width; 2: h(x, y)")
+    L: Positive = metres(0.1, "length in the direction of motion")
+    width: Positive | None = metres(None, "width in y; default L (2D)")
+    U: Finite = measured("m/s", 5.0, "speed of the moving wall, towards larger x; negative: to smaller x; 0: at rest")
+    scheme: Literal["nodal", "face", "upwind"] = Field("face", description="form of the Couette flux")
+    mean_cubes: bool = Field(False, description="h^3 at a face as the mean of the nodal values")
+    p_unit: Positive | None = measured("Pa", 1e6, "pressure unit of the equations")
+    h_offset: Finite = metres(0.0, "added to the film everywhere: its level")
+    h_floor: Positive | None = metres(None, "smallest film: the sum is cut there; default no cut")
+    balance: BalanceTable | None = Field(None, description="load to carry, and what is found for it")
+    n: Count = Field(100, description="points a side")
+    nx: Count | None = Field(None, description="points in x; default n")
+    ny: Count | None = Field(None, description="points in y; default n (2D)")
 
-    def bearing_numbers(self, values: dict[str, Any]) -> dict[str, Any]:
-        """Made of the film's: what they add to these, or take the place of."""
+    @model_validator(mode="after")
+    def _one_dimensional(self) -> "RectangleScene":
+        for key in ("ny", "width"):
+            if self.dimension == 1 and (value := getattr(self, key)) is not None:
+                raise ValueError(f"{key} = {value}: the scene is one-dimensional (dimension = 2 is not set)")
+        return self
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        nx = self.nx or self.n
+        return (nx,) if self.dimension == 1 else (nx, self.ny or self.n)
+
+    @property
+    def side_lengths(self) -> tuple[float, ...]:
+        return (self.L,) if self.dimension == 1 else (self.L, self.width or self.L)
+
+    @property
+    def mu_0(self) -> float:
+        """Viscosity, Pa s; where it varies, that from which it does."""
         raise NotImplementedError
+
+    @property
+    def cavitation_pressure(self) -> float:
+        """p_c, absolute, Pa."""
+        raise NotImplementedError
+
+    def _sides(self) -> Sides:
+        """West, east, south and north."""
+        raise NotImplementedError
+
+    def _parts(self) -> Sequence[Shape]:
+        """The shapes of the film."""
+        raise NotImplementedError
+
+    def sum_of(self, parts: Sequence[Shape]) -> Sum:
+        """The film of these shapes."""
+        level = [Block(self.h_offset, ALL, ALL)] if self.h_offset else []
+        return Sum([*parts, *level], self.h_floor)
+
+    @property
+    def gap(self) -> Sum:
+        """The film h(x, y) in metres."""
+        return self.sum_of(self._parts())
+
+    def _model(self) -> Model:
+        return Model(
+            lengths=self.side_lengths,
+            sides=self._sides(),
+            gap=self.gap,
+            mu=self.mu_0,
+            U=self.U,
+            p_c=self.cavitation_pressure,
+            p_unit=self.p_unit or 1.0,
+            scheme=self.scheme,
+            mean_cubes=self.mean_cubes,
+            exact=self.exact,
+        )
+
+    def exact(self) -> ExactSolution | None:
+        """The exact solution; None where none is known."""
+        model = self.model
+        west, east, *_ = model.sides
+        known = self.dimension == 1 and {west.kind, east.kind} == {"open"} and getattr(model.gap, "smooth_between", False)
+        if not known or model.law or model.effects or model.supplies or west.r:
+            return None
+        return exact_either_way(model.gap, self.L, model.mu, self.U, west.p, east.p)

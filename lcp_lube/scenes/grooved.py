@@ -1,29 +1,27 @@
 """Journals with axial grooves across the whole width, under a load of given direction; or without any groove."""
 
 import math
-from pathlib import Path
+from dataclasses import replace
 from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
 from ..problems.film.bore import Bore, Dam
-from ..problems.film.forces import Shaft
 from ..problems.film.grooves import Groove
-from ..problems.film.model import Model, Side
+from ..problems.film.model import Model
 from ..problems.film.supplies import Patch, Supply
-from ..problems.film.turning import Turning
 from .balance import BalanceTable
 from .effects.table import WithEffects, effects_of
-from .film import Extent, FilmPart
-from .film_scene import BearingNumbers
+from .film import FilmPart
 from .motion import MotionTable
 from .moving import Models
-from .scene import Count, Finite, NotNegative, Positive
+from .scene import Finite, NotNegative
+from .shaft import ShaftScene
 from .supply import Place, SupplyTable, supplies_of
-from .units import measured, metres
+from .units import metres
 
 
-class GroovedJournalScene(WithEffects, BearingNumbers):
+class GroovedJournalScene(ShaftScene, WithEffects):
     """A journal under a vertical load, its film cut by axial grooves that hold a pressure; 2D.
 
     Angles are counted from the line of the load, in the sense of rotation. The film is h = c (1 - eccentricity cos(theta -
@@ -36,11 +34,6 @@ class GroovedJournalScene(WithEffects, BearingNumbers):
     say where the bore has a pressure dam, a recess about the middle of the width that ends in a step.
     """
 
-    D: Positive = metres(0.1, "diameter")
-    L_over_D: Positive = Field(0.5, description="width over diameter")
-    clearance: Positive = metres(1e-4, "radial clearance")
-    speed_rpm: Positive = Field(3000.0, description="speed of the journal, rpm")
-    mu: Positive = measured("Pa s", 0.02, "viscosity")
     eccentricity: Annotated[float, Field(ge=0, lt=1, description="relative eccentricity")] = 0.5
     attitude_deg: Finite | None = Field(None, description="from the load to the thinnest film, degrees; default: as it follows")
     grooves_deg: list[Finite] = Field([90.0, 270.0], description="middles of the grooves, degrees from the load; [] for none")
@@ -55,21 +48,12 @@ class GroovedJournalScene(WithEffects, BearingNumbers):
     dam_depth: NotNegative = metres(0.0, "depth of the pressure dam")
     dam_width: Annotated[float, Field(gt=0, le=1)] = Field(0.75, description="width of the dam over the bearing's")
     film: list[FilmPart] = Field([], description="shapes that are added to the film; x from the first groove's edge")
-    p_groove: NotNegative = measured("Pa", 0.0, "pressure in the grooves, above p_c")
-    p_end: NotNegative = measured("Pa", 0.0, "pressure at both ends, above p_c")
-    p_c: Finite = measured("Pa", 0.0, "cavitation pressure")
     supply: list[SupplyTable] = Field([], description="supplies inside the film, beside the grooves; pressures are absolute")
     balance: BalanceTable | None = Field(None, description="load to carry; eccentricity and attitude are found for it")
     motion: MotionTable | None = Field(None, description="how the journal moves in time")
-    scheme: str | None = Field("face", description="form of the Couette flux: face")
-    n: Count = Field(360, description="points around, and an odd number near a sixteenth of them across")
-    nx: Count | None = Field(None, description="points around; default n")
-    ny: Count | None = Field(None, description="points across; default as n says")
 
     @model_validator(mode="after")
     def _possible(self) -> "GroovedJournalScene":
-        if self.scheme != "face":
-            raise ValueError(f"scheme = {self.scheme}: face is allowed")
         places = sorted(angle % 360.0 for angle in self.grooves_deg)
         gaps = [(b - a) % 360.0 or 360.0 for a, b in zip(places, [*places[1:], *places[:1]], strict=True)]
         if places and min(gaps) <= self.groove_deg:
@@ -111,12 +95,7 @@ class GroovedJournalScene(WithEffects, BearingNumbers):
         return (*supplies_of(self.supply, place), *grooves)
 
     @property
-    def shape(self) -> tuple[int, ...]:
-        return self.nx or self.n, self.ny or max(3, self.n // 16 | 1)
-
-    @property
     def mu_0(self) -> float:
-        """mu, Pa s; at T_in where it depends on the temperature."""
         own = self.temperature.own_mu if self.temperature is not None else None
         return float(own or self.mu)
 
@@ -125,16 +104,9 @@ class GroovedJournalScene(WithEffects, BearingNumbers):
         return {"mu": self.mu_0}
 
     @property
-    def omega(self) -> float:
-        """Angular velocity, rad/s."""
-        return 2.0 * math.pi * self.speed_rpm / 60.0
-
-    @property
-    def turning(self) -> Turning:
-        """Place x = 0 lies half a mesh before the first groove's first edge, so that its edges are points of the grid."""
-        first = math.radians((self.grooves_deg or [180.0])[0] - 0.5 * (self.groove_deg if self.grooves_deg else 0.0))
-        start = first - math.pi / self.shape[0]
-        return Turning(0.5 * self.D, self.clearance, self.L_over_D * self.D, self.omega, start)
+    def start(self) -> float:
+        """The first groove's first edge."""
+        return math.radians((self.grooves_deg or [180.0])[0] - 0.5 * (self.groove_deg if self.grooves_deg else 0.0))
 
     @property
     def place(self) -> tuple[float, float]:
@@ -159,7 +131,6 @@ class GroovedJournalScene(WithEffects, BearingNumbers):
         if self.dam_depth and self.dam_deg is not None:
             start, end = map(math.radians, self.dam_deg)
             dam = Dam(start, end, self.dam_width * turning.B, self.dam_depth)
-        extent = Extent((turning.length, turning.B), self._folder or Path())
         return Bore(
             turning,
             self.eccentricity,
@@ -170,7 +141,7 @@ class GroovedJournalScene(WithEffects, BearingNumbers):
             self.tilt_across,
             self.barrel,
             dam,
-            tuple(table.part(extent) for table in self.film),
+            tuple(table.part(self.extent) for table in self.film),
         )
 
     @property
@@ -188,27 +159,6 @@ class GroovedJournalScene(WithEffects, BearingNumbers):
         middle = self.grooves_deg[0] if self.grooves_deg else 0.0
         return tuple(Groove(round((at - middle) * meshes) % nx, count, self.p_groove) for at in self.grooves_deg)
 
-    @property
-    def model(self) -> Model:
-        """What is discretised."""
-        ends = Side(p=self.p_end)
-        turning = self.turning
-        return Model(
-            lengths=(math.pi * self.D, turning.B),
-            sides=(Side("periodic"), Side("periodic"), ends, ends),
-            gap=self.gap,
-            mu=self.mu_0,
-            effects=effects_of(self),
-            U=turning.R * turning.omega,
-            p_c=self.p_c,
-            p_unit=self.mu_0 * self.omega * (turning.R / self.clearance) ** 2,
-            scheme="face",
-            shaft=Shaft(
-                turning.R, math.radians(self.attitude_deg or 0.0) + math.pi if self.eccentricity else None, turning.start
-            ),
-            grooves=() if self.supply else self.grooves,
-            supplies=self._supplies(),
-        )
-
-    def bearing_numbers(self, values: dict[str, Any]) -> dict[str, Any]:
-        return self.turning.numbers(values["load"], self.mu_0, self.eccentricity)
+    def _model(self) -> Model:
+        model = replace(super()._model(), effects=effects_of(self))
+        return replace(model, grooves=(), supplies=self._supplies()) if self.supply else model

@@ -1,27 +1,27 @@
 """Journal bearings, unwrapped from one axial groove at the widest gap to the same groove again."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from ..problems.film.exact import ExactSolution, exact_solution
 from ..problems.film.forces import Shaft
-from ..problems.film.gaps import JournalGap, Raised
 from ..problems.film.lines import graded_across, graded_round
 from ..problems.film.model import Model, Side
+from ..problems.film.shapes import Journal, Shape
 from ..problems.film.supplies import Supply
 from ..problems.film.turning import Turning
 from ..problems.grid import Places
-from .film_scene import BearingNumbers
+from .film_scene import Sides
 from .published import LubricationScene
 from .scene import Positive
 from .supply import Place, SupplyTable, supplies_of
 from .units import measured, metres
 
 
-class JournalScene(LubricationScene, BearingNumbers):
+class JournalScene(LubricationScene):
     """A journal of diameter D turning in a bush of width B: x = D phi/2 from the groove at h_max, y along the axis.
 
     h = c (1 + eccentricity cos phi), c = psi D/2; the groove keeps p = p_a = p_b and no void, the ends p = p_side. L, width, U
@@ -77,15 +77,13 @@ class JournalScene(LubricationScene, BearingNumbers):
 
     def _supplies(self) -> tuple[Supply, ...]:
         """The supplies inside the film, angles counted from the widest gap."""
-        lengths = (self.L,) if self.dimension == 1 else (self.L, self.width or self.L)
         used = [self.p_side] if self.round == "periodic" else [self.p_a, self.p_b, *[self.p_side] * (self.dimension - 1)]
-        place = Place(lengths, self.round == "periodic", self.p_c, 0.5 * self.D, 0.0, min(used) + self.p_c)
+        place = Place(self.side_lengths, self.round == "periodic", self.p_c, 0.5 * self.D, 0.0, min(used) + self.p_c)
         return supplies_of(self.supply, place)
 
-    @property
-    def sides(self) -> tuple[Side, Side, Side, Side]:
+    def _sides(self) -> Sides:
         if self.round == "groove":
-            return super().sides
+            return super()._sides()
         return Side("periodic"), Side("periodic"), Side(p=self.p_side), Side(p=self.p_side)
 
     @property
@@ -94,19 +92,13 @@ class JournalScene(LubricationScene, BearingNumbers):
         width = self.width if self.dimension == 2 and self.width else 1.0
         return Turning(0.5 * self.D, 0.5 * self.psi * self.D, width, self.omega, 0.0)
 
-    @property
-    def gap(self) -> JournalGap:
-        return JournalGap(0.5 * self.psi * self.D, self.eccentricity, self.L)
+    def _parts(self) -> Sequence[Shape]:
+        return [Journal(0.5 * self.psi * self.D, self.eccentricity, self.L)]
 
-    def exact(self) -> ExactSolution | None:
-        if self.dimension == 2 or self.supply:
-            return None
-        return exact_solution(Raised(self.gap, self.h_offset), self.L, self.mu, self.U, self.p_a, self.p_b)
-
-    @property
-    def model(self) -> Model:
+    def _model(self) -> Model:
         shaft = Shaft(0.5 * self.D, 0.0 if self.eccentricity else None)
-        return replace(super().model, shaft=shaft, supplies=self._supplies(), places=self._places)
+        extras, places = self.bearing_numbers, self._places
+        return replace(super()._model(), shaft=shaft, supplies=self._supplies(), places=places, extras=extras)
 
     @property
     def _places(self) -> Places | None:

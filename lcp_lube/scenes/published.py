@@ -1,86 +1,43 @@
-"""Sliders: films over [0, L] or a rectangle with preset data, those of the published problems among them."""
+"""Films with preset data: the published problems' sliders, rough ones among them, and the textured slider of the FBNS codes."""
 
-from typing import Literal
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from ..problems.film.exact import ExactSolution
-from ..problems.film.gaps import Raised, Wave
-from ..problems.film.model import Model, Side
-from ..problems.film.reynolds import Film
-from ..problems.film.turned import exact_either_way
-from .balance import BalanceTable
-from .film_scene import FilmScene
-from .scene import Count, Finite, NotNegative, Positive
+from ..problems.film.model import Side
+from ..problems.film.shapes import MEAN_SQUARE, Along, Block, DimpleArray, RandomSurface, Shape
+from .film_scene import ALL, RectangleScene, Sides
+from .scene import Finite, NotNegative, Positive
 from .units import measured, metres
 
 
-class LubricationScene(FilmScene):
-    """A film over [0, L] or [0, L] x [0, width], in SI units; a family adds its film, `gap`.
+class LubricationScene(RectangleScene):
+    """A film between sides whose pressures are given, above the cavitation pressure p_c, which is added to what is reported."""
 
-    Pressures are above the cavitation pressure p_c, which is added to what is reported.
-    """
-
-    dimension: Literal[1, 2] = 1
-    L: Positive = metres(0.1, "length in the direction of motion")
-    width: Positive | None = metres(None, "width Ly; default L (2D)")
     mu: Positive = measured("Pa s", 0.015, "viscosity")
-    U: Finite = measured("m/s", 5.0, "speed of the moving wall; negative: to smaller x; 0: at rest")
     p_a: NotNegative = measured("Pa", 0.0, "pressure at x = 0; above p_c")
     p_b: NotNegative = measured("Pa", 0.0, "pressure at x = L; above p_c")
     p_side: NotNegative = measured("Pa", 0.0, "pressure at y = 0 and y = width; above p_c (2D)")
     p_c: Finite = measured("Pa", 0.0, "cavitation pressure")
-    scheme: Literal["nodal", "face", "upwind"] = Field("face", description="form of the Couette flux")
-    mean_cubes: bool = Field(False, description="h^3 at a face as the mean of the nodal values")
-    p_unit: Positive = measured("Pa", 1e6, "pressure unit of the equations")
-    h_offset: Finite = metres(0.0, "added to the film everywhere: its level")
-    balance: BalanceTable | None = Field(None, description="load to carry, and what is found for it")
-    n: Count = Field(100, description="interior points a side")
-    nx: Count | None = Field(None, description="interior points in x; default n")
-    ny: Count | None = Field(None, description="interior points in y; default n (2D)")
 
     @model_validator(mode="after")
-    def _one_dimensional(self) -> "LubricationScene":
-        for key in ("ny", "width", "p_side"):
-            if self.dimension == 1 and getattr(self, key):
-                raise ValueError(f"{key} = {getattr(self, key)}: the scene is one-dimensional")
+    def _no_ends(self) -> "LubricationScene":
+        if self.dimension == 1 and self.p_side:
+            raise ValueError(f"p_side = {self.p_side}: the scene is one-dimensional")
         return self
 
     @property
-    def shape(self) -> tuple[int, ...]:
-        nx = self.nx or self.n
-        return (nx,) if self.dimension == 1 else (nx, self.ny or self.n)
+    def mu_0(self) -> float:
+        return self.mu
 
     @property
-    def gap(self) -> Film:
-        """The film h(x, y) in metres."""
-        raise NotImplementedError
+    def cavitation_pressure(self) -> float:
+        return self.p_c
 
-    def exact(self) -> ExactSolution | None:
-        """The exact solution; None where none is known."""
-        return None
-
-    @property
-    def sides(self) -> tuple[Side, Side, Side, Side]:
-        """West, east, south and north: a pressure each, unless a family says otherwise."""
+    def _sides(self) -> Sides:
         west, east, ends = (Side(p=p) for p in (self.p_a, self.p_b, self.p_side))
         return west, east, ends, ends
-
-    @property
-    def model(self) -> Model:
-        """What is discretised."""
-        return Model(
-            lengths=(self.L,) if self.dimension == 1 else (self.L, self.width or self.L),
-            sides=self.sides,
-            gap=Raised(self.gap, self.h_offset) if self.h_offset else self.gap,  # type: ignore[arg-type]
-            mu=self.mu,
-            U=self.U,
-            p_c=self.p_c,
-            p_unit=self.p_unit,
-            scheme=self.scheme,
-            mean_cubes=self.mean_cubes,
-            exact=self.exact,
-        )
 
 
 class SliderScene(LubricationScene):
@@ -101,12 +58,68 @@ class SliderScene(LubricationScene):
             raise ValueError(f"wave = {list(self.wave)}: 0 <= start < end <= 1 is needed")
         return self
 
-    @property
-    def gap(self) -> Wave:
+    def _parts(self) -> Sequence[Shape]:
+        heights = (self.h_min, self.h_max) if self.form == "convergent-divergent" else (self.h_max, self.h_min)
         start, end = (self.L * part for part in self.wave)
-        return Wave(self.film, self.form, self.h_min, self.h_max, start, end - start)
+        return [Along(self.film, *heights, start, end)]
 
-    def exact(self) -> ExactSolution | None:
-        if self.dimension == 2:
-            return None
-        return exact_either_way(Raised(self.gap, self.h_offset), self.L, self.mu, self.U, self.p_a, self.p_b)
+
+class RoughScene(SliderScene):
+    """Problem 1's wave over a square, with a random surface, by default 0.1 MPa all round.
+
+    The surface is a smooth spline through random numbers of standard deviation `amplitude`; its own is 0.479 of that, before
+    the cut at h_floor. (A bearing's shape `roughness` takes the surface's own, sigma.)
+    """
+
+    dimension: Literal[2] = 2
+    seed: Annotated[int, Field(ge=0)] = 1
+    amplitude: NotNegative = metres(2.5e-6, "standard deviation of the random numbers; the surface's is 0.479 of it")
+    cells: Annotated[int, Field(strict=True, ge=1, le=4000)] = Field(40, description="meshes of the surface along a side")
+    h_floor: Positive = metres(1e-6, "smallest film that the surface leaves")
+    scheme: Literal["nodal", "face", "upwind"] = "face"
+    p_a: NotNegative = 1e5
+    p_b: NotNegative = 1e5
+    p_side: NotNegative = 1e5
+
+    def _parts(self) -> Sequence[Shape]:
+        surface = RandomSurface(self.amplitude * MEAN_SQUARE, self.seed, self.cells, self.extent.both)
+        return [*super()._parts(), surface]
+
+
+class TexturedScene(LubricationScene):
+    """Textured slider of the FBNS codes: 80 mm square, K x K cells with a square dimple each, 100 kPa all round.
+
+    The reference grid has 30 K interior points a side; a dimple has 20 of a cell's 30, and a rim at half depth of one more on
+    either side. Edges lie half-way between these points: other grids see the same film. mean_cubes is the reference's, of its
+    scheme 'upwind' alone unless it is given.
+    """
+
+    dimension: Literal[2] = 2
+    L: Positive = 0.08
+    K: Annotated[int, Field(ge=1, le=1000, description="cells a side")] = 4
+    h: Positive = metres(15e-6, "film between the dimples")
+    depth: Positive = metres(12e-6, "depth of the dimples")
+    mu: Positive = 0.03
+    p_a: NotNegative = 70e3
+    p_b: NotNegative = 70e3
+    p_side: NotNegative = 70e3
+    p_c: float = 30e3
+    scheme: Literal["nodal", "face", "upwind"] = "upwind"
+    mean_cubes: bool = True
+    p_unit: Positive = 1e5
+
+    @model_validator(mode="before")
+    @classmethod
+    def _reference_grid(cls, data: Any) -> Any:
+        data = cls.in_si_units(data)
+        if isinstance(data, dict) and "n" not in data and isinstance(data.get("K", 4), int):
+            data = {**data, "n": 30 * data.get("K", 4)}
+        if isinstance(data, dict) and data.get("scheme", "upwind") != "upwind":
+            data = {"mean_cubes": False, **data}
+        return data
+
+    def _parts(self) -> Sequence[Shape]:
+        mesh = self.L / (30 * self.K + 1)
+        inside = (0.5 * mesh, (30 * self.K + 0.5) * mesh)
+        halves = (DimpleArray("square", 0.5 * self.depth, m * mesh, self.K, self.K, inside, inside) for m in (22, 20))
+        return [Block(self.h, ALL, ALL), *halves]

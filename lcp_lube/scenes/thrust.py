@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -12,8 +11,8 @@ from ..base.parallel import Array
 from ..problems.film.model import Model, Side
 from ..problems.film.shapes import Along, Block, Shape, SpiralGrooves, Sum
 from .balance import BalanceTable
-from .film import Extent, FilmPart
-from .film_scene import BearingNumbers
+from .film import FilmPart
+from .film_scene import FilmScene
 from .scene import Count, Finite, NotNegative, Positive
 from .supply import Place, SupplyTable, supplies_of
 from .units import measured, metres
@@ -45,7 +44,7 @@ class _Tilt:
         return -radius * np.sin(angle) if self.about is None else radius * np.cos(angle) - self.about
 
 
-class ThrustScene(BearingNumbers):
+class ThrustScene(FilmScene):
     """A thrust bearing of equal sectors under a flat runner that turns towards larger angles; 2D, polar coordinates.
 
     Lines run along the angle: x is the arc at the mean radius from where the runner enters, y the radius beyond the inner one.
@@ -143,7 +142,7 @@ class ThrustScene(BearingNumbers):
     @property
     def gap(self) -> Sum:
         """The film h(x, y), m."""
-        (L, width), inf = self.side_lengths, math.inf
+        L, inf = self.side_lengths[0], math.inf
         parts: list[Shape] = [Block(self.h_min + self.h_offset, (-inf, inf), (-inf, inf))]
         if self.profile == "tapered_land":
             parts.append(Along("linear", self.taper, 0.0, 0.0, self.taper_part * L))
@@ -157,8 +156,7 @@ class ThrustScene(BearingNumbers):
         if self.pivot_part is not None:
             pitch, roll = self.tilt_modes
             parts += [_Times(self.pitch or 0.0, pitch), _Times(self.roll or 0.0, roll)]
-        extent = Extent((L, width), self._folder or Path())
-        return Sum([*parts, *(table.part(extent) for table in self.film)])
+        return Sum([*parts, *(table.part(self.extent) for table in self.film)])
 
     @property
     def tilt_modes(self) -> tuple[Shape, Shape]:
@@ -167,9 +165,8 @@ class ThrustScene(BearingNumbers):
         at, radius = (self.pivot_part or 0.0) * L / mean, self.pivot_radius or mean
         return _Tilt(inner, mean, at), _Tilt(inner, mean, at, radius)
 
-    @property
-    def model(self) -> Model:
-        """What is discretised: one sector."""
+    def _model(self) -> Model:
+        """One sector."""
         along = Side("periodic") if self.pad_deg is None else Side(p=self.p_groove)
         U = self.radii[1] * self.omega
         least = self.h_min + self.h_offset
@@ -183,6 +180,7 @@ class ThrustScene(BearingNumbers):
             p_c=self.p_c,
             p_unit=10.0 ** round(math.log10(max(drag, self.p_inner, self.p_outer, self.p_groove, 1e-90))),
             scheme="face",
+            extras=self.bearing_numbers,
             polar=self.radii,
             supplies=self._supplies(),
         )

@@ -1,22 +1,19 @@
 """Journal bearings of separate pads, fixed or tilting about pivots, under a load of given direction."""
 
 import math
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import Field, model_validator
 
 from ..problems.film.bore import PadBore
-from ..problems.film.forces import Shaft
 from ..problems.film.grooves import Groove
-from ..problems.film.model import Model, Side
-from ..problems.film.turning import Turning
 from .balance import BalanceTable
-from .film_scene import BearingNumbers
-from .scene import Count, Finite, NotNegative, Positive
+from .scene import Finite, NotNegative, Positive
+from .shaft import ShaftScene
 from .units import measured, metres
 
 
-class TiltingPadScene(BearingNumbers):
+class TiltingPadScene(ShaftScene):
     """A journal in pads that tilt about their pivots; 2D. Angles are counted from the load, in the sense of rotation.
 
     The pads' tilts are found at which no moment acts about any pivot, and with balance.load the journal's place at which the
@@ -24,8 +21,6 @@ class TiltingPadScene(BearingNumbers):
     preload m makes the pads' own bore wider, clearance/(1 - m). Between pads p_groove holds. With `tilts` given they are fixed.
     """
 
-    D: Positive = metres(0.1, "diameter")
-    L_over_D: Positive = Field(0.5, description="width over diameter")
     clearance: Positive = metres(1e-4, "radial clearance at the pivots, the journal in the middle")
     preload: Annotated[float, Field(ge=0, lt=1, description="of the pads: 1 - clearance over that of their own bore")] = 0.3
     pivots_deg: list[Finite] = Field(
@@ -36,23 +31,13 @@ class TiltingPadScene(BearingNumbers):
     tilts: list[Finite] | None = Field(
         None, description="tilts of the pads, rad, positive: inlet open; default: as they follow"
     )
-    speed_rpm: Positive = Field(3000.0, description="speed of the journal, rpm")
-    mu: Positive = measured("Pa s", 0.02, "viscosity")
     eccentricity: Annotated[float, Field(ge=0, lt=2, description="of the journal over the clearance")] = 0.3
     attitude_deg: Finite = Field(0.0, description="from the load to the journal's displacement, degrees")
     p_groove: NotNegative = measured("Pa", 0.0, "pressure between the pads, above p_c")
-    p_end: NotNegative = measured("Pa", 0.0, "pressure at both ends, above p_c")
-    p_c: Finite = measured("Pa", 0.0, "cavitation pressure")
     balance: BalanceTable | None = Field(None, description="load to carry; the journal's place is found for it")
-    scheme: str | None = Field("face", description="form of the Couette flux: face")
-    n: Count = Field(360, description="points around, and an odd number near a sixteenth of them across")
-    nx: Count | None = Field(None, description="points around; default n")
-    ny: Count | None = Field(None, description="points across; default as n says")
 
     @model_validator(mode="after")
     def _possible(self) -> "TiltingPadScene":
-        if self.scheme != "face":
-            raise ValueError(f"scheme = {self.scheme}: face is allowed")
         if sorted(self.pivots_deg) != self.pivots_deg or self.pivots_deg[-1] - self.pivots_deg[0] >= 360.0:
             raise ValueError(f"pivots_deg = {self.pivots_deg}: ascending angles within a turn are needed")
         turn = [*self.pivots_deg[1:], self.pivots_deg[0] + 360.0]
@@ -70,20 +55,9 @@ class TiltingPadScene(BearingNumbers):
         return self
 
     @property
-    def shape(self) -> tuple[int, ...]:
-        return self.nx or self.n, self.ny or max(3, self.n // 16 | 1)
-
-    @property
-    def omega(self) -> float:
-        """Angular velocity, rad/s."""
-        return 2.0 * math.pi * self.speed_rpm / 60.0
-
-    @property
-    def turning(self) -> Turning:
-        """Place x = 0 lies half a mesh before the first pad's outlet."""
-        outlet = self.pivots_deg[0] + (1.0 - self.pivot_part) * self.pad_deg
-        start = math.radians(outlet) - math.pi / self.shape[0]
-        return Turning(0.5 * self.D, self.clearance, self.L_over_D * self.D, self.omega, start)
+    def start(self) -> float:
+        """The first pad's outlet."""
+        return math.radians(self.pivots_deg[0] + (1.0 - self.pivot_part) * self.pad_deg)
 
     @property
     def gap(self) -> PadBore:
@@ -111,23 +85,3 @@ class TiltingPadScene(BearingNumbers):
             end = round((behind - self.pivot_part * self.pad_deg - first) * meshes)
             out.append(Groove(start % nx, max(1, end - start + 1), self.p_groove))
         return tuple(out)
-
-    @property
-    def model(self) -> Model:
-        """What is discretised."""
-        ends, turning = Side(p=self.p_end), self.turning
-        return Model(
-            lengths=(turning.length, turning.B),
-            sides=(Side("periodic"), Side("periodic"), ends, ends),
-            gap=self.gap,
-            mu=self.mu,
-            U=turning.R * turning.omega,
-            p_c=self.p_c,
-            p_unit=self.mu * self.omega * (turning.R / self.clearance) ** 2,
-            scheme="face",
-            shaft=Shaft(turning.R, math.radians(self.attitude_deg) + math.pi if self.eccentricity else None, turning.start),
-            grooves=self.grooves,
-        )
-
-    def bearing_numbers(self, values: dict[str, Any]) -> dict[str, Any]:
-        return self.turning.numbers(values["load"], self.mu, self.eccentricity)

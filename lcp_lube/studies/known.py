@@ -9,15 +9,13 @@ from time import process_time
 from ..api import solve
 from ..base.resumable import ResumableCsv
 from ..output.results import as_dict, machine
-from ..scenes.bearing import BearingScene
-from ..scenes.published import LubricationScene
+from ..scenes.film_scene import RectangleScene
+from ..scenes.published import TexturedScene
 from ..scenes.scene import Scene
-from ..scenes.textured import TexturedScene
 from .compare import read_off
 from .experiment import scene_key
 
 QUANTITIES = ("load", "p_max", "rupture")
-FilmScene = LubricationScene | BearingScene  # what has a load
 SIDES: tuple[int, ...] = (255, 511, 1023)  # spacings halve
 QUICK_SIDES = (31, 63, 127)
 KEY = ("scene", "data", "sides")
@@ -33,7 +31,7 @@ class Known:
     how: str
 
 
-def known_answer(scene: FilmScene, path: Path, quick: bool = False) -> Known:
+def known_answer(scene: RectangleScene, path: Path, quick: bool = False) -> Known:
     """The exact solution; else Richardson's limit of three grids, from the csv at `path` or computed now. Collective."""
     exact = scene.exact()
     if exact is not None:
@@ -60,7 +58,7 @@ def dimple_cells(scene: Scene) -> int:
     return 30 * scene.K + 1 if isinstance(scene, TexturedScene) and scene.K <= 4 else 0
 
 
-def fine(scene: FilmScene, sides: tuple[int, ...]) -> dict[str, object]:
+def fine(scene: RectangleScene, sides: tuple[int, ...]) -> dict[str, object]:
     """Limits of the three numbers and their doubt, the distance from the finest grid's value to the limit. Collective."""
     begin = process_time()
     found = [on_grid(scene.with_shape((n,) * len(scene.shape))) for n in sides]

@@ -18,11 +18,12 @@ from ..errors import InputError
 from ..output.console import say
 from ..problems.solution import Outcome
 from ..registry import METHODS
+from ..scenes.film_scene import RectangleScene
 from ..scenes.scene import Scene, load_scene
 from ..solvers.newton import Stopping
 from .compare import errors
 from .experiment import KRYLOV_LIMIT, open_store, run, scene_key
-from .known import FilmScene, Known, dimple_cells, known_answer, on_grid
+from .known import Known, dimple_cells, known_answer, on_grid
 from .log import write_log
 from .precision_picture import draw_all, seconds
 from .precision_words import cheapest, sentence, which
@@ -159,14 +160,14 @@ def grids(scene: Scene, quick: bool) -> tuple[int, ...]:
     return (QUICK_SIZES if quick else SIZES)[len(scene.shape)]
 
 
-def film(scene: Scene) -> FilmScene:
+def film(scene: Scene) -> RectangleScene:
     """The scene, if its load can be told.
 
     Raises
     ------
     InputError : it is no film with cavitation.
     """
-    if not isinstance(scene, FilmScene):
+    if not isinstance(scene, RectangleScene):
         raise InputError(f"scene {scene.name}: it has no load; a film with cavitation is needed, as {', '.join(SCENES)} are")
     return scene
 
@@ -174,7 +175,7 @@ def film(scene: Scene) -> FilmScene:
 class Bench:
     """Runs on one scene. known: what its errors are measured against; repeats: of short runs."""
 
-    def __init__(self, scene: FilmScene, known: Known, repeats: int):
+    def __init__(self, scene: RectangleScene, known: Known, repeats: int):
         self.scene, self.known, self.repeats = scene, known, repeats
         self._discrete: dict[tuple[int, ...], Mapping[str, float | None]] = {}
         self._warm: set[str] = set()

@@ -4,7 +4,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from films import make_problem
+from films import Wave, make_problem
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -12,7 +12,6 @@ from lcp_lube import load_scene, solve
 from lcp_lube.base.compiled import compiled
 from lcp_lube.problems.certificate import Certificate, certificate_tol
 from lcp_lube.problems.film.certify import array_misfits, cell_misfits, void_scale
-from lcp_lube.problems.film.gaps import Wave
 
 
 @pytest.fixture(scope="module")

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.parallel import Array
+from .edges import jumps_of
 from .shapes import Shape
 from .turning import Turning
 
@@ -67,7 +68,7 @@ class Bore:
 
     def jumps(self, axis: str) -> tuple[float, ...]:
         """x or y (m) of the straight lines across which the film jumps."""
-        found = [t for part in self.parts if hasattr(part, "jumps") for t in part.jumps(axis)]
+        found = [t for part in self.parts for t in jumps_of(part, axis)]
         if self.dam is not None and axis == "x":
             angles = np.remainder(np.array([self.dam.start, self.dam.end]) - self.turning.start, 2.0 * math.pi)
             found += [*(angles * self.turning.R)]

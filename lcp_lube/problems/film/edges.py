@@ -31,6 +31,12 @@ def marks_of(film: Any) -> tuple[float, ...]:
     return ()
 
 
+def jumps_of(film: Any, axis: str) -> tuple[float, ...]:
+    """x or y (m) of the straight lines across which a film jumps, as far as it tells."""
+    tell = getattr(film, "jumps", None)
+    return () if tell is None else tuple(tell(axis))
+
+
 def face_film(
     film: Callable[[Array, Array], Array],
     nodes: Array,

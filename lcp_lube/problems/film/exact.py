@@ -26,14 +26,26 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ...base.parallel import Array
 from ...errors import InputError
-from .gaps import Array, Film
 
 Indices = NDArray[np.intp]
+
+
+class Film(Protocol):
+    """What the exact solution asks of a film."""
+
+    def __call__(self, x: ArrayLike, y: ArrayLike | None = None, /) -> Array:
+        """Return h (m) at x and y (m), with the broadcast shape of both."""
+
+    def breakpoints(self) -> tuple[float, ...]:
+        """Return the x (m) of all jumps, kinks and extrema: in between, h is smooth and monotone."""
+
 
 _XI, _WEIGHT = np.polynomial.legendre.leggauss(16)
 _TIE = 1e-14  # relative difference between two fluxes that rounding can make

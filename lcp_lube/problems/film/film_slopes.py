@@ -1,14 +1,12 @@
 """Derivatives of the box scheme's coefficients by the film: a complex step through the code that makes them."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ...base.parallel import Array
 from .lubrication import LubricationProblem
 from .reynolds import BoxScheme, Film, _coefficients
+from .views import Raised
 
 STEP = 1e-30  # relative: nothing is subtracted, so no digits are lost however small it is
 
@@ -25,27 +23,9 @@ def film_slopes(problem: LubricationProblem, film: Film, data: dict[str, Any]) -
     """
     grid, flow_unit = problem.grid, problem.scheme.flow_unit
     step = STEP * grid.reduce.max(np.abs(np.asarray(film(grid.x, grid.y))))
-    moved = Lifted(film, 1j * step)
+    moved: Any = Raised(film, 1j * step)
     integrals = None if problem.integrals is None else problem.integrals.lifted(1j * step)
     names = ("mu", "U", "scheme", "p_sides", "p_unit", "mean_cubes", "r_in")
     box = _coefficients(grid, moved, *(data[name] for name in names), problem.dry, integrals)  # type: ignore[arg-type, call-arg]
     changes = {name: np.imag(getattr(box, name)) / step for name in box.arrays}
     return BoxScheme(**{name: a if name == "h" else a / flow_unit for name, a in changes.items()}, flow_unit=flow_unit)
-
-
-@dataclass(frozen=True)
-class Lifted:
-    """A film with a complex number added."""
-
-    film: Film
-    step: complex
-
-    def __call__(self, x: Array, y: Array) -> Array:
-        return self.film(x, y) + self.step  # type: ignore[return-value]
-
-    @property
-    def rims(self) -> Sequence[Any]:
-        return getattr(self.film, "rims", ())
-
-    def jumps(self, axis: str) -> Sequence[float]:
-        return getattr(self.film, "jumps", lambda axis: ())(axis)

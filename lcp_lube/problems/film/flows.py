@@ -9,7 +9,7 @@ import numpy as np
 from ...base.parallel import Array
 from ..grid import Grid
 from .cavity import cavity_sign
-from .edges import strips
+from .edges import jumps_of, strips
 from .reynolds import BoxScheme, sides
 
 if TYPE_CHECKING:
@@ -120,7 +120,7 @@ def sheared_faces(problem: LubricationProblem, x: Array, lifted: complex = 0.0) 
     grid, film = problem.grid, problem.film
     h = np.broadcast_to(film(x, grid.y) + lifted, grid.box)
     resting, moving = np.zeros_like(h), h
-    jumps = getattr(film, "jumps", lambda axis: ())("y") if grid.dim == 2 else ()
+    jumps = jumps_of(film, "y") if grid.dim == 2 else ()
     if jumps:
         rows, in_strips, shares = strips(film, x[0], grid.y[:, 0], grid.steps(1), jumps)
         if rows.size:

@@ -8,19 +8,20 @@ from numpy.typing import ArrayLike
 
 from ...base.parallel import Array
 from ..grid import Grid
+from .views import View
 
 
 @dataclass(frozen=True)
-class LiftedFilm:
+class LiftedFilm(View):
     """h(x, y) + lift, the lift bilinear between this rank's points and those beside them, constant beyond.
 
     x, y : coordinates of the points with their neighbours, m. lift : there, shape (y.size, x.size), m.
     """
 
-    film: Any
     x: Array
     y: Array
     lift: Array
+    rims = ()  # what bends them is not known between points
 
     @classmethod
     def of(cls, film: Any, grid: Grid, lift: Array) -> "LiftedFilm":
@@ -41,11 +42,6 @@ class LiftedFilm:
         f = self.lift
         lift = (1 - b) * ((1 - a) * f[j, i] + a * f[j, i + 1]) + b * ((1 - a) * f[j + 1, i] + a * f[j + 1, i + 1])
         return self.film(x, y) + lift
-
-    def __getattr__(self, name: str) -> Any:
-        if name not in ("jumps", "breakpoints"):  # of its shapes
-            raise AttributeError(name)
-        return getattr(self.film, name)
 
 
 def _place(lines: Array, at: Array) -> tuple[Any, Array]:

@@ -5,15 +5,12 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-import numpy as np
-from numpy.typing import ArrayLike
 from petsc4py import PETSc
 
-from ...base.parallel import Array
 from ...errors import InputError
 from ..facts import Facts
 from ..grid import EVEN, Grid, Places, Polar
-from .edges import marks_of
+from .edges import jumps_of
 from .effects import Effect
 from .exact import ExactSolution
 from .film_slopes import film_slopes
@@ -26,7 +23,8 @@ from .lubrication import LubricationProblem
 from .reynolds import BoxScheme, Film, box_scheme
 from .stored import Stored
 from .supplies import Supply, hold
-from .turned import MirroredFilm, TurnedProblem
+from .turned import TurnedProblem
+from .views import FromHere, Inside, MirroredFilm
 
 NAMES = ("west", "east", "south", "north")
 OPPOSITE = dict(zip(NAMES, ("east", "west", "north", "south"), strict=True))
@@ -79,6 +77,7 @@ class Model:
     places: Places | None = None  # of the lines of points; None: on the film's straight edges, if it has any
     effects: tuple[Effect, ...] = ()  # what else makes its coefficients depend on the answer; `build` leaves them out
     stored: Stored | None = None  # by the cells, in a time step
+    extras: Callable[[dict[str, Any]], dict[str, Any]] | None = None  # the bearing's own numbers, made of the film's
 
     def __post_init__(self) -> None:
         used = dict(zip(NAMES, self.sides, strict=True) if len(self.lengths) == 2 else zip(NAMES[:2], self.sides, strict=False))
@@ -101,7 +100,7 @@ class Model:
         kinds = [tuple(side.kind for side in self.sides[2 * k : 2 * k + 2]) for k in range(dims)]
         if all(pair == ("open", "open") for pair in kinds):
             return self.gap
-        return _Inside(self.gap, self.lengths, [pair == ("periodic", "periodic") for pair in kinds])
+        return Inside(self.gap, self.lengths, tuple(pair == ("periodic", "periodic") for pair in kinds))
 
     def facts(self, shape: Sequence[int], comm: PETSc.Comm | None = None) -> Facts:
         """The problem on (nx,) or (nx, ny) points, in numbers."""
@@ -126,10 +125,9 @@ class Model:
         """Where the lines of points of a grid lie (`Grid.places`): on edges, where scheme 'face' can make use of it in 2D."""
         if self.places is not None:
             return self.places
-        of_film = getattr(self.gap, "jumps", lambda axis: ())
         if self.scheme != "face" or self.mean_cubes or len(shape) == 1:
             return EVEN
-        edges = [[*of_film(axis), *(t for one in self.supplies for t in one.region.edges(axis))] for axis in "xy"]
+        edges = [[*jumps_of(self.gap, axis), *(t for one in self.supplies for t in one.region.edges(axis))] for axis in "xy"]
         x, y = (
             on_edges(n, length, [side.kind for side in self.sides[2 * k : 2 * k + 2]], edges[k])
             for k, (n, length) in enumerate(zip(shape, self.lengths, strict=True))
@@ -174,7 +172,7 @@ class Model:
             held=held,
             integrals=integrals,
         )
-        problem.shares_grid = shared
+        problem.shares_grid, problem.extras = shared, self.extras
         if isinstance(problem, GroovedProblem):
             problem.grooves = self.grooves
         if getattr(self.gap, "rims", ()) and not self.supplies and self.law is None:
@@ -201,52 +199,8 @@ class Model:
             lengths = ((pad.n + 1) * dx, *self.lengths[1:])
             sides = (Side(p=pad.west), Side(p=pad.east), *self.sides[2:])
             # Its x = 0 is the last column of the groove before it.
-            gap = _Moved(self.gap, (pad.first - 0.5) * dx, self.lengths[0])
+            gap = FromHere(self.gap, (pad.first - 0.5) * dx, self.lengths[0])
             stored = self.stored.starting(pad.first) if self.stored else None
             film = replace(self, lengths=lengths, sides=sides, gap=gap, exact=None, grooves=(), places=places, stored=stored)
             films.append((pad, film))
         return films
-
-
-@dataclass(frozen=True)
-class _Moved:
-    """A film round a ring of this length that begins elsewhere."""
-
-    gap: Film
-    start: float
-    period: float
-
-    def __call__(self, x: ArrayLike, y: ArrayLike | None = None, /) -> Array:
-        return self.gap(np.asarray(x, dtype=float) + self.start, np.asarray(0.0 if y is None else y))
-
-    def jumps(self, axis: str) -> tuple[float, ...]:
-        found = getattr(self.gap, "jumps", lambda axis: ())(axis)
-        return tuple((t - self.start) % self.period for t in found) if axis == "x" else found
-
-    @property
-    def rims(self) -> tuple[Film, ...]:
-        return tuple(_Moved(rim, self.start, self.period) for rim in getattr(self.gap, "rims", ()))
-
-
-@dataclass(frozen=True)
-class _Inside:
-    """A film that goes on periodically, or keeps its value, beyond [0, length]."""
-
-    gap: Film
-    lengths: Sequence[float]
-    periodic: Sequence[bool]
-
-    def __call__(self, x: ArrayLike, y: ArrayLike | None = None, /) -> Array:
-        places = [np.asarray(a, dtype=float) for a in (x, 0.0 if y is None else y)]
-        for side, (length, periodic) in enumerate(zip(self.lengths, self.periodic, strict=True)):
-            places[side] = places[side] % length if periodic else np.clip(places[side], 0.0, length)
-        return self.gap(*places)
-
-    def marks(self) -> tuple[float, ...]:
-        return marks_of(self.gap)
-
-    def jumps(self, axis: str) -> tuple[float, ...]:
-        return getattr(self.gap, "jumps", lambda axis: ())(axis)
-
-    def breakpoints(self) -> tuple[float, ...]:
-        return self.gap.breakpoints()  # type: ignore[attr-defined]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ...base.parallel import Array
 from ...errors import InputError
 from ..grid import Grid
-from .edges import face_film
+from .edges import face_film, jumps_of
 from .integrals import LineIntegrals
 from .positive import check_film
 from .rims import rims_across_x, rims_across_y
@@ -179,8 +179,8 @@ def _coefficients(
         return 0.5 * (nodal[:-1] + nodal[1:])
 
     k = p_unit / (6.0 * mu)
-    edges = (lambda axis: ()) if mean_cubes else getattr(film, "jumps", lambda axis: ())
-    x_jumps, y_jumps, across = edges("x"), edges("y"), grid.steps(1) if grid.dim == 2 else np.ones(2)
+    x_jumps, y_jumps = ((), ()) if mean_cubes else (jumps_of(film, axis) for axis in "xy")
+    across = grid.steps(1) if grid.dim == 2 else np.ones(2)
     if integrals is not None:
         own = slice(grid.x_start, grid.x_end + 1)
         cubes_x, h_face = dx / integrals.parts[2][None, own], integrals.films[None, own]

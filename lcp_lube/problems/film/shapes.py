@@ -4,13 +4,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...base.parallel import Array
-from .edges import marks_of
+from .edges import jumps_of, marks_of
 
 Shape = Callable[[Array, Array], Array]
 EDGE = 1e-12  # relative: a point so near an edge is on it, whatever its coordinate's rounding; edges belong to the recess
@@ -22,7 +21,8 @@ class Along:
     """A course along one axis between start and end; beyond them it keeps its end values.
 
     With s from 0 to 1 between start and end: linear, h_start + (h_end - h_start) s; parabola, h_min at the middle and h_max at
-    the ends; sinusoid, h_max at s = 0 and so many full waves. h_0, h_1 are the values of linear, else h_min and h_max.
+    the ends; sinusoid, h_max at s = 0 and so many full waves. h_0, h_1 are the values of linear, else h_min and h_max, or these
+    two exchanged. The films of problems 1 to 4 of Mezzadri and Galligani (2018) are such.
     """
 
     course: str
@@ -35,11 +35,15 @@ class Along:
 
     def __call__(self, x: Array, y: Array) -> Array:
         s = np.clip(((x if self.axis == "x" else y) - self.start) / (self.end - self.start), 0.0, 1.0)
+        if self.course == "linear":
+            return self.h_0 + (self.h_1 - self.h_0) * s
+        # From the thinnest film up, by squares and products: K + a cos(2 pi s) and 1 - s^2 lose digits next to it.
+        down = self.h_0 > self.h_1
         if self.course == "parabola":
-            s = (2.0 * s - 1.0) ** 2
-        elif self.course == "sinusoid":
-            s = np.cos(np.pi * self.waves * s) ** 2
-        return self.h_0 + (self.h_1 - self.h_0) * s
+            rise = 4.0 * s * (1.0 - s) if down else (2.0 * s - 1.0) ** 2
+        else:
+            rise = (np.sin if down else np.cos)(np.pi * self.waves * s) ** 2
+        return min(self.h_0, self.h_1) + abs(self.h_1 - self.h_0) * rise
 
     def breakpoints(self) -> tuple[float, ...]:
         """The x of its kinks and extrema, m."""
@@ -210,27 +214,6 @@ class Scaled:
 
 
 @dataclass(frozen=True)
-class Travelling:
-    """A shape that the wall has carried along x by `travel`; it goes on periodically over L."""
-
-    shape: Shape
-    travel: float
-    L: float
-
-    def __call__(self, x: Array, y: Array) -> Array:
-        return self.shape((x - self.travel) % self.L, y)
-
-    def __getattr__(self, name: str) -> Any:
-        if name == "rims":
-            return [lambda x, y, rim=rim: rim((x - self.travel) % self.L, y) for rim in self.shape.rims]  # type: ignore[attr-defined]
-        if name != "jumps":  # a shape without them has no such attribute
-            raise AttributeError(name)
-        jumps = self.shape.jumps  # type: ignore[attr-defined]
-        shifted = lambda axis: tuple(sorted((x + self.travel) % self.L for x in jumps("x")))  # noqa: E731
-        return lambda axis: shifted(axis) if axis == "x" else jumps(axis)
-
-
-@dataclass(frozen=True)
 class Sum:
     """The film: parts added up, and cut from below at `floor` where that is given."""
 
@@ -253,7 +236,7 @@ class Sum:
 
     def jumps(self, axis: str) -> tuple[float, ...]:
         """x or y (m) of the straight lines across which the film jumps."""
-        return tuple(t for part in self.parts if hasattr(part, "jumps") for t in part.jumps(axis))
+        return tuple(t for part in self.parts for t in jumps_of(part, axis))
 
     @property
     def rims(self) -> tuple[Shape, ...]:

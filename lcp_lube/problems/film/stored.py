@@ -15,7 +15,7 @@ import numpy as np
 from ...base.parallel import Array
 from ..grid import Grid
 from ..transfer import Pick, numbers
-from .edges import GAUSS, _pieces
+from .edges import GAUSS, _pieces, jumps_of
 
 if TYPE_CHECKING:
     from .lubrication import LubricationProblem
@@ -82,11 +82,11 @@ def mean_film(grid: Grid, film: Any) -> Array:
     Else a pocket that travels would fill a whole cell at the moment when its edge passes the point.
     """
     h = np.array(np.broadcast_to(film(grid.x, grid.y), grid.box), dtype=float)
-    jumps = getattr(film, "jumps", lambda axis: ())
-    if not (jumps("x") or jumps("y")):
+    x_jumps, y_jumps = jumps_of(film, "x"), jumps_of(film, "y")
+    if not (x_jumps or y_jumps):
         return h
     x_faces, lines = grid.nodes_and_faces(0)[1], grid.y[:, 0]
-    columns, pieces = _pieces(x_faces[:-1], x_faces[1:], jumps("x"))
+    columns, pieces = _pieces(x_faces[:-1], x_faces[1:], x_jumps)
 
     def along(y: Array) -> Array:
         values = np.array(np.broadcast_to(film(grid.x, y[:, None]), (y.size, grid.box[1])))
@@ -102,7 +102,7 @@ def mean_film(grid: Grid, film: Any) -> Array:
     h = along(lines)
     if grid.dim == 2:
         y_faces = grid.nodes_and_faces(1)[1]
-        rows, strips = _pieces(y_faces[:-1], y_faces[1:], jumps("y"))
+        rows, strips = _pieces(y_faces[:-1], y_faces[1:], y_jumps)
         if rows.size:
             h[rows] = sum(((b - a) / (strips[-1] - strips[0]))[:, None] * along(0.5 * (a + b)) for a, b in pairwise(strips))
     return h

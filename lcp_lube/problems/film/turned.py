@@ -17,38 +17,11 @@ from ..certificate import Certificate
 from ..grid import Grid
 from ..solution import Fields
 from ..transfer import Pick
-from .edges import marks_of
 from .exact import ExactSolution, exact_solution
 from .lubrication import LubricationProblem
+from .views import MirroredFilm
 
 PLACES = ("rupture", "reformation")
-
-
-@dataclass(frozen=True)
-class MirroredFilm:
-    """h(L - x, y) of a film h over [0, L]."""
-
-    film: Any
-    L: float
-
-    def __call__(self, x: ArrayLike, y: ArrayLike | None = None, /) -> Array:
-        turned = self.L - np.asarray(x, dtype=float)
-        # The wall lies at 0, not beyond it by the last bit of L: sqrt(x) is a film.
-        return self.film(np.where((turned < 0) & (turned > -1e-12 * self.L), 0.0, turned), y)
-
-    def breakpoints(self) -> tuple[float, ...]:
-        return tuple(sorted(self.L - x for x in self.film.breakpoints()))
-
-    def marks(self) -> tuple[float, ...]:
-        return tuple(sorted(self.L - x for x in marks_of(self.film)))
-
-    def __getattr__(self, name: str) -> Any:
-        if name == "rims":
-            return tuple(MirroredFilm(rim, self.L) for rim in getattr(self.film, "rims", ()))
-        if name != "jumps":  # a film without them has no such attribute
-            raise AttributeError(name)
-        jumps = self.film.jumps
-        return lambda axis: tuple(sorted(self.L - x for x in jumps(axis))) if axis == "x" else jumps(axis)
 
 
 class TurnedProblem(LubricationProblem):
@@ -125,10 +98,6 @@ class TurnedProblem(LubricationProblem):
             out[name] = sorted(L - x for x in out[name])
         out["flow"] = {**out["flow"], "west": out["flow"]["east"], "east": out["flow"]["west"]}
         out["friction"] = -out["friction"]
-        if self.extras:
-            out |= self.extras(out)
-            carried = out.get("bearing_load", out["load_above_ambient"])
-            out["friction_coefficient"] = -out["friction"] / carried if carried > 0 else None
         return out
 
     def destroy(self) -> None:

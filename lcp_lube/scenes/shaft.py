@@ -1,0 +1,103 @@
+"""What journals under a load of given direction share, in one bush with grooves or in pads; 2D, unwrapped round the shaft."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from pydantic import Field, field_validator
+
+from ..problems.film.forces import Shaft
+from ..problems.film.grooves import Groove
+from ..problems.film.model import Model, Side
+from ..problems.film.reynolds import Film
+from ..problems.film.turning import Turning
+from .film_scene import FilmScene
+from .scene import Count, Finite, NotNegative, Positive
+from .units import measured, metres
+
+
+class ShaftScene(FilmScene):
+    """A journal of diameter D that turns at speed_rpm. Angles are counted from the load, in the sense of rotation."""
+
+    D: Positive = metres(0.1, "diameter")
+    L_over_D: Positive = Field(0.5, description="width over diameter")
+    clearance: Positive = metres(1e-4, "radial clearance")
+    speed_rpm: Positive = Field(3000.0, description="speed of the journal, rpm")
+    mu: Positive = measured("Pa s", 0.02, "viscosity")
+    eccentricity: float
+    attitude_deg: Finite | None
+    p_groove: NotNegative = measured("Pa", 0.0, "pressure in the grooves, above p_c")
+    p_end: NotNegative = measured("Pa", 0.0, "pressure at both ends, above p_c")
+    p_c: Finite = measured("Pa", 0.0, "cavitation pressure")
+    scheme: str | None = Field("face", description="form of the Couette flux: face")
+    n: Count = Field(360, description="points around, and an odd number near a sixteenth of them across")
+    nx: Count | None = Field(None, description="points around; default n")
+    ny: Count | None = Field(None, description="points across; default as n says")
+
+    @field_validator("scheme")
+    @classmethod
+    def _face(cls, scheme: str | None) -> str | None:
+        if scheme != "face":
+            raise ValueError("face is allowed")
+        return scheme
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return self.nx or self.n, self.ny or max(3, self.n // 16 | 1)
+
+    @property
+    def side_lengths(self) -> tuple[float, float]:
+        return math.pi * self.D, self.L_over_D * self.D
+
+    @property
+    def omega(self) -> float:
+        """Angular velocity, rad/s."""
+        return 2.0 * math.pi * self.speed_rpm / 60.0
+
+    @property
+    def mu_0(self) -> float:
+        """Viscosity, Pa s; where it varies, that from which it does."""
+        return self.mu
+
+    @property
+    def start(self) -> float:
+        """Angle of an edge on which points of the grid lie, rad."""
+        raise NotImplementedError
+
+    @property
+    def turning(self) -> Turning:
+        """Place x = 0 lies half a mesh before `start`."""
+        start = self.start - math.pi / self.shape[0]
+        return Turning(0.5 * self.D, self.clearance, self.L_over_D * self.D, self.omega, start)
+
+    @property
+    def gap(self) -> Film:
+        """The film h(x, y), m."""
+        raise NotImplementedError
+
+    @property
+    def grooves(self) -> tuple[Groove, ...]:
+        """The columns of points that have p_groove; edges of grooves are points of the grid."""
+        raise NotImplementedError
+
+    def _model(self) -> Model:
+        turning, ends = self.turning, Side(p=self.p_end)
+        thinnest = math.radians(self.attitude_deg or 0.0)
+        numbers: Callable[[dict[str, Any]], dict[str, Any]] = self.bearing_numbers
+        return Model(
+            lengths=self.side_lengths,
+            sides=(Side("periodic"), Side("periodic"), ends, ends),
+            gap=self.gap,
+            mu=self.mu_0,
+            U=turning.R * turning.omega,
+            p_c=self.p_c,
+            p_unit=self.mu_0 * self.omega * (turning.R / self.clearance) ** 2,
+            scheme="face",
+            shaft=Shaft(turning.R, thinnest + math.pi if self.eccentricity else None, turning.start),
+            grooves=self.grooves,
+            extras=numbers,
+        )
+
+    def bearing_numbers(self, values: dict[str, Any]) -> dict[str, Any]:
+        """Eccentricity and Sommerfeld numbers."""
+        return self.turning.numbers(values["load"], self.mu_0, self.eccentricity)
