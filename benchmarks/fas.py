@@ -35,7 +35,9 @@ from lcp_lube.base.stages import Stages
 from lcp_lube.linear.krylov import Krylov
 from lcp_lube.output.results import machine
 from lcp_lube.problems.film.lubrication import LubricationProblem
-from lcp_lube.solvers.fas.driver import Fas, FasOptions
+from lcp_lube.solvers.fas.driver import Fas
+from lcp_lube.solvers.job import Job
+from lcp_lube.solvers.newton import Stopping
 
 Values = dict[str, Any]
 KEY = ("experiment", "film", "n", "variant")
@@ -101,7 +103,7 @@ def problem_of(film: str, n: int) -> LubricationProblem:
 
 def cycles(problem: LubricationProblem, eps1: float, most: int = 40, **options: Any) -> tuple[Fas, str]:
     """Multigrid alone, without anybody to take over; and how it ended."""
-    run, taken = Fas(problem, Stages(), FasOptions(**options), eps1), 0
+    run, taken = Fas(Job(problem, Stages(), options=options, stopping=Stopping(eps1))), 0
     try:
         while run.norm > eps1 and taken < most:
             run.advance()

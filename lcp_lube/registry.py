@@ -43,7 +43,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class MethodEntry(Entry):
-    """A method: `target` is build(job: solvers.job.Job) -> Method.
+    """A method: `target` makes one of a solvers.job.Job: its class.
 
     kinds are the problems it solves (`Problem.kind`), systems the matrices it can use, its default first, none if it solves no
     linear systems; nested: it can start from a coarser grid's answer, which must lie strictly inside p, r > 0 if it is an
@@ -68,16 +68,16 @@ class MethodEntry(Entry):
 
 
 METHODS: dict[str, MethodEntry] = {
-    "din": MethodEntry("lcp_lube.solvers.din:build", "damped inexact Newton of Mezzadri and Galligani (interior)", nested=True),
+    "din": MethodEntry("lcp_lube.solvers.din:DIN", "damped inexact Newton of Mezzadri and Galligani (interior)", nested=True),
     "din-pc": MethodEntry(
-        "lcp_lube.solvers.din_pc:build",
+        "lcp_lube.solvers.din_pc:DinPc",
         "DIN with a predictor-corrector step: fewer iterations",
         systems=("reduced", "full"),
         nested=True,
         nested_above=500,
     ),
     "active-set": MethodEntry(
-        "lcp_lube.solvers.active_set:build",
+        "lcp_lube.solvers.active_set:ActiveSet",
         "semismooth Newton in z = p or -r: finitely many steps to the exact discrete solution",
         kinds=("lubrication", "box", "mixed", "user"),
         systems=("reduced", "full", "cavity"),
@@ -87,7 +87,7 @@ METHODS: dict[str, MethodEntry] = {
         fallback=("pivoting", "monotone", "din-pc"),
         variants={
             "box": MethodEntry(
-                "lcp_lube.solvers.box_active_set:build",
+                "lcp_lube.solvers.box_active_set:BoxActiveSet",
                 "semismooth Newton: points in contact held, a Newton step at the others",
                 kinds=("box",),
                 systems=("jacobian",),
@@ -99,7 +99,7 @@ METHODS: dict[str, MethodEntry] = {
             **dict.fromkeys(
                 ("mixed", "user"),
                 MethodEntry(
-                    "lcp_lube.solvers.box_active_set:build",
+                    "lcp_lube.solvers.box_active_set:BoxActiveSet",
                     "semismooth Newton: unknowns at a bound held, a Newton step for the others",
                     kinds=("mixed", "user"),
                     systems=("jacobian",),
@@ -111,7 +111,7 @@ METHODS: dict[str, MethodEntry] = {
         },
     ),
     "interior": MethodEntry(
-        "lcp_lube.solvers.interior:build",
+        "lcp_lube.solvers.interior:Interior",
         "inexact interior point of Bergamaschi and Zilli for box-constrained problems",
         kinds=("box", "mixed", "user"),
         systems=("jacobian",),
@@ -119,7 +119,7 @@ METHODS: dict[str, MethodEntry] = {
         variants=dict.fromkeys(
             ("mixed", "user"),
             MethodEntry(
-                "lcp_lube.solvers.mixed_interior:build",
+                "lcp_lube.solvers.interior:MixedInterior",
                 "inexact interior point of Bergamaschi and Zilli, free unknowns among the bounded ones",
                 kinds=("mixed", "user"),
                 systems=("jacobian",),
@@ -129,7 +129,7 @@ METHODS: dict[str, MethodEntry] = {
         ),
     ),
     "semismooth": MethodEntry(
-        "lcp_lube.solvers.semismooth:build",
+        "lcp_lube.solvers.semismooth:Semismooth",
         "Fischer-Burmeister Newton for bounds of any kind, with proximal steps where it stalls",
         kinds=("user", "mixed", "box"),
         systems=("jacobian",),
@@ -137,7 +137,7 @@ METHODS: dict[str, MethodEntry] = {
         eps=(1e-10, inf),
     ),
     "fas": MethodEntry(
-        "lcp_lube.solvers.fas.driver:build",
+        "lcp_lube.solvers.fas.driver:Fas",
         "nonlinear multigrid: full multigrid and a few cycles of sweeps, no matrix at all",
         kinds=("lubrication", "box"),
         systems=(),
@@ -146,7 +146,7 @@ METHODS: dict[str, MethodEntry] = {
         fallback=("active-set", "pivoting", "monotone", "din-pc"),
         variants={
             "box": MethodEntry(
-                "lcp_lube.solvers.fas.box:build",
+                "lcp_lube.solvers.fas.box:BoxFas",
                 "nonlinear multigrid between two obstacles: projected sweeps, coarse grids that know the bounds",
                 kinds=("box",),
                 systems=(),
@@ -157,7 +157,7 @@ METHODS: dict[str, MethodEntry] = {
         },
     ),
     "monotone": MethodEntry(
-        "lcp_lube.solvers.monotone:build",
+        "lcp_lube.solvers.monotone:Monotone",
         "policy iteration from above: slow on hard films, but proved to end on every one",
         systems=("reduced",),
         nested=True,
@@ -165,12 +165,12 @@ METHODS: dict[str, MethodEntry] = {
         interior=False,
     ),
     "pivoting": MethodEntry(
-        "lcp_lube.solvers.pivoting:build", "small films of any ratio of heights", systems=(), interior=False, at_most=SMALL
+        "lcp_lube.solvers.pivoting:Pivoting", "small films of any ratio of heights", systems=(), interior=False, at_most=SMALL
     ),
-    "fbn-a": MethodEntry("lcp_lube.solvers.fischer:build_armijo", "Fischer-Burmeister Newton, Armijo rule on ||F||^2/2"),
-    "fbn-i": MethodEntry("lcp_lube.solvers.fischer:build_inexact", "Fischer-Burmeister Newton, inexact decrease of ||F||"),
+    "fbn-a": MethodEntry("lcp_lube.solvers.fischer:ArmijoNewton", "Fischer-Burmeister Newton, Armijo rule on ||F||^2/2"),
+    "fbn-i": MethodEntry("lcp_lube.solvers.fischer:FischerNewton", "Fischer-Burmeister Newton, inexact decrease of ||F||"),
     "newton": MethodEntry(
-        "lcp_lube.solvers.plain_newton:build",
+        "lcp_lube.solvers.plain_newton:PlainNewton",
         "Newton or inexact Newton for equations without complementarity",
         kinds=("equations",),
         systems=("jacobian",),

@@ -25,7 +25,7 @@ from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Fields, Step
 from .job import Job
 from .method import Method
-from .method_options import MethodOptions, least, make_options, part, positive
+from .method_options import MethodOptions, least, part, positive
 from .newton import StalledError
 from .relaxation import Relaxation, relaxation
 from .zform import EPS, ZForm
@@ -54,22 +54,18 @@ class ActiveSetOptions(MethodOptions):
 class ActiveSet(Method):
     """The iterates z; `newton.iterate` runs it. `norm` is ||G(z)|| / ||c||, see `zform.ZForm.norm`.
 
-    Parameters
-    ----------
-    start : fields p and r, a cell being cavitated where r > 0; default full film at options.p0.
+    A start's cells count as cavitated where r > 0; without one the film is full at options.p0.
     """
 
-    state: tuple[str, ...] = ("z", "G", "norm", "_best", "_stalled", "_rescue", "_taken", "_sweeps")  # what a step starts from
+    Options = ActiveSetOptions
+    problem: LubricationProblem
+    system: System
+    state = ("z", "G", "norm", "_best", "_stalled", "_rescue", "_taken", "_sweeps")
 
-    def __init__(
-        self,
-        problem: LubricationProblem,
-        system: System,
-        options: ActiveSetOptions,
-        eps1: float,
-        start: Fields | None = None,
-    ):
-        self.problem, self.system, self.options, self.eps1 = problem, system, options, eps1
+    def __init__(self, job: Job):
+        super().__init__(job)
+        problem, options, start = self.problem, self.options, job.start
+        self.system = make_system(job.system, problem, self.stages)
         self.form = ZForm(problem)
         self.z = self.form.z(start) if start else np.full(problem.grid.local_size, options.p0)
         self._look()
@@ -151,14 +147,3 @@ class ActiveSet(Method):
         """The step for another right-hand side with the matrix of the last one. Collective."""
         dp, dr, _ = self.system.resolve(f, np.zeros_like(f), self.options.rtol)
         return np.where(full, dp, -dr / self.form.s)
-
-
-def build(job: Job) -> ActiveSet:
-    """The registry's door.
-
-    Raises
-    ------
-    InputError : an unknown option or a value out of range.
-    """
-    settings = make_options(ActiveSetOptions, "active-set", job.options)
-    return ActiveSet(job.problem, make_system(job.system, job.problem, job.stages), settings, job.stopping.eps1, job.start)

@@ -18,7 +18,7 @@ from ..problems.box import BoxProblem
 from ..problems.solution import Fields, Step
 from .job import Job
 from .method import Method
-from .method_options import MethodOptions, make_options, part
+from .method_options import MethodOptions, part
 from .steplength import halve_until, inexact_decrease
 
 Trial = tuple[Array, Array, Array]  # v, f(v), R(v)
@@ -38,17 +38,18 @@ class BoxActiveSetOptions(MethodOptions):
 class BoxActiveSet(Method):
     """The iterates v; `newton.iterate` runs it.
 
-    `norm` is max |D R(v)| against the mean size of the terms of f; steps are measured against max |v|.
-
-    Parameters
-    ----------
-    start : field v, moved into the bounds; default problem.v0. D is that of the start.
+    `norm` is max |D R(v)| against the mean size of the terms of f; steps are measured against max |v|. D is that of the start.
     """
 
-    state: tuple[str, ...] = ("v", "D", "f", "R", "_scale", "norm")  # what a step starts from
+    Options = BoxActiveSetOptions
+    problem: BoxProblem
+    system: BoxSystem
+    state = ("v", "D", "f", "R", "_scale", "norm")
 
-    def __init__(self, problem: BoxProblem, system: BoxSystem, options: BoxActiveSetOptions, start: Fields | None = None):
-        self.problem, self.system, self.options = problem, system, options
+    def __init__(self, job: Job):
+        super().__init__(job)
+        problem, start = self.problem, job.start
+        self.system = system = BoxSystem(problem, self.stages)
         self.v = np.clip(start["v"], problem.lower, problem.upper) if start else problem.v0
         diagonal = system.linearise(self.v)
         self.D = np.where(diagonal > 0, diagonal, 1.0)
@@ -93,14 +94,3 @@ class BoxActiveSet(Method):
                 self._scale = problem.scales(self.v)[1]
             self.norm = self._norm()
         return Step(self.norm, step_norm, alpha, iterations, backtracking=cuts, rtol=rtol)
-
-
-def build(job: Job) -> BoxActiveSet:
-    """The registry's door.
-
-    Raises
-    ------
-    InputError : an unknown option or a value out of range.
-    """
-    settings = make_options(BoxActiveSetOptions, "active-set", job.options)
-    return BoxActiveSet(job.problem, BoxSystem(job.problem, job.stages), settings, job.start)

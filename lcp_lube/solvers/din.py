@@ -12,7 +12,7 @@ from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Fields, Step
 from .job import Job
 from .method import Method, constant_or
-from .method_options import MethodOptions, make_options, one_of, option, part, positive
+from .method_options import MethodOptions, one_of, option, part, positive
 from .steplength import Centrality, feasible, halve_until, inexact_decrease, reduction
 
 Trial = tuple[Array, Array, Array]  # p, r, F1
@@ -66,23 +66,22 @@ class DinOptions(MethodOptions):
 
 
 class DIN(Method):
-    """The iterates and steps of DIN; `newton.iterate` runs it.
+    """The iterates and steps of DIN; `newton.iterate` runs it."""
 
-    Parameters
-    ----------
-    problem : supplies F1 = A p + B r - c and n.
-    system : solves A dp + B dr = f1, r dp + p dr = f2.
-    options : see `DinOptions`.
-    """
+    Options: type[MethodOptions] = DinOptions
+    problem: LubricationProblem
+    system: System
 
     state: tuple[str, ...] = ("p", "r", "F1", "norm", "central.tau1", "central.tau2")  # what a step starts from
 
-    def __init__(self, problem: LubricationProblem, system: System, options: DinOptions, start: Fields | None = None):
-        self.problem, self.system, self.options = problem, system, options
-        self.p, self.r = constant_or(start, problem.grid.local_size, options.p0, options.r0)
+    def __init__(self, job: Job):
+        super().__init__(job, tol_min=job.inner_floor)
+        problem, o = self.problem, self.options
+        self.system = make_system(job.system, problem, self.stages)
+        self.p, self.r = constant_or(job.start, problem.grid.local_size, o.p0, o.r0)
         self.F1 = problem.flow(self.p, self.r)
         reduce = problem.reduce
-        self.central = Centrality(reduce, self.p * self.r, problem.size, reduce.norm(self.F1), options.gamma)
+        self.central = Centrality(reduce, self.p * self.r, problem.size, reduce.norm(self.F1), o.gamma)
         self.norm = reduce.norm(self.F1, self.p * self.r)
 
     @property
@@ -147,15 +146,3 @@ class DIN(Method):
         if "B" in o.conditions:
             alpha, backtracking = halve_until(decreases, alpha, o.theta)
         return alpha, centrality, backtracking, trial(alpha)
-
-
-def build(job: Job) -> DIN:
-    """The registry's door: DIN on the named system, for the options that were given by name.
-
-    Raises
-    ------
-    InputError : an unknown option or a value out of range.
-    """
-    floor = float(np.clip(job.stopping.eps1, 1e-12, 1e-4))  # no inner solve need be much better than the outer test
-    settings = make_options(DinOptions, "din", {"tol_min": floor, **job.options})
-    return DIN(job.problem, make_system(job.system, job.problem, job.stages), settings, job.start)

@@ -10,12 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.parallel import Array
-from ..linear.system import System, make_system
-from ..problems.film.lubrication import LubricationProblem
-from ..problems.solution import Fields, Step
-from .din import DIN, INSIDE, DinOptions
-from .job import Job
-from .method_options import MethodOptions, make_options, part, positive
+from ..problems.solution import Step
+from .din import DIN, INSIDE
+from .method_options import MethodOptions, part, positive
 from .steplength import feasible, halve_until
 
 CENTRING = (0.0, 0.01, 0.1)  # sigma at least; the next where the step would leave the central path's neighbourhood
@@ -37,10 +34,7 @@ class DinPcOptions(MethodOptions):
 class DinPc(DIN):
     """The iterates of DIN by predictor-corrector steps."""
 
-    def __init__(self, problem: LubricationProblem, system: System, options: DinPcOptions, start: Fields | None = None):
-        base = DinOptions(p0=options.p0, r0=options.r0, tol_min=options.tol_min, gamma=options.gamma)
-        super().__init__(problem, system, base, start)
-        self.boundary = options.boundary
+    Options = DinPcOptions
 
     def advance(self) -> Step:
         """One predictor, a corrector, or up to three; alpha as close to the boundary as the centrality conditions allow."""
@@ -59,7 +53,7 @@ class DinPc(DIN):
             return self.central.holds(trial[0] * trial[1], reduce.norm(self.problem.flow(*trial)))
 
         # Towards a full step near the solution, where the products vanish: superlinear convergence needs it.
-        near = max(self.boundary, 1.0 - mu)
+        near = max(self.options.boundary, 1.0 - mu)
         for floor in CENTRING:
             sigma = max(sigma, floor)
             dp, dr, more = self.system.resolve(-self.F1, sigma * mu - products - second_order, rtol)
@@ -74,15 +68,3 @@ class DinPc(DIN):
             self.norm = reduce.norm(self.F1, self.p * self.r)
             step_norm = alpha * reduce.norm(dp, dr)
         return Step(self.norm, step_norm, alpha, its, cuts, 0, sigma, rtol)
-
-
-def build(job: Job) -> DinPc:
-    """The registry's door.
-
-    Raises
-    ------
-    InputError : an unknown option or a value out of range.
-    """
-    floor = float(np.clip(job.stopping.eps1, 1e-12, 1e-4))
-    settings = make_options(DinPcOptions, "din-pc", {"tol_min": floor, **job.options})
-    return DinPc(job.problem, make_system(job.system, job.problem, job.stages), settings, job.start)

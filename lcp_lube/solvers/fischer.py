@@ -5,7 +5,7 @@ phi(p, r) = sqrt(p^2 + r^2) - p - r vanishes exactly where p >= 0, r >= 0 and p 
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Fields, Step
 from .job import Job
 from .method import Method, constant_or
-from .method_options import MethodOptions, make_options, option, part
+from .method_options import MethodOptions, option, part
 from .steplength import StepLengthError, armijo, halve_until, inexact_decrease
 
 SMALL = np.finfo(float).tiny / np.finfo(float).eps
@@ -53,7 +53,6 @@ class FischerOptions(MethodOptions):
     delta_k = max(tol_min, min(delta_max, delta_factor ||F~||)): quadratic convergence down to tol_min.
     """
 
-    method = "fbn"
     p0: float = option(1.0, np.isfinite, "a finite number is needed", "--p0")
     r0: float = option(0.1, np.isfinite, "a finite number is needed", "--r0")
     beta: float = part(1e-4)
@@ -63,30 +62,30 @@ class FischerOptions(MethodOptions):
     tol_min: float = part(1e-8)
 
 
+class InexactOptions(FischerOptions):
+    method = "fbn-i"
+
+
+class ArmijoOptions(FischerOptions):
+    method = "fbn-a"
+
+
 class FischerNewton(Method):
     """The iterates and steps of FBN; `newton.iterate` runs it.
 
-    Parameters
-    ----------
-    problem : supplies F1 = A p + B r - c.
-    system : solves A dp + B dr = f1, D_p dp + D_r dr = f2.
-    options : see `FischerOptions`.
-    merit : the decrease that ends the halving of alpha: 'armijo' (FBN-A) on ||F~||^2/2, or 'inexact' (FBN-I) on ||F~||.
-    start : fields p and r to start from; default p0 and r0 everywhere.
+    A step is halved until a merit function falls enough: ||F~|| as an inexact Newton step must make it (FBN-I).
     """
 
-    state: tuple[str, ...] = ("p", "r", "F1", "F2", "norm")  # what a step starts from
+    Options: type[MethodOptions] = InexactOptions
+    problem: LubricationProblem
+    system: System
+    state: tuple[str, ...] = ("p", "r", "F1", "F2", "norm")
 
-    def __init__(
-        self,
-        problem: LubricationProblem,
-        system: System,
-        options: FischerOptions,
-        merit: str,
-        start: Fields | None = None,
-    ):
-        self.problem, self.system, self.options, self.merit = problem, system, options, merit
-        self.p, self.r = constant_or(start, problem.grid.local_size, options.p0, options.r0)
+    def __init__(self, job: Job):
+        super().__init__(job, tol_min=job.inner_floor)
+        problem, o = self.problem, self.options
+        self.system = make_system(job.system, problem, self.stages)
+        self.p, self.r = constant_or(job.start, problem.grid.local_size, o.p0, o.r0)
         self.F1, self.F2 = problem.flow(self.p, self.r), fischer_burmeister(self.p, self.r)
         self.norm = problem.reduce.norm(self.F1, self.F2)
 
@@ -108,12 +107,39 @@ class FischerNewton(Method):
                 p, r = self.p + alpha * dp, self.r + alpha * dr
                 return p, r, self.problem.flow(p, r), fischer_burmeister(p, r)
 
-            decreases = self._decrease(trial, self._slope(D_p * dp + D_r * dr, dp, dr), delta)
+            decreases = self._decrease(trial, D_p * dp + D_r * dr, dp, dr, delta)
             alpha, backtracking = halve_until(decreases, 1.0, o.theta)
             self.p, self.r, self.F1, self.F2 = trial(alpha)
             self.norm = reduce.norm(self.F1, self.F2)
             step_norm = alpha * reduce.norm(dp, dr)
         return Step(self.norm, step_norm, alpha, linear_iterations, backtracking=backtracking, rtol=delta)
+
+    def _decrease(
+        self, trial: Callable[[float], Trial], change2: Array, dp: Array, dr: Array, delta: float
+    ) -> Callable[[float], bool]:
+        """The test of a trial alpha; change2 : of F2 along the step."""
+        reduce, norm, beta = self.problem.reduce, self.norm, self.options.beta
+        return lambda alpha: inexact_decrease(norm, reduce.norm(*trial(alpha)[2:]), alpha, delta, beta)
+
+
+class ArmijoNewton(FischerNewton):
+    """FBN-A: the Armijo rule on ||F~||^2/2."""
+
+    Options = ArmijoOptions
+
+    def _decrease(
+        self, trial: Callable[[float], Trial], change2: Array, dp: Array, dr: Array, delta: float
+    ) -> Callable[[float], bool]:
+        """The test of a trial alpha.
+
+        Raises
+        ------
+        StepLengthError : the inner solver's direction does not reduce the merit function.
+        """
+        reduce, norm, beta, slope = self.problem.reduce, self.norm, self.options.beta, self._slope(change2, dp, dr)
+        if slope >= 0.0 and norm > 0.0:
+            raise StepLengthError(f"the inexact direction is not one of descent: slope {slope:.1e}")
+        return lambda alpha: armijo(0.5 * norm**2, 0.5 * reduce.norm(*trial(alpha)[2:]) ** 2, alpha, slope, beta)
 
     def _slope(self, change2: Array, dp: Array, dr: Array) -> float:
         """Derivative of Phi = ||F~||^2/2 along d, F~ . F~' d: -2 Phi for an exact step."""
@@ -122,35 +148,3 @@ class FischerNewton(Method):
             return -(self.norm**2)
         change1 = problem.multiply(problem.A, dp) + problem.multiply(problem.B, dr)
         return problem.reduce.dot(self.F1, change1) + problem.reduce.dot(self.F2, change2)
-
-    def _decrease(self, trial: Callable[[float], Trial], slope: float, delta: float) -> Callable[[float], bool]:
-        """The test of a trial alpha.
-
-        Raises
-        ------
-        StepLengthError : the inner solver's direction does not reduce the merit function (FBN-A).
-        """
-        o, reduce, norm = self.options, self.problem.reduce, self.norm
-        if self.merit == "inexact":
-            return lambda alpha: inexact_decrease(norm, reduce.norm(*trial(alpha)[2:]), alpha, delta, o.beta)
-        if slope >= 0.0 and norm > 0.0:
-            raise StepLengthError(f"the inexact direction is not one of descent: slope {slope:.1e}")
-        return lambda alpha: armijo(0.5 * norm**2, 0.5 * reduce.norm(*trial(alpha)[2:]) ** 2, alpha, slope, o.beta)
-
-
-def _build(merit: str, job: Job) -> FischerNewton:
-    """FBN with one of its two rules, for the options that were given by name.
-
-    Raises
-    ------
-    InputError : an unknown option or a value out of range.
-    """
-    floor = float(np.clip(job.stopping.eps1, 1e-12, 1e-4))  # no inner solve need be much better than the outer test
-    name = "fbn-a" if merit == "armijo" else "fbn-i"
-    settings = make_options(FischerOptions, name, {"tol_min": floor, **job.options})
-    return FischerNewton(job.problem, make_system(job.system, job.problem, job.stages), settings, merit, job.start)
-
-
-# The registry's doors to the two methods; arguments as `din.build` has them.
-build_armijo = partial(_build, "armijo")
-build_inexact = partial(_build, "inexact")

@@ -1,4 +1,4 @@
-"""Inexact interior point of Bergamaschi and Zilli for l <= v <= u and f(v), condensed to n unknowns.
+"""Inexact interior point of Bergamaschi and Zilli for l <= v <= u and f(v), condensed to n unknowns; free ones among them too.
 
     H(v, s1, s2, z1, z2) = (f(v) - z1 + z2, S1 Z1 e, S2 Z2 e, v - l - s1, u - v - s2) = 0,   s, z > 0.
 
@@ -12,12 +12,18 @@ the symmetry of f'.) Where a bound is infinite its s, z and their equations are 
 
 The paper leaves sigma, mu and the tolerances open. It prints the start v = s = z = 1 (v0 = 1, s0 = 1); the defaults here, with
 v0 = 1 and the slacks of that v, are fitted to the counts of its table 1.
+
+For mixed complementarity, dense or sparse f', the start is z = max(+-f, z0), since f is of no known size, and the Jacobian may
+be kept for several steps, which the paper asks for because its dense one cost a third of the run. C's diagonal is new in every
+step all the same: it is what tells the bounds in contact from the others.
 """
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
+from petsc4py import PETSc
 
 from ..base.parallel import Array
 from ..errors import InputError
@@ -26,9 +32,10 @@ from ..problems.box import BoxProblem
 from ..problems.solution import Fields, Step
 from .job import Job
 from .method import Method
-from .method_options import MethodOptions, least, make_options, option, part, positive
-from .steplength import feasible, halve_until, inexact_decrease
+from .method_options import MethodOptions, least, option, part, positive
+from .steplength import StepLengthError, feasible, halve_until, inexact_decrease
 
+STUCK = 1e-9  # mixed problems: steps shorter than this lead nowhere
 RTOL = (1e-12, 0.5)  # of the inner solves: what PETSc's test can tell apart, and what still is a solve
 
 
@@ -67,32 +74,43 @@ class Point:
 class Interior(Method):
     """The iterates of the interior point method; `newton.iterate` runs it. `norm` is ||H||, all five blocks.
 
-    Parameters
-    ----------
-    start : field v; default problem.v0. Either is moved inside the bounds; the slacks are those of v but for options.s0.
+    A start is moved inside the bounds; the slacks are those of v but for options.s0.
 
     Raises
     ------
-    InputError : l = u somewhere: the box has no inside.
+    InputError : also l = u somewhere: the box has no inside.
     """
 
-    state: tuple[str, ...] = ("at", "H", "norm")  # what a step starts from
+    Options: type[MethodOptions] = InteriorOptions
+    problem: BoxProblem
+    system: BoxSystem
+    state: tuple[str, ...] = ("at", "H", "norm")
 
-    def __init__(self, problem: BoxProblem, system: BoxSystem, options: InteriorOptions, start: Fields | None = None):
-        self.problem, self.system, self.options = problem, system, options
+    def __init__(self, job: Job):
+        super().__init__(job)
+        problem, o = self.problem, self.options
         l, u = problem.lower, problem.upper
         self._has = np.isfinite(l), np.isfinite(u)
         if problem.reduce.sum((l == u).astype(float)):
             raise InputError("--method interior: v_lower = v_upper at some points, no inside to start in; active-set can")
-        margin = options.inside * np.minimum(u - l, 1.0)
-        v = np.clip(start["v"] if start else problem.v0, l + margin, u - margin)
-        s1, s2 = (np.where(has, options.s0 or s, 1.0) for has, s in zip(self._has, (v - l, u - v), strict=True))
-        z1, z2 = (np.where(has, options.z0, 0.0) for has in self._has)
+        self.system = BoxSystem(self._for_system(), self.stages)
+        margin = o.inside * np.minimum(u - l, 1.0)
+        v = np.clip(job.start["v"] if job.start else problem.v0, l + margin, u - margin)
+        s1, s2 = (np.where(has, o.s0 or s, 1.0) for has, s in zip(self._has, (v - l, u - v), strict=True))
+        z1, z2 = (np.where(has, z, 0.0) for has, z in zip(self._has, self._multipliers(v), strict=True))
         # Without a bound, s = 1 and z = 0 stay as they are.
         self.at = Point(v, s1, s2, z1, z2)
         self.H = self._H(self.at)
         self.norm = problem.reduce.norm(*self.H)
         self._pairs = problem.reduce.sum(self._has[0].astype(float)) + problem.reduce.sum(self._has[1].astype(float))
+
+    def _for_system(self) -> BoxProblem:
+        """The problem as the Newton matrix sees it."""
+        return self.problem
+
+    def _multipliers(self, v: Array) -> tuple[Array | float, Array | float]:
+        """z1 and z2 to start with."""
+        return self.options.z0, self.options.z0
 
     @property
     def fields(self) -> Fields:
@@ -150,12 +168,78 @@ class Interior(Method):
         return alpha, cuts, *trial(alpha)
 
 
-def build(job: Job) -> Interior:
-    """The registry's door.
+@dataclass(frozen=True)
+class MixedInteriorOptions(InteriorOptions):
+    """Those of `InteriorOptions`, z0 being the least start of z1 and z2; and keep: steps that one Jacobian serves."""
 
-    Raises
-    ------
-    InputError : an unknown option or a value out of range.
+    z0: float = positive(1e-3)
+    halvings: int = least(1, 20)
+    keep: int = least(1, 1)
+
+
+class KeptJacobian:
+    """A problem whose Jacobian serves `keep` calls before it is evaluated anew; the rest is the problem's own.
+
+    The first call, before the first step, gives the Newton matrix its layout and does not count.
     """
-    settings = make_options(InteriorOptions, "interior", job.options)
-    return Interior(job.problem, BoxSystem(job.problem, job.stages), settings, job.start)
+
+    def __init__(self, problem: BoxProblem, keep: int):
+        self._problem, self._keep = problem, keep
+        self._mat: PETSc.Mat | None = None
+        self._age = keep  # calls served by the one at hand
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._problem, name)
+
+    def jacobian(self, v: Array) -> PETSc.Mat:
+        """f' at the v of this call or of an earlier one. Collective."""
+        layout = self._mat is None
+        if self._age >= self._keep:
+            self._mat = self._problem.jacobian(v)
+            self._age = 0
+        self._age = self._keep if layout else self._age + 1
+        return self._mat
+
+    @property
+    def old(self) -> bool:
+        """Whether the last call was served by an earlier one's Jacobian."""
+        return self._age > 1
+
+    def expire(self) -> None:
+        """Evaluate at the next call."""
+        self._age = self._keep
+
+
+class MixedInterior(Interior):
+    """The iterates of the interior point method from z = max(+-f(v), z0), with Jacobians that may be kept."""
+
+    Options = MixedInteriorOptions
+    state = ()  # a Jacobian kept from earlier steps cannot be made anew
+
+    def _for_system(self) -> Any:
+        self.kept = KeptJacobian(self.problem, self.options.keep)
+        return self.kept
+
+    def _multipliers(self, v: Array) -> tuple[Array, Array]:
+        f = self.problem.residual(v)
+        return np.maximum(f, self.options.z0), np.maximum(-f, self.options.z0)
+
+    def advance(self) -> Step:
+        """As `Interior.advance`; a step that a kept Jacobian fails to give is made with a new one. Collective.
+
+        Raises
+        ------
+        StepLengthError : also where the bounds leave no room for a step, as where f is not monotone and H has a local minimum.
+        """
+        try:
+            step = super().advance()
+        except StepLengthError:
+            if not self.kept.old:
+                raise
+            self.kept.expire()
+            step = super().advance()
+        if step.backtracking:
+            self.kept.expire()
+        if step.alpha < STUCK:
+            raise StepLengthError(f"the bounds leave room for {step.alpha:.1e} of it")
+        return step

@@ -3,6 +3,8 @@
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from ..base.stages import Stages
 from ..problems.solution import Fields
 from .newton import Stopping
@@ -28,3 +30,8 @@ class Job:
     options: dict[str, Any] = field(default_factory=dict)
     stopping: Stopping = field(default_factory=Stopping)
     start: Fields | None = None
+
+    @property
+    def inner_floor(self) -> float:
+        """The relative tolerance of an inner solve below which the outer test would see nothing of it."""
+        return float(np.clip(self.stopping.eps1, 1e-12, 1e-4))

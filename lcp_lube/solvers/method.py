@@ -1,28 +1,45 @@
 """What the outer loop and its caller need of a method: ||F|| at the start, one step at a time, and the fields it reached."""
 
-from typing import Any
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..base.parallel import Array
 from ..linear.krylov import Krylov
 from ..problems.solution import Fields, Step
+from .method_options import MethodOptions, make_options
+
+if TYPE_CHECKING:
+    from .job import Job
 
 
 class Method:
-    """Base of all methods.
+    """Base of all methods: a job's problem, clocks, tolerances and options.
+
+    Raises
+    ------
+    InputError : an unknown option, or a value out of range.
 
     Attributes
     ----------
+    Options : the dataclass of its options.
     state : the attributes that a step starts from: numbers, arrays of this rank's points, or tuples and dataclasses of these.
         A checkpoint keeps them, all else is made anew; a method without any cannot be taken up again.
     norm : ||F|| at the present fields, in the method's own measure.
     system : the matrix behind the steps and its KSP; None for a method without one.
     """
 
+    Options: type[MethodOptions] = MethodOptions
     state: tuple[str, ...] = ()
     norm: float
     system: Any = None
+
+    def __init__(self, job: Job, **defaults: Any):
+        self.problem: Any = job.problem
+        self.stages, self.eps1 = job.stages, job.stopping.eps1
+        self.options: Any = make_options(self.Options, {**defaults, **job.options})
 
     @property
     def fields(self) -> Fields:

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, TypeVar
 
 from ..errors import InputError, nearest
 
-T = TypeVar("T")
+T = TypeVar("T", bound="MethodOptions")
 
 
 def option(default: Any, allowed: Callable[[Any], bool], words: str, flag: str = "") -> Any:
@@ -46,7 +46,7 @@ class MethodOptions:
     InputError : a value that its field does not allow.
     """
 
-    method: ClassVar[str]
+    method: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
         for known in fields(self):
@@ -56,7 +56,7 @@ class MethodOptions:
                 raise InputError(f"{name}: {says['words']}")
 
 
-def make_options(kind: type[T], method: str, given: dict[str, Any]) -> T:
+def make_options(kind: type[T], given: dict[str, Any]) -> T:
     """An options dataclass from a mapping; numbers are converted to the type of the field's default.
 
     Raises
@@ -64,7 +64,7 @@ def make_options(kind: type[T], method: str, given: dict[str, Any]) -> T:
     InputError : an unknown name, or a value of another type; the dataclass itself checks ranges.
     """
     known: dict[str, type] = {field.name: type(field.default) for field in fields(kind)}  # type: ignore[arg-type]
-    values = {}
+    values, method = {}, kind.method
     for name, value in given.items():
         if name not in known:
             near = nearest(name, known) or f"; known are {', '.join(known)}"

@@ -24,7 +24,7 @@ from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Fields, Step
 from .job import Job
 from .method import Method
-from .method_options import MethodOptions, least, make_options, part
+from .method_options import MethodOptions, least, part
 from .relaxation import relaxation
 from .zform import ZForm
 
@@ -77,22 +77,18 @@ class ModelSystem(ReducedSystem):
 class Monotone(Method):
     """The supersolutions z; `newton.iterate` runs it. `norm` is ||G(z)|| / ||c||, as the active set's.
 
-    Parameters
-    ----------
-    start : fields p and r whose cavity is the first policy; cells of it that turn out positive leave it again. Default: none.
+    A start's cavity is the first policy; cells of it that turn out positive leave it again. Without one there is none.
     """
 
-    state: tuple[str, ...] = ("z", "cavity", "_above", "norm")  # what a step starts from
+    Options = MonotoneOptions
+    problem: LubricationProblem
+    system: ModelSystem
+    state = ("z", "cavity", "_above", "norm")
 
-    def __init__(
-        self,
-        problem: LubricationProblem,
-        system: ModelSystem,
-        options: MonotoneOptions,
-        eps1: float,
-        start: Fields | None = None,
-    ):
-        self.problem, self.system, self.options, self.eps1 = problem, system, options, eps1
+    def __init__(self, job: Job):
+        super().__init__(job)
+        problem, options, start = self.problem, self.options, job.start
+        self.system = ModelSystem(problem, self.stages)
         self.form = ZForm(problem)
         n = problem.grid.local_size
         z = self.form.z(start) if start else np.ones(n)
@@ -154,14 +150,3 @@ class Monotone(Method):
         self.cavity = cavity
         step_norm = self.problem.reduce.norm(self.z - before) if changed else 0.0
         return Step(self.norm, step_norm, 1.0, iterations, rtol=self.options.rtol)
-
-
-def build(job: Job) -> Monotone:
-    """The registry's door. The matrices are the reduced system's in sparsity, but its own.
-
-    Raises
-    ------
-    InputError : an unknown option or a value out of range.
-    """
-    settings = make_options(MonotoneOptions, "monotone", job.options)
-    return Monotone(job.problem, ModelSystem(job.problem, job.stages), settings, job.stopping.eps1, job.start)

@@ -1,20 +1,15 @@
 """Principal pivoting on the full cells: small films of any ratio of heights, right to the last digits (`film.graded`)."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from ..base.stages import Stages
 from ..linear.krylov import LinearSolverError
 from ..problems.film.graded import Pivots
-from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Fields, Step
 from .job import Job
 from .method import Method
-from .method_options import MethodOptions, make_options
+from .method_options import MethodOptions
 
 
-@dataclass(frozen=True)
 class PivotingOptions(MethodOptions):
     """There are none."""
 
@@ -27,12 +22,14 @@ class Pivoting(Pivots, Method):
     `norm` is the share of cells whose sign is wrong.
     """
 
+    Options = PivotingOptions
     state = ("p", "r", "full", "norm", "_fewest", "_patience")
 
-    def __init__(self, problem: LubricationProblem, stages: Stages):
-        ones = np.ones(problem.grid.local_size)
-        super().__init__(problem, ones, 0.0 * ones)
-        self.stages, self.norm = stages, 1.0
+    def __init__(self, job: Job):
+        Method.__init__(self, job)
+        ones = np.ones(job.problem.grid.local_size)
+        Pivots.__init__(self, job.problem, ones, 0.0 * ones)
+        self.norm = 1.0
 
     @property
     def fields(self) -> Fields:
@@ -52,14 +49,3 @@ class Pivoting(Pivots, Method):
             raise LinearSolverError(str(error)) from None
         self.norm = self.wrong / self.problem.size
         return Step(self.norm, moved, 1.0, enough=not self.wrong)
-
-
-def build(job: Job) -> Pivoting:
-    """The registry's door.
-
-    Raises
-    ------
-    InputError : an option.
-    """
-    make_options(PivotingOptions, "pivoting", job.options)
-    return Pivoting(job.problem, job.stages)

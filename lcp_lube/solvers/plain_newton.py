@@ -17,14 +17,13 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..base.parallel import Array
-from ..base.stages import Stages
 from ..linear.krylov import Krylov, LinearSolverError
 from ..problems.fold import whole_lengths
 from ..problems.semilinear import SemilinearProblem
 from ..problems.solution import Fields, Step
 from .job import Job
 from .method import Method
-from .method_options import MethodOptions, make_options, option, part
+from .method_options import MethodOptions, option, part
 from .newton import NoSolutionError
 from .steplength import halve_until, inexact_decrease
 
@@ -51,10 +50,13 @@ class PlainNewton(Method):
     alpha = 1 for a convex source from below; else it is halved until ||f|| decreases as an inexact Newton step must.
     """
 
-    state: tuple[str, ...] = ("v", "f", "climbing", "norm", "enough")  # what a step starts from
+    Options = NewtonOptions
+    problem: SemilinearProblem
+    state = ("v", "f", "climbing", "norm", "enough")
 
-    def __init__(self, problem: SemilinearProblem, stages: Stages, options: NewtonOptions, start: Fields | None = None):
-        self.problem, self.stages, self.options = problem, stages, options
+    def __init__(self, job: Job):
+        super().__init__(job)
+        problem, start, stages = self.problem, job.start, self.stages
         self.v = start["v"].copy() if start else np.full(problem.grid.local_size, problem.v0)
         self.climbing = start is None and problem.climbs
         grid = problem.grid
@@ -69,7 +71,7 @@ class PlainNewton(Method):
             self._krylov = Krylov(self.mat)
         self.f = problem.residual(self.v)
         self.norm = problem.reduce.norm(self.f)
-        self.enough = options.relative * self.norm  # of ||f||
+        self.enough = self.options.relative * self.norm  # of ||f||
 
     @property
     def fields(self) -> Fields:
@@ -149,13 +151,3 @@ class PlainNewton(Method):
         self.krylov.destroy()
         for obj in (self.mat, self._x, self._b):
             obj.destroy()
-
-
-def build(job: Job) -> PlainNewton:
-    """The registry's door: Newton's method with the options that were given by name.
-
-    Raises
-    ------
-    InputError : an unknown option or a value out of range.
-    """
-    return PlainNewton(job.problem, job.stages, make_options(NewtonOptions, "newton", job.options), job.start)

@@ -16,13 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.parallel import Array
-from ..base.stages import Stages
 from ..linear.krylov import Krylov, LinearSolverError
 from ..problems.box import BoxProblem
 from ..problems.solution import Fields, Step
 from .job import Job
 from .method import Method
-from .method_options import MethodOptions, least, make_options, option, part
+from .method_options import MethodOptions, least, option, part
 from .newton import StalledError
 from .steplength import StepLengthError, armijo, halve_until
 
@@ -57,17 +56,15 @@ def fischer(a: Array, b: Array) -> tuple[Array, Array, Array]:
 
 
 class Semismooth(Method):
-    """The iterates x; `newton.iterate` runs it. `norm` is the largest |mid(x - u, F, x - l)| at x moved into the bounds.
+    """The iterates x; `newton.iterate` runs it. `norm` is the largest |mid(x - u, F, x - l)| at x moved into the bounds."""
 
-    Parameters
-    ----------
-    start : field v; default problem.v0.
-    """
+    Options = SemismoothOptions
+    problem: BoxProblem
+    state = ("x", "centre", "rho", "_rho0", "_first", "_mark", "_since", "norm")
 
-    state: tuple[str, ...] = ("x", "centre", "rho", "_rho0", "_first", "_mark", "_since", "norm")  # what a step starts from
-
-    def __init__(self, problem: BoxProblem, stages: Stages, options: SemismoothOptions, start: Fields | None = None):
-        self.problem, self.stages, self.options = problem, stages, options
+    def __init__(self, job: Job):
+        super().__init__(job)
+        problem, start, stages = self.problem, job.start, self.stages
         l, u = problem.lower, problem.upper
         self._has_l, self._has_u, self._fixed = np.isfinite(l), np.isfinite(u), l == u
         self.x = np.clip(start["v"], l, u) if start else problem.v0.copy()
@@ -190,13 +187,3 @@ class Semismooth(Method):
         self.krylov.destroy()
         for obj in (self.mat, self._a, self._b):
             obj.destroy()
-
-
-def build(job: Job) -> Semismooth:
-    """The registry's door.
-
-    Raises
-    ------
-    InputError : an unknown option or a value out of range.
-    """
-    return Semismooth(job.problem, job.stages, make_options(SemismoothOptions, "semismooth", job.options), job.start)

@@ -11,7 +11,7 @@ from lcp_lube import load_scene, solve
 from lcp_lube.base.stages import Stages
 from lcp_lube.problems.film.flows import SIDES
 from lcp_lube.problems.film.model import Model, Side
-from lcp_lube.solvers.active_set import build
+from lcp_lube.solvers.active_set import ActiveSet
 from lcp_lube.solvers.job import Job
 from lcp_lube.solvers.newton import Stopping, iterate
 
@@ -158,7 +158,7 @@ def on_sides(shape, film, sides, width=WIDTH):
     """Quantities of a film with sides of any kind; all of them per whole width where half of it is modelled."""
     model = Model((L, width)[: len(shape)], sides, film, MU, U, 0.0, 1e6, "face", integrals=False)
     problem = model.build(shape)
-    run = build(Job(problem, Stages(), "reduced"))
+    run = ActiveSet(Job(problem, Stages(), "reduced"))
     outcome, message, _ = iterate(run, Stopping())
     assert outcome == "converged", message
     values = problem.quantities(run.fields)

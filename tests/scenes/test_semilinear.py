@@ -10,8 +10,9 @@ from lcp_lube.base.stages import Stages
 from lcp_lube.errors import InputError
 from lcp_lube.problems.solution import Outcome
 from lcp_lube.scenes.scene import load_scene
+from lcp_lube.solvers.job import Job
 from lcp_lube.solvers.newton import Stopping
-from lcp_lube.solvers.plain_newton import NewtonOptions, PlainNewton
+from lcp_lube.solvers.plain_newton import PlainNewton
 
 # lambda, max v, h^2 sum v on the lower branch, 64 interior points a side (computed by another code)
 LOWER_BRANCH = [(1, 0.07805522, 0.03696526), (4, 0.39529769, 0.18180085), (6, 0.79667635, 0.35275905)]
@@ -58,7 +59,7 @@ def test_solution_exists_up_to_the_turning_point(lam, n):
 def test_newton_climbs():
     """v_k rises, f(v_k) <= 0 and f' stays an M-matrix: what the proof of no_solution stands on."""
     problem = load_scene("bratu", {"n": 20, "lambda": 6.7}).build()
-    newton = PlainNewton(problem, Stages(), NewtonOptions(eta=1e-12))
+    newton = PlainNewton(Job(problem, Stages(), options={"eta": 1e-12}))
     for _ in range(6):
         before = newton.v
         newton.advance()

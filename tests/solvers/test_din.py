@@ -179,7 +179,7 @@ def test_start_from_given_fields(run):
     first = run("problem1", {"n": 30}, recipe="superlu")
     problem = first.problem
     start = {name: np.maximum(field, 1e-6) for name, field in first.fields.items()}
-    method = din.build(Job(problem, Stages(), "reduced", start=start))
+    method = din.DIN(Job(problem, Stages(), "reduced", start=start))
     assert np.array_equal(method.p, start["p"]) and method.p is not start["p"]
     assert method.norm < 1e-3
     method.destroy()

@@ -13,8 +13,9 @@ from lcp_lube.base.options import recipe
 from lcp_lube.base.stages import Stages
 from lcp_lube.errors import InputError
 from lcp_lube.scenes.scene import load_scene
-from lcp_lube.solvers.active_set import ActiveSet, ActiveSetOptions
+from lcp_lube.solvers.active_set import ActiveSet
 from lcp_lube.solvers.enclosure import balance, conditions, enclose
+from lcp_lube.solvers.job import Job
 from lcp_lube.solvers.newton import Stopping, iterate
 
 small = st.one_of(st.tuples(st.integers(1, 14)), st.tuples(st.integers(1, 4), st.integers(1, 4)))
@@ -69,10 +70,9 @@ def exact_solution(problem, cavity):
 
 def answer(problem, eps1=1e-10, max_it=200):
     """z by the active set, as p and r."""
-    from lcp_lube.linear.reduced import ReducedSystem
 
     with recipe("umfpack"):
-        run = ActiveSet(problem, ReducedSystem(problem), ActiveSetOptions(), eps1)
+        run = ActiveSet(Job(problem, Stages(), "reduced", stopping=Stopping(eps1)))
         iterate(run, Stopping(eps1, np.inf, max_it))
         run.destroy()
     return run.fields

@@ -12,10 +12,9 @@ from hypothesis import strategies as st
 from lcp_lube.base.options import recipe
 from lcp_lube.base.stages import Stages
 from lcp_lube.errors import InputError
-from lcp_lube.linear.box import BoxSystem
 from lcp_lube.problems.solution import Outcome
-from lcp_lube.solvers.box_active_set import build as build_active_set
-from lcp_lube.solvers.interior import Interior, InteriorOptions, build
+from lcp_lube.solvers.box_active_set import BoxActiveSet
+from lcp_lube.solvers.interior import Interior
 from lcp_lube.solvers.job import Job
 from lcp_lube.solvers.newton import Stopping, iterate
 
@@ -55,7 +54,7 @@ def test_the_step_solves_all_five_equations(lower, upper):
     M = rng.normal(size=(7, 7)) + 7 * np.eye(7)
     problem = affine(M, rng.normal(size=7), lower, upper)
     with recipe("lu"):
-        run = Interior(problem, BoxSystem(problem), InteriorOptions())
+        run = Interior(Job(problem, Stages()))
         has1, has2 = np.isfinite(problem.lower), np.isfinite(problem.upper)
         for name, has in (("s1", has1), ("s2", has2), ("z1", has1), ("z2", has2)):
             getattr(run.at, name)[has] *= 1 + rng.random(has.sum())
@@ -109,7 +108,7 @@ def test_any_box_affine_and_monotone(seed, bounds):
     q = 5 * rng.normal(size=n)
     answers = []
     with recipe("lu"):
-        for build_method in (build, build_active_set):
+        for build_method in (Interior, BoxActiveSet):
             problem = affine(M, q, lower, upper)
             run = build_method(Job(problem, Stages(), "jacobian"))
             outcome, message, _ = iterate(run, Stopping(1e-11, np.inf, 100))

@@ -9,11 +9,11 @@ from lcp_lube import load_scene, solve
 from lcp_lube.base.options import recipe
 from lcp_lube.base.parallel import Array
 from lcp_lube.base.stages import Stages
-from lcp_lube.linear.system import make_system
 from lcp_lube.problems.solution import Step
-from lcp_lube.solvers.din import DIN, DinOptions
-from lcp_lube.solvers.fischer import FischerNewton, FischerOptions, derivatives
+from lcp_lube.solvers.din import DIN
+from lcp_lube.solvers.fischer import ArmijoNewton, derivatives
 from lcp_lube.solvers.interior import InteriorOptions
+from lcp_lube.solvers.job import Job
 from lcp_lube.solvers.newton import Stopping
 from lcp_lube.solvers.plain_newton import NewtonOptions
 
@@ -69,7 +69,7 @@ def test_the_armijo_slope_is_that_of_an_inexact_step() -> None:
     """F~ . F~' d by differences of ||F~||^2 / 2; -2 Phi, its value for an exact step, is far off."""
     problem = load_scene("problem1", {"n": 20}).build()
     with recipe("gmres_ilu"):
-        method = FischerNewton(problem, make_system("full", problem, Stages()), FischerOptions(), "armijo")
+        method = ArmijoNewton(Job(problem, Stages(), "full"))
         assert not method.system.direct
         rng = np.random.default_rng(1)
         method.p, method.r = rng.uniform(0.5, 2.0, 20), rng.uniform(0.1, 0.9, 20)
@@ -97,7 +97,7 @@ def test_inner_residuals_of_din(inner: str, petsc_options: Any) -> None:
     petsc_options(ksp_pc_side="right")
     problem = load_scene("problem1", {"n": 100}).build()
     with recipe("gmres_ilu"):
-        method = DIN(problem, make_system("full", problem, Stages()), DinOptions(inner=inner, tol_min=1e-4))
+        method = DIN(Job(problem, Stages(), "full", {"inner": inner, "tol_min": 1e-4}))
         solve_step, found = method.system.solve, []
 
         def watched(D1: Array, D2: Array, f1: Array, f2: Array, rtol: float) -> tuple[Array, Array, int]:

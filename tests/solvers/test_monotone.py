@@ -13,13 +13,13 @@ from lcp_lube.errors import InputError
 from lcp_lube.problems.solution import Outcome
 from lcp_lube.scenes.scene import load_scene
 from lcp_lube.solvers.job import Job
-from lcp_lube.solvers.monotone import ModelSystem, build
+from lcp_lube.solvers.monotone import ModelSystem, Monotone
 from lcp_lube.solvers.newton import Stopping, iterate
 
 
 def run(problem, start=None, sweeps=0, watch=None):
     with recipe("umfpack"):
-        method = build(Job(problem, Stages(), "reduced", {"sweeps": sweeps}, start=start))
+        method = Monotone(Job(problem, Stages(), "reduced", {"sweeps": sweeps}, start=start))
         ended = iterate(method, Stopping(max_it=problem.size + 2), (lambda k, step: watch(method)) if watch else None)
         method.destroy()
     return method, *ended

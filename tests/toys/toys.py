@@ -16,9 +16,9 @@ def register(registry):
 
 
 def build(job):
-    from lcp_lube.solvers.active_set import build
+    from lcp_lube.solvers.active_set import ActiveSet
 
-    return build(job)
+    return ActiveSet(job)
 
 
 def __getattr__(name):  # models are made when they are asked for: naming costs no PETSc

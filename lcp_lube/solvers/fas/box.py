@@ -13,15 +13,14 @@ from typing import Any
 import numpy as np
 
 from ...base.parallel import Array
-from ...base.stages import Stages
 from ...errors import InputError
 from ...problems.box import BoxProblem
 from ...problems.obstacle import ObstacleEquations
 from ...problems.solution import Fields, Step
 from ..job import Job
-from ..method_options import least, make_options
+from ..method_options import least
 from ..newton import StalledError
-from .cycles import COARSEST_SWEEPS, CycleOptions, Cycles, need_numba
+from .cycles import COARSEST_SWEEPS, CycleOptions, Cycles
 
 
 @dataclass(frozen=True)
@@ -48,18 +47,21 @@ class BoxFas(Cycles):
     The first step is full multigrid, unless a start is given, the others are cycles.
     """
 
-    state: tuple[str, ...] = ("v", "norm", "_recent", "_first", "_taken")
+    Options = BoxFasOptions
+    problem: BoxProblem
+    state = ("v", "norm", "_recent", "_first", "_taken")
 
-    def __init__(self, problem: BoxProblem, stages: Stages, options: BoxFasOptions, start: Fields | None = None):
+    def __init__(self, job: Job):
+        super().__init__(job)
+        problem, start = self.problem, job.start
         from . import box_kernels, fronts, levels, transfer
 
         self._kernels, self._fronts, self._transfer, self._tools = box_kernels, fronts, transfer, levels
         equations = problem.equations
         if not isinstance(equations, ObstacleEquations):
             raise InputError("--method fas: for obstacle problems on a rectangle; use active-set")
-        self.problem, self.stages, self.options = problem, stages, options
         self._source = equations.semilinear.source
-        with stages("assembly"):
+        with self.stages("assembly"):
             self._grids = self._hierarchy(equations)
         self._levels = [grid.level for grid in self._grids]
         self._begin(start is not None)
@@ -218,15 +220,3 @@ class BoxFas(Cycles):
         self._add(grid.level, lower, lower.part(lower.old))
         self._clip(grid)
         self._relax(grid, self.options.post, True, near=True)
-
-
-def build(job: Job) -> BoxFas:
-    """The registry's door.
-
-    Raises
-    ------
-    InputError : an unknown option or a value out of range; numba is missing; no obstacle problem on a rectangle.
-    """
-    settings = make_options(BoxFasOptions, "fas", job.options)
-    need_numba()
-    return BoxFas(job.problem, job.stages, settings, job.start)

@@ -8,6 +8,7 @@ from typing import Any
 
 from ...errors import InputError
 from ...problems.solution import Step
+from ..job import Job
 from ..method import Method
 from ..method_options import MethodOptions, least, one_of, option
 
@@ -38,12 +39,15 @@ class CycleOptions(MethodOptions):
 class Cycles(Method):
     """A multigrid method: the first step is full multigrid, unless there is a start, the others are cycles.
 
-    The class that fills this in has `problem`, `stages`, `options` and `norm`, and makes `_levels`, finest first.
+    The class that fills this in makes `_levels`, finest first.
     """
 
     _levels: list[Any]
-    problem: Any
-    options: CycleOptions
+
+    def __init__(self, job: Job):
+        super().__init__(job)
+        if find_spec("numba") is None:
+            raise InputError("--method fas: its loops need numba, which is not installed (pip install numba)")
 
     def _begin(self, started: bool) -> None:
         self._depth = len(self._levels)  # levels in use
@@ -106,9 +110,3 @@ class Cycles(Method):
 
     def advance(self) -> Step:
         raise NotImplementedError
-
-
-def need_numba() -> None:
-    """Raises InputError if numba is missing."""
-    if find_spec("numba") is None:
-        raise InputError("--method fas: its loops need numba, which is not installed (pip install numba)")

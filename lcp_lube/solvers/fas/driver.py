@@ -16,14 +16,13 @@ from typing import Any
 import numpy as np
 
 from ...base.parallel import Array
-from ...base.stages import Stages
 from ...problems.film.lubrication import LubricationProblem
 from ...problems.film.stored import storing
 from ...problems.solution import Fields, Step
 from ..job import Job
-from ..method_options import make_options, one_of, option
+from ..method_options import one_of, option
 from ..newton import StalledError
-from .cycles import COARSEST_SWEEPS, WINDOW, CycleOptions, Cycles, need_numba
+from .cycles import COARSEST_SWEEPS, WINDOW, CycleOptions, Cycles
 
 EPS = float(np.finfo(float).eps)
 TRUNCATIONS = {"none": 0, "clip": 1, "points": 2}  # see `transfer.correct`
@@ -49,24 +48,21 @@ class Fas(Cycles):
     """The iterates z; `newton.iterate` runs it. `norm` is that of `active_set`, ||G(z)|| / ||c||.
 
     The first step is full multigrid, the others are cycles; a given start takes full multigrid's place.
-
-    Parameters
-    ----------
-    start : fields p and r.
     """
 
-    state: tuple[str, ...] = ("z", "norm", "_recent", "_taken", "_first", "_depth")  # what a cycle starts from
+    Options = FasOptions
+    problem: LubricationProblem
+    state = ("z", "norm", "_recent", "_taken", "_first", "_depth")
 
-    def __init__(
-        self, problem: LubricationProblem, stages: Stages, options: FasOptions, eps1: float, start: Fields | None = None
-    ):
+    def __init__(self, job: Job):
+        super().__init__(job)
+        problem, options, start = self.problem, self.options, job.start
         # numba starts with this import, 0.4 s: only where the method is used.
         from . import fronts, kernels, levels, transfer
 
         self._kernels, self._fronts, self._transfer, self._tools = kernels, fronts, transfer, levels
-        self.problem, self.stages, self.options, self.eps1 = problem, stages, options, eps1
         self._harmonic, self._truncation = options.weights == "harmonic", TRUNCATIONS[options.truncation]
-        with stages("assembly"):
+        with self.stages("assembly"):
             self._levels = levels.hierarchy(levels.finest(problem), self._harmonic)
         self._begin(start is not None)
         self._c_norm = problem.reduce.norm(problem.c)
@@ -250,15 +246,3 @@ class Fas(Cycles):
                 self._kernels.sweep(level.z[rows], level.kx[rows], level.ky[faces], level.c[rows], 1, down, carry)
             level.share(level.z)
         level.work += sweeps * level.nx * (level.z.shape[0] - 2)
-
-
-def build(job: Job) -> Fas:
-    """The registry's door.
-
-    Raises
-    ------
-    InputError : an unknown option or a value out of range; numba is missing.
-    """
-    settings = make_options(FasOptions, "fas", job.options)
-    need_numba()
-    return Fas(job.problem, job.stages, settings, job.stopping.eps1, job.start)
