@@ -6,12 +6,11 @@ from pathlib import Path
 from typing import NoReturn
 
 from .. import __version__
-from ..base.quantity import in_si
 from ..errors import InputError, nearest
 from ..registry import STABILITY
 from . import design_arguments
+from .common_arguments import json_option, number, results_option, scene_options, solver_options, whole
 from .examples import EXAMPLES
-from .explore.options import explore_options
 
 
 class Parser(argparse.ArgumentParser):
@@ -61,9 +60,7 @@ def parser_of_all() -> Parser:
         return commands.add_parser(name, help=text, description=text, epilog=example, allow_abbrev=False)
 
     solve = command("solve", "solve a scene")
-    _scene_options(solve)
-    solve.add_argument("--method", default="auto", help="see 'lcp-lube list'; default auto")
-    solve.add_argument("--recipe", help="inner solver: options/NAME.opts; explicit PETSc options win over it")
+    solver_options(solve)
     solve.add_argument(
         "--no-memory-check", action="store_true", help="begin even if the estimate says that memory is too short"
     )
@@ -91,7 +88,7 @@ def parser_of_all() -> Parser:
     solve.add_argument(
         "--times", metavar="T,T,...", help="times (s), or their number, of the frames of --plot FILE.gif and --output FILE.pvd"
     )
-    solve.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")
+    json_option(solve)
     solve.add_argument("--explain", action="store_true", help="say on stderr what was chosen, and why")
     solve.add_argument("--monitor", action="store_true", help="a line an iteration on stderr")
 
@@ -101,15 +98,13 @@ def parser_of_all() -> Parser:
     solve.add_argument("--resume", metavar="FILE", help="go on from a checkpoint of this scene, on any number of ranks")
 
     compare = command("compare", "several methods and recipes on one scene, in one table")
-    _scene_options(compare)
+    scene_options(compare)
     compare.add_argument("--methods", default="din", metavar="A,B,...", help="default din")
     compare.add_argument("--recipes", default="", metavar="A,B,...", help="default: the default recipe")
     compare.add_argument("--json", action="store_true", help="a JSON list of the runs")
 
     sweep = command("sweep", "a scene at many values of its keys: one csv row a point, warm starts")
-    _scene_options(sweep)
-    sweep.add_argument("--method", default="auto", help="see 'lcp-lube list'; default auto")
-    sweep.add_argument("--recipe", help="inner solver: options/NAME.opts; explicit PETSc options win over it")
+    solver_options(sweep)
     sweep.add_argument(
         "--vary",
         action="append",
@@ -133,7 +128,7 @@ def parser_of_all() -> Parser:
     table.add_argument("--quick", action="store_true", help="leave the long rows out")
     table.add_argument("--fitted", action="store_true", help="settings fitted to the paper's counts in place of printed ones")
     table.add_argument("--stored", action="store_true", help="run nothing: print the rows of --results with their age")
-    _results_option(table)
+    results_option(table)
 
     chart = command("chart", "long experiments: the runs in a csv, the pictures drawn from it")
     charts = chart.add_subparsers(dest="chart", required=True, metavar="precision|stability|scaling|rungs", parser_class=Parser)
@@ -149,16 +144,14 @@ def parser_of_all() -> Parser:
     rungs = charts.add_parser("rungs", help=text, description=text, allow_abbrev=False)
     for parser_of_chart in (precision, stability, scaling, rungs):
         parser_of_chart.add_argument("--quick", action="store_true", help="a small chart in seconds, with a csv of its own")
-        _results_option(parser_of_chart)
+        results_option(parser_of_chart)
 
     verify = command("verify", "known answers: ours, reference, error, observed order, verdict")
     verify.add_argument("--quick", action="store_true", help="one case in a moment")
-    verify.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")
+    json_option(verify)
 
     coefficients = command("coefficients", "stiffness and damping of a journal's film, or of a pad's along its normal")
-    _scene_options(coefficients)
-    coefficients.add_argument("--method", default="auto", help="see 'lcp-lube list'; default auto")
-    coefficients.add_argument("--recipe", help="inner solver of the film: options/NAME.opts")
+    solver_options(coefficients)
     coefficients.add_argument(
         "--frequency", default="0", metavar="F,F,...", help="of the motion, rad/s; default 0, the limit of slow motion"
     )
@@ -168,16 +161,20 @@ def parser_of_all() -> Parser:
     coefficients.add_argument("--output", type=Path, metavar="FILE.csv", help="of --speeds; default standard output")
     coefficients.add_argument("--tilt", action="store_true", help="with the slopes of a journal's axis: 4 x 4, with moments")
     coefficients.add_argument("--plot", metavar="FILE.png", help="of --speeds: K and C against S and the speed")
-    coefficients.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")
+    json_option(coefficients)
 
-    design_arguments.add(command, _scene_options, number, whole)
+    design_arguments.add(command)
 
     explore = command("explore", "a local page with the scene's numbers as sliders; pressure, film and numbers follow")
-    _scene_options(explore)
-    explore_options(explore, number, whole)
+    solver_options(explore)
+    text = "relative error at which refining ends; default 1e-3"
+    explore.add_argument("--accuracy", type=number, default=1e-3, metavar="TOL", help=text)
+    explore.add_argument("--port", type=whole, default=0, metavar="N", help="of 127.0.0.1; default: any free one")
+    text = "open the page in a browser; default yes"
+    explore.add_argument("--browser", action=argparse.BooleanOptionalAction, default=True, help=text)
 
     doctor = command("doctor", "what is installed, what is missing, and a short self-check on one and two ranks")
-    doctor.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")
+    json_option(doctor)
 
     new = command("new", "a commented scene file to edit, which solves to the same numbers as the scene that it is made from")
     new.add_argument("file", type=Path, metavar="FILE.toml")
@@ -185,79 +182,3 @@ def parser_of_all() -> Parser:
 
     command("list", "scenes, methods, systems and recipes, each with a line")
     return parser
-
-
-def number(text: str) -> float:
-    """A number, 1e-4, .75 or 1%; its unit would have nothing to be checked against."""
-    try:
-        value = in_si(text, "")
-        return float(text) if value is None else value  # nan and inf are for others to refuse
-    except InputError as error:
-        raise argparse.ArgumentTypeError(f"{text}: {error}") from None
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"invalid float value: {text!r}") from None
-
-
-def whole(text: str) -> int:
-    """A whole number, 200 or 1e3."""
-    try:
-        return int(text)
-    except ValueError:
-        pass
-    try:
-        value = in_si(text, "")
-    except InputError:
-        value = None
-    if value is None or not value.is_integer():
-        raise argparse.ArgumentTypeError(f"invalid int value: {text!r}")
-    return int(value)
-
-
-def _results_option(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--results",
-        type=Path,
-        default=Path("lcp_lube_results"),
-        metavar="DIR",
-        help="where the runs are kept: those that are there are not made again; default lcp_lube_results",
-    )
-
-
-def _scene_options(parser: argparse.ArgumentParser) -> None:
-    """What both `solve` and `compare` take."""
-    parser.add_argument("scene", metavar="SCENE", help="a .toml file or a built-in name, see 'lcp-lube list'")
-    parser.add_argument("--n", type=whole, help="interior points (a side, in 2D)")
-    parser.add_argument("--nx", type=whole)
-    parser.add_argument("--ny", type=whole)
-    parser.add_argument("--film", help="sinusoid or parabola (published problems)")
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="change a scene's value (SI), film.pocket.depth=1e-6 in a table, or METHOD.OPTION for a method's, din.gamma=0.4",
-    )
-    parser.add_argument("--system", default="auto", help="which matrix the inner solver sees; default auto")
-    parser.add_argument(
-        "--nested",
-        action=argparse.BooleanOptionalAction,
-        default=None,
-        help="start from the answers on coarser grids; default: where it pays",
-    )
-    parser.add_argument(
-        "--model",
-        default="auto",
-        metavar="auto|full|least|NAMES",
-        help="effects (see 'lcp-lube list') to solve for of those that the scene names: auto (default) leaves out what changes "
-        "the quantity asked by less than a tenth of the tolerance",
-    )
-    parser.add_argument(
-        "--no-rescue", action="store_true", help="if the method fails, say so; by default another takes over, and is named"
-    )
-    parser.add_argument("--eps1", type=number, help="stop when ||F|| <= eps1, default 1e-8 (fas: 1e-11, interior: 8e-8)")
-    parser.add_argument("--eps2", type=number, help="and ||alpha d|| <= eps2, default 1e-8 (fas and box scenes: no such test)")
-    parser.add_argument("--max-it", type=whole, default=500, help="at most so many outer iterations, default 500")
-    parser.add_argument("--p0", help="start of p in the scene's p_unit (MPa in the published problems), 1; or 1bar")
-    parser.add_argument("--r0", type=number, help="start of r, 0.1")
-    parser.add_argument("--mu", help="perturbation: mu1, mu2 (default) or adaptive")
-    parser.add_argument("--conditions", help="step-length conditions, any of the letters FRCB; default FCB")

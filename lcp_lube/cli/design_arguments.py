@@ -3,23 +3,14 @@
 import argparse
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+
+from .common_arguments import json_option, solver_options, whole
 
 
-def add(
-    command: Callable[[str, str], argparse.ArgumentParser],
-    scene_options: Callable[[argparse.ArgumentParser], None],
-    number: Callable[[str], float],
-    whole: Callable[[str], int],
-) -> None:
-    """Add both commands.
-
-    Parameters
-    ----------
-    command : makes a command's parser. scene_options : adds what all commands with a scene take. number, whole : read values.
-    """
+def add(command: Callable[[str, str], argparse.ArgumentParser]) -> None:
+    """Add both commands; command : makes one's parser."""
     sensitivity = command("sensitivity", "what matters: derivatives of a number by every number of the scene, ranked")
-    _solver_options(sensitivity, scene_options)
+    solver_options(sensitivity)
     sensitivity.add_argument("--quantity", default="load", metavar="Q,Q,...", help="default load; vectors by part, force_x")
     sensitivity.add_argument("--by", metavar="KEY,KEY,...", help="numbers of the scene; default all of them")
     sensitivity.add_argument(
@@ -34,10 +25,10 @@ def add(
     sensitivity.add_argument("--seed", type=whole, default=1, help="of these numbers, default 1")
     sensitivity.add_argument("--plot", metavar="FILE.png", help="bars, and the film's own derivative at every point")
     sensitivity.add_argument("--output", metavar="FILE", help="fields with d(Q)/dh per area: .npz, .vts (ParaView) or .h5")
-    sensitivity.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")
+    json_option(sensitivity)
 
     optimise = command("optimise", "the numbers of a scene, within bounds, that make one of its results largest or smallest")
-    _solver_options(optimise, scene_options)
+    solver_options(optimise)
     optimise.add_argument("--maximise", metavar="Q", help="a number of the results: load, ...")
     optimise.add_argument("--minimise", metavar="Q", help="or this: friction, friction_coefficient, ...")
     text = "a number of the scene and its range, dimples.depth=0um:10um; several --vary"
@@ -48,10 +39,4 @@ def add(
     optimise.add_argument("--output", type=Path, metavar="FILE.toml", help="the best design as a scene")
     text = "every design is a row of it, and those that are there are not solved again; default FILE.csv beside --output"
     optimise.add_argument("--history", type=Path, metavar="FILE.csv", help=text)
-    optimise.add_argument("--json", action="store_true", help="one JSON object on stdout and nothing else")
-
-
-def _solver_options(parser: argparse.ArgumentParser, scene_options: Callable[[Any], None]) -> None:
-    scene_options(parser)
-    parser.add_argument("--method", default="auto", help="see 'lcp-lube list'; default auto")
-    parser.add_argument("--recipe", help="inner solver of the film: options/NAME.opts")
+    json_option(optimise)

@@ -4,6 +4,8 @@ import argparse
 import json
 import sys
 from collections.abc import Callable
+from importlib import import_module
+from typing import Any
 
 from mpi4py import MPI
 
@@ -128,64 +130,15 @@ def run_table(args: argparse.Namespace) -> int:
 
 
 def run_chart(args: argparse.Namespace) -> int:
+    study: Any = None if args.chart == "stability" else import_module(f"..studies.{args.chart}", __package__)
     if args.chart == "precision":
-        from ..studies.precision import chart
-
-        return chart(args.scenes, quick=args.quick, results=args.results)
-    if args.chart == "scaling":
-        from ..studies import scaling
-
-        return scaling.chart(quick=args.quick, results=args.results)
-    if args.chart == "rungs":
-        from ..studies import rungs
-
-        return rungs.chart(quick=args.quick, results=args.results)
+        return study.chart(args.scenes, quick=args.quick, results=args.results)
+    if study is not None:
+        return study.chart(quick=args.quick, results=args.results)
     for name in args.maps:
         if name not in STABILITY:
             raise InputError(f"chart stability {name}: allowed are {', '.join(STABILITY)}{nearest(name, STABILITY)}")
     return max(STABILITY[name].load()(quick=args.quick, results=args.results) for name in args.maps or STABILITY)
-
-
-def run_verify(args: argparse.Namespace) -> int:
-    from .verify import run
-
-    return run(args)
-
-
-def run_doctor(args: argparse.Namespace) -> int:
-    from .doctor import run
-
-    return run(args)
-
-
-def run_coefficients(args: argparse.Namespace) -> int:
-    from .coefficients import run
-
-    return run(args)
-
-
-def run_sensitivity(args: argparse.Namespace) -> int:
-    from .sensitivity import run
-
-    return run(args)
-
-
-def run_optimise(args: argparse.Namespace) -> int:
-    from .optimise import run
-
-    return run(args)
-
-
-def run_explore(args: argparse.Namespace) -> int:
-    from .explore.command import run
-
-    return run(args)
-
-
-def run_sweep(args: argparse.Namespace) -> int:
-    from .sweep import run
-
-    return run(args)
 
 
 def run_new(args: argparse.Namespace) -> int:
@@ -210,18 +163,18 @@ def run_list(args: argparse.Namespace) -> int:
     return 0
 
 
+def run_elsewhere(args: argparse.Namespace) -> int:
+    """A command with a file of its own, loaded where it is asked for."""
+    return import_module(f".{args.command}", __package__).run(args)
+
+
 COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "solve": run_solve,
     "compare": run_compare,
-    "sweep": run_sweep,
-    "coefficients": run_coefficients,
-    "sensitivity": run_sensitivity,
-    "optimise": run_optimise,
-    "explore": run_explore,
+    **dict.fromkeys(("sweep", "coefficients", "sensitivity", "optimise", "explore"), run_elsewhere),
     "table": run_table,
     "chart": run_chart,
-    "verify": run_verify,
-    "doctor": run_doctor,
+    **dict.fromkeys(("verify", "doctor"), run_elsewhere),
     "new": run_new,
     "list": run_list,
 }

@@ -17,6 +17,7 @@ from ..registry import METHODS
 from ..scenes.scene import Solvable
 from ..solvers.newton import Stopping
 from .ask import Ask
+from .chain import added
 from .compose import Inner
 from .estimate import QUADRATURE, Estimate, estimate, known_numbers, misplaced_film, scalars
 from .memory import DENSE, available
@@ -108,7 +109,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         ask.tell(
             "accuracy", f"{quantity} to {best.relative:.0e}", of_ladder(seconds_by_level, best.relative, tol, 2.0 ** len(shape))
         )
-        times = {name: times.get(name, 0.0) + seconds for name, seconds in solution.times.items()}
+        times = added(times, solution.times)
         shape = tuple(int(n + meshes) for n, meshes in zip(shape, problem.grid.meshes, strict=True))  # half the spacing
         values = [level["value"] for level in levels]
         end = _end([level["estimate"] for level in levels], values, tol, problem.grid.size) or _no_room(
@@ -130,7 +131,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     }
     if best.extrapolated and quantity in solution.numbers:
         solution.numbers[quantity] = best.value
-    solution.settings["why"] = [*solution.settings["why"], *ladder(levels, quantity, tol)]
+    solution.because(*ladder(levels, quantity, tol), after=True)
     solution.levels = levels
     solution.times = {**times, "total": perf_counter() - begin}
     return solution
@@ -225,11 +226,6 @@ def _no_room(solution: Solution, shape: tuple[int, ...], finest: tuple[int, ...]
     problem, name = solution.problem, " x ".join(map(str, shape))
     if finest and any(n > most for n, most in zip(shape, finest, strict=True)):
         return f"a finer grid than {' x '.join(map(str, finest))} is not allowed"
-    comm = problem.grid.comm
-    machine = comm.Split_type(MPI.COMM_TYPE_SHARED)
-    share = machine.size / comm.size  # of the points, on this machine
-    machine.Free()
-    left, share = comm.allreduce(available(), MPI.MIN), comm.allreduce(share, MPI.MAX)
     each = BYTES_FAS if solution.asked == "fas" else BYTES[len(shape)]
     dense = bool(getattr(problem, "dense", False))
 

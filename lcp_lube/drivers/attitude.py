@@ -1,13 +1,13 @@
 """The attitude at which a journal's film holds up a load of given direction: a secant iteration on the force's angle."""
 
 import math
-from dataclasses import replace
 
 from ..problems.solution import Outcome, Solution
 from ..scenes.grooved import GroovedJournalScene
 from ..scenes.moving import motion_of
 from ..scenes.scene import Solvable
 from .ask import Ask
+from .chain import Chain
 from .compose import Inner
 
 MOST_SOLVES = 20
@@ -31,16 +31,11 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     assert isinstance(scene, GroovedJournalScene)
     known = ask.start.settings.get("attitude_deg") if ask.start is not None else None
     attitude = math.radians(known) if known is not None else half_film_attitude(scene.eccentricity)
-    solution: Solution | None = None
+    chain = Chain(ask, inner)
     before: tuple[float, float] | None = None
     slope = 1.0
     for _ in range(MOST_SOLVES):
-        near = solution or ask.start
-        trial = scene.model_copy(update={"attitude_deg": math.degrees(attitude)})
-        new = inner(trial, replace(ask, start=near))
-        if solution is not None:
-            solution.destroy()
-        solution = new
+        solution = chain.solve(scene.model_copy(update={"attitude_deg": math.degrees(attitude)}))
         if not solution.converged:
             break
         fx, fy = solution.problem.quantities(solution.fields)["force"]
@@ -51,7 +46,6 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
             break
         before = (attitude, off)
         attitude -= off / slope
-    assert solution is not None
     if solution.converged and abs(off) > TOLERANCE:
         solution.outcome = Outcome.LOAD_NOT_CARRIED
         solution.message = (
@@ -59,8 +53,5 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
             f"force, at {math.degrees(attitude) % 360.0:.4g} degrees, is {math.degrees(abs(off)):.3g} degrees off"
         )
     solution.settings |= {"attitude_deg": math.degrees(attitude)}
-    solution.settings["why"] = [
-        f"attitude {math.degrees(attitude):.6g} degrees, at which the film's force is opposite to the load",
-        *solution.settings["why"],
-    ]
+    solution.because(f"attitude {math.degrees(attitude):.6g} degrees, at which the film's force is opposite to the load")
     return solution

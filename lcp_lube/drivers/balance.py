@@ -16,6 +16,7 @@ from ..problems.solution import Outcome, Solution
 from ..scenes.balance import BalanceTable
 from ..scenes.scene import Scene, Solvable, as_scene
 from .ask import Ask
+from .chain import added
 from .compose import Inner
 from .levels import level_shapes
 from .root import Search
@@ -131,8 +132,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         def solve_at(t: float, near: Any, shape: tuple[int, ...] = shape) -> Solution:
             trial = as_scene(scene, {unknown.key: unknown.to_value(t)}).with_shape(shape)
             solution = inner(trial.model_copy(update={"balance": None}), replace(ask, start=near))
-            for name, seconds in solution.times.items():
-                times[name] = times.get(name, 0.0) + seconds
+            times.update(added(times, solution.times))
             return solution
 
         solution, t, count, found = _on_grid(solve_at, search, t, start, table.load, tol)

@@ -7,7 +7,7 @@ was reached and the steps so far. On as many ranks as before the run takes the s
 import json
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import astuple, dataclass, fields, is_dataclass, replace
 from pathlib import Path
@@ -149,16 +149,26 @@ class Checkpointer:
             if monitor is not None:
                 monitor(k, step)
             self.steps.append(step)
-            self._since += 1
-            told = self.comm.allreduce(self.told, MPI.MAX)
-            if told or self._since >= self.every:
-                self.save()
-            if told == signal.SIGTERM:
-                raise SystemExit(128 + told)
-            if told:
-                raise KeyboardInterrupt(f"--resume {self.path} goes on")
+            self.after_step(self.save)
 
         return watch
+
+    def after_step(self, save: Callable[[], None], last: bool = False) -> None:
+        """Save if it is the last step, if that is due, or if the run is told to end.
+
+        Raises
+        ------
+        KeyboardInterrupt, SystemExit : SIGINT or SIGTERM came.
+        """
+        self._since += 1
+        told = self.comm.allreduce(self.told, MPI.MAX)
+        if told or last or self._since >= self.every:
+            save()
+            self._since = 0
+        if told == signal.SIGTERM:
+            raise SystemExit(128 + told)
+        if told:
+            raise KeyboardInterrupt(f"--resume {self.path} goes on")
 
     @contextmanager
     def listening(self) -> Iterator[None]:
@@ -204,7 +214,7 @@ class Checkpointer:
         except OSError as error:
             kept = "; the last one is still there" if self._saved else ""
             raise InputError(f"--checkpoint {self.path}: could not be written: {error}{kept}") from None
-        self._since, self._saved = 0, True
+        self._saved = True
 
 
 @dataclass(frozen=True)

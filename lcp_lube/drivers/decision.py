@@ -66,7 +66,8 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         "left_out": {name: effects.get(name) for name in gone},
         **record,
     }
-    solution.settings |= {"model": model, "why": [*solution.settings["why"], f"model: {sentence(model)}"]}
+    solution.settings["model"] = model
+    solution.because(f"model: {sentence(model)}", after=True)
     return solution
 
 

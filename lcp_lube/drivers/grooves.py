@@ -17,6 +17,7 @@ from ..problems.solution import Fields, Outcome, Solution
 from ..problems.transfer import Pick, numbers
 from ..scenes.scene import Derived, Solvable
 from .ask import Ask, Start
+from .chain import added
 from .compose import Inner
 
 
@@ -101,21 +102,21 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
             fields[name] = np.where(within, spread(values), fields[name])
         if (of_pad := getattr(solution.problem, "dry", None)) is not None:
             dry = np.where(within, spread(of_pad), dry)
-        times = {name: times.get(name, 0.0) + seconds for name, seconds in solution.times.items()}
+        times = added(times, solution.times)
         done.append(solution)
     if dry.any():
         ring = ring.revised(dry)  # type: ignore[assignment]
     failed = next((one for one in done if not one.converged), done[0])
     steps = [step for one in done for step in one.steps]
     message = f"{len(done)} films between grooves; {failed.message}"
-    settings = {**failed.settings, "why": [f"{len(done)} films between grooves, solved one by one", *failed.settings["why"]]}
+    failed.because(f"{len(done)} films between grooves, solved one by one")
     outcome: Outcome = failed.outcome
     certificate = ring.certify(fields, failed.settings["eps1"])
     for one in done:
         one.destroy()
     levels: list[dict] = []
     changed = {"problem": ring, "fields": fields, "outcome": outcome, "message": message, "certificate": certificate}
-    return replace(failed, **changed, steps=steps, settings=settings, times=times, levels=levels).judged()  # type: ignore[arg-type]
+    return replace(failed, **changed, steps=steps, times=times, levels=levels).judged()  # type: ignore[arg-type]
 
 
 def pick_pad(ring: Grid, pad: Grid, first: int) -> Pick:

@@ -15,6 +15,7 @@ from ..problems.film.model import Model
 from ..problems.solution import Solution
 from ..scenes.scene import Derived, Solvable
 from .ask import Ask, Start
+from .chain import added
 from .compose import Inner
 
 MOST_SOLVES = 100
@@ -117,9 +118,7 @@ class Loop:
         self.first = self.first or new
         self.steps += new.steps
         self.rescued = new if new.took_over else self.rescued
-        self.times = {name: self.times.get(name, 0.0) + seconds for name, seconds in new.times.items()} | {
-            name: seconds for name, seconds in self.times.items() if name not in new.times
-        }
+        self.times = added(self.times, new.times)
         self.solves += 1
         self.work += new.problem.unknowns
         if not new.converged:

@@ -1,13 +1,11 @@
 """Checkpoints of a march in time: what its next step starts from, written after every so many steps (`checkpoint_file`)."""
 
-import signal
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import astuple
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
 from .. import __version__
 from ..errors import InputError
@@ -34,7 +32,7 @@ class MarchFile:
     def __init__(self, ask: Ask, scene: Any):
         self.keeper = Checkpointer(ask.checkpoint, ask.every, ask.mpi)
         self.resume = None if ask.resume is None else Path(ask.resume)
-        self.scene, self._since = scene_record(scene), 0
+        self.scene = scene_record(scene)
         self.scene.get("motion", {}).pop("t_end", None)  # a march may go on beyond its first end
         self.comm = ask.mpi
 
@@ -50,16 +48,8 @@ class MarchFile:
         InputError : it cannot be written; the last one is still there then.
         KeyboardInterrupt, SystemExit : SIGINT or SIGTERM came.
         """
-        if not self.keeper.active:
-            return
-        self._since += 1
-        told = self.comm.allreduce(self.keeper.told, MPI.MAX)
-        if told or run.done or self._since >= self.keeper.every:
-            self._write(run)
-        if told == signal.SIGTERM:
-            raise SystemExit(128 + told)
-        if told:
-            raise KeyboardInterrupt(f"--resume {self.keeper.path} goes on")
+        if self.keeper.active:
+            self.keeper.after_step(lambda: self._write(run), run.done)
 
     def _write(self, run: Any) -> None:
         march, rotor = run.march, run.rotor
@@ -86,7 +76,6 @@ class MarchFile:
             checkpoint_file.write(self.keeper.path, march.grid, header, arrays)
         except OSError as error:
             raise InputError(f"--checkpoint {self.keeper.path}: could not be written: {error}") from None
-        self._since = 0
 
     def restore(self, run: Any, grid: Grid) -> bool:
         """Put the run where the file has it; False without one.

@@ -11,7 +11,7 @@ which the journal has moved so far that it finds no place with stiffness idles: 
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -26,6 +26,7 @@ from ..scenes.scene import Scene, Solvable
 from ..scenes.thrust import ThrustScene
 from ..scenes.tilting import TiltingPadScene
 from .ask import Ask
+from .chain import Chain
 from .compose import Inner
 from .grooves import films_of
 from .impedance import Mode, displacements, impedance
@@ -214,15 +215,12 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     assert bearing is not None  # as `applies` found
     known = ask.start.settings.get("coordinates") if ask.start is not None else None
     q = bearing.start(known)
-    solution: Solution | None = None
+    chain = Chain(ask, inner)
     found, again = False, False
     nudges, nudge = np.zeros(q.size, dtype=int), np.zeros(q.size)
     for count in range(1, MOST_SOLVES + 1):
         at = bearing.at(q)
-        new = inner(at, replace(ask, start=solution or ask.start))
-        if solution is not None:
-            solution.destroy()
-        solution = new
+        solution = chain.solve(at)
         if not solution.converged:
             break
         films = list(bearing.films(at, solution))
@@ -244,7 +242,6 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         if found or thin or count == MOST_SOLVES:
             break
         q = q + step
-    assert solution is not None
     _tell(scene, bearing, solution, q, found, count)
     return solution
 
@@ -287,7 +284,7 @@ def _tell(scene: Any, bearing: Bearing, solution: Solution, q: Array, found: boo
     tilts = [float(tilt) for tilt in told["tilts"]]
     solution.problem.more |= {"pad_tilts": tilts}  # type: ignore[attr-defined]
     solution.settings |= {"coordinates": [float(one) for one in q]}
-    solution.settings["why"] = [*solution.settings["why"], f"pads: {place}, found in {count} solves"]
+    solution.because(f"pads: {place}, found in {count} solves", after=True)
     if "attitude_deg" in told:
         solution.settings["attitude_deg"] = told["attitude_deg"]
     if scene.balance is not None:

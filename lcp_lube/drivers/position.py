@@ -17,6 +17,7 @@ from ..scenes.grooved import GroovedJournalScene
 from ..scenes.scene import Solvable
 from .ask import Ask
 from .attitude import half_film_attitude
+from .chain import Chain
 from .coefficients import coefficients
 from .compose import Inner
 
@@ -81,15 +82,12 @@ def _on_grid(
     scene: Any, ask: Ask, inner: Inner, t: float, phi: float, load: float, tol: float
 ) -> tuple[Solution, float, float, int, bool]:
     """Newton's method on one grid: solution, t, attitude, number of solves, whether the place was found. Collective."""
-    solution: Solution | None = None
+    chain = Chain(ask, inner)
     inverse, before = None, None  # of effects: the place's secant method, and (residual, step) before
     for count in range(1, MOST_SOLVES + 1):
         e = 1.0 / (1.0 + math.exp(-t))
         at = scene.model_copy(update={"eccentricity": e, "attitude_deg": math.degrees(phi)})
-        new = inner(at, replace(ask, start=solution or ask.start))
-        if solution is not None:
-            solution.destroy()
-        solution = new
+        solution = chain.solve(at)
         if not solution.converged:
             return solution, t, phi, count, False
         force = np.array(solution.problem.quantities(solution.fields)["force"])

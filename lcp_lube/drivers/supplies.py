@@ -23,6 +23,7 @@ from ..problems.film.supplies import Supply, supply_flows
 from ..problems.solution import Outcome, Solution
 from ..scenes.scene import Derived, Solvable
 from .ask import Ask
+from .chain import Chain
 from .compose import Inner
 from .linearised import Feed, Linear
 
@@ -71,17 +72,10 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     known = ask.start.settings.get("supply_pressures") if ask.start is not None else None
     P = np.array(known if known is not None and len(known) == len(supplies) else _first(model))
     free = np.array([one.open for one in supplies])
-    solution: Solution | None = None
-    times: dict[str, float] = {}
-    steps: list[Any] = []
+    chain = Chain(ask, inner)
     for count in range(1, MOST_SOLVES + 1):
         held = tuple(Supply(one.region, float(p)) for one, p in zip(supplies, P, strict=True))
-        new = inner(Fed(scene, held), replace(ask, start=solution or ask.start))
-        if solution is not None:
-            solution.destroy()
-        solution = new
-        steps += solution.steps
-        times = {name: times.get(name, 0.0) + solution.times.get(name, 0.0) for name in {**times, **solution.times}}
+        solution = chain.solve(Fed(scene, held))
         problem: Any = solution.problem
         if not solution.converged:
             break
@@ -95,7 +89,6 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
             break
         slope = misfit[free, 2:] * _slopes(problem, solution.fields, free) + np.diag(misfit[free, 1])
         P[free] = np.maximum(P[free] + np.linalg.solve(slope, -misfit[free, 0]), 0.0)
-    assert solution is not None
     if solution.converged and np.max(off) > TOLERANCE:
         worst = int(np.argmax(np.where(starved, off, 0.0) if starved.any() else off))
         if starved.any():
@@ -104,14 +97,12 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         else:
             message = f"supply {worst + 1}: film and source differ by {off[worst]:.1e} of the flow after {count} solves"
             solution.outcome, solution.message = Outcome.MAX_ITERATIONS, message
-    solution.steps, solution.times = steps, times
+    solution.steps = chain.steps
     problem.hold_at([replace(one, p=float(p)) for one, p in zip(supplies, P, strict=True)])
     solution.certificate = problem.certify(solution.fields, solution.settings["eps1"])
     found = ", ".join(f"{p + model.p_c:.6g}" for p in P)
-    solution.settings |= {
-        "supply_pressures": [float(p) for p in P],
-        "why": [f"supplies: pressures {found} Pa, found in {count} solves", *solution.settings["why"]],
-    }
+    solution.settings["supply_pressures"] = [float(p) for p in P]
+    solution.because(f"supplies: pressures {found} Pa, found in {count} solves")
     return solution.judged()
 
 

@@ -98,7 +98,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
 
 def _whole(solution: Solution, reason: str) -> Solution:
     """A solution of the whole model, with the reason for that."""
-    solution.settings["why"] = [f"the whole model: {reason}", *solution.settings["why"]]
+    solution.because(f"the whole model: {reason}")
     return solution
 
 

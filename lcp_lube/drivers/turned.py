@@ -48,6 +48,5 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     band = solution.enclosure
     if band is not None:
         band = replace(band, lower=problem.here(band.lower), upper=problem.here(band.upper))
-    why = ["the wall moves to smaller x: the mirror image is solved, and turned back", *solution.settings["why"]]
-    settings = {**solution.settings, "why": why}
-    return replace(solution, problem=problem, fields=problem.here(solution.fields), settings=settings, enclosure=band)
+    solution.because("the wall moves to smaller x: the mirror image is solved, and turned back")
+    return replace(solution, problem=problem, fields=problem.here(solution.fields), enclosure=band)

@@ -5,6 +5,7 @@ from dataclasses import replace
 from ..problems.solution import Solution
 from ..scenes.scene import Solvable
 from .ask import Ask
+from .chain import added
 from .compose import Inner
 
 
@@ -25,5 +26,5 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         solution.destroy()
     solution = inner(scene, replace(ask, start=None))
     solution.settings["start"] = "cold"
-    solution.times = {name: times.get(name, 0.0) + solution.times.get(name, 0.0) for name in {**times, **solution.times}}
+    solution.times = added(times, solution.times)
     return solution

@@ -42,7 +42,7 @@ def _lines(frames: Frames, history: list[dict[str, Any]]) -> Any:
     """p and r along x, the film, and the load in time."""
     figure = new_figure(7.0, 5.6)
     upper, middle, lower = figure.subplots(3, 1, height_ratios=[2.2, 1.0, 0.8])
-    scale, label = _along(frames)
+    scale, label = frames.along
     x, right = scale * frames.x, upper.twinx()
     to_p, unit_p = prefix(_most(frames, "p"), "Pa")
     to_h, unit_h = prefix(_most(frames, "h"), "m")
@@ -71,7 +71,7 @@ def _maps(frames: Frames, history: list[dict[str, Any]]) -> Any:
     figure = new_figure(8.0, 4.6)
     grid = figure.add_gridspec(2, 2, height_ratios=[2.6, 0.8])
     images: dict[str, Any] = {}
-    (scale_x, label), (scale_y, unit_y) = _along(frames), prefix(frames.lengths[1], "m")
+    (scale_x, label), (scale_y, unit_y) = frames.along, prefix(frames.lengths[1], "m")
     box = (0.0, scale_x * frames.lengths[0], 0.0, scale_y * frames.lengths[1])
     for k, name in enumerate(("p", "r")):
         axes = figure.add_subplot(grid[0, k])
@@ -101,13 +101,6 @@ def _history(axes: Any, history: list[dict[str, Any]]) -> Any:
     axes.plot([row["t"] for row in history], factor * values, color=GREY, lw=1.0)
     axes.set(xlabel="t (s)", ylabel=f"{name} ({unit})".replace("_", " "))
     return axes.axvline(0.0, color=RED, lw=1.0)
-
-
-def _along(frames: Frames) -> tuple[float, str]:
-    if frames.journal:
-        return 360.0 / frames.lengths[0], "angle from x = 0 (°)"
-    factor, unit = prefix(frames.lengths[0], "m")
-    return factor, f"x ({unit})"
 
 
 def _most(frames: Frames, name: str) -> float:

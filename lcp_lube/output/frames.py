@@ -15,8 +15,9 @@ from ..base.together import on_all_ranks
 from ..errors import InputError
 from ..problems.film.fronts import middle_row
 from ..problems.solution import Outcome, Solution
-from .files import check_target, coordinates, gather, replacing, save, taken
-from .series import collection
+from .files import check_target, coordinates, gather, save, taken
+from .series import write_collection
+from .units import prefix
 
 MOST = {1: 1000, 2: 160}  # points a direction of a frame
 LINE, LINES = 400, 600  # points, and times, of the middle line
@@ -95,9 +96,7 @@ class Series:
         solution = Solution(moment.problem, moment.fields, Outcome.CONVERGED, "", None, [])  # type: ignore[arg-type]
         save(solution, target, self.boundary)
         self._files.append((float(f"{moment.t:.12g}"), target.name))
-        with replacing(self.path, comm) as temporary, on_all_ranks(comm, str(self.path)):
-            if comm.rank == 0:
-                Path(temporary).write_text(collection(self._files), encoding="utf-8")
+        write_collection(self.path, self._files, comm)
 
 
 @dataclass
@@ -114,6 +113,14 @@ class Frames:
     lengths: tuple[float, ...] = ()
     journal: bool = False
     _every: int = 1
+
+    @property
+    def along(self) -> tuple[float, str]:
+        """By what x is multiplied to be drawn, and the axis' label: degrees round a journal."""
+        if self.journal:
+            return 360.0 / self.lengths[0], "angle from x = 0 (°)"
+        factor, unit = prefix(self.lengths[0], "m")
+        return factor, f"x ({unit})"
 
     def add(self, moment: Any) -> None:
         """Keep a frame. Collective."""

@@ -27,7 +27,7 @@ def _figure(frames: Frames, history: list[dict[str, Any]], title: str) -> Any:
     orbit = "journal_x" in history[0]
     figure = new_figure(12.0 if orbit else 9.0, 5.4)
     grid = figure.add_gridspec(2, 3 if orbit else 2, height_ratios=[2.0, 1.0], width_ratios=[1, 1, 1.05][: 3 if orbit else 2])
-    scale, label = _along(frames)
+    scale, label = frames.along
     to_t, unit_t = prefix(history[-1]["t"], "s")
     times = to_t * np.array(frames.line_times)
     for k, name in enumerate(("p", "r")):
@@ -75,10 +75,3 @@ def draw_orbit(axes: Any, history: list[dict[str, Any]]) -> None:
     axes.spines[:].set_visible(False)
     axes.set_title("journal in its clearance circle", loc="left")
     axes.legend(loc="upper right")
-
-
-def _along(frames: Frames) -> tuple[float, str]:
-    if frames.journal:
-        return 360.0 / frames.lengths[0], "angle from x = 0 (°)"
-    factor, unit = prefix(frames.lengths[0], "m")
-    return factor, f"x ({unit})"

@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
+from mpi4py import MPI
+
 from ..base.together import on_all_ranks
 from ..errors import InputError
 from ..problems.solution import Solution
@@ -30,22 +32,13 @@ def save_series(solutions: Mapping[float, Solution], path: str | Path, boundary:
         name = f"{path.stem}_{k:04d}.vts"
         files.save(solution, path.with_name(name), boundary)
         entries.append((float(time), name))
-    comm = next(iter(solutions.values())).problem.grid.comm
+    write_collection(path, entries, next(iter(solutions.values())).problem.grid.comm)
+
+
+def write_collection(path: Path, entries: Sequence[tuple[float, str]], comm: MPI.Comm) -> None:
+    """Write a .pvd of times and names of files beside it. Collective."""
+    listed = "".join(f'    <DataSet timestep="{time!r}" part="0" file={quoteattr(name)}/>\n' for time, name in entries)
+    head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n  <Collection>\n'
     with files.replacing(path, comm) as temporary, on_all_ranks(comm, str(path)):
         if comm.rank == 0:
-            Path(temporary).write_text(collection(entries), encoding="utf-8")
-
-
-def collection(entries: Sequence[tuple[float, str]]) -> str:
-    """The text of a .pvd, from times and names of files beside it."""
-    lines = [f'    <DataSet timestep="{time!r}" part="0" file={quoteattr(name)}/>' for time, name in entries]
-    return "\n".join(
-        [
-            '<?xml version="1.0"?>',
-            '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">',
-            "  <Collection>",
-            *lines,
-            "  </Collection>",
-            "</VTKFile>\n",
-        ]
-    )
+            Path(temporary).write_text(f"{head}{listed}  </Collection>\n</VTKFile>\n", encoding="utf-8")

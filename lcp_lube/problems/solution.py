@@ -210,6 +210,11 @@ class Solution(Shown):
             self.message = f"{self.message}, but the certificate fails: {self.certificate.failure}"
         return self
 
+    def because(self, *reasons: str, after: bool = False) -> None:
+        """Add to what was chosen and why, before what stands there or after it."""
+        why = self.settings.get("why", [])
+        self.settings["why"] = [*why, *reasons] if after else [*reasons, *why]
+
     def __enter__(self) -> Self:
         return self
 

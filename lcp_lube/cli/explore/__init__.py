@@ -1,1 +1,41 @@
-"""`lcp-lube explore`: a scene's numbers as sliders on a local page."""
+"""`lcp-lube explore`: numbers of a scene as sliders on a local page, and answers to what the page asks until Ctrl-C."""
+
+import argparse
+import sys
+import webbrowser
+
+from mpi4py import MPI
+
+from ...base.options import check_unread
+from ...errors import InputError
+from ...output.console import say
+from ..asked import ask_of, scene_of
+from .answers import Answers
+from .server import Server
+
+
+def run(args: argparse.Namespace) -> int:
+    """Serve the page until Ctrl-C; exit status 0.
+
+    Raises
+    ------
+    InputError : several ranks; a scene that cannot be solved as asked; a port that is taken.
+    """
+    if MPI.COMM_WORLD.size > 1:
+        raise InputError("explore: a page is served by one rank; leave mpiexec out")
+    if not 0 <= args.port < 65536:
+        raise InputError(f"--port {args.port}: allowed are 0 (any free port) to 65535")
+    answers = Answers(scene_of(args), ask_of(args), args.accuracy)
+    level = 0  # what cannot be solved at all is refused here, and loops are compiled before the hand moves
+    while not answers.solve({}, level)["last"]:
+        level += 1
+    check_unread()
+    try:
+        with Server(answers, args.port) as server:
+            say(f"{answers.base.name}: {server.address}\nCtrl-C ends the page")
+            if args.browser:
+                webbrowser.open(server.address)
+            server.serve()
+    except KeyboardInterrupt:
+        print("lcp-lube: the page has ended", file=sys.stderr, flush=True)
+    return 0

@@ -1,0 +1,43 @@
+"""Solves of one driver, one after another: each starts from the last one, which is then freed; their seconds add up."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from ..problems.solution import Solution, Step
+from ..scenes.scene import Solvable
+from .ask import Ask
+from .compose import Inner
+
+
+def added(times: Mapping[str, float], more: Mapping[str, float]) -> dict[str, float]:
+    """Seconds by stage of two solves together."""
+    return {name: times.get(name, 0.0) + more.get(name, 0.0) for name in {**times, **more}}
+
+
+class Chain:
+    """Attributes: count, of the solves; steps, of all of them; solution, the last one. Collective.
+
+    Parameters
+    ----------
+    ask : its `start` is where the first one starts.
+    """
+
+    def __init__(self, ask: Ask, inner: Inner):
+        self._ask, self._inner = ask, inner
+        self._last: Solution | None = None
+        self.count = 0
+        self.steps: list[Step] = []
+        self._times: dict[str, float] = {}
+
+    @property
+    def solution(self) -> Solution:
+        assert self._last is not None  # a first one was solved
+        return self._last
+
+    def solve(self, scene: Solvable) -> Solution:
+        new = self._inner(scene, replace(self._ask, start=self._last or self._ask.start))
+        if self._last is not None:
+            self._last.destroy()
+        self._last, self.count, self.steps = new, self.count + 1, [*self.steps, *new.steps]
+        self._times = new.times = added(self._times, new.times)
+        return new
