@@ -139,11 +139,6 @@ class Checkpointer:
         self._run, self._grid, self.steps = run, grid, list(before)
         self._reached = {f"reached.{name}": values for name, values in (reached or {}).items()}
         self.record |= record
-        with self.listening():
-            return iterate(run, stopping, self._watching(monitor), before)
-
-    def _watching(self, monitor: Monitor | None) -> Monitor:
-        """The monitor, and after it the checkpoints that are due, and one when the run is told to end."""
 
         def watch(k: int, step: Step) -> None:
             if monitor is not None:
@@ -151,7 +146,8 @@ class Checkpointer:
             self.steps.append(step)
             self.after_step(self.save)
 
-        return watch
+        with self.listening():
+            return iterate(run, stopping, watch, before)
 
     def after_step(self, save: Callable[[], None], last: bool = False) -> None:
         """Save if it is the last step, if that is due, or if the run is told to end.
