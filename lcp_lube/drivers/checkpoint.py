@@ -10,6 +10,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import astuple, dataclass, fields, is_dataclass, replace
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -45,10 +46,7 @@ def _leaves(owner: Any, names: tuple[str, ...]) -> list[Entry]:
 
     found: list[Entry] = []
     for name in names:
-        value = owner
-        for part in name.split("."):
-            value = getattr(value, part)
-        found += walk(name, value)
+        found += walk(name, attrgetter(name)(owner))
     return found
 
 
@@ -241,10 +239,8 @@ class Checkpoint:
             raise InputError(f"--resume {self.path}: {error}") from None
         values = {**self.record["scalars"], **arrays}
         for name in state_names(run):
-            *path, last = name.split(".")
-            owner: Any = run
-            for part in path:
-                owner = getattr(owner, part)
+            path, _, last = name.rpartition(".")
+            owner = attrgetter(path)(run) if path else run
             setattr(owner, last, _rebuilt(name, getattr(owner, last), values))
         for name in reached or {}:
             reached[name] = values[f"reached.{name}"]  # type: ignore[index]
