@@ -71,10 +71,10 @@ class Fas(Cycles):
         self._correction = 0.0
         if start is not None:
             self.z = start["p"] + problem.scheme.b_C.ravel() * start["r"]
-        self._rest, self._share = eps1, 0.1
+        self._rest, self._share = self.eps1, 0.1
         self.norm = self._first = self._norm()
         if start is not None and problem.scheme.storage is not None:
-            self._rest = max(eps1, min(options.rest * self.norm, eps1**0.5))
+            self._rest = max(self.eps1, min(options.rest * self.norm, self.eps1**0.5))
             self._share = 0.5 if options.rest else 0.1
 
     @property
