@@ -41,7 +41,7 @@ def test_the_short_bearing_with_half_a_film():
     R, c, mu, omega, e, B = 0.05, 1e-4, 0.1, 157.1, 0.2663, 1e-3
     scene = load_scene(
         {
-            "family": "bearing", "dimension": 2, "L": 2 * math.pi * R, "width": B, "U": omega * R, "nx": 360, "ny": 31,
+            "family": "bearing", "dimension": 2, "L": 2 * math.pi * R, "width": B, "U": omega * R, "nx": 180, "ny": 63,
             "fluid": {"mu": mu, "p_supply": 1e9, "p_c": 0.0}, "sides": {"west": "periodic", "east": "periodic"},
             "film": {"shape": "journal", "c": c, "eccentricity": e, "widest": math.pi * R},
         }
@@ -61,8 +61,8 @@ def test_the_short_bearing_with_half_a_film():
     # In the axes of the source: y along the load, x a quarter of a turn behind.
     turn = np.array([[0.0, 1.0], [-1.0, 0.0]])
     K, C = turn.T @ K @ turn, turn.T @ C @ turn
-    assert sorted(np.abs(K).ravel() / 1e6) == pytest.approx(sorted([12.81, 16.39, 25.06, 8.815]), rel=2e-3)
-    assert sorted(np.abs(C).ravel() / 1e3) == pytest.approx(sorted([232.9, 81.92, 81.92, 294.9]), rel=2e-3)
+    assert sorted(np.abs(K).ravel() / 1e6) == pytest.approx(sorted([12.81, 16.39, 25.06, 8.815]), rel=1e-3)
+    assert sorted(np.abs(C).ravel() / 1e3) == pytest.approx(sorted([232.9, 81.92, 81.92, 294.9]), rel=1e-3)
     assert K[0, 1] * K[1, 0] < 0 and C[0, 1] == pytest.approx(C[1, 0], rel=1e-3)
 
 

@@ -123,10 +123,11 @@ class Squeeze:
         self.history.rupture_time = float(np.clip(found, self.time - self.dt, self.time))
 
     def _reformation(self) -> None:
-        """When: the void, falling as it was in the last two steps, is used up."""
-        fall = self._void[-2] - self._void[-1] if len(self._void) > 1 else 0.0
-        part = self._void[-1] / fall if fall > 0 else 1.0
-        self.history.reformation_time = self.time - self.dt * (1.0 - min(part, 1.0))
+        """When: the void, falling as it was in the last three steps, by a parabola, is used up."""
+        last = self._void[-3:]
+        fall = np.polyfit(np.arange(1 - len(last), 1), last, len(last) - 1)
+        roots = [root.real for root in np.roots(fall) if abs(root.imag) <= 1e-9 and 0 <= root.real <= 1]
+        self.history.reformation_time = self.time - self.dt * (1.0 - min(roots, default=1.0))
 
     def _look_back(self) -> None:
         """Sigma and the front at `front_time`, from the fronts of all steps."""
