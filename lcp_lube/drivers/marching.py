@@ -71,7 +71,8 @@ class Run:
         if chosen.method == "active-set":  # the steps before have the front to within a cell or two: see `_sweeps`
             self.may_sweep = "sweeps" not in ask.options
             ask = replace(ask, options={"sweeps": 0, **ask.options})
-        if chosen.method == "fas" and self.rotor is None:  # a free journal's place wants forces to the last digit
+        coupled = first.effects or (first.law is not None and first.law.dowson_higginson)
+        if chosen.method == "fas" and self.rotor is None and not coupled:  # those want an answer to the last digit
             ask = replace(ask, options={"rest": REST, **ask.options})
         self.ask = replace(ask, method=chosen.method, implied=not named)
         self.steps: list[Step] = []
@@ -110,7 +111,7 @@ class Run:
         solution = self.inner(TimeStep(self.scene, model, self.march.grid), ask)
         if not solution.converged:
             raise InputError(f"{self.scene.name}: no steady film at t = 0: {solution.message}; motion.start = full needs none")
-        self.march.begin(contents(self.march.grid, model, solution.fields), solution.fields)
+        self.march.begin(contents(self.march.grid, model, solution.fields, solution.problem), solution.fields)
         solution.destroy()
 
     @property
@@ -145,7 +146,7 @@ class Run:
                 self._keep(solution, solves)
                 return
             model = self.model
-            new = contents(march.grid, model, solution.fields)
+            new = contents(march.grid, model, solution.fields, problem)
             error = None
             if self.table.step is None:
                 error = march.error(dt, problem, new)

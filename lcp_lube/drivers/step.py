@@ -1,6 +1,7 @@
 """One time step: the film at its end, with what its cells store, as a scene that the inner drivers solve."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
@@ -40,13 +41,17 @@ class TimeStep(Derived):
         return self.model.build(self.shape, comm, self.grid if self.model.U >= 0 else None)
 
 
-def contents(grid: Grid, model: Model, fields: Fields | None) -> Array:
-    """h (1 - r) of the owned cells, m, times the density over that at p_c; without fields the full film's. Collective."""
+def contents(grid: Grid, model: Model, fields: Fields | None, problem: Any = None) -> Array:
+    """h (1 - r) of the owned cells, m, times the density over that at p_c; without fields the full film's. Collective.
+
+    problem : solved by the fields; it knows the densities and lifts that it was solved with.
+    """
     h = mean_film(grid, model.film).ravel()
     if fields is None:
         return h
-    density = model.law.density(fields["p"] * model.p_unit) if model.law else 1.0
-    return h * (1.0 - fields["r"]) * density
+    moving = getattr(problem, "moving", None)  # of a film that is turned round
+    cells = problem.cells if moving is None else {name: problem._here(values) for name, values in moving.cells.items()}
+    return (h + cells.get("lift", 0.0)) * (1.0 - fields["r"]) * cells.get("density", 1.0)
 
 
 def check_content(grid: Grid, r: Array, t: float, dt: float, name: str) -> None:

@@ -38,10 +38,8 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         raise InputError("--system cavity: cells of a film that moves store liquid; allowed are full, reduced")
     assert isinstance(scene, Moving)
     model: Any = getattr(scene, "model", None)
-    if model is not None and (model.effects or (model.law is not None and model.law.dowson_higginson)):
-        raise InputError(
-            f"scene {scene.name}: [motion]: of the fluid's laws fluid.barus alone goes on in time, and no effect on the film"
-        )
+    for kept in filter(None, (getattr(effect, "keeps", "") for effect in getattr(model, "effects", ()))):
+        raise InputError(f"scene {scene.name}: [motion]: {kept}: only effects whose law is local in time go on in time")
     run = Run(scene, ask, inner)
     with run.file.listening():
         while run.outcome is Outcome.CONVERGED and not run.done:

@@ -334,7 +334,7 @@ def test_bad_input(cli, tmp_path):
         (("moving_texture", "--set", "balance.load=3"), "balance and motion"),
         (("dynamic_journal", "--set", 'motion.load=["log(0-1)", "0"]'), "no number at t ="),
         (("pocketed_pad", "--set", "film.pocket.moves=true"), "a table [motion] is needed"),
-        (("moving_texture", "--set", "fluid.density=dowson-higginson"), "fluid.barus alone goes on in time"),
+        (("moving_texture", "--set", "temperature.beta=0.03"), "the heat that the oil stores"),
     ):
         run = cli("solve", *words)
         assert run.status == 2 and message in run.lines[-1] and len(run.lines) == 1, (words, run.err)

@@ -26,7 +26,7 @@ from .supplies import Held, pressed
 CHANNELS = {"viscosity": 1.0, "density": 1.0, "lift": 0.0, "pressure_flow": 1.0, "drag_flow": 1.0}
 Cells = dict[str, Array]
 THINNEST = 0.05  # of the rigid film: no lift of an iterate leaves less
-FACTORS = ("k_W", "k_E", "k_S", "k_N", "u_W", "u_E", "mu")
+FACTORS = ("k_W", "k_E", "k_S", "k_N", "u_W", "u_E", "mu", "stored")
 
 
 @dataclass(frozen=True)
@@ -49,8 +49,12 @@ NOTHING = Report({}, {}, {})
 class Effect(Protocol):
     """A rung: what one effect makes of an answer.
 
-    channels : what it may change. even : whether what it makes of an answer that is symmetric in y is so too.
+    channels : what it may change. even : whether what it makes of an answer that is symmetric in y is so too. keeps : what it
+    would have to remember of earlier times in a film that moves; empty: its law is local in time.
     """
+
+    @property
+    def keeps(self) -> str: ...
 
     @property
     def channels(self) -> tuple[str, ...]: ...
@@ -76,6 +80,7 @@ class Plain:
 
     channels: tuple[str, ...] = ("viscosity",)
     even = True
+    keeps = ""
 
     def report(self, at: "Answer") -> Report:
         return NOTHING
@@ -133,6 +138,7 @@ class FaceFactors:
     """Factors of a rigid, isoviscous film's scheme on the points of `grid`, each of shape grid.box.
 
     k_W, k_E, k_S, k_N : of the conductances. u_W, u_E : of the wall's flows. mu : viscosity at the east face, over mu.
+    stored : of what a full cell holds, in a time step.
     """
 
     grid: Grid
@@ -178,19 +184,22 @@ def factors(problem: LubricationProblem, cells: Cells, density_at_sides: Sequenc
     """What the fields make of the scheme of a rigid, isoviscous film. Collective."""
     grid = problem.grid
     ones = np.ones(grid.box)
-    k, u, mu = [ones] * 4, [ones] * 4, ones
+    k, u, mu, stored = [ones] * 4, [ones] * 4, ones, ones
     if "viscosity" in cells:
         at_faces = face_means(framed_by(grid, cells["viscosity"]))
         k, mu = [a / b for a, b in zip(k, at_faces, strict=True)], at_faces[1]
     if "lift" in cells:
-        thick = [1.0 + part for part in face_means(framed_by(grid, cells["lift"] / problem.scheme.h.ravel()))]
+        thicker = cells["lift"] / problem.scheme.h.ravel()
+        thick, stored = [1.0 + part for part in face_means(framed_by(grid, thicker))], 1.0 + thicker.reshape(grid.box)
         k, u = [a * b**3 for a, b in zip(k, thick, strict=True)], thick
     for name, driven in (("pressure_flow", (True, False)), ("drag_flow", (False, True)), ("density", (True, True))):
         if name in cells:
             at = face_means(framed_by(grid, cells[name], density_at_sides if name == "density" else None))
             k = [a * b for a, b in zip(k, at, strict=True)] if driven[0] else k
             u = [a * b for a, b in zip(u, at, strict=True)] if driven[1] else u
-    return FaceFactors(grid, dict(zip(FACTORS, [*k, *u[:2], mu], strict=True)))
+    if "density" in cells:
+        stored = stored * cells["density"].reshape(grid.box)
+    return FaceFactors(grid, dict(zip(FACTORS, [*k, *u[:2], mu, stored], strict=True)))
 
 
 def scaled(
@@ -205,12 +214,16 @@ def scaled(
     names = ("k_W", "k_E", "k_S", "k_N")
     k: dict[str, Any] = {name: getattr(s, name) * f[name] * (mobility[i] if mobility else 1.0) for i, name in enumerate(names)}
     couette_W, couette_E = s.couette_W * f["u_W"], s.couette_E * f["u_E"]
-    c = couette_W - couette_E + problem._sources
+    c, carried = couette_W - couette_E + problem._sources, s.b_E * f["u_E"]
+    stored: dict[str, Any] = {}
+    if s.storage is not None:
+        stored["storage"] = s.storage * f["stored"]
+        c, carried = c + s.storage - stored["storage"], carried - stored["storage"]
     p_sides = p_sides or problem.p_sides
     for conductance, at_side, p_side in zip(k.values(), sides(grid), p_sides, strict=True):
         c = c + np.where(at_side, conductance * (p_side / problem.p_unit), 0.0)
-    u: dict[str, Any] = {"b_C": s.b_C * f["u_E"], "b_W": s.b_W * f["u_W"], "couette_W": couette_W, "couette_E": couette_E}
-    scheme = replace(s, **k, **u, c=c)
+    u: dict[str, Any] = {"b_C": carried, "b_W": s.b_W * f["u_W"], "couette_W": couette_W, "couette_E": couette_E}
+    scheme = replace(s, **k, **u, **stored, c=c)
     held = held or problem.held
     if held is not None:
         scheme = pressed(scheme, held, problem.p_unit)

@@ -94,6 +94,7 @@ class Heat(Plain):
     mu: float
     table: Temperature
     wall: float
+    keeps = "temperature: the heat that the oil stores is not in its equation"
 
     def apply(self, at: Answer, out: Cells) -> None:
         coldest = self.table.T_in + min(self.wall, 0.0)  # heat arises only: an iterate that is colder is no film's

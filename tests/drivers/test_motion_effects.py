@@ -1,0 +1,85 @@
+"""Effects in time: a fluid that gives way, against its exact oscillation; walls, shear and roughness, with mass conserved."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lcp_lube import InputError, load_scene, solve
+from lcp_lube.problems.film.fluid import Law
+
+WEDGE: dict[str, Any] = {
+    "family": "bearing",
+    "L_mm": 10,
+    "U": 1.0,
+    "n": 24,
+    "fluid": {"mu": 0.01, "p_supply": 1e5},
+    "film": [
+        {"shape": "sinusoid", "h_min_um": 1, "h_max_um": 3, "waves": 2},
+        {"shape": "formula", "unit": "um", "h": "0.4*sin(300*t)"},
+    ],
+    "motion": {"t_end": 0.02, "steps": 12},
+}
+EFFECTS: dict[str, dict[str, Any]] = {
+    "density": {"fluid": {"mu": 0.01, "p_supply": 1e5, "density": "dowson-higginson"}},
+    "shear": {"shear": {"law": "eyring", "tau_0": 5e5}},
+    "roughness": {"roughness": {"sigma_um": 0.3, "moving": 0.8}},
+    "elastic": {"elastic": {"compliance": 1e-14}},
+}
+EFFECTS["all"] = {
+    **{key: value for effect in EFFECTS.values() for key, value in effect.items()},
+    "fluid": {"mu": 0.01, "p_supply": 1e5, "barus": 1e-9, "density": "dowson-higginson"},
+}
+
+
+def test_a_fluid_that_gives_way_between_plates():
+    """Plates h0 (1 + eps sin wt) with rho'/rho = s: p - p_s = -Re[eps/s (1 - cosh k(x - L/2)/cosh kL/2) exp(iwt)/i],
+    k^2 = 12 i mu w s/h0^2, second order in the step."""
+    mu, L, h0, ps, eps, n = 0.1, 0.1, 1e-5, 1e6, 1e-4, 19
+    law = Law(0.0, True)
+    s = float(law.density_slope(np.array(ps)) / law.density(np.array(ps)))
+    w = 4.0 * h0**2 / (12.0 * mu * s * L**2)
+    t_end, x = 1.25 * 2 * np.pi / w, np.arange(1, n + 1) / (n + 1) * L
+    k = np.sqrt(12j * mu * w * s) / h0
+    P = -eps / s * (1 - np.cosh(k * (x - L / 2)) / np.cosh(k * L / 2)) / 1j
+    errors = []
+    for steps in (25, 50):
+        scene = {
+            "family": "bearing", "L": L, "U": 0.0, "n": n,
+            "fluid": {"mu": mu, "p_supply": ps, "density": "dowson-higginson"},
+            "film": {"shape": "formula", "h": f"{h0}*(1+{eps}*sin({w}*t))"}, "motion": {"t_end": t_end, "steps": steps},
+        }  # fmt: skip
+        solution = solve(load_scene(scene))
+        assert solution.converged and solution.mass_defect_run < 1e-10
+        found = solution.fields["p"] * solution.problem.p_unit - ps
+        errors.append(np.abs(found - (P * np.exp(1j * w * t_end)).real).max() / np.abs(P).max())
+        solution.destroy()
+    assert errors[1] < 1e-2 and errors[0] / errors[1] > 3.5
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_nothing_is_lost(name):
+    """In every step and in the whole run, walls moving either way; and a film at rest ends the same however it began."""
+    ends = []
+    for U in (1.0, -1.0):
+        solution = solve(load_scene(WEDGE | EFFECTS[name] | {"U": U}))
+        assert solution.converged, solution.message
+        assert solution.mass_defect < 1e-10 and solution.mass_defect_run < 1e-10
+        assert max(row["cavitated_fraction"] for row in solution.history) > 0.05
+        ends.append(solution.load)
+        solution.destroy()
+    assert ends[0] == pytest.approx(ends[1], rel=1e-8)  # waves are symmetric
+    still = WEDGE | EFFECTS[name] | {"film": WEDGE["film"][:1], "scheme": "face"}
+    loads = []
+    for motion in ({"t_end": 0.5, "steps": 25, "start": "full"}, {"t_end": 0.5, "steps": 5}):
+        solution = solve(load_scene(still | {"motion": motion}))
+        assert solution.converged, solution.message
+        loads.append(solution.load)
+        solution.destroy()
+    assert loads[0] == pytest.approx(loads[1], rel=1e-4)
+
+
+def test_heat_is_refused():
+    oil = {"fluid": {"mu": 0.01, "p_supply": 1e5}, "temperature": {"beta": 0.03}}
+    with pytest.raises(InputError, match="the heat that the oil stores"):
+        solve(load_scene(WEDGE | oil))
