@@ -14,8 +14,19 @@ from mpi4py import MPI
 from mpi_job import whole
 
 SIDES = {"round": "periodic", "p_side": 1e5}
+FED = {
+    "family": "bearing", "dimension": 2, "L_mm": 100, "width_mm": 60, "U": 2.0, "nx": 64, "ny": 37,
+    "fluid": {"mu": 0.02, "p_supply": 1e5},
+    "film": [{"shape": "journal", "c": 50e-6, "eccentricity": 0.7}],
+    "sides": {"west": "periodic", "east": "periodic"},
+    "supply": [
+        {"x_mm": [-10, 15], "y_mm": [13, 47], "p": 1e6},
+        {"shape": "hole", "at_mm": [60, 20], "diameter_mm": 1e-3, "p": 3e5},
+        {"shape": "hole", "at_mm": [40, 40], "diameter_mm": 9, "flow": 1e-6},
+    ],
+}  # fmt: skip
 # name: (scene, changes). Sizes that no number of ranks divides; lines cut by the ranks, or too few of them; periodic in x.
-CASES: dict[str, tuple[str, dict[str, Any]]] = {
+CASES: dict[str, tuple[Any, dict[str, Any]]] = {
     "line": ("problem3", {"n": 53}),
     "plane": ("problem4", {"nx": 61, "ny": 47, "p_a": 1e5, "p_b": 1e5, "p_side": 1e5}),
     "even": ("rough", {"nx": 64, "ny": 50}),
@@ -23,6 +34,7 @@ CASES: dict[str, tuple[str, dict[str, Any]]] = {
     "flat": ("problem4", {"nx": 31, "ny": 1, "scheme": "upwind"}),
     "dimples": ("textured_slider", {"K": 2, "nx": 53, "ny": 67}),
     "ring": ("journal", {"nx": 72, "ny": 37, "eccentricity": 0.7, **SIDES}),
+    "fed": (FED, {}),
     "obstacles": (
         "obstacle_bratu",
         {"nx": 50, "ny": 61, "v_upper": 0.3, "v_lower": "0.28 - 10*((x - 0.2)^2 + (y - 0.2)^2)"},
@@ -36,7 +48,7 @@ def run(name: str, method: str = "fas") -> tuple[dict[str, Any], dict[str, np.nd
     from lcp_lube import load_scene, solve
 
     scene, changes = CASES[name]
-    stopping = {"eps1": 1e-9 if scene.startswith("obstacle") else 1e-10}
+    stopping = {"eps1": 1e-9 if name == "obstacles" else 1e-10}
     solution = solve(load_scene(scene, changes), method=method, stopping=stopping)
     fields = {key: whole(solution.problem.grid, values) for key, values in solution.fields.items()}
     record = {

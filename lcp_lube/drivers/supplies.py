@@ -5,6 +5,9 @@ grows with P_s and falls with the others' pressures (an M-function: the film's r
 gives R_s(P_s), which never grows. Newton's method on Q - R, with the exact derivative of the discrete film at its signs, ends
 after a handful of solves, each started from the last. That leaves A, B, c and every method as they are; sharing one unknown
 among a supply's cells would put a dense row into each of their matrices, grids and kernels.
+
+Large films, whose factors would cost more than their multigrid, begin with the pressures and derivatives that half their points
+have each way; Broyden's update keeps the derivatives near.
 """
 
 from dataclasses import dataclass, replace
@@ -21,7 +24,7 @@ from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.supplies import Supply, supply_flows
 from ..problems.solution import Outcome, Solution
-from ..scenes.scene import Derived, Solvable
+from ..scenes.scene import Derived, Scene, Solvable
 from .ask import Ask
 from .chain import Chain
 from .compose import Inner
@@ -30,6 +33,7 @@ from .linearised import Feed, Linear
 MOST_SOLVES = 40
 TOLERANCE = 1e-10  # of the largest flow: by how much what a source gives may differ from what the film takes
 FIRST = 0.5  # part of p_s behind a restrictor, to begin with
+LARGE = 60_000  # points of a film in the plane that is not factored
 
 
 @dataclass(frozen=True)
@@ -70,8 +74,13 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     model: Model = scene.model  # type: ignore[attr-defined]
     supplies = model.supplies
     known = ask.start.settings.get("supply_pressures") if ask.start is not None else None
-    P = np.array(known if known is not None and len(known) == len(supplies) else _first(model))
     free = np.array([one.open for one in supplies])
+    P, film = _coarse(scene, ask, inner, free)
+    if known is not None and len(known) == len(supplies):
+        P = np.array(known)
+    elif P is None:
+        P = np.array(_first(model))
+    last: tuple[Array, Array] | None = None  # pressures and flows
     chain = Chain(ask, inner)
     for count in range(1, MOST_SOLVES + 1):
         held = tuple(Supply(one.region, float(p)) for one, p in zip(supplies, P, strict=True))
@@ -87,8 +96,15 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         starved = (off > TOLERANCE) & (misfit[:, 0] > 0.0) & (P <= 0.0)
         if np.max(off) <= TOLERANCE or starved.any() or count == MOST_SOLVES:
             break
-        slope = misfit[free, 2:] * _slopes(problem, solution.fields, free) + np.diag(misfit[free, 1])
-        P[free] = np.maximum(P[free] + np.linalg.solve(slope, -misfit[free, 0]), 0.0)
+        if film is None:
+            slopes = _slopes(problem, solution.fields, free)
+        else:
+            if last is not None and (moved := P[free] - last[0]).any():
+                film += np.outer(flows[free] - last[1] - film @ moved, moved) / (moved @ moved)
+            last, slopes = (P[free], flows[free]), film
+        P = P.copy()
+        P[free] += np.linalg.solve(misfit[free, 2:] * slopes + np.diag(misfit[free, 1]), -misfit[free, 0])
+        P[free] = np.maximum(P[free], 0.0)
     if solution.converged and np.max(off) > TOLERANCE:
         worst = int(np.argmax(np.where(starved, off, 0.0) if starved.any() else off))
         if starved.any():
@@ -104,6 +120,22 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     solution.settings["supply_pressures"] = [float(p) for p in P]
     solution.because(f"supplies: pressures {found} Pa, found in {count} solves")
     return solution.judged()
+
+
+def _coarse(scene: Solvable, ask: Ask, inner: Inner, free: Array) -> tuple[Array | None, Array | None]:
+    """Pressures of a large film with half the points each way, and dQ_s/dP_t of those that are free there. Collective."""
+    facts = scene.facts(ask.comm)
+    if not isinstance(scene, Scene) or facts.dim == 1 or facts.size <= LARGE:
+        return None, None
+    coarse = scene.with_shape(tuple(n // 2 for n in scene.shape))
+    solution = solve(coarse, replace(ask, start=None), inner)
+    try:
+        if not solution.converged:
+            return None, None
+        problem: Any = solution.problem
+        return np.array(solution.settings["supply_pressures"]), _slopes(problem, solution.fields, free)
+    finally:
+        solution.destroy()
 
 
 def _first(model: Model) -> list[float]:

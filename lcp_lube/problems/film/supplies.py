@@ -215,7 +215,8 @@ def _nearest(grid: Grid, place: tuple[float, float]) -> NDArray[np.bool_]:
     best = (round(float(far[j, i]) / (MARGIN * grid.spacing[0])), grid.comm.rank, int(j), int(i))
     _, rank, j, i = grid.comm.allreduce(best, MPI.MIN)
     mine = np.zeros(grid.box, dtype=bool)
-    mine[j, i] = rank == grid.comm.rank
+    if rank == grid.comm.rank:  # the others' boxes may be smaller
+        mine[j, i] = True
     return mine
 
 

@@ -1,12 +1,16 @@
 """What nonlinear multigrid for films and for obstacles share: the order of cycles, full multigrid, and when it stalls."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from math import inf
 from time import perf_counter
 from typing import Any
 
+import numpy as np
+
 from ...errors import InputError
+from ...problems.grid import Grid
 from ...problems.solution import Step
 from ..job import Job
 from ..method import Method
@@ -56,9 +60,7 @@ class Cycles(Method):
 
     @property
     def details(self) -> dict[str, Any]:
-        """What the JSON tells of a run, see `levels.record`. Collective."""
-        from .levels import record
-
+        """What the JSON tells of a run, see `record`. Collective."""
         return record(self._levels, self.problem.grid, self._taken - 1, self._first, self.norm)
 
     @property
@@ -110,3 +112,22 @@ class Cycles(Method):
 
     def advance(self) -> Step:
         raise NotImplementedError
+
+
+def record(levels: Sequence[Any], grid: Grid, cycles: int, first: float, last: float) -> dict[str, Any]:
+    """What the JSON tells of a run. Collective.
+
+    levels: coarse to fine, their visits and own seconds; cycles: after full multigrid; work_units: relaxed points over points;
+    convergence_factor: geometric mean of the cycles', which have taken the norm from `first` to `last`.
+    """
+    apart = grid.reduce.sum(np.array([sum(level.work for level in levels if level.split)]))
+    measured = cycles > 0 and 0 < last < inf and 0 < first < inf
+    return {
+        "levels": [
+            {"nx": v.nx, "ny": v.ny, "iterations": v.visits, "linear_iterations": 0, "time_s": v.seconds}
+            for v in reversed(levels)
+        ],
+        "cycles": max(cycles, 0),
+        "work_units": (sum(level.work for level in levels if not level.split) + apart) / grid.size,
+        "convergence_factor": (last / first) ** (1.0 / cycles) if measured else None,
+    }

@@ -30,6 +30,7 @@ EXACT = (1200, 5000, 10_000)  # points of the coarsest grid once the cycles have
 EXTREME = 1000.0  # film ratio above which a small ||G|| says little of p, and the corrections have to be small too
 SETTLED = 1e-8  # of the largest pressure: what they may then be in the mean
 SCALED = 1e-3  # the most by which all pressures and voids are scaled (`Fas._balance`)
+FED = 3e-5  # of the certificate's tolerance: the flow that a film with supplies may lose, 3e-12 in parts of what flows
 BORDER = 4  # lines on either side of the border between two ranks
 
 
@@ -65,9 +66,10 @@ class Fas(Cycles):
         with self.stages("assembly"):
             self._levels = levels.hierarchy(levels.finest(problem), self._harmonic)
         self._begin(start is not None)
-        self._c_norm = problem.reduce.norm(problem.c)
+        self._c_norm = problem.reduce.norm(problem.c) if problem.held is None else self._norms()[0]
         h = problem.scheme.h
-        self._extreme = problem.reduce.max(h) > EXTREME * problem.reduce.min(h)
+        # An edge of a supply may lie as near to a side as one likes: what drives the film there has no scale for the rest.
+        self._extreme = problem.held is not None or problem.reduce.max(h) > EXTREME * problem.reduce.min(h)
         self._correction = 0.0
         if start is not None:
             self.z = start["p"] + problem.scheme.b_C.ravel() * start["r"]
@@ -84,13 +86,26 @@ class Fas(Cycles):
 
     @z.setter
     def z(self, value: Array) -> None:
-        self._tools.put(self._levels[0], self.problem.grid, self._levels[0].z, value)
+        level = self._levels[0]
+        self._tools.put(level, self.problem.grid, level.z, value)
+        if level.held is not None:
+            level.z[level.held] = level.given
 
     @property
     def fields(self) -> Fields:
         z = self._tools.own(self._levels[0], self.problem.grid)
         p, r = self._kernels.pressure_and_void(z, self.problem.scheme.b_C)
         return {"p": p.ravel(), "r": r.ravel()}
+
+    def _norms(self) -> tuple[float, float]:
+        """||G|| and the size of its terms; before the first step of a film with supplies, what sides and supplies drive."""
+        level = self._levels[0]
+        self._tools.held.settle(level)
+        sums = np.array(self._kernels.norms(level.z, level.kx, level.ky, level.c, level.carry))
+        if level.comm is not None:
+            level.comm.Allreduce(sums.copy(), sums)
+        residual, terms = np.sqrt(sums)
+        return float(residual), float(terms)
 
     def _norm(self) -> float:
         """||G|| / ||c||; where rounding in G's sums alone exceeds eps1, on very fine grids, relative to that. Collective.
@@ -99,16 +114,13 @@ class Fas(Cycles):
         drive next to nothing beside the wall, the certificate sees more of it than ||G|| does: then eps1 times the ratio of
         its mass defect or residual to a tenth of what may be.
         """
-        level = self._levels[0]
-        sums = np.array(self._kernels.norms(level.z, level.kx, level.ky, level.c, level.carry))
-        if level.comm is not None:
-            level.comm.Allreduce(sums.copy(), sums)
-        residual, terms = np.sqrt(sums)
+        residual, terms = self._norms()
         norm = float(residual / (max(self._c_norm, 16 * EPS * terms / self.eps1) or 1.0))
         if norm > self._rest:
             return norm
         seen = self.problem.certify(self.fields, self.eps1)
-        return max(norm, self._rest * max(seen.measures["mass_defect"], seen.measures["residual"]) / (self._share * seen.tol))
+        lost = seen.measures["mass_defect"] / (self._share if self.problem.held is None else FED)
+        return max(norm, self._rest * max(lost, seen.measures["residual"] / self._share) / seen.tol)
 
     def _balance(self) -> None:
         """Scale pressures up and voids down, or the reverse, so that what enters the film is what it stores. Collective.
@@ -187,6 +199,8 @@ class Fas(Cycles):
             where = (level.first, level.by_x, level.by_y, self._harmonic)
             self._transfer.interpolate(level.z, coarse.part(self._seen(coarse, coarse.z)), level.kx, level.ky, *where)
             level.share(level.z)
+        if level.held is not None:
+            level.z[level.held] = level.given
 
     @staticmethod
     def _seen(coarse: Any, z: Array) -> Array:
@@ -203,6 +217,7 @@ class Fas(Cycles):
     def _descend(self, k: int) -> None:
         level, coarse = self._levels[k], self._levels[k + 1]
         self._relax(level, self.options.pre, False)
+        self._tools.held.settle(level)
         self._tools.restrict(level, coarse, coarse.c, self._harmonic)
         self._transfer.inject(level.z, coarse.part(coarse.old), level.first, level.by_x, level.by_y)
         coarse.gather(coarse.old)
@@ -216,7 +231,10 @@ class Fas(Cycles):
         where = (level.first, level.by_x, level.by_y)
         new, old = (coarse.part(self._seen(coarse, z)) for z in (coarse.z, coarse.old))
         fine = (level.z, new, old, level.kx, level.ky)
+        at_supplies = None if level.held is None else level.z[level.held]
         self._correction = self._transfer.correct(*fine, *where, self._harmonic, self._truncation)  # type: ignore[arg-type]
+        if level.held is not None:
+            level.z[level.held] = at_supplies
         level.share(level.z)
         if o.front:
             self._relax_fronts(level)
@@ -228,7 +246,8 @@ class Fas(Cycles):
         # What lies beyond a periodic side must be new at each sweep: else fronts that cross it wander for ever.
         parts = front if any(level.periodic) else 2 if level.split else 1
         for count in (front // parts + (n < front % parts) for n in range(parts)):
-            level.work += self._fronts.relax_front(level.z, level.kx, level.ky, level.c, count, width, level.carry)
+            arrays = (level.z, level.kx, level.ky, level.c)
+            level.work += self._fronts.relax_front(*arrays, count, width, level.carry, level.held, level.slips)
             level.share(level.z)
 
     def _relax(self, level: Any, sweeps: int, down: bool) -> None:
@@ -236,11 +255,18 @@ class Fas(Cycles):
 
         That makes up for what these did not hear of: the factor is that of one rank, where without it it doubles.
         """
-        for count in [1] * sweeps if level.periodic[0] else [sweeps] * bool(sweeps):
-            self._kernels.sweep(level.z, level.kx, level.ky, level.c, count, down, level.carry)
+        arrays = (level.z, level.kx, level.ky, level.c)
+        for count in [1] * sweeps if level.periodic[0] or level.held is not None else [sweeps] * bool(sweeps):
+            if level.held is not None:
+                self._tools.held.sweep(*arrays, level.spans, 1, level.z.shape[0], down, level.carry)
+            else:
+                self._kernels.sweep(*arrays, count, down, level.carry)
             level.share(level.z)
         if sweeps and level.split:
             for first in (0, level.z.shape[0] - BORDER - 2):
+                if level.held is not None:
+                    self._tools.held.sweep(*arrays, level.spans, first + 1, first + BORDER, down, level.carry)
+                    continue
                 rows, faces = slice(first, first + BORDER + 2), slice(first, first + BORDER + 3)
                 carry = None if level.carry is None else level.carry[rows]
                 self._kernels.sweep(level.z[rows], level.kx[rows], level.ky[faces], level.c[rows], 1, down, carry)

@@ -5,10 +5,12 @@ region of one pressure, which they hardly move.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...base.compiled import kernel
 from ...base.parallel import Array
 from .fronts import relax_pairs
+from .held import free_spans
 from .kernels import balance_row
 
 MOST_STEPS = 60
@@ -18,17 +20,26 @@ SWEEPS, RESCUE_SWEEPS, MOST_SWEEPS = 8, 32, 4096  # between two steps; where the
 
 
 @kernel
-def solve(z: Array, kx: Array, ky: Array, c: Array, ring_x: bool, ring_y: bool, carry: Array | None = None) -> bool:
+def solve(
+    z: Array,
+    kx: Array,
+    ky: Array,
+    c: Array,
+    ring_x: bool,
+    ring_y: bool,
+    carry: Array | None = None,
+    held: NDArray[np.bool_] | None = None,
+) -> bool:
     """Solve G(z) = c in place, arrays as in `kernels`; returns whether the signs of z settled.
 
     Each step is followed by sweeps, which bring order into the signs where steps alone cycle. Where the signs do not settle,
     z is the best that was met.
     """
-    ny, nx = z.shape[0] - 2, z.shape[1] - 2
+    spans = free_spans(np.zeros(z.shape, dtype=np.bool_) if held is None else held)
     best, least, stalled, rescue, singular = z.copy(), np.inf, 0, RESCUE_SWEEPS, 0
     for _ in range(MOST_STEPS):
         full = z > 0.0
-        stepped = newton_step(z, kx, ky, c, ring_x, ring_y, carry)
+        stepped = newton_step(z, kx, ky, c, ring_x, ring_y, carry, held)
         wrap(z, ring_x, ring_y)
         if stepped and (full == (z > 0.0)).all():
             return True
@@ -39,10 +50,11 @@ def solve(z: Array, kx: Array, ky: Array, c: Array, ring_x: bool, ring_y: bool, 
         if stalled == PATIENCE or not stepped:
             sweeps, rescue, stalled = rescue, min(2 * rescue, MOST_SWEEPS), 0
         for s in range(sweeps):
-            for m in range(ny):
-                relax_pairs(z, kx, ky, c, ny - m if s % 2 else m + 1, 1, nx + 1, carry)
+            for k in range(len(spans)):
+                at = len(spans) - 1 - k if s % 2 else k
+                relax_pairs(z, kx, ky, c, spans[at, 0], spans[at, 1], spans[at, 2], carry)
             wrap(z, ring_x, ring_y)
-        size = residual_square(z, kx, ky, c, carry)
+        size = residual_square(z, kx, ky, c, carry, held)
         stalled = 0 if size < 0.8 * least else stalled + 1
         if size < least:
             best[:], least = z, size
@@ -60,13 +72,16 @@ def wrap(z: Array, ring_x: bool, ring_y: bool) -> None:
 
 
 @kernel
-def residual_square(z: Array, kx: Array, ky: Array, c: Array, carry: Array | None = None) -> float:
-    """||c - G(z)||^2."""
+def residual_square(
+    z: Array, kx: Array, ky: Array, c: Array, carry: Array | None = None, held: NDArray[np.bool_] | None = None
+) -> float:
+    """||c - G(z)||^2 of the points that are free."""
     G, total = np.zeros(z.shape[1]), 0.0
     for m in range(1, z.shape[0] - 1):
         balance_row(z, kx, ky, m, G, carry)
         for i in range(1, z.shape[1] - 1):
-            total += (c[m, i] - G[i]) ** 2
+            if held is None or not held[m, i]:
+                total += (c[m, i] - G[i]) ** 2
     return total
 
 
@@ -79,7 +94,16 @@ def place(a: int, n: int, ring: bool) -> int:
 
 
 @kernel
-def newton_step(z: Array, kx: Array, ky: Array, c: Array, ring_x: bool, ring_y: bool, carry: Array | None = None) -> bool:
+def newton_step(
+    z: Array,
+    kx: Array,
+    ky: Array,
+    c: Array,
+    ring_x: bool,
+    ring_y: bool,
+    carry: Array | None = None,
+    held: NDArray[np.bool_] | None = None,
+) -> bool:
     """z += J^-1 (c - G(z)) for the signs of z; False where J is singular: a line is cavitated all the way round.
 
     J is column diagonally dominant: no pivoting is needed. The shorter direction runs fastest, so that the band is narrow.
@@ -99,6 +123,9 @@ def newton_step(z: Array, kx: Array, ky: Array, c: Array, ring_x: bool, ring_y: 
         balance_row(z, kx, ky, m, G, carry)
         for i in range(1, nx + 1):
             here, full = at[m, i], z[m, i] > 0.0
+            if held is not None and held[m, i]:
+                J[here, b] = 1.0
+                continue
             d[here] = c[m, i] - G[i]
             k_W, k_E, k_S, k_N = kx[m, i], kx[m, i + 1], ky[m, i], ky[m + 1, i]
             J[here, b] += k_W + k_E + k_S + k_N if full else 1.0
@@ -118,6 +145,8 @@ def newton_step(z: Array, kx: Array, ky: Array, c: Array, ring_x: bool, ring_y: 
         return False
     for m in range(1, ny + 1):
         for i in range(1, nx + 1):
+            if held is not None and held[m, i]:
+                continue
             full = z[m, i] > 0.0
             new = z[m, i] + d[at[m, i]]
             if (new > 0.0) != full:  # a pressure has become a flow of void, or the other way round

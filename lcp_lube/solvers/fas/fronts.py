@@ -35,23 +35,57 @@ def relax_pairs(z: Array, kx: Array, ky: Array, c: Array, m: int, start: int, en
 
 
 @kernel
-def relax_front(z: Array, kx: Array, ky: Array, c: Array, count: int, width: int, carry: Array | None = None) -> int:
+def relax_front(
+    z: Array,
+    kx: Array,
+    ky: Array,
+    c: Array,
+    count: int,
+    width: int,
+    carry: Array | None = None,
+    held: NDArray[np.bool_] | None = None,
+    slips: NDArray[np.bool_] | None = None,
+) -> int:
     """`count` sweeps, to and fro, over the points within `width` cells of a front; returns how many points were relaxed.
+
+    held : points that are left out; slips : those of them about which points are swept as they are at fronts.
 
     Where fronts are rare, and twice as wide a strip takes in less than a tenth of the points, it is that, swept twice as often.
     """
-    spans, found = front_spans(z, 2 * width)
+    seen = z if slips is None else np.where(slips, -1.0, z)
+    spans, found = front_spans(seen, 2 * width)
     points = (spans[:found, 2] - spans[:found, 1]).sum()
     if points > 0.1 * (z.shape[0] - 2) * (z.shape[1] - 2):
-        spans, found = front_spans(z, width)
+        spans, found = front_spans(seen, width)
         points = (spans[:found, 2] - spans[:found, 1]).sum()
     else:
         count *= 2
+    if held is not None:
+        spans, found = without(spans, found, held)
     for s in range(count):
         for k in range(found):
             at = found - 1 - k if s % 2 == 1 else k
             relax_pairs(z, kx, ky, c, spans[at, 0], spans[at, 1], spans[at, 2], carry)
     return count * points
+
+
+@kernel
+def without(spans: NDArray[np.int32], found: int, held: NDArray[np.bool_]) -> tuple[NDArray[np.int32], int]:
+    """What is left of spans without the points that are held."""
+    out, n = np.empty((2 * found + 64, 3), dtype=np.int32), 0
+    for k in range(found):
+        m, i, stop = spans[k, 0], spans[k, 1], spans[k, 2]
+        while i < stop:
+            begin = i
+            while i < stop and not held[m, i]:
+                i += 1
+            if i > begin:
+                if n == out.shape[0]:
+                    out = np.concatenate((out, np.empty((n, 3), dtype=np.int32)))
+                out[n, 0], out[n, 1], out[n, 2] = m, begin, i
+                n += 1
+            i += 1
+    return out, n
 
 
 @kernel

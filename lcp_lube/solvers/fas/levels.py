@@ -1,18 +1,16 @@
 """Grids of the nonlinear multigrid: their points, how these are dealt to the ranks, and their coefficients."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from math import inf
-from typing import Any
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from ...base.parallel import Array
 from ...errors import InputError
 from ...problems.film.lubrication import LubricationProblem
 from ...problems.grid import Grid
-from . import exact, kernels, transfer
+from . import exact, held, kernels, transfer
 
 FEWEST = 3  # points a side of the coarsest grid, at least
 FEWEST_LINES = 8  # of a rank; grids with fewer are held whole by every rank
@@ -37,6 +35,8 @@ class Level:
     by_x, by_y : which points the next coarser grid leaves out.
     carry : of a time step (`kernels`); void : the part of it that b_C r is made of, what leaves and what is stored; scale : z
         of a cavitated cell over that of the finer grid's, which is smaller.
+    held, given, spans, slips : of a film with supplies (`held`): which points are held, their pressures, the runs of free
+        points, and the held points that the next coarser grid sees beside their place.
     """
 
     nx: int
@@ -57,6 +57,10 @@ class Level:
     carry: Array | None = None
     void: tuple[Array, Array] | None = None
     scale: Array | None = None
+    held: NDArray[np.bool_] | None = None
+    given: Array = field(default_factory=lambda: np.zeros(0))
+    spans: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int32))
+    slips: NDArray[np.bool_] | None = None
     visits: int = 0
     seconds: float = 0.0
     work: float = 0.0  # relaxed points
@@ -133,8 +137,6 @@ def finest(problem: LubricationProblem) -> Level:
     InputError : the void that leaves a cell is not what enters the next one, which no scheme of this package does.
     """
     grid, s = problem.grid, problem.scheme
-    if s.held is not None:
-        raise InputError("--method fas: the cells of supplies are held, on which its grids have no word; use active-set")
     lost, carried = kernels.lost_void(s.b_E, s.b_W, s.b_C)
     if grid.reduce.max(np.array([lost])) > 1e-12 * grid.reduce.max(np.array([carried])):
         raise InputError("--method fas: what leaves a cell of this scheme does not enter the next one; use active-set")
@@ -144,6 +146,11 @@ def finest(problem: LubricationProblem) -> Level:
         put(level, grid, level.void[0], -s.b_E)
         put(level, grid, level.void[1], s.storage)
         _carry(level)
+    if problem.held is not None:
+        mask, pressures = np.zeros_like(level.z), np.zeros_like(level.z)
+        put(level, grid, mask, problem.held.mask.astype(float))
+        put(level, grid, pressures, problem.held.pressures(problem.p_unit))
+        held.hold(level, mask, pressures)
     return level
 
 
@@ -198,25 +205,6 @@ def put(level: Level, grid: Grid, into: Array, values: Array) -> None:
     level.share(into)
 
 
-def record(levels: Sequence[Level], grid: Grid, cycles: int, first: float, last: float) -> dict[str, Any]:
-    """What the JSON tells of a run. Collective.
-
-    levels: coarse to fine, their visits and own seconds; cycles: after full multigrid; work_units: relaxed points over points;
-    convergence_factor: geometric mean of the cycles', which have taken the norm from `first` to `last`.
-    """
-    apart = grid.reduce.sum(np.array([sum(level.work for level in levels if level.split)]))
-    measured = cycles > 0 and 0 < last < inf and 0 < first < inf
-    return {
-        "levels": [
-            {"nx": v.nx, "ny": v.ny, "iterations": v.visits, "linear_iterations": 0, "time_s": v.seconds}
-            for v in reversed(levels)
-        ],
-        "cycles": max(cycles, 0),
-        "work_units": (sum(level.work for level in levels if not level.split) + apart) / grid.size,
-        "convergence_factor": (last / first) ** (1.0 / cycles) if measured else None,
-    }
-
-
 def _empty(nx: int, ny: int, y0: int, y1: int, comm: MPI.Comm | None, whole: bool, periodic: tuple[bool, bool]) -> Level:
     n = ny if whole or comm is None else y1 - y0
     z, c, kx, ky = (np.zeros(shape) for shape in ((n + 2, nx + 2), (n + 2, nx + 2), (n + 2, nx + 3), (n + 3, nx + 2)))
@@ -255,11 +243,14 @@ def _coarser(fine: Level, harmonic: bool) -> Level | None:
     beyond_x = by_x and fine.nx % 2 == 0 and not fine.periodic[0]
     beyond_y = by_y and fine.ny % 2 == 0 and not fine.periodic[1] and last
     flags = (fine.first, by_x, by_y, harmonic)
-    transfer.coarsen_x_faces(fine.kx, fine.ky, coarse.part(coarse.kx), *flags, beyond_x)
-    transfer.coarsen_y_faces(fine.kx, fine.ky, coarse.part(coarse.ky), *flags, beyond_y)
+    kx, ky = (fine.kx, fine.ky) if fine.held is None else held.marked(fine)
+    transfer.coarsen_x_faces(kx, fine.ky, coarse.part(coarse.kx), *flags, beyond_x)
+    transfer.coarsen_y_faces(fine.kx, ky, coarse.part(coarse.ky), *flags, beyond_y)
     for a in (coarse.kx, coarse.ky):
         coarse.gather(a)
     restrict(fine, coarse, coarse.c, harmonic, fine.c)
+    if fine.held is not None:
+        held.coarser(fine, coarse)
     coarse.f, coarse.old = coarse.c.copy(), np.zeros_like(coarse.z)
     if fine.void is not None:
         leaves, stored, before = (np.zeros_like(coarse.z) for _ in range(3))
@@ -279,14 +270,15 @@ def solve(level: Level) -> bool:
     if level.nx * n * (4 * min(level.nx, n) + 1) > MOST_ENTRIES:  # odd numbers of points between periodic sides
         return False
     if comm is None or not level.split:
-        return exact.solve(level.z, level.kx, level.ky, level.c, *level.periodic, level.carry)
+        return exact.solve(level.z, level.kx, level.ky, level.c, *level.periodic, level.carry, level.held)
     whole = _empty(level.nx, n, 0, n, None, False, level.periodic)
     whole.carry = None if level.carry is None else np.zeros_like(whole.z)
-    for name in ("z", "c", "kx", "ky", *(["carry"] if whole.carry is not None else [])):
+    whole.held = None if level.held is None else np.zeros(whole.z.shape, dtype=bool)
+    for name in ("z", "c", "kx", "ky", *(name for name in ("carry", "held") if getattr(whole, name) is not None)):
         mine, out = getattr(level, name), getattr(whole, name)
         rows = mine[1 if level.y0 else 0 : level.y1 - level.y0 + 1 if level.y1 < n else None]
         np.concatenate(comm.allgather(np.ascontiguousarray(rows)), out=out)
-    settled = exact.solve(whole.z, whole.kx, whole.ky, whole.c, *level.periodic, whole.carry)
+    settled = exact.solve(whole.z, whole.kx, whole.ky, whole.c, *level.periodic, whole.carry, whole.held)
     level.z[:] = whole.z[level.y0 : level.y1 + 2]
     return settled
 

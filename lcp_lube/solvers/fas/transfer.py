@@ -197,7 +197,9 @@ def interpolate(z: Array, coarse: Array, kx: Array, ky: Array, y0: int, by_x: bo
 
 @kernel
 def series(a: float, b: float) -> float:
-    """Conductance of two faces one behind the other."""
+    """Conductance of two faces one behind the other; one that lies in a supply, -1, resists nothing (`held.marked`)."""
+    if a < 0.0 or b < 0.0:
+        return max(a, b, 0.0)
     return a * b / (a + b) if a + b > 0.0 else 0.0
 
 
@@ -223,7 +225,7 @@ def coarsen_x_faces(kx: Array, ky: Array, out: Array, y0: int, by_x: bool, by_y:
                     k *= 1.0 - share(ky[m - 1, at], ky[m, at], harmonic)
                 elif d == 1:
                     k *= share(ky[m + 1, at], ky[m + 2, at], harmonic)
-                total += k
+                total += max(k, 0.0)
             out[J + 1, f] = 0.5 * total if by_y else total
 
 
@@ -247,5 +249,5 @@ def coarsen_y_faces(kx: Array, ky: Array, out: Array, y0: int, by_x: bool, by_y:
                     value *= 1.0 - share(kx[at, i - 1], kx[at, i], harmonic)
                 elif d == 1:
                     value *= share(kx[at, i + 1], kx[at, i + 2], harmonic)
-                total += value
+                total += max(value, 0.0)
             out[f, k] = 0.5 * total if by_y else total

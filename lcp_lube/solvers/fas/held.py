@@ -1,0 +1,129 @@
+"""Multigrid for films with supplies: cells that are held at a pressure on every grid, and sweeps that leave them out.
+
+A held cell has z = P > 0 and no equation; its neighbours see it as they see any other. Corrections leave it as it is. A coarse
+point that lies in a supply is held, and the coarse face to it resists as the fine faces up to the supply do. Where a supply
+slips between the coarse points, those about it are held in its place: the functions that a grid corrects by then vanish there,
+as they should. So a hole of one point is one or four points on every grid.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.compiled import kernel
+from ...base.parallel import Array
+from . import transfer
+from .kernels import balance_row, relax
+
+if TYPE_CHECKING:
+    from .levels import Level
+
+
+def hold(level: Level, mask: Array, pressures: Array) -> None:
+    """Hold a level's cells; mask (1 where held) and pressures have frames that are up to date."""
+    level.held = mask > 0.0
+    level.spans = free_spans(level.held)
+    level.given = pressures[level.held]
+    level.z[level.held] = level.given
+    level.c[level.held] = 0.0  # what is restricted
+
+
+def settle(level: Level) -> None:
+    """Give held cells the right-hand side that leaves them no residual."""
+    if level.held is not None:
+        settle_rows(level.z, level.kx, level.ky, level.c, level.held, level.carry)
+
+
+def coarser(fine: Level, coarse: Level) -> None:
+    """Hold a coarse level's cells as the finer one's are. Collective."""
+    assert fine.held is not None
+    where = (fine.first, fine.by_x, fine.by_y)
+    mask, pressures = fine.held.astype(float), np.where(fine.held, fine.z, 0.0)
+    pressures[fine.held] = fine.given
+    of_coarse = [np.zeros_like(coarse.z) for _ in range(2)]
+    for values, out in zip((mask, pressures), of_coarse, strict=True):
+        transfer.inject(values, coarse.part(out), *where)
+        coarse.gather(out)
+    seen = np.zeros_like(fine.z)
+    ones = (np.ones_like(fine.kx), np.ones_like(fine.ky))
+    held = coarse.part(of_coarse[0])
+    transfer.correct(seen, held, np.zeros_like(held), *ones, *where, False, 0)  # type: ignore[arg-type]
+    lonely = fine.held & (seen == 0.0)
+    lonely[0], lonely[-1], lonely[:, 0], lonely[:, -1] = False, False, False, False
+    fine.slips = lonely if lonely.any() else None  # what is swept as fronts are
+    parts = [np.zeros_like(coarse.z) for _ in range(2)]
+    for values, out in zip((mask, pressures), parts, strict=True):
+        given = np.where(lonely, values, 0.0)
+        into = (fine.z, *ones, given, coarse.part(out))
+        transfer.restrict(*into, *where, False, fine.periodic[0], False, None)  # type: ignore[arg-type]
+        coarse.collect(out)
+        coarse.share(out)
+    added = (parts[0] > 0.0) & (of_coarse[0] == 0.0)
+    of_coarse[0][added] = 1.0
+    of_coarse[1][added] = parts[1][added] / parts[0][added]
+    hold(coarse, *of_coarse)
+
+
+def marked(level: Level) -> tuple[Array, Array]:
+    """kx and ky with -1 at the faces between two held cells, which resist nothing to what lies beside a supply."""
+    kx, ky, held = level.kx.copy(), level.ky.copy(), level.held
+    assert held is not None
+    kx[:, 1:-1][held[:, :-1] & held[:, 1:]] = -1.0
+    ky[1:-1][held[:-1] & held[1:]] = -1.0
+    return kx, ky
+
+
+@kernel
+def free_spans(held: NDArray[np.bool_]) -> NDArray[np.int32]:
+    """Row, first column and last column + 1 of the runs of points that are not held, upwards."""
+    ny, nx = held.shape[0] - 2, held.shape[1] - 2
+    spans, found = np.empty((ny + 64, 3), dtype=np.int32), 0
+    for m in range(1, ny + 1):
+        i = 1
+        while i <= nx:
+            while i <= nx and held[m, i]:
+                i += 1
+            begin = i
+            while i <= nx and not held[m, i]:
+                i += 1
+            if i > begin:
+                if found == spans.shape[0]:
+                    spans = np.concatenate((spans, np.empty((found, 3), dtype=np.int32)))
+                spans[found, 0], spans[found, 1], spans[found, 2] = m, begin, i
+                found += 1
+    return spans[:found]
+
+
+@kernel
+def sweep(
+    z: Array,
+    kx: Array,
+    ky: Array,
+    c: Array,
+    spans: NDArray[np.int32],
+    first: int,
+    last: int,
+    down: bool,
+    carry: Array | None,
+) -> None:
+    """A sweep over the free points of rows first to last, as `kernels.sweep`."""
+    n = spans.shape[0]
+    for s in range(n):
+        k = n - 1 - s if down else s
+        if first <= spans[k, 0] <= last:
+            relax(z, kx, ky, c, spans[k, 0], spans[k, 1], spans[k, 2], carry)
+
+
+@kernel
+def settle_rows(z: Array, kx: Array, ky: Array, c: Array, held: NDArray[np.bool_], carry: Array | None) -> None:
+    """c = G(z) at the held points."""
+    G = np.zeros(z.shape[1])
+    for m in range(1, z.shape[0] - 1):
+        if held[m, 1:-1].any():
+            balance_row(z, kx, ky, m, G, carry)
+            for i in range(1, z.shape[1] - 1):
+                if held[m, i]:
+                    c[m, i] = G[i]
