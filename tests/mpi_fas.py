@@ -35,6 +35,7 @@ CASES: dict[str, tuple[Any, dict[str, Any]]] = {
     "dimples": ("textured_slider", {"K": 2, "nx": 53, "ny": 67}),
     "ring": ("journal", {"nx": 72, "ny": 37, "eccentricity": 0.7, **SIDES}),
     "fed": (FED, {}),
+    "lobes": ("three_lobe_journal", {"nx": 73, "ny": 21, "attitude_deg": 50.0}),
     "obstacles": (
         "obstacle_bratu",
         {"nx": 50, "ny": 61, "v_upper": 0.3, "v_lower": "0.28 - 10*((x - 0.2)^2 + (y - 0.2)^2)"},

@@ -1,12 +1,14 @@
-"""A ring with axial grooves: the films between the grooves are solved one by one, their fields put together and certified."""
+"""A ring with axial grooves: the films between them are solved by themselves, their fields put together and certified."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from mpi4py import MPI
 from petsc4py import PETSc
 
+from ..base.parallel import Array
+from ..base.together import on_all_ranks
 from ..problems.facts import Facts
 from ..problems.film.effects import FaceFactors
 from ..problems.film.grooves import GroovedProblem, Pad
@@ -14,7 +16,7 @@ from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.grid import Grid
 from ..problems.solution import Fields, Outcome, Solution
-from ..problems.transfer import Pick, numbers
+from ..problems.transfer import Pick, fetch, numbers
 from ..scenes.scene import Derived, Solvable
 from .ask import Ask, Start
 from .chain import added
@@ -50,12 +52,15 @@ class PadFilm(Derived):
         return by.on(problem.grid, j, (self.first + i) % by.grid.shape[0]).film(problem)
 
 
+Films = list[tuple[Pad, PadFilm]]
+
+
 def applies(scene: Solvable, ask: Ask) -> bool:
     """Whether the film has grooves."""
     return bool(getattr(getattr(scene, "model", None), "grooves", ()))
 
 
-def pad_films(scene: Solvable) -> list[tuple[Pad, PadFilm]]:
+def pad_films(scene: Solvable) -> Films:
     """The films between the grooves, and where they lie."""
     model: Model = scene.model  # type: ignore[attr-defined]
     return [(pad, PadFilm(scene, film, (pad.n, *scene.shape[1:]), pad.first)) for pad, film in model.pads(scene.shape)]
@@ -77,57 +82,100 @@ def films_of(
 
 
 def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
-    """The ring's solution from those of its films; the first one that fails tells how the whole ends. Collective."""
+    """The ring's solution from those of its films; the first one that fails tells how the whole ends. Collective.
+
+    On several ranks the films are solved side by side, each by some of the ranks.
+    """
     ring = scene.build(ask.comm)
     assert isinstance(ring, GroovedProblem)  # as `applies` found
-    n = ring.grid.local_size
-    fields = {"p": np.zeros(n), "r": np.zeros(n)}
-    for inside, groove in zip(ring.columns, ring.grooves, strict=True):
-        fields["p"][inside] = groove.p / ring.p_unit
-    near = ask.start if ask.start is not None and ask.start.problem.grid.shape == ring.grid.shape else None
-    done: list[Solution] = []
-    dry = np.zeros(n)
-    times: dict[str, float] = {}
-    for pad, film in pad_films(scene):
-        start = None
-        if near is not None:
-            at = film.build(ask.comm)
-            take = pick_pad(near.problem.grid, at.grid, pad.first)
-            start = Start(at, {name: take(values) for name, values in near.fields.items()}, near.settings)
-        solution = inner(film, replace(ask, start=start))
-        if start is not None:
-            start.problem.destroy()
-        spread, within = place_pad(solution.problem.grid, ring.grid, pad)
-        for name, values in solution.fields.items():
-            fields[name] = np.where(within, spread(values), fields[name])
-        if (of_pad := getattr(solution.problem, "dry", None)) is not None:
-            dry = np.where(within, spread(of_pad), dry)
-        times = added(times, solution.times)
-        done.append(solution)
-    if dry.any():
+    comm, films = ask.mpi, pad_films(scene)
+    # Factors of effects lie on the whole ring, and every rank takes part in handing them out.
+    apart = not hasattr(scene, "by") and not scene.facts(ask.comm).moving
+    groups = min(comm.size, len(films)) if apart else 1
+    some = comm.Split(comm.rank % groups, comm.rank) if groups > 1 else comm
+    mine = [k for k in range(len(films)) if _group(films, groups)[k] == comm.rank % groups]
+    ask = replace(ask, comm=some) if groups > 1 else ask
+    starts = _starts(ring, films, mine, ask, comm)
+    done: dict[int, Solution] = {}
+    with on_all_ranks(comm):
+        for k in mine:
+            done[k] = inner(films[k][1], replace(ask, start=starts.get(k)))
+    for start in starts.values():
+        start.problem.destroy()
+    fields, dry = _spread(ring, films, done, comm)
+    if ring.reduce.max(dry) > 0:
         ring = ring.revised(dry)  # type: ignore[assignment]
-    failed = next((one for one in done if not one.converged), done[0])
-    steps = [step for one in done for step in one.steps]
-    message = f"{len(done)} films between grooves; {failed.message}"
-    failed.because(f"{len(done)} films between grooves, solved one by one")
-    outcome: Outcome = failed.outcome
-    certificate = ring.certify(fields, failed.settings["eps1"])
-    for one in done:
+    first = {k: (one.outcome, one.message, one.steps, one.settings, one.times) for k, one in done.items()}
+    told = sorted({k: one for part in comm.allgather(first) for k, one in part.items()}.items())
+    for one in done.values():
         one.destroy()
-    levels: list[dict] = []
-    changed = {"problem": ring, "fields": fields, "outcome": outcome, "message": message, "certificate": certificate}
-    return replace(failed, **changed, steps=steps, times=times, levels=levels).judged()  # type: ignore[arg-type]
+    if groups > 1:
+        some.Free()
+    outcome, message, _, settings, _ = next((one for _, one in told if one[0] is not Outcome.CONVERGED), told[0][1])
+    how = "solved one by one" if groups == 1 else f"solved by {groups} groups of ranks side by side"
+    settings = {**settings, "why": [f"{len(films)} films between grooves, {how}", *settings["why"]]}
+    times: dict[str, float] = {}
+    for _, (*_, seconds) in told:
+        times = added(times, seconds)
+    return Solution(
+        ring,
+        fields,
+        outcome,
+        f"{len(films)} films between grooves; {message}",
+        ring.certify(fields, settings["eps1"]),
+        [step for _, one in told for step in one[2]],
+        settings=settings,
+        times=times,
+    ).judged()
+
+
+def _group(films: Films, groups: int) -> list[int]:
+    """Which group solves each film: the largest first, to the group that has the least."""
+    load, out = [0] * groups, [0] * len(films)
+    for k in sorted(range(len(films)), key=lambda k: -films[k][0].n):
+        out[k] = load.index(min(load))
+        load[out[k]] += films[k][0].n
+    return out
+
+
+def _starts(ring: LubricationProblem, films: Films, mine: list[int], ask: Ask, comm: MPI.Comm) -> dict[int, Start]:
+    """Fields of an answer on the same ring for each of this rank's films, if there is one. Collective."""
+    near = ask.start
+    if near is None or near.problem.grid.shape != ring.grid.shape:
+        return {}
+    at = {k: films[k][1].build(ask.comm) for k in mine}
+    boxes = {k: np.broadcast_arrays(*numbers(problem.grid)) for k, problem in at.items()}
+    j = [boxes[k][0].ravel() for k in mine]
+    i = [(films[k][0].first + boxes[k][1].ravel()) % ring.grid.shape[0] for k in mine]
+    have = [(0, near.problem.grid, np.array(list(near.fields.values())))]
+    none = np.zeros(0, dtype=np.int64)
+    values = fetch(comm, have, 0 * np.concatenate([*j, none]), np.concatenate([*j, none]), np.concatenate([*i, none]))
+    ends = np.cumsum([one.size for one in j])
+    parts = np.split(values, ends[:-1], axis=1) if mine else []
+    return {
+        k: Start(at[k], dict(zip(near.fields, part, strict=True)), near.settings) for k, part in zip(mine, parts, strict=True)
+    }
+
+
+def _spread(ring: GroovedProblem, films: Films, done: dict[int, Solution], comm: MPI.Comm) -> tuple[Fields, Array]:
+    """The ring's fields from its films and grooves, and which of its points a film took to be cavitated. Collective."""
+    j, i = (one.ravel() for one in np.broadcast_arrays(*numbers(ring.grid)))
+    which, column = np.full(j.size, -1), np.zeros(j.size, dtype=np.int64)
+    for k, (pad, _) in enumerate(films):
+        at = (i - pad.first) % ring.grid.shape[0]
+        which, column = np.where(at < pad.n, k, which), np.where(at < pad.n, at, column)
+    have = []
+    for k, one in done.items():
+        dry = getattr(one.problem, "dry", None)
+        fields = (one.fields["p"], one.fields["r"], dry if dry is not None else np.zeros(one.problem.grid.local_size))
+        have.append((k, one.problem.grid, np.array(fields)))
+    p, r, dry = fetch(comm, have, which, j, column)
+    for inside, groove in zip(ring.columns, ring.grooves, strict=True):
+        p[inside] = groove.p / ring.p_unit
+    return {"p": p, "r": r}, dry
 
 
 def pick_pad(ring: Grid, pad: Grid, first: int) -> Pick:
     """Takes a film's values from the ring's grid."""
     j, i = numbers(pad)
     return Pick(ring, pad, j, (first + i) % ring.shape[0])
-
-
-def place_pad(pad: Grid, ring: Grid, where: Pad) -> tuple[Pick, NDArray[np.bool_]]:
-    """Takes the ring's values from a film's grid (any value outside the film), and which of the ring's points are inside."""
-    j, i = numbers(ring)
-    column = (i - where.first) % ring.shape[0]
-    inside = np.broadcast_to(column < where.n, ring.box).ravel()
-    return Pick(pad, ring, j, np.minimum(column, where.n - 1)), inside

@@ -1,8 +1,10 @@
 """Bilinear interpolation of a field from one grid of a rectangle to another one, on any number of ranks."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
@@ -133,3 +135,38 @@ class Pick:
     def destroy(self) -> None:
         for obj in (self._from, self._to):
             obj.destroy()
+
+
+def fetch(
+    comm: MPI.Comm,
+    have: Sequence[tuple[int, Grid, Array]],
+    which: NDArray[np.int64],
+    j: NDArray[np.int64],
+    i: NDArray[np.int64],
+) -> Array:
+    """Values at numbered points of several grids, each of which some of the ranks share. Collective.
+
+    Parameters
+    ----------
+    have : of each grid that this rank has a part of: its number, itself, and the values there, shape (fields, local_size).
+    which, j, i : number of the grid, line and column of each point that this rank asks for, shape (m,).
+
+    Returns
+    -------
+    Shape (fields, m); 0 where no grid has the point.
+    """
+    boxes = [(k, grid.y_start, grid.y_end, grid.x_start, grid.x_end) for k, grid, _ in have]
+    places: list[list[NDArray[np.int64]]] = []
+    asked: list[list[tuple[int, NDArray[np.int64]]]] = []
+    for there in comm.allgather(boxes):
+        inside = [np.flatnonzero((which == k) & (y0 <= j) & (j < y1) & (x0 <= i) & (i < x1)) for k, y0, y1, x0, x1 in there]
+        at = [(j[m] - y0) * (x1 - x0) + i[m] - x0 for m, (_, y0, _, x0, x1) in zip(inside, there, strict=True)]
+        places.append([m for m in inside if m.size])
+        asked.append([(n, one) for n, one in enumerate(at) if one.size])
+    answers = comm.alltoall([[have[n][2][:, at] for n, at in one] for one in comm.alltoall(asked)])
+    fields = comm.allreduce(max((values.shape[0] for _, _, values in have), default=0), MPI.MAX)
+    out = np.zeros((fields, which.size))
+    for mine, values in zip(places, answers, strict=True):
+        for points, found in zip(mine, values, strict=True):
+            out[:, points] = found
+    return out
