@@ -54,7 +54,8 @@ def save(
     shape (ny, nx), or (nx,) in 1D, in the natural order, whatever the number of ranks.
 
     - .npz: the fields, x of shape (nx,), y of shape (ny,) in 2D, and two JSON strings: `units` by field, and `result`, the
-      object that --json prints. Rank 0 gathers it all: take .h5 or .vts where that is too much for it.
+      object that --json prints; of plane films `fronts`, rows (number of the curve, x, y). Rank 0 gathers it all: take .h5 or
+      .vts where that is too much for it.
     - .nc: NetCDF with the names and units of the CF conventions, the numbers of the answer among them, for xarray and many
       others; by rank 0 too.
     - .pvd: a collection of ParaView's of this one answer, with its .vts beside it; `save_series` writes one of many.
@@ -180,6 +181,9 @@ def _save_npz(solution: Solution, grid: Grid | Frame, fields: dict[str, Array], 
     arrays |= dict(zip("xy", coordinates(grid), strict=False))
     units = {name: units[name] for name in arrays}
     result = json.dumps(finite(as_dict(solution)))
+    if grid.dim == 2 and solution.problem.kind == "lubrication":
+        curves = [np.column_stack([np.full(len(curve), k), curve]) for k, curve in enumerate(solution.front_curves())]
+        arrays["fronts"] = np.concatenate([np.empty((0, 3)), *curves])
     if grid.comm.rank > 0:
         return
     entries = {**arrays, "units": np.array(json.dumps(units)), "result": np.array(result)}

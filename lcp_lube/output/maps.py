@@ -129,7 +129,7 @@ def _to_the_sides(at: Array, start: float, length: float) -> Array:
 
 
 def outline(axes: Axes, picture: Picture, hatch: str) -> None:
-    """The cavity's edge as a white line and its inside dotted."""
+    """The cavity's fronts as white lines and its inside dotted."""
     sign = np.pad(picture.sign, 1, mode="edge")  # up to the sides, as the colours reach
     if not sign.min() < 0:
         return
@@ -144,5 +144,5 @@ def outline(axes: Axes, picture: Picture, hatch: str) -> None:
 
     with rc_context({"hatch.color": hatch}):
         axes.contourf(x, y, sign, levels=[sign.min() - 1.0, 0.0], colors="none", hatches=[".."])
-    if sign.max() > 0:
-        axes.contour(x, y, sign, levels=[0.0], colors="white", linewidths=1.2)
+    for curve in picture.curves:
+        axes.plot(picture.along[0] * curve[:, 0], picture.across[0] * curve[:, 1], color="white", lw=1.2)

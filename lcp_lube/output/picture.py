@@ -11,6 +11,7 @@ from ..problems.box import BoxProblem
 from ..problems.film.cavity import cavity_sign
 from ..problems.film.edges import jumps_of
 from ..problems.film.exact import ExactSolution
+from ..problems.film.front_curves import front_curves
 from ..problems.film.fronts import middle_row
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Solution
@@ -28,8 +29,8 @@ class Picture:
 
     scales : what a field's values are large or small against; differences below `noise` of it say nothing.
     Of a lubrication problem: sign, positive in the full film and negative in the cavity (`cavity.cavity_sign`); void, the void
-    fraction at the face `ahead` (m) of each point, where the scheme knows it; middle, the row of the middle line. Empty and 0
-    for other problems.
+    fraction at the face `ahead` (m) of each point, where the scheme knows it; middle, the row of the middle line; curves, the
+    fronts in the plane (`front_curves`). Empty and 0 for other problems.
     """
 
     solution: Solution
@@ -43,6 +44,7 @@ class Picture:
     ahead: Array = field(default_factory=lambda: np.zeros(1))
     middle: int = 0
     exact: ExactSolution | None = None
+    curves: list[Array] = field(default_factory=list)
 
     def noise(self, name: str) -> float:
         """Differences of a field that are not drawn, in parts of its scale: rounding, and of the void what the run left."""
@@ -147,6 +149,7 @@ def collect(solution: Solution) -> Picture | None:
             "ahead": ahead(problem)[taken(grid.shape[0], nx)],
             "middle": int(np.argmin(np.abs(rows - middle_row(problem)))),
             "exact": problem.exact() if problem.exact is not None else None,
+            "curves": front_curves(problem, solution.fields["p"], np.where(signs < 0, r, 0.0)) if grid.dim == 2 else [],
         }
     if grid.comm.rank > 0:
         return None

@@ -108,6 +108,17 @@ class Shown:
         """
         OUTPUT["save"].load()(self, path, boundary)
 
+    def front_curves(self) -> list[Array]:
+        """x and y (m) along the fronts of a plane film's cavities, shape (points, 2); on rank 0. Collective.
+
+        Raises
+        ------
+        InputError : no film in the plane.
+        """
+        from .film.front_curves import front_curves
+
+        return front_curves(self.problem, self.fields["p"], self.fields["r"])  # type: ignore[arg-type]
+
     def gradient(self, quantity: str, keys: Sequence[str]) -> dict[str, float]:
         """Derivatives of one of the numbers by numbers of the scene, SI: dQ/da by key, as --set takes them. Collective.
 

@@ -121,7 +121,7 @@ def read_h5(path: Path, solution: Solution) -> Fields:
 def read(path: Path, solution: Solution) -> Fields:
     if path.suffix == ".npz":
         with np.load(path) as content:
-            return {name: content[name] for name in content if name not in ("units", "result")}
+            return {name: content[name] for name in content if name not in ("units", "result", "fronts")}
     return read_h5(path, solution) if path.suffix == ".h5" else read_vtk(path)
 
 

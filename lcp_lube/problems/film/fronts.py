@@ -24,12 +24,13 @@ class Fronts:
 
     Attributes
     ----------
-    ruptures, reformations : pairs of arrays, numbers of the rank's lines and x, m. shift : by how much longer the cavities of
-        each line are than the cells of their points, m, shape (ny_local,).
+    ruptures, reformations : numbers of the rank's lines and of the rank's points behind the front (the number of these at the
+        east side), and x, m. shift : by how much longer the cavities of each line are than the cells of their points, m, shape
+        (ny_local,).
     """
 
-    ruptures: tuple[NDArray[np.int64], Array]
-    reformations: tuple[NDArray[np.int64], Array]
+    ruptures: tuple[NDArray[np.int64], NDArray[np.int64], Array]
+    reformations: tuple[NDArray[np.int64], NDArray[np.int64], Array]
     shift: Array
 
 
@@ -60,22 +61,22 @@ def line_fronts(problem: LubricationProblem, p: Array, r: Array) -> Fronts:
     ruptures = _rises_through(film, Q[row, i] / problem.U, before, (x + ahead)[i], y[row])
     shift = np.zeros(grid.box[0])
     np.add.at(shift, row, (x - 0.5 * behind)[i] - ruptures)
-    starts = row, ruptures
+    starts = row, i, ruptures
     row, i = np.nonzero(~cavity[:, 1:-1] & cavity[:, :-2])
     pressed = (s.k_W * p.reshape(grid.box))[row, i]
     lacking = (s.b_W * grid.ghosted(r, outside=0.0)[1:-1, :-2])[row, i]
     known = pressed + lacking > 0.0
     back = np.where(known & (lacking > 0.0), pressed / np.where(known, pressed + lacking, 1.0), 0.5)
     np.add.at(shift, row, ((0.5 - back) * behind[i]))
-    closes, places = row, (x[i] - back * behind[i])
+    closes, ends, places = row, i, (x[i] - back * behind[i])
     if grid.x_end == grid.shape[0] and opens[1]:
         row = np.flatnonzero(cavity[:, -2])
         if problem.p_sides[1] > 0:  # before a side above the cavitation pressure
-            closes = np.append(closes, row)
+            closes, ends = np.append(closes, row), np.append(ends, np.full(row.size, x.size))
             places = np.append(places, np.full(row.size, start + grid.lengths[0] - 0.5 * steps[-1]))
         else:
             shift[row] += 0.5 * steps[-1]
-    return Fronts(starts, (closes, places), shift)
+    return Fronts(starts, (closes, ends, places), shift)
 
 
 def fronts(problem: LubricationProblem, found: Fronts | None) -> tuple[list[float], list[float]]:
@@ -89,7 +90,7 @@ def fronts(problem: LubricationProblem, found: Fronts | None) -> tuple[list[floa
     grid = problem.grid
     start, L = grid.origin[0], grid.lengths[0]
     here = middle_row(problem) - grid.y_start
-    own = [places[rows == here].tolist() for rows, places in (found.ruptures, found.reformations)]
+    own = [places[rows == here].tolist() for rows, _, places in (found.ruptures, found.reformations)]
     parts = grid.comm.allgather(own)
     all_of = ([place for part in parts for place in part[k]] for k in (0, 1))
     if grid.periodic[0]:
@@ -111,20 +112,27 @@ def cavitated_area(problem: LubricationProblem, found: Fronts | None, p: Array, 
     stretch, dy = grid.stretch(grid.y), grid.spacing[1] if grid.dim == 2 else 1.0
     more = found.shift[:, None] * line_weights(grid) * stretch * dy
     if grid.dim == 2:
-        dry = grid.ghosted(cavity.astype(float), outside=0.0) > 0.0
-        frame, steps = grid.ghosted(p, outside=0.0), grid.steps(1)[:, None]
-        here, width = frame[1:-1, 1:-1], grid.widths(0) * grid.spacing[0] * stretch
-        sides_of = ((dry[:-2], frame[2:], steps[:-1], steps[1:]), (dry[2:], frame[:-2], steps[1:], steps[:-1]))
-        for beside, beyond, step, far in sides_of:
-            rise = (beyond[:, 1:-1] - here) / far
-            back = np.where(rise > 0.0, np.minimum(here / np.where(rise > 0.0, rise, 1.0), step), 0.5 * step)
-            front = beside[:, 1:-1] & ~dry[1:-1, 1:-1]
+        width, steps = grid.widths(0) * grid.spacing[0] * stretch, grid.steps(1)[:, None]
+        for (front, back), step in zip(across(grid, p, cavity), (steps[:-1], steps[1:]), strict=True):
             more = more + np.sum(np.where(front, (0.5 * step - back) * width, 0.0), axis=1, keepdims=True)
         for end, rim, p_side in zip(sides(grid)[2:], grid.rims(1), problem.p_sides[2:], strict=True):
             if p_side == 0.0:  # the cavity reaches up to it
                 at_side = np.where(end, 0.5 * rim * dy * width, 0.0) * cavity.reshape(grid.box)
                 more = more + np.sum(at_side, axis=1, keepdims=True)
     return max(area + problem.reduce.sum(more), 0.0)  # of a cavity of one point the two fronts may cross
+
+
+def across(grid: Grid, p: Array, cavity: NDArray[np.bool_]) -> list[tuple[NDArray[np.bool_], Array]]:
+    """Full points beside a cavity to the south, and to the north, and how far from each its front lies, m. Collective."""
+    dry = grid.ghosted(cavity.astype(float), outside=0.0) > 0.0
+    frame, steps = grid.ghosted(p, outside=0.0), grid.steps(1)[:, None]
+    here, out = frame[1:-1, 1:-1], []
+    sides_of = ((dry[:-2], frame[2:], steps[:-1], steps[1:]), (dry[2:], frame[:-2], steps[1:], steps[:-1]))
+    for beside, beyond, step, far in sides_of:
+        rise = (beyond[:, 1:-1] - here) / far
+        back = np.where(rise > 0.0, np.minimum(here / np.where(rise > 0.0, rise, 1.0), step), 0.5 * step)
+        out.append((beside[:, 1:-1] & ~dry[1:-1, 1:-1], back))
+    return out
 
 
 def first_cavity(grid: Grid, ruptures: list[float], reformations: list[float]) -> tuple[float | None, float | None]:

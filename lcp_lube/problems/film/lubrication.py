@@ -50,6 +50,7 @@ class LubricationProblem:
     kind = "lubrication"
     shares_grid = False  # a time step's with those of the others
     plain = True  # whether the coefficients are those of the film alone
+    tops = False  # whether the largest pressure is looked for between the points (`peak`)
 
     def __init__(
         self,

@@ -14,6 +14,7 @@ from .flows import friction, side_flows
 from .forces import ambient, corner_flows, forces, open_pressures
 from .fronts import cavitated_area, first_cavity, fronts, line_fronts
 from .line import Line, known_of
+from .peak import Window
 from .supplies import supply_flows
 
 if TYPE_CHECKING:
@@ -158,9 +159,11 @@ def _read(problem: LubricationProblem, p_pa: Array, r: Array) -> _Read:
 
 
 def largest_pressure(problem: LubricationProblem, p_pa: Array) -> tuple[float, list[float] | None]:
-    """p - p_c in Pa at the points and sides, and where. Collective."""
+    """p - p_c in Pa at the points and sides, where `tops` is so between the points too (`peak`), and where. Collective."""
     grid = problem.grid
-    largest, place = _largest(problem, p_pa.reshape(grid.box), grid.x[0], grid.y[:, 0])
+    largest, place = largest_of(problem, p_pa.reshape(grid.box), grid.x[0], grid.y[:, 0])
+    if problem.tops and place is not None:
+        largest, place = Window(grid, p_pa, place, problem.p_sides).top()
     low = [*grid.origin[: grid.dim]]
     middle = [a + 0.5 * length for a, length in zip(low, grid.lengths, strict=True)]
     for k, p_side in enumerate(open_pressures(problem)):
@@ -177,11 +180,11 @@ def thinnest(problem: LubricationProblem) -> tuple[float, list[float] | None]:
     ends = [np.array([start, start + length]) for start, length in zip(grid.origin, grid.lengths, strict=False)]
     places = [(ends[0], y)] + ([(x, ends[1]), (ends[0], ends[1])] if grid.dim == 2 else [])
     films = [(problem.scheme.h, x, y)] + [(film(a[None, :], b[:, None]), a, b) for a, b in places]
-    thickness, place = max((_largest(problem, -h, a, b) for h, a, b in films), key=lambda found: found[0])
+    thickness, place = max((largest_of(problem, -h, a, b) for h, a, b in films), key=lambda found: found[0])
     return -thickness, place
 
 
-def _largest(problem: LubricationProblem, values: Array, x: Array, y: Array) -> tuple[float, list[float] | None]:
+def largest_of(problem: LubricationProblem, values: Array, x: Array, y: Array) -> tuple[float, list[float] | None]:
     """Largest of values over y (rows) and x (columns) and its place; NaN: nowhere. Collective.
 
     Of equals, to within the tolerance of a solve, the first in x and then y, whatever the ranks.

@@ -17,7 +17,8 @@ from .flows import friction, line_weights, point_weights, sheared_faces, side_fl
 from .forces import forces, shaft_angle
 from .grooves import GroovedProblem
 from .lubrication import LubricationProblem
-from .quantities import largest_pressure, thinnest
+from .peak import Window
+from .quantities import largest_of, largest_pressure, thinnest
 from .reynolds import sides
 from .supplies import supply_flows
 from .tangent import Tangent
@@ -147,7 +148,7 @@ def _friction(problem: LubricationProblem, tangent: Tangent, p: Array, r: Array,
 
 
 def _largest(problem: LubricationProblem, p: Array) -> Slope:
-    """The point with the largest pressure, the first of equals; nothing where a side has it."""
+    """The point with the largest pressure, the first of equals, or those around the top; nothing where a side has it."""
     grid, reduce = problem.grid, problem.reduce
     largest = reduce.max(p)
     at_side = max((q for q in problem.p_sides if q), default=0.0) / problem.p_unit > largest
@@ -155,7 +156,12 @@ def _largest(problem: LubricationProblem, p: Array) -> Slope:
     index = grid.first + np.arange(p.size)
     chosen = -reduce.max(np.where(near, -index.astype(float), -np.inf))
     ties = int(reduce.sum(near.astype(float))) - 1
-    return Slope(np.where(index == chosen, 0.0 if at_side else problem.p_unit, 0.0), np.zeros(p.size), 0 if at_side else ties)
+    by_p = np.where(index == chosen, 1.0, 0.0)
+    if problem.tops and not at_side:
+        place = largest_of(problem, p.reshape(grid.box), grid.x[0], grid.y[:, 0])[1]
+        assert place is not None  # a solution's pressures are numbers
+        by_p = Window(grid, p, place, [q / problem.p_unit for q in problem.p_sides]).slopes(p.size)
+    return Slope(by_p * (0.0 if at_side else problem.p_unit), np.zeros(p.size), 0 if at_side else ties)
 
 
 def _flow(problem: LubricationProblem, tangent: Tangent, side: str) -> Slope:
