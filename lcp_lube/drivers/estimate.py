@@ -9,8 +9,8 @@ grid is what does not fall like that: fronts that stand anywhere in their cells,
 A quarter instead of a third is a little worse as a value and far better known: the whole third is right to a part of n that no
 three values tell, so that an error within which 95 % lie is six times the median one. Where n is less than a hundredth of d_k/3
 second order is beyond doubt, and the whole third is taken, with the error n. The constants were taken from the loads, largest
-pressures and frictions of 200 random plane films; `benchmarks/estimates.py` draws others and tells how often the truth was within
-the estimate, and how far below. The answer is the one of the two with the lesser error.
+pressures and frictions of 200 random plane films; `benchmarks/estimates.py` draws others and tells how often the truth was
+within the estimate, and how far below. The answer is the one of the two with the lesser error.
 
 Values from grids so coarse that the scheme did not see the film's edges tell nothing of those that do, and are left out. Values
 cannot tell of what no grid has met: where the film has detail inside cells that the scheme does not see (`misplaced_film`), the

@@ -307,7 +307,8 @@ def test_a_journal_is_drawn_in_its_bush(scene: str) -> None:
     pressure = np.stack([np.asarray(part) for part in bearing.lines[0].get_data()])
     peak = pressure[:, np.nanargmax(np.hypot(*pressure))]
     angle = 90.0 + attitude + 360.0 * shown.quantities["p_max_at"][0] / solved.problem.grid.lengths[0]
-    assert (np.degrees(np.arctan2(peak[1], peak[0])) - angle + 180.0) % 360.0 == pytest.approx(180.0, abs=1.0)
+    off = (np.degrees(np.arctan2(peak[1], peak[0])) - angle + 180.0) % 360.0  # drawn at the points, told between them
+    assert off == pytest.approx(180.0, abs=1.0 + 180.0 / solved.problem.grid.shape[0])
     labels = {axes.get_xlabel() for axes in draw(shown).axes}
     assert "angle from x = 0 (°)" in labels
     solved.destroy()
