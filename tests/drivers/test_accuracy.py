@@ -172,6 +172,15 @@ def test_estimates_by_hand():
     assert estimated([1.2, 1.04, 1.04, 1.04], [0.0] * 4).relative >= 0.16 / 16 / 3
 
 
+def test_grids_that_did_not_see_the_edges_are_left_out():
+    """Loads of the textured slider: with edges inside cells the first three say nothing of grids whose lines lie on them."""
+    loads, shares = [-233.4, 353.6, -14.8, -246.51, -259.81, -264.61], [0.5, 0.4, 0.2, 0.0, 0.0, 0.0]
+    found = estimated(loads, shares)
+    assert found == estimated(loads[3:], [0.0] * 3) and found.extrapolated
+    assert found.relative < 0.02 < estimated(loads, [0.0] * 6).relative
+    assert estimated(loads[:5], shares[:5]).relative > 0.1  # two are too few to go by
+
+
 def test_jump_is_seen_where_values_do_not_show_it():
     """A step off the faces by the same length on several grids: equal values, and an estimate that is not fooled."""
     film = Pieces("steps", (0.0, 0.63 * L, L), (2e-5, 1e-5, 1e-5))
