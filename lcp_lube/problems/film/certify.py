@@ -1,12 +1,10 @@
 """What certifies a film's answer: how far it is from balance in every cell, from complementarity, from flow in = flow out."""
 
-from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.compiled import compiled
 from ...base.parallel import Array
 from ..certificate import Certificate, certificate_tol
 from .graded import GradedJacobian, Pivots, within_reach
@@ -20,7 +18,7 @@ if TYPE_CHECKING:
 UNIT = 2.0**-53  # largest relative error of one operation
 IDLE = 1e-8  # share of what the pressures alone would drive through the sides, below which a flow is none
 UNEVEN = 1e-4  # part of the flow that the rounding of pressures inside may make of a mass defect, at most
-MANY = 100_000  # points from which compiled loops, which spare memory, are worth being loaded
+BLOCK = 16_384  # cells that are looked at together
 LEAST = 1e-200  # below any void or pressure
 FINE = 1e-7  # of p_max: rounding that may leave less than this in p needs no closer look
 CHECKS = 30  # sets of full cells that the closer look may try
@@ -118,12 +116,16 @@ def misfits(problem: "LubricationProblem", p: Array, r: Array, p_max: float) -> 
 
     Collective.
     """
-    s, reduce = problem.scheme, problem.reduce
+    s, reduce, (ny, nx) = problem.scheme, problem.reduce, problem.grid.box
     framed = [problem.grid.ghosted(field, outside=0.0) for field in (p, r)]
-    many = problem.grid.size >= MANY and find_spec("numba")
-    loop: Any = compiled(cell_misfits) if many else array_misfits
     held = s.held if s.held is not None else np.zeros((0, 0), dtype=bool)
-    *squares, worst = loop(*framed, s.k_W, s.k_E, s.k_S, s.k_N, s.b_C, s.entering, s.c, held, p_max)
+    owned = (s.k_W, s.k_E, s.k_S, s.k_N, s.b_C, s.entering, s.c, held)
+    squares, worst, lines = np.zeros(4), 0.0, max(1, BLOCK // nx)
+    for j in range(0, ny, lines):  # so that what lies between is no more than the cache holds
+        for i in range(0, nx, BLOCK):
+            around, own = (np.s_[j : j + lines + beyond, i : i + BLOCK + beyond] for beyond in (2, 0))
+            *sums, off = cell_misfits(*(a[around] for a in framed), *(a[own] for a in owned), p_max)
+            squares, worst = squares + sums, np.maximum(worst, off)  # NaN stays NaN
     norms = [float(np.sqrt(reduce.sum(np.array([square])))) for square in squares]
     return *norms, reduce.max(np.array([worst]))  # type: ignore[return-value]
 
@@ -141,52 +143,12 @@ def cell_misfits(
     held: NDArray[np.bool_],
     p_max: float,
 ) -> tuple[float, float, float, float, float]:
-    """Sums of the squares of A p, B r, A p + B r - c and diag(A) p over this rank's points, and the worst cell; `compiled`.
+    """Sums of the squares of A p, B r, A p + B r - c and diag(A) p over some cells, and the worst one.
 
     p and r have a frame of neighbours. A cell's misfit, beyond the rounding of its own terms, is at least its diagonal times
     the change of p that mends it: it is told in parts of that for p_max, and where the cell is cavitated, of b_C if that is
     less. The norms cannot see a film that is thin, or pressures next to nothing, beside flows that are large.
     """
-    ny, nx = c.shape
-    pressure, void, balance, diagonal, worst = 0.0, 0.0, 0.0, 0.0, 0.0
-    for j in range(ny):
-        for i in range(nx):
-            here, west, east, south, north = p[j + 1, i + 1], p[j + 1, i], p[j + 1, i + 2], p[j, i + 1], p[j + 2, i + 1]
-            w, e, s, n = k_W[j, i], k_E[j, i], k_S[j, i], k_N[j, i]
-            if held.size and held[j, i]:
-                west = east = south = north = 0.0
-            x, y = w * (here - west) + e * (here - east), s * (here - south) + n * (here - north)
-            own, entering = b_C[j, i] * r[j + 1, i + 1], b_W[j, i] * r[j + 1, i]
-            a, b, k = x + y, own + entering, w + e + s + n
-            left = a + b - c[j, i]
-            pressure += a * a
-            void += b * b
-            balance += left * left
-            diagonal += (k * here) ** 2
-            terms = k * abs(here) + w * abs(west) + e * abs(east) + s * abs(south) + n * abs(north)
-            excess = abs(left) - 8 * 2.0**-53 * (terms + abs(b_C[j, i]) + abs(b_W[j, i]) + abs(c[j, i]))
-            if excess > 0.0:
-                moved = k * p_max if p_max > 0.0 else -b_C[j, i]  # all void: there is no other measure
-                if here < r[j + 1, i + 1] * p_max:
-                    moved = min(moved, -b_C[j, i])
-                worst = max(worst, excess / moved if moved > 0.0 else np.inf)
-    return pressure, void, balance, diagonal, worst
-
-
-def array_misfits(
-    p: Array,
-    r: Array,
-    k_W: Array,
-    k_E: Array,
-    k_S: Array,
-    k_N: Array,
-    b_C: Array,
-    b_W: Array,
-    c: Array,
-    held: NDArray[np.bool_],
-    p_max: float,
-) -> tuple[float, float, float, float, float]:
-    """`cell_misfits` by array arithmetic, where points are few or numba is missing."""
     here, void_here, entering = p[1:-1, 1:-1], r[1:-1, 1:-1], b_W * r[1:-1, :-2]
     around = (p[1:-1, :-2], p[1:-1, 2:], p[:-2, 1:-1], p[2:, 1:-1])
     if held.size:
