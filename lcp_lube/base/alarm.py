@@ -3,11 +3,11 @@
 import hashlib
 import os
 import re
-import time
 
 from mpi4py import MPI
 
 from ..errors import InputError
+from .together import all_come
 
 
 class Alarm:
@@ -25,13 +25,7 @@ class Alarm:
         """
         if seconds is None:
             seconds = min(6.0, 4.0 * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1)))
-        request = self._comm.Ibarrier()
-        end = time.monotonic() + seconds + min(0.25 * self.rank, 2.0)
-        while not request.Test():
-            if time.monotonic() > end:
-                return False
-            time.sleep(0.01)
-        return True
+        return all_come(self._comm, seconds + min(0.25 * self.rank, 2.0))
 
     def end_all(self, status: int) -> None:
         if not self.alone:

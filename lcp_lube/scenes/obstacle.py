@@ -2,20 +2,19 @@
 
 from typing import Annotated, ClassVar
 
-from petsc4py import PETSc
-from pydantic import Field, PrivateAttr, field_validator, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 
 from ..base.parallel import Array
 from ..problems.grid import Grid
 from ..problems.obstacle import ObstacleProblem
 from .formula import Formula, FormulaText
-from .scene import Scene
+from .semilinear import OneUnknownScene
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Surface = Annotated[float | str, FormulaText]
 
 
-class ObstacleScene(Scene):
+class ObstacleScene(OneUnknownScene):
     """-Lap v = lambda e^v where v touches no obstacle, v_lower <= v <= v_upper; defaults are the paper's data.
 
     Surfaces are numbers or formulas in x and y; inf and -inf stand for no obstacle.
@@ -31,17 +30,7 @@ class ObstacleScene(Scene):
     boundary: Surface = Field(0.0, description="v on the boundary")
     x: tuple[Finite, Finite] = Field((0.0, 1.0), description="the rectangle's sides")
     y: tuple[Finite, Finite] = Field((0.0, 1.0), description="the rectangle's sides")
-    n: int = Field(64, description="interior points a side")
-    nx: int | None = Field(None, description="interior points in x; default n")
-    ny: int | None = Field(None, description="interior points in y; default n")
     _coarse: bool = PrivateAttr(False)
-
-    @field_validator("n", "nx", "ny")
-    @classmethod
-    def _interior(cls, n: int | None) -> int | None:
-        if n is not None and n < 1:
-            raise ValueError("leaves no interior point; allowed are 1 and more")
-        return n
 
     @model_validator(mode="after")
     def _rectangle(self) -> "ObstacleScene":
@@ -51,28 +40,13 @@ class ObstacleScene(Scene):
                 raise ValueError(f"{name} = {[start, end]}: start < end is needed")
         return self
 
-    @property
-    def shape(self) -> tuple[int, ...]:
-        return self.nx or self.n, self.ny or self.n
-
     def with_shape(self, shape: tuple[int, ...]) -> "ObstacleScene":
         """The same scene on a grid that serves this one."""
         scene = self.model_copy(update={"nx": shape[0], "ny": shape[1]})
         scene._coarse = True
         return scene
 
-    def build(self, comm: PETSc.Comm | None = None) -> ObstacleProblem:
-        """The discrete problem on this scene's grid. Collective.
-
-        Raises
-        ------
-        InputError : obstacles that cross, a formula without a value, more ranks than the grid can be dealt to.
-        """
-        lengths = (self.x[1] - self.x[0], self.y[1] - self.y[0])
-        return self.problem_on(Grid(self.shape, lengths, comm, (self.x[0], self.y[0])))
-
     def problem_on(self, grid: Grid) -> ObstacleProblem:
-        """The discrete problem on a grid of the rectangle, or of a part of it (`problems.fold`). Collective."""
         v0 = None if self.v0 is None else Formula(self.v0)
         return ObstacleProblem(
             grid, self.lam, Formula(self.v_lower), Formula(self.v_upper), v0, self.on_boundary, coarse=self._coarse
@@ -80,7 +54,6 @@ class ObstacleScene(Scene):
 
     @property
     def rectangle(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Where x and y start and end."""
         return self.x, self.y
 
     @property

@@ -1,6 +1,6 @@
 """Scenes of semilinear equations on the unit square: Bratu, and Poisson with a cubic term."""
 
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from petsc4py import PETSc
@@ -15,19 +15,42 @@ from .scene import Count, Finite, NotNegative, Scene
 Rectangle = tuple[tuple[float, float], tuple[float, float]]
 
 
-class SemilinearScene(Scene):
-    """-Lap v = g(x, y, v) on the unit square, v given on its boundary; a subclass has g."""
+class OneUnknownScene(Scene):
+    """One unknown v on a rectangle."""
 
-    problem_kind: ClassVar[str] = "equations"
-    v0: Finite = Field(0.0, description="start of v at every point")
     n: Count = Field(64, description="interior points a side")
     nx: Count | None = Field(None, description="interior points in x; default n")
     ny: Count | None = Field(None, description="interior points in y; default n")
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Numbers of interior points, (nx, ny)."""
         return self.nx or self.n, self.ny or self.n
+
+    @property
+    def rectangle(self) -> Rectangle:
+        """Where x and y start and end."""
+        return (0.0, 1.0), (0.0, 1.0)
+
+    def problem_on(self, grid: Grid) -> Any:
+        """The discrete problem on a grid of the rectangle, or of a part of it (`problems.fold`). Collective."""
+        raise NotImplementedError
+
+    def build(self, comm: PETSc.Comm | None = None) -> Any:
+        """The discrete problem on this scene's grid. Collective.
+
+        Raises
+        ------
+        InputError : more ranks than the grid can be dealt to, values that are not finite, obstacles that cross.
+        """
+        (x0, x1), (y0, y1) = self.rectangle
+        return self.problem_on(Grid(self.shape, (x1 - x0, y1 - y0), comm, (x0, y0)))
+
+
+class SemilinearScene(OneUnknownScene):
+    """-Lap v = g(x, y, v) on the unit square, v given on its boundary; a subclass has g."""
+
+    problem_kind: ClassVar[str] = "equations"
+    v0: Finite = Field(0.0, description="start of v at every point")
 
     @property
     def source(self) -> Source:
@@ -39,27 +62,12 @@ class SemilinearScene(Scene):
         """v on the boundary; None for 0."""
         return None
 
-    @property
-    def rectangle(self) -> Rectangle:
-        """Where x and y start and end."""
-        return (0.0, 1.0), (0.0, 1.0)
-
     def inside(self, x: Array, y: Array) -> list[Array]:
         """What varies over the rectangle and is not v: the source, at v0 and beside it."""
         return [self.source.value(x, y, np.full(np.broadcast(x, y).shape, v)) for v in (self.v0, self.v0 + 1.0)]
 
     def problem_on(self, grid: Grid) -> SemilinearProblem:
-        """The discrete problem on a grid of the rectangle, or of a part of it (`problems.fold`). Collective."""
         return SemilinearProblem(grid, self.source, self.v0, self.on_boundary)
-
-    def build(self, comm: PETSc.Comm | None = None) -> SemilinearProblem:
-        """The discrete problem on this scene's grid. Collective.
-
-        Raises
-        ------
-        InputError : more ranks than the grid can be dealt to, or values on the boundary that are not finite.
-        """
-        return self.problem_on(Grid(self.shape, (1.0, 1.0), comm))
 
 
 class BratuScene(SemilinearScene):

@@ -67,7 +67,7 @@ def make_options(kind: type[T], given: dict[str, Any]) -> T:
     values, method = {}, kind.method
     for name, value in given.items():
         if name not in known:
-            near = nearest(name, known) or f"; known are {', '.join(known)}"
+            near = nearest(name, known) or (f"; known are {', '.join(known)}" if known else ", and no other")
             raise InputError(f"{method}.{name}: method {method} has no such option{near}")
         try:
             if known[name] is not str and isinstance(value, (str, bool)) and known[name] is not type(value):
