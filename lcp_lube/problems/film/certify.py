@@ -1,6 +1,6 @@
 """What certifies a film's answer: how far it is from balance in every cell, from complementarity, from flow in = flow out."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,8 +124,8 @@ def misfits(problem: "LubricationProblem", p: Array, r: Array, p_max: float) -> 
     for j in range(0, ny, lines):  # so that what lies between is no more than the cache holds
         for i in range(0, nx, BLOCK):
             around, own = (np.s_[j : j + lines + beyond, i : i + BLOCK + beyond] for beyond in (2, 0))
-            arrays: Any = (*(a[around] for a in framed), *(a[own] for a in owned))
-            *sums, off = cell_misfits(*arrays, p_max=p_max)
+            arrays = [*(a[around] for a in framed), *(a[own] for a in owned)]
+            *sums, off = cell_misfits(*arrays, p_max)  # type: ignore[arg-type, call-arg]
             squares, worst = squares + sums, np.maximum(worst, off)  # NaN stays NaN
     norms = [float(np.sqrt(reduce.sum(np.array([square])))) for square in squares]
     return *norms, reduce.max(np.array([worst]))  # type: ignore[return-value]
