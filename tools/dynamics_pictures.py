@@ -50,7 +50,7 @@ def axes_picture() -> None:
 def stored_void() -> None:
     """K and C of a ring fed from its ends over the frequency, with the void that is stored and without it."""
     scene = load_scene("ring_journal", n=240)
-    ratios = np.geomspace(0.03, 10.0, 12)
+    ratios = np.geomspace(0.03, 10.0, 48)
     with solve(scene) as solution:
         scale = scene.clearance / solution.load
         nu = [*(ratios * scene.omega)]

@@ -207,7 +207,7 @@ def test_text_and_bad_input(cli):
         (("squeeze",), "coefficients are of films"),
         (("dynamic_journal",), "leave [motion] out"),
         (("problem1", "--plot", "a.png"), "--speeds FROM:TO:N"),
-        (("journal", "--frequency", "-1"), "--frequency -1"),
+        (("journal", "--frequency", "1,1e300"), "--frequency 1e+300"),
         (("journal", "--speeds", "1:2:2"), "has no speed_rpm"),
         (("journal", "--frequency", "a"), "numbers in rad/s"),
         (("two_groove_journal", "--set", "groove_deg=179", "--set", "grooves_deg=[0,90]"), "overlap"),
@@ -216,6 +216,12 @@ def test_text_and_bad_input(cli):
     ):
         done = cli("coefficients", *words)
         assert done.status == 2 and message in done.lines[0] and len(done.lines) == 1
+
+
+def test_a_frequency_below_zero():
+    scene = load_scene("journal", nx=30, ny=6)
+    with solve(scene) as solution, pytest.raises(InputError, match="--frequency -1: numbers from 0"):
+        coefficients(scene, solution, [-1.0])
 
 
 def test_grooves_give_what_the_ends_lose():
