@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 
+from lcp_lube.problems.film.graded import whole
+
 LONG = np.longdouble
 BEYOND_LU = 1e12  # ratio of conductances at which factors in double precision are no longer to be trusted
 COLUMNS = ("i", "j", "k", "u", "b_i", "b_j", "p_i", "p_j", "r_i", "r_j")
@@ -163,10 +165,18 @@ def discretise(scene: Any) -> tuple[Faces, int, np.ndarray]:
         if plane
         else Line(*map(np.array, ([0.0] * 3, [0.0] * 2, [1.0] * 2, [0.0], [1.0])))
     )
-    jx, jy = jumps("x"), jumps("y")
+    around = kinds[0] == "periodic", plane and kinds[2] == "periodic"
+    jx, jy = (
+        [t + k * length for t in jumps(axis) for k in ((-1, 0, 1) if ring else (0,))]
+        for axis, ring, length in zip("xy", around, (*model.lengths, 0.0), strict=False)
+    )
 
     def film(x: Any, y: Any) -> np.ndarray:
         x, y = np.atleast_1d(x), np.atleast_1d(y)
+        x, y = (
+            np.where((t < -1e-9 * length) | (t > (1 + 1e-9) * length), t % length, np.clip(t, 0, length)) if ring else t
+            for t, ring, length in zip((x, y), around, (*model.lengths, 1.0), strict=False)
+        )
         return np.broadcast_to(model.gap(x[None, :], y[:, None]), (y.size, x.size))
 
     at_points, at_x_faces = film(x.points, y.points[1:-1]), film(x.faces, y.points[1:-1])
@@ -186,11 +196,9 @@ def discretise(scene: Any) -> tuple[Faces, int, np.ndarray]:
                 continue  # the face at 0
             along = lambda t, s, f=f: film(x.faces[f] if t is None else t, s)[0, 0]  # noqa: E731
             a, b = float(x.points[f]), float(x.points[f + 1])
+            a = b - float(x.gaps[f]) if around[0] else a
             if not plane and scheme == "face":
-                ring, L = kinds[0] == "periodic", model.lengths[0]
-                a = b - float(x.gaps[f]) if ring else a
-                marks = [t + k * L for t in jx for k in (-1, 0, 1)] if ring else jx
-                C, H = in_series(lambda t, ring=ring, L=L: film(t % L if ring else t, 0.0)[0], a, b, marks)
+                C, H = in_series(lambda t: film(t, 0.0)[0], a, b, jx)
             else:
                 C, H = resistance(along, a, b, float(at_x_faces[m, f]), place, strip, jx, jy)
             k = C * width / (6 * mu * float(x.gaps[f]))
@@ -213,6 +221,7 @@ def discretise(scene: Any) -> tuple[Faces, int, np.ndarray]:
                 continue
             for l in range(nx):
                 a, b = float(y.points[f]), float(y.points[f + 1])
+                a = b - float(y.gaps[f]) if around[1] else a
                 strip = (float(x.starts[l]), float(x.ends[l]))
                 across = lambda t, s, f=f: film(s, y.faces[f] if t is None else t)[0, 0]  # noqa: E731
                 C, _ = resistance(across, a, b, float(at_y_faces[f, l]), float(x.points[l + 1]), strip, jy, jx)
@@ -228,30 +237,51 @@ def discretise(scene: Any) -> tuple[Faces, int, np.ndarray]:
 
 
 def faces_of(problem: Any) -> tuple[Faces, int, np.ndarray]:
-    """What `discretise` returns, from the package's own coefficients, for a film whose faces depend on its cavities (rims)."""
-    s, grid = problem.scheme, problem.grid
-    ny, nx = grid.box
+    """What `discretise` returns, from the package's own coefficients, for a film whose faces depend on its cavities (rims).
+
+    Cells that supplies hold are sides to those around them. Collective.
+    """
+    s, grid, held = problem.scheme, problem.grid, problem.held
     around = (*grid.periodic, False)[:2]
     unit, p_side = LONG(problem.p_unit), problem.p_sides
+    names = ("k_W", "k_E", "k_S", "k_N", "couette_W", "couette_E", "b_C")
+    k_W, k_E, k_S, k_N, u_W, u_E, b_C = whole(grid, *(getattr(s, name) for name in names))
+    none = np.zeros(grid.box)
+    is_held, P = whole(grid, *((none, none) if held is None else (held.mask.astype(float), held.pressures(1.0))))
+    ny, nx = k_W.shape
     faces, dead = Faces(*([] for _ in range(10))), np.zeros(nx * ny, dtype=bool)
+
+    def between(i: tuple[int, int], j: tuple[int, int], k: float, **flow: Any) -> None:
+        """A face of two cells, of a cell and a supply, or of none."""
+        ends, number = (is_held[i] > 0, is_held[j] > 0), [m * nx + l for m, l in (i, j)]
+        if all(ends):
+            return
+        if ends[0]:
+            number[0], flow["p_i"], flow["b_i"] = -1, P[i], 0.0
+        if ends[1]:
+            number[1], flow["p_j"] = -1, P[j]
+        faces.add(number[0], number[1], k, **flow)
+
     for m in range(ny):
         for l in range(nx):
             i = m * nx + l
-            if l == 0 and not around[0] and s.k_W[m, l] > 0:
-                faces.add(-1, i, s.k_W[m, l] / unit, u=s.couette_W[m, l], p_i=p_side[0])
-            flow = {"u": s.couette_E[m, l], "b_i": -s.b_C[m, l]}
+            if is_held[m, l]:
+                faces.add(i, -1, (k_W + k_E + k_S + k_N)[m, l] / unit, p_j=P[m, l])
+            elif l == 0 and not around[0] and k_W[m, l] > 0:
+                faces.add(-1, i, k_W[m, l] / unit, u=u_W[m, l], p_i=p_side[0])
+            flow = {"u": u_E[m, l], "b_i": -b_C[m, l]}
             if l < nx - 1 or around[0]:
-                faces.add(i, m * nx + (l + 1) % nx, s.k_E[m, l] / unit, **flow)
-            elif s.k_E[m, l] > 0:
-                faces.add(i, -1, s.k_E[m, l] / unit, p_j=p_side[1], **flow)
+                between((m, l), (m, (l + 1) % nx), k_E[m, l] / unit, **flow)
+            elif not is_held[m, l] and k_E[m, l] > 0:
+                faces.add(i, -1, k_E[m, l] / unit, p_j=p_side[1], **flow)
             else:
                 dead[i] = True
-            if m == 0 and not around[1] and s.k_S[m, l] > 0:
-                faces.add(-1, i, s.k_S[m, l] / unit, p_i=p_side[2])
+            if m == 0 and not around[1] and k_S[m, l] > 0 and not is_held[m, l]:
+                faces.add(-1, i, k_S[m, l] / unit, p_i=p_side[2])
             if m < ny - 1 or around[1]:
-                faces.add(i, (m + 1) % ny * nx + l, s.k_N[m, l] / unit)
-            elif s.k_N[m, l] > 0:
-                faces.add(i, -1, s.k_N[m, l] / unit, p_j=p_side[3])
+                between((m, l), ((m + 1) % ny, l), k_N[m, l] / unit)
+            elif k_N[m, l] > 0 and not is_held[m, l]:
+                faces.add(i, -1, k_N[m, l] / unit, p_j=p_side[3])
     return faces, nx * ny, dead
 
 

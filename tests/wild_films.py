@@ -14,6 +14,7 @@ from dense_film import Dense
 
 from lcp_lube.api import solve
 from lcp_lube.errors import InputError
+from lcp_lube.problems.film.graded import whole
 from lcp_lube.scenes.bearing import BearingScene
 
 WRONG = 1e-6  # of the largest pressure
@@ -154,6 +155,7 @@ class Verdict:
     method: str = ""
     error: float = float("nan")
     ratio: float = 0.0
+    said: float = 0.0  # the largest measure of its certificate
 
     @property
     def wrong(self) -> bool:
@@ -168,26 +170,33 @@ class Verdict:
 def judge(seed: int, folder: Path, **how_to: Any) -> Verdict:
     """Solve by `auto`, or as `solve`'s keywords say, and compare."""
     scene = scene_of(seed, folder)
+    # Faces made for the cavities found, or by quadrature in 1D, have tests of their own: here it is solvers that are judged.
+    own = scene.scheme == "face" and (bool(getattr(scene.gap, "rims", None)) or len(scene.shape) == 1)
+    return judged(scene, seed, own, **how_to)
+
+
+def judged(scene: BearingScene, seed: int, own_faces: bool, **how_to: Any) -> Verdict:
+    """The verdict on a scene, its faces taken from the package or made anew. Collective."""
     try:
         solution = solve(scene, **how_to)
     except InputError as refusal:
         return Verdict(seed, "refused", str(refusal))
     problem: Any = solution.problem
     how: Any = {"message": solution.message, "method": str(solution.settings["method"])}
-    p, r, converged, outcome = solution.fields["p"] * problem.p_unit, solution.fields["r"], solution.converged, solution.outcome
+    if not solution.converged:
+        outcome = str(solution.outcome)
+        solution.destroy()
+        return Verdict(seed, outcome, **how)
+    p, r = whole(problem.grid, solution.fields["p"] * problem.p_unit, solution.fields["r"])
     p_sides, p_unit = problem.p_sides, problem.p_unit
-    # Faces made for the cavities found, or by quadrature in 1D, have tests of their own: here it is solvers that are judged.
-    if scene.model.scheme == "face" and (bool(getattr(scene.model.gap, "rims", None)) or len(scene.shape) == 1):
-        moving = getattr(problem, "moving", None)
-        dense = Dense(scene, moving or problem)
-        if moving is not None:  # the mirror image is what is solved
-            p, r = (field.reshape(problem.grid.box)[:, ::-1].ravel() for field in (p, r))
-    else:
-        dense = Dense(scene)
+    moving = getattr(problem, "moving", None)
+    if own_faces and moving is not None:  # the mirror image is what is solved
+        p, r = p[:, ::-1], r[:, ::-1]
+    p, r = p.ravel(), r.ravel()
+    how["said"] = max(solution.certificate.measures.values())
+    dense = Dense(scene, (moving or problem) if own_faces else None)
     solution.destroy()
     ratio = float(dense.k.max() / dense.k.min())
-    if not converged:
-        return Verdict(seed, str(outcome), **how, ratio=ratio)
     try:
         expected, _ = dense.solve()
     except ArithmeticError:

@@ -22,7 +22,7 @@ from ..problems.facts import Facts
 from ..problems.film.cavity import cavity_sign
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
-from ..problems.film.supplies import Supply, supply_flows
+from ..problems.film.supplies import Supply, supply_defects, supply_flows
 from ..problems.solution import Outcome, Solution
 from ..scenes.scene import Derived, Scene, Solvable
 from .ask import Ask
@@ -32,6 +32,7 @@ from .linearised import Feed, Linear
 
 MOST_SOLVES = 40
 TOLERANCE = 1e-10  # of the largest flow: by how much what a source gives may differ from what the film takes
+DIGITS, ENOUGH = 1e-7, 1e-4  # two steps of such parts of the largest pressure are rounding; the misfit that may be left then
 FIRST = 0.5  # part of p_s behind a restrictor, to begin with
 LARGE = 60_000  # points of a film in the plane that is not factored
 
@@ -67,12 +68,20 @@ def applies(scene: Solvable, ask: Ask) -> bool:
 def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     """The solution at the pressures at which every source gives what its supply takes. Collective.
 
+    Raises
+    ------
+    InputError : what all the supplies give has no way out, and nothing says how large the pressure is.
+
     Returns
     -------
     Solution : outcome NO_SOLUTION where the film draws more than a supply gives even at the cavitation pressure.
     """
     model: Model = scene.model  # type: ignore[attr-defined]
     supplies = model.supplies
+    if all(one.flow is not None for one in supplies) and not any(
+        side.kind == "open" for side in model.sides[: 2 * len(scene.shape)]
+    ):
+        raise InputError(f"{scene.name}: supply.1.flow: no side has a pressure, and no supply one or a restrictor: no way out")
     known = ask.start.settings.get("supply_pressures") if ask.start is not None else None
     free = np.array([one.open for one in supplies])
     P, film = _coarse(scene, ask, inner, free)
@@ -82,6 +91,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         P = np.array(_first(model))
     last: tuple[Array, Array] | None = None  # pressures and flows
     chain = Chain(ask, inner)
+    rests, enough = False, TOLERANCE
     for count in range(1, MOST_SOLVES + 1):
         held = tuple(Supply(one.region, float(p)) for one, p in zip(supplies, P, strict=True))
         solution = chain.solve(Fed(scene, held))
@@ -90,9 +100,9 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
             break
         flows = np.array(supply_flows(problem, solution.fields["p"], solution.fields["r"]))
         sought = [(one, float(p), float(flow)) for one, p, flow in zip(supplies, P, flows, strict=True)]
-        largest = max(map(abs, [*flows, *(one.flow or 0.0 for one in supplies)]))
-        off = np.array([one.defect(p, flow, largest) if one.open else 0.0 for one, p, flow in sought])
-        misfit = np.array([one.misfit(p, flow) if one.open else (0.0, 0.0, 0.0) for one, p, flow in sought])
+        problem.hold_at([replace(one, p=float(p)) for one, p in zip(supplies, P, strict=True)])
+        off = np.array(supply_defects(problem, flows.tolist()), dtype=float)
+        misfit = np.array([one.sought(p, flow) if one.open else (0.0, 0.0, 0.0) for one, p, flow in sought])
         starved = (off > TOLERANCE) & (misfit[:, 0] > 0.0) & (P <= 0.0)
         if np.max(off) <= TOLERANCE or starved.any() or count == MOST_SOLVES:
             break
@@ -102,16 +112,23 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
             if last is not None and (moved := P[free] - last[0]).any():
                 film += np.outer(flows[free] - last[1] - film @ moved, moved) / (moved @ moved)
             last, slopes = (P[free], flows[free]), film
+        new_P = P[free] + np.linalg.solve(misfit[free, 2:] * slopes + np.diag(misfit[free, 1]), -misfit[free, 0])
+        new_P = np.maximum(new_P, 0.0)
+        resting, rests = rests, film is None and bool(np.all(np.abs(new_P - P[free]) <= DIGITS * np.max(P)))
+        if rests and resting:
+            enough = ENOUGH
+            break
         P = P.copy()
-        P[free] += np.linalg.solve(misfit[free, 2:] * slopes + np.diag(misfit[free, 1]), -misfit[free, 0])
-        P[free] = np.maximum(P[free], 0.0)
-    if solution.converged and np.max(off) > TOLERANCE:
+        P[free] = new_P
+    if solution.converged and np.max(off) > enough:
         worst = int(np.argmax(np.where(starved, off, 0.0) if starved.any() else off))
         if starved.any():
             message = f"supply {worst + 1}: at p_c the film draws {flows[worst]:.6g} m3/s already, more than its source gives"
             solution.outcome, solution.message = Outcome.NO_SOLUTION, message
         else:
             message = f"supply {worst + 1}: film and source differ by {off[worst]:.1e} of the flow after {count} solves"
+            if enough == ENOUGH:
+                message += ": the last digit of the pressure moves the film's flow by more than that"
             solution.outcome, solution.message = Outcome.MAX_ITERATIONS, message
     solution.steps = chain.steps
     problem.hold_at([replace(one, p=float(p)) for one, p in zip(supplies, P, strict=True)])

@@ -6,6 +6,7 @@ With slacks and multipliers, f(v) = z1 - z2, s1 = v - l, s2 = u - v, all >= 0, s
 all of them, these are the equations f(v) = 0.
 """
 
+from functools import cached_property
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -96,6 +97,11 @@ class BoxProblem:
             middle = f / f_scale
         np.minimum(middle, (v - self.lower) / v_scale, out=middle)
         return np.maximum(middle, (v - self.upper) / v_scale, out=middle)
+
+    @cached_property
+    def idle(self) -> tuple[float, float]:
+        """Least scales of v and f: more than 0 where v = 0 is the answer, because nothing drives it. Collective."""
+        return 0.0, 0.0
 
     def scales(self, v: Array) -> tuple[float, float]:
         """max |v| and the mean size of the terms of f; 1 in place of 0. Collective."""

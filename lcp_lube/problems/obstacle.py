@@ -113,7 +113,7 @@ class ObstacleProblem(BoxProblem):
         super().__init__(grid, equations, l, u, start)
 
     @cached_property
-    def _idle(self) -> tuple[float, float]:
+    def idle(self) -> tuple[float, float]:
         """Scales of v and f where nothing drives: v = 0 is then the answer, and what is left of it is measured by the start."""
         zero = self.reduce.max(self.lower) <= 0.0 <= self.reduce.min(self.upper)
         if self.lam != 0.0 or not self.homogeneous or not zero:
@@ -122,7 +122,7 @@ class ObstacleProblem(BoxProblem):
         return LEFT * self.reduce.max(np.abs(start)), LEFT * self.equations.scale(start)
 
     def scales(self, v: Array) -> tuple[float, float]:
-        (v_scale, f_scale), (v_least, f_least) = super().scales(v), self._idle
+        (v_scale, f_scale), (v_least, f_least) = super().scales(v), self.idle
         return max(v_scale, v_least), max(f_scale, f_least)
 
     def quantities(self, fields: Fields) -> dict[str, Any]:

@@ -89,7 +89,7 @@ class BoxActiveSet(Method):
                 lambda alpha: inexact_decrease(before, reduce.norm(trial(alpha)[2]), alpha, 0.0, o.beta), 1.0, most=HALVINGS
             )
             self.v, self.f, self.R = trial(alpha)
-            step_norm = reduce.max(np.abs(self.v - v)) / (reduce.max(np.abs(self.v)) or 1.0)
+            step_norm = reduce.max(np.abs(self.v - v)) / (max(reduce.max(np.abs(self.v)), problem.idle[0]) or 1.0)
             if step_norm > NEAR:
                 self._scale = problem.scales(self.v)[1]
             self.norm = self._norm()

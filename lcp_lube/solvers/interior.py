@@ -78,7 +78,7 @@ class Interior(Method):
 
     Raises
     ------
-    InputError : also l = u somewhere: the box has no inside.
+    InputError : also l = u somewhere: the box has no inside; nothing drives v.
     """
 
     Options: type[MethodOptions] = InteriorOptions
@@ -93,6 +93,11 @@ class Interior(Method):
         self._has = np.isfinite(l), np.isfinite(u)
         if problem.reduce.sum((l == u).astype(float)):
             raise InputError("--method interior: v_lower = v_upper at some points, no inside to start in; active-set can")
+        if problem.idle[0]:
+            raise InputError(
+                "--method interior: nothing drives v, and v = 0 is the answer: ||H|| <= eps1 says nothing about what is left "
+                "of it, nor of s and z where it lies on a bound; active-set, semismooth or fas can"
+            )
         self.system = BoxSystem(self._for_system(), self.stages)
         margin = o.inside * np.minimum(u - l, 1.0)
         v = np.clip(job.start["v"] if job.start else problem.v0, l + margin, u - margin)

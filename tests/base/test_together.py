@@ -20,6 +20,8 @@ from conftest import ENVIRONMENT, TESTS
         ("picture", "x.png: no figure", 2),
         ("vts", "x.vts: could not be written: cut short; is the disk full?", 2),
         ("npz", "x.npz: could not be written: File too large", 2),
+        ("h5", "x.h5: could not be written: File too large", 2),
+        ("h5 elsewhere", "x.h5: could not be written: No such file or directory", 2),
         ("write", "MPI_ERR_NO_SUCH_FILE", 2),
         ("read", "MPI_ERR_NO_SUCH_FILE", 2),
         ("doctor", "ZeroDivisionError: on purpose", 2),

@@ -165,8 +165,13 @@ def test_ranks_agree(cli, ranks, n, how):
 
 
 @pytest.mark.parametrize("n, lower", [(20, 0.0), (64, 0.0), (63, "-inf"), (20, -1.0)])
-@pytest.mark.parametrize("method", ["auto", "semismooth"])
+@pytest.mark.parametrize("method", ["auto", "semismooth", "fas", "active-set", "interior"])
 def test_where_nothing_drives_zero_is_the_answer(n, lower, method):
     """lambda = 0, v = 0 on the boundary: what is left of v is measured by the start, not by itself."""
+    if method == "interior":
+        with pytest.raises(InputError, match="nothing drives v, and v = 0 is the answer"):
+            solve("obstacle_bratu", **{"n": n, "lambda": 0.0, "v_lower": float(lower)}, method=method)
+        return
     with solve("obstacle_bratu", **{"n": n, "lambda": 0.0, "v_lower": float(lower)}, method=method) as s:
         assert s.converged and abs(s.max_v) < 1e-6, s.message
+        assert s.steps[-1].step_norm < 1001.0 and s.settings["took_over"] is None

@@ -4,18 +4,21 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 from lcp_lube import load_scene, solve
 from lcp_lube.base.options import recipe
-from lcp_lube.base.parallel import Array
+from lcp_lube.base.parallel import Array, Reduce
 from lcp_lube.base.stages import Stages
 from lcp_lube.problems.solution import Step
-from lcp_lube.solvers.din import DIN
-from lcp_lube.solvers.fischer import ArmijoNewton, derivatives
+from lcp_lube.registry import METHODS
+from lcp_lube.solvers.din import DIN, DinOptions
+from lcp_lube.solvers.fischer import ArmijoNewton, FischerOptions, derivatives
 from lcp_lube.solvers.interior import InteriorOptions
 from lcp_lube.solvers.job import Job
 from lcp_lube.solvers.newton import Stopping
 from lcp_lube.solvers.plain_newton import NewtonOptions
+from lcp_lube.solvers.steplength import Centrality, inexact_decrease
 
 
 def steps(scene: str, method: str, recipe_name: str, system: str = "full", max_it: int = 3, **options: Any) -> list[Step]:
@@ -125,3 +128,82 @@ def test_eta_of_newton() -> None:
     named, tight = (steps("bratu", "newton", "bcgs_jacobi", "jacobian", eta=eta) for eta in (1e-3, 1e-6))
     count = [sum(step.linear_iterations for step in record) for record in (default, named, tight)]
     assert count[0] == count[1] < count[2]
+
+
+def test_defaults_are_the_papers() -> None:
+    """Those whose change no printed count of the fast tables shows."""
+    din_options, fbn = DinOptions(), FischerOptions()
+    assert (din_options.gamma, din_options.beta, din_options.theta, fbn.beta, fbn.theta) == (0.5, 1e-4, 0.5, 1e-4, 0.5)
+    assert InteriorOptions().halvings == 5
+    reduce = Reduce(MPI.COMM_SELF)
+    assert Centrality(reduce, np.array([1.0]), 10**8, 1.0).tau1 == 0.99  # min(n min(p r)/p'r 1e-7/2, 0.99)
+
+
+@pytest.mark.parametrize("n, tau1, tau2, worst", [(4, 0.5, 0.0, 2.25 / 0.75), (1, 0.0, 100.0, 51.0)])
+def test_delta_by_hand(n: int, tau1: float, tau2: float, worst: float) -> None:
+    """delta_k = min(0.1, eps^ sigma_k/max(...)) with eps^ = 1/n: one case for each of the two terms of (31)."""
+
+    class Given:
+        options = DinOptions()
+        problem = type("P", (), {"size": n})
+        central = type("C", (), {"tau1": tau1, "tau2": tau2})
+
+    given: Any = Given()
+    assert DIN.forcing(given, 0.2) == pytest.approx(0.2 / n / worst, rel=1e-14)
+
+
+@pytest.mark.parametrize("recipe_name", ["lu", "gmres_ilu"])
+def test_the_decrease_that_din_asks_for(recipe_name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """||F(new)|| <= (1 - beta alpha (1 - (sigma_k + delta_k))) ||F||, delta_k = 0 for a direct solver; inner solves to
+    max(tol_min, delta_k ||F||); gamma of (28), (29) is the option's."""
+    asked: list[float] = []
+
+    def watched(norm: float, new_norm: float, alpha: float, forcing: float, beta: float) -> bool:
+        asked.append(forcing)
+        return inexact_decrease(norm, new_norm, alpha, forcing, beta)
+
+    monkeypatch.setattr("lcp_lube.solvers.din.inexact_decrease", watched)
+    problem = load_scene("problem1", {"n": 20}).build()
+    with recipe(recipe_name):
+        method = DIN(Job(problem, Stages(), "full", {"gamma": 0.3, "tol_min": 1e-9}))
+        assert method.central.gamma == 0.3 and method.system.direct == (recipe_name == "lu")
+        for _ in range(6):
+            norm, before = method.norm, len(asked)
+            step = method.advance()
+            delta = 0.0 if method.system.direct else method.forcing(step.sigma)
+            assert asked[before:] == [step.sigma + delta] * (len(asked) - before) and len(asked) > before
+            assert step.rtol == max(1e-9, delta * norm)
+    assert recipe_name == "lu" or delta > 0
+    method.destroy()
+    problem.destroy()
+
+
+def test_the_decrease_that_fbn_asks_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """FBN-I: ||F~(new)|| <= (1 - beta alpha (1 - delta)) ||F~||, delta that of the inner solve; FBN-A, exact: slope -2 Phi."""
+    asked: list[float] = []
+
+    def watched(norm: float, new_norm: float, alpha: float, forcing: float, beta: float) -> bool:
+        asked.append(forcing)
+        return inexact_decrease(norm, new_norm, alpha, forcing, beta)
+
+    monkeypatch.setattr("lcp_lube.solvers.fischer.inexact_decrease", watched)
+    record = steps("problem1", "fbn-i", "gmres_ilu", max_it=4)
+    assert set(asked) == {step.rtol for step in record} and min(asked) > 0
+    problem = load_scene("problem1", {"n": 20}).build()
+    with recipe("lu"):
+        method = ArmijoNewton(Job(problem, Stages(), "full"))
+        none = np.zeros(20)
+        assert method._slope(none, none, none) == -(method.norm**2)
+    method.destroy()
+    problem.destroy()
+
+
+@pytest.mark.parametrize("method", ["din", "fbn-a"])
+@pytest.mark.parametrize("eps1, floor", [(1e-5, 1e-5), (1e-2, 1e-4), (1e-13, 1e-12)])
+def test_inner_tolerance_follows_the_outer_one(method: str, eps1: float, floor: float) -> None:
+    """tol_min is eps1 between 1e-12 and 1e-4 where nobody names it."""
+    job = Job(load_scene("problem1", {"n": 5}).build(), Stages(), "full", stopping=Stopping(eps1=eps1))
+    built: Any = METHODS[method].load()(job)
+    assert built.options.tol_min == floor
+    built.destroy()
+    job.problem.destroy()

@@ -55,6 +55,7 @@ ONCE_FAILED = [
     (6017562, "a ring at 4e8 m/s, rounding's signs as a start"),
     (6004666, "empty all over"),
     (6015374, "empty all over, a ring's misfit of one rounding"),
+    (1032, "a ring, half a cell before x = 0, where sqrt(x) is none"),
     *CERTIFIED_WRONG_ONCE,
 ]
 

@@ -10,7 +10,7 @@ from ..certificate import Certificate, certificate_tol
 from .graded import GradedJacobian, Pivots, within_reach
 from .reynolds import side_points
 from .stored import storing
-from .supplies import supply_defect, supply_flows
+from .supplies import supply_defects, supply_flows
 
 if TYPE_CHECKING:
     from .lubrication import LubricationProblem
@@ -29,7 +29,7 @@ def certify(problem: "LubricationProblem", p: Array, r: Array, eps1: float) -> C
 
     residual: ||A p + B r - c||, beyond what rounding of p and c makes of it, over ||A p|| + ||B r|| + ||c||; or, where that is
     more, the largest balance of one cell in parts of what would move its own pressure by max|p|, or its void by 1 (`worst`), or
-    what a supply's restrictor and its film disagree by (`supply_defect`);
+    what a supply's restrictor and its film disagree by (`supply_defects`);
     complementarity: max_i |min(p_i / max|p|, r_i)|, which bounds negative p, negative r and products alike; where the wall
     drags more than the pressures could push, r counts as the pressure that would push as much (`void_scale`);
     mass_defect: |flow in - flow out| / flow, over the open sides (`mass_defect`);
@@ -48,7 +48,7 @@ def certify(problem: "LubricationProblem", p: Array, r: Array, eps1: float) -> C
         scale += red.norm(s.diagonal.ravel())
     over_all = np.maximum(residual - rounding, 0.0) / scale if scale != 0 else 0.0  # NaN stays NaN
     measures = {
-        "residual": float(np.max([over_all, worst, supply_defect(problem, p, r)])),
+        "residual": float(np.max([over_all, worst, *supply_defects(problem, supply_flows(problem, p, r))])),
         "complementarity": red.max(np.abs(np.minimum(p / (p_max or 1.0), r / void_scale(problem, p_max)))),
         "mass_defect": mass_defect(problem, p, r),
     }
@@ -170,9 +170,9 @@ def mass_defect(problem: "LubricationProblem", p: Array, r: Array) -> float:
     """|flow in - flow out| over the open sides, beyond what rounding makes of it, in parts of the flow. Collective.
 
     The flow is the largest of what comes in, of what the wall drags through every cross-section of the film, also if
-    nothing comes in, and of IDLE times what the pressures would drive through the sides' cells alone: below this the
-    flows are differences of pressures that are equal to as many digits as a solve has. Rounding is that of the sums here,
-    and of p inside, where the conductances may be 1e9 times the sides' (up to UNEVEN parts of the flow).
+    nothing comes in, and of IDLE times what the pressures would drive through the sides' and supplies' cells alone: below
+    this the flows are differences of pressures that are equal to as many digits as a solve has. Rounding is that of the sums
+    here, and of p inside, where the conductances may be 1e9 times the sides' (up to UNEVEN parts of the flow).
     """
     s, reduce, grid = problem.scheme, problem.reduce, problem.grid
     flows = west, east, south, north = problem.boundary_flows(p, r)
@@ -187,9 +187,9 @@ def mass_defect(problem: "LubricationProblem", p: Array, r: Array) -> float:
     pressed = 0.0
     for k, points, side in zip((s.k_W, s.k_E, s.k_S, s.k_N), side_points(grid), problem.p_sides, strict=True):
         pressed += s.flow_unit * reduce.sum(k[points] * (at[points] + side / problem.p_unit))
-    flow = max(inflow, dragged, IDLE * pressed if driven else pressed)
     if s.held is not None:
         pressed += s.flow_unit * reduce.sum(np.where(s.held, s.diagonal * at, 0.0))
+    flow = max(inflow, dragged, IDLE * pressed if driven else pressed)
     if s.storage is not None:  # in the middle of a stroke nothing flows: rounding is measured by what is stored
         held = s.flow_unit * reduce.sum(s.storage)
         flow = max(flow, abs(storing(problem, r)), certificate_tol(0.0) * held)

@@ -10,6 +10,7 @@ an edge inside a cell, only the part before it resists, which the coefficients c
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -17,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.parallel import Array
+from ..grid import Grid
 
 GAUSS = (0.5 - 0.5 / np.sqrt(3.0), 0.5 + 0.5 / np.sqrt(3.0))
 MARGIN = 1e-9  # of a spacing: an edge so near a point, or a face's end, is on it
@@ -37,6 +39,35 @@ def jumps_of(film: Any, axis: str) -> tuple[float, ...]:
     return () if tell is None else tuple(tell(axis))
 
 
+@dataclass(frozen=True)
+class Around:
+    """A film on a grid, that goes on beyond periodic sides: what lies behind one is what lies within the other, edges too."""
+
+    film: Callable[[Array, Array], Array]
+    grid: Grid
+
+    def __call__(self, x: Array, y: Array) -> Array:
+        return self.film(*self._inside(x, y))
+
+    def _inside(self, *at: Array) -> list[Array]:
+        out = list(at)
+        for k, (length, start) in enumerate(zip(self.grid.lengths, self.grid.origin, strict=False)):
+            if self.grid.periodic[k]:
+                # On a side counts as inside, also by rounding.
+                beyond = np.round((at[k] - start - 0.5 * length) / (length * (1.0 + MARGIN)))
+                out[k] = np.where(beyond, at[k] - beyond * length, np.clip(at[k], start, start + length))
+        return out
+
+    def jumps(self, axis: str) -> Sequence[float]:
+        found, k = jumps_of(self.film, axis), "xy".index(axis)
+        around = k < self.grid.dim and self.grid.periodic[k]
+        return [t + m * self.grid.lengths[k] for t in found for m in (-1, 0, 1)] if around else found
+
+    @property
+    def rims(self) -> Sequence[Any]:
+        return [lambda x, y, rim=rim: rim(*self._inside(x, y)) for rim in getattr(self.film, "rims", ())]
+
+
 def face_film(
     film: Callable[[Array, Array], Array],
     nodes: Array,
@@ -45,6 +76,7 @@ def face_film(
     jumps: Sequence[float],
     jumps_across: Sequence[float],
     steps: Array,
+    period: float = 0.0,
 ) -> tuple[Array, Array]:
     """C and H of all faces along t, of the lines at s; shape (lines, faces).
 
@@ -52,9 +84,10 @@ def face_film(
     ----------
     film : h(t, s) in m for arrays that broadcast. nodes, faces : t of the points (one more than faces) and of the faces, m.
     lines : s of the lines of points. steps : distances before, between and behind them, half-way along which cells end.
-    jumps, jumps_across : t and s of the film's edges, m.
+    jumps, jumps_across : t and s of the film's edges, m. period : round a ring, whose last point lies before the first.
     """
-    columns, pieces = _pieces(nodes[:-1], nodes[1:], jumps)
+    ends = np.where(nodes[1:] < nodes[:-1], nodes[1:] + period, nodes[1:])
+    columns, pieces = _pieces(nodes[:-1], ends, jumps)
 
     def along(s: Array) -> tuple[Array, Array]:
         h = np.broadcast_to(film(faces[None, :], s[:, None]), (s.size, faces.size))

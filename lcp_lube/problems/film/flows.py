@@ -9,7 +9,7 @@ import numpy as np
 from ...base.parallel import Array
 from ..grid import Grid
 from .cavity import cavity_sign
-from .edges import jumps_of, strips
+from .edges import Around, strips
 from .reynolds import BoxScheme, sides
 
 if TYPE_CHECKING:
@@ -117,10 +117,10 @@ def sheared_faces(problem: LubricationProblem, x: Array, lifted: complex = 0.0) 
     In the strips on both sides of an edge a cavity carries a layer of one thickness t, or the whole film where that is thinner:
     t/h^2, and 1/h. That is linear in what flows between a film that is full in the thinnest strip alone and one that is full.
     """
-    grid, film = problem.grid, problem.film
+    grid, film = problem.grid, Around(problem.film, problem.grid)
     h = np.broadcast_to(film(x, grid.y) + lifted, grid.box)
     resting, moving = np.zeros_like(h), h
-    jumps = jumps_of(film, "y") if grid.dim == 2 else ()
+    jumps = film.jumps("y") if grid.dim == 2 else ()
     if jumps:
         rows, in_strips, shares = strips(film, x[0], grid.y[:, 0], grid.steps(1), jumps)
         if rows.size:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ...base.parallel import Array
 from ...errors import InputError
 from ..grid import Grid
-from .edges import face_film, jumps_of
+from .edges import Around, face_film, jumps_of
 from .integrals import LineIntegrals
 from .positive import check_film
 from .rims import rims_across_x, rims_across_y
@@ -167,6 +167,8 @@ def _coefficients(
     x_share, y_share = grid.widths(0), grid.widths(1)[:, None] if grid.dim == 2 else np.ones((1, 1))
     x_nodes, x_faces = grid.nodes_and_faces(0)
     x, y = x_nodes[None, 1:-1], grid.y
+    film = Around(film, grid)
+    period = [length if around else 0.0 for length, around in zip(grid.lengths, grid.periodic, strict=True)]
     h_x = np.broadcast_to(film(x_nodes[None, :], y), (ny, nx + 2))
     h_face = np.broadcast_to(film(x_faces[None, :], y), (ny, nx + 1))
     h = np.array(h_x[:, 1:-1])
@@ -185,12 +187,12 @@ def _coefficients(
         own = slice(grid.x_start, grid.x_end + 1)
         cubes_x, h_face = dx / integrals.parts[2][None, own], integrals.films[None, own]
     elif x_jumps or y_jumps:
-        cubes_x, h_face = face_film(film, x_nodes, x_faces, y[:, 0], x_jumps, y_jumps, across)
+        cubes_x, h_face = face_film(film, x_nodes, x_faces, y[:, 0], x_jumps, y_jumps, across, period[0])
     else:
         cubes_x = cubes(h_face.T, h_x.T).T
     rims = [] if mean_cubes or scheme != "face" or grid.dim == 1 else getattr(film, "rims", [])
     if rims:
-        cubes_x, h_face = rims_across_x(grid, film, rims, cavity, cubes_x, h_face)
+        cubes_x, h_face = rims_across_x(grid, film, rims, cavity, cubes_x, h_face, period[0])
     m = grid.stretch(y)
     k_x = k * cubes_x / dx * (y_share / m)
     k_W, k_E = k_x[:, :-1], k_x[:, 1:]  # a face's conductance is stored once
@@ -199,11 +201,12 @@ def _coefficients(
         h_y = np.broadcast_to(film(x, y_nodes[:, None]), (ny + 2, nx))
         at_y_faces = np.broadcast_to(film(x, y_faces[:, None]), (ny + 1, nx))
         if x_jumps or y_jumps:
-            cubes_y = face_film(lambda t, s: film(s, t), y_nodes, y_faces, x[0], y_jumps, x_jumps, dx)[0].T
+            turned = face_film(lambda t, s: film(s, t), y_nodes, y_faces, x[0], y_jumps, x_jumps, dx, period[1])
+            cubes_y = turned[0].T
         else:
             cubes_y = cubes(at_y_faces, h_y)
         if rims:
-            cubes_y = rims_across_y(grid, film, rims, cavity, cubes_y)
+            cubes_y = rims_across_y(grid, film, rims, cavity, cubes_y, period[1])
         arcs = grid.spacing[0] * x_share * grid.stretch(y_faces)[:, None]
         k_y = k * cubes_y * arcs / (grid.steps(1) * grid.spacing[1])[:, None]
         k_S, k_N = k_y[:-1], k_y[1:]

@@ -32,6 +32,7 @@ def cut_faces(
     steps: Array,
     cavity: Flags,
     along_flow: bool,
+    period: float = 0.0,
 ) -> tuple[Flags, Array, Array]:
     """Which faces along t a rim cuts, shape (lines, faces), and C and H of those (`edges.face_film`).
 
@@ -40,15 +41,17 @@ def cut_faces(
     film : h(t, s) in m. rims : distances to edges at (t, s), m, negative inside. nodes : t of the points, one more than faces.
     lines, steps : s of the lines of points, and the distances before, between and behind them.
     cavity : whether the points are cavitated, shape (lines, nodes). along_flow : whether the flow goes to larger t.
+    period : round a ring, whose last point lies before the first.
     """
     a, d = nodes[:-1], np.diff(nodes)
+    d = np.where(d < 0.0, d + period, d)
     low, width = lines - 0.5 * steps[:-1], 0.5 * (steps[:-1] + steps[1:])
     middle, across = (a + 0.5 * d)[None, :], (low + 0.5 * width)[:, None]
     reach = 0.5 * np.hypot(d[None, :], width[:, None])
     cut = np.zeros(reach.shape, dtype=bool)
     for rim in rims:
         cut |= np.abs(rim(middle, across)) <= reach
-    cut &= d[None, :] > 0.0  # round a ring the last point lies before the first
+    cut &= d[None, :] > 0.0
     j, i = np.nonzero(cut)
     t = a[i, None] + d[i, None] * ((np.arange(IN_SERIES) + 0.5) / IN_SERIES)
     looks = ((np.arange(SIDE_BY_SIDE) + 0.5) / SIDE_BY_SIDE)[:, None] * width[j] + low[j]
@@ -76,24 +79,24 @@ def cut_faces(
 
 
 def rims_across_x(
-    grid: Grid, film: Shape, rims: Sequence[Shape], cavity: Array | None, cubes: Array, films: Array
+    grid: Grid, film: Shape, rims: Sequence[Shape], cavity: Array | None, cubes: Array, films: Array, period: float
 ) -> tuple[Array, Array]:
     """C and H of the x faces, those that rims cut made anew; cavity: 1 at the owned points that are cavitated. Collective."""
     nodes, _ = grid.nodes_and_faces(0)
     cut, cut_cubes, cut_films = cut_faces(
-        film, rims, nodes, grid.y[:, 0], grid.steps(1), _dry(grid, cavity)[1:-1], along_flow=True
+        film, rims, nodes, grid.y[:, 0], grid.steps(1), _dry(grid, cavity)[1:-1], True, period
     )
     cubes, films = np.array(cubes), np.array(films)
     cubes[cut], films[cut] = cut_cubes, cut_films
     return cubes, films
 
 
-def rims_across_y(grid: Grid, film: Shape, rims: Sequence[Shape], cavity: Array | None, cubes: Array) -> Array:
+def rims_across_y(grid: Grid, film: Shape, rims: Sequence[Shape], cavity: Array | None, cubes: Array, period: float) -> Array:
     """The same for C of the y faces. Collective."""
     nodes, _ = grid.nodes_and_faces(1)
     turned = [partial(_swapped, rim) for rim in (film, *rims)]
     cut, cut_cubes, _ = cut_faces(
-        turned[0], turned[1:], nodes, grid.x[0], grid.steps(0), _dry(grid, cavity)[:, 1:-1].T, along_flow=False
+        turned[0], turned[1:], nodes, grid.x[0], grid.steps(0), _dry(grid, cavity)[:, 1:-1].T, False, period
     )
     cubes = np.array(cubes)
     cubes.T[cut] = cut_cubes

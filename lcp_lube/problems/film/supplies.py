@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 MARGIN = 1e-9  # of a shape's extent: a point so near an edge is on it, and belongs to the supply
 NEAREST = 1e-4  # part of a spacing: a face to an edge that is nearer resists over this
+KNOWN, IDLE, ROUNDINGS = 1e-8, 1e-8, 64  # parts of a pressure and a flow that count as none; of 2^-53 in a supply's flows
 HALVINGS = 26  # of the interval in which an edge is looked for: coarse enough that both cells of a face find the same
 
 
@@ -156,9 +157,27 @@ class Supply:
             return flow - self.K * (self.p_s - p), self.K, 1.0
         return p - self.p_s + flow * abs(flow) / self.K**2, 1.0, 2.0 * abs(flow) / self.K**2
 
-    def defect(self, p: float, flow: float, largest: float) -> float:
-        """The misfit in parts of the largest flow; behind an orifice, of its pressures."""
-        return abs(self.misfit(p, flow)[0]) / ((max(abs(p), abs(self.p_s)) if self.law == "orifice" else largest) or 1.0)
+    def sought(self, p: float, flow: float) -> tuple[float, float, float]:
+        """As `misfit`, for the next p by Newton's method: in flows also behind an orifice of which the film asks too much.
+
+        There the square grows beyond bounds, and its steps are halves.
+        """
+        if self.law != "orifice" or not flow**2 > self.K**2 * (self.p_s - p) > 0.0:
+            return self.misfit(p, flow)
+        given = self.K * math.sqrt(self.p_s - p)
+        return flow - given, 0.5 * given / (self.p_s - p), 1.0
+
+    def defect(self, p: float, flow: float, largest: float, rounding: float) -> float:
+        """The misfit beyond rounding in parts of the largest flow; behind an orifice, of its pressures.
+
+        rounding : of the flow, m3/s; as much as makes 1e-8 of a restrictor's pressures counts.
+        """
+        off, by_p, by_flow = map(abs, self.misfit(p, flow))
+        pressure = max(abs(p), abs(self.p_s))
+        off -= min(
+            rounding * (by_flow + rounding / self.K**2 if self.law == "orifice" else 1.0), by_p * KNOWN * pressure or np.inf
+        )
+        return max(off, 0.0) / ((pressure if self.law == "orifice" else largest) or 1.0)
 
 
 @dataclass(frozen=True)
@@ -260,11 +279,20 @@ def supply_flows(problem: LubricationProblem, p: Array, r: Array) -> list[float]
     return [unit * problem.reduce.sum(np.where(held.owner == k, given, 0.0)) for k in range(len(held.supplies))]
 
 
-def supply_defect(problem: LubricationProblem, p: Array, r: Array) -> float:
-    """The largest difference between what a source gives and the film takes, in parts of the largest flow. Collective."""
-    held = problem.held
-    if held is None or not any(supply.open for supply in held.supplies):
-        return 0.0
-    flows = supply_flows(problem, p, r)
+def supply_defects(problem: LubricationProblem, flows: Sequence[float]) -> list[float]:
+    """What each source gives and the film takes differ by, in parts of the largest flow; 0 where p is given. Collective.
+
+    flows : of `supply_flows`. A flow that is next to nothing beside what the pressures drive through the supply's own faces
+    counts as that part of it.
+    """
+    held, grid, s = problem.held, problem.grid, problem.scheme
+    if held is None or not any(one.open for one in held.supplies):
+        return []
+    unit = 0.5 * s.flow_unit * (grid.spacing[1] if grid.dim == 2 else 1.0)
+    moved = unit * (s.diagonal * held.pressures(problem.p_unit) + np.abs(s.couette_W) + np.abs(s.couette_E))
+    pressed = [problem.reduce.sum(np.where(held.owner == k, moved, 0.0)) for k in range(len(flows))]
     largest = max(map(abs, [*flows, *(one.flow or 0.0 for one in held.supplies)]))
-    return max(one.defect(one.p, flow, largest) for one, flow in zip(held.supplies, flows, strict=True) if one.open)
+    return [
+        one.defect(one.p, flow, max(largest, IDLE * by), ROUNDINGS * 2.0**-53 * by) if one.open else 0.0
+        for one, flow, by in zip(held.supplies, flows, pressed, strict=True)
+    ]

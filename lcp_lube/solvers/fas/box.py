@@ -128,7 +128,8 @@ class BoxFas(Cycles):
         if self._taken == 1:
             self._first = self.norm
         reduce, after = self.problem.reduce, self.v
-        return Step(self.norm, reduce.max(np.abs(after - before)) / (reduce.max(np.abs(after)) or 1.0), 1.0)
+        size = max(reduce.max(np.abs(after)), self.problem.idle[0]) or 1.0
+        return Step(self.norm, reduce.max(np.abs(after - before)) / size, 1.0)
 
     def _evaluate(self, grid: _Grid, slope: bool = False) -> None:
         """g, and its slope if wanted, at v."""
@@ -147,7 +148,7 @@ class BoxFas(Cycles):
         if level is not self._grids[0].level:
             return largest
         terms = reduce.sum(np.array([terms])) if level.comm is not None else terms
-        return reduce.max(np.array([largest])) / (terms / self.problem.unknowns or 1.0)
+        return reduce.max(np.array([largest])) / (max(terms / self.problem.unknowns, self.problem.idle[1]) or 1.0)
 
     def _relax(self, grid: _Grid, sweeps: int, down: bool, near: bool = False) -> None:
         """Linearise at v and sweep, at first the points near the edges of the contact if wanted. Collective."""
