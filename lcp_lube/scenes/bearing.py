@@ -174,8 +174,8 @@ class BearingScene(RectangleScene, WithEffects):
 
     def _model(self) -> Model:
         model = super()._model()
-        unit, supplies, effects = self.p_unit or self._pressure_unit(model.gap), self._supplies(), effects_of(self)
-        return replace(model, p_unit=unit, shaft=self._shaft, supplies=supplies, law=self._law, effects=effects)
+        unit = self.p_unit or self._pressure_unit(model.gap)
+        return replace(model, p_unit=unit, shaft=self._shaft, law=self._law, effects=effects_of(self))
 
     @property
     def _shaft(self) -> Shaft | None:

@@ -15,6 +15,7 @@ from ..problems.film.exact import ExactSolution
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model, Side
 from ..problems.film.shapes import Block, Shape, Sum
+from ..problems.film.supplies import Supply
 from ..problems.film.turned import exact_either_way
 from .balance import BalanceTable
 from .scene import Count, Finite, Positive, Scene
@@ -164,7 +165,12 @@ class RectangleScene(FilmScene):
             scheme=self.scheme,
             mean_cubes=self.mean_cubes,
             exact=self.exact,
+            supplies=self._supplies(),  # at once: they may be all that sets the pressure
         )
+
+    def _supplies(self) -> tuple[Supply, ...]:
+        """Supplies inside the film."""
+        return ()
 
     def exact(self) -> ExactSolution | None:
         """The exact solution; None where none is known."""
