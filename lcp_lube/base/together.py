@@ -1,5 +1,8 @@
 """Work of one rank alone: when it fails there, it fails on all ranks."""
 
+import errno
+import os
+import resource
 from collections.abc import Iterator
 from contextlib import contextmanager
 from time import monotonic, sleep
@@ -55,3 +58,17 @@ def _reason(error: Exception) -> str:
     if isinstance(error, OSError):
         return error.strerror or str(error) or type(error).__name__
     return f"{type(error).__name__}: {error}"
+
+
+def reserve(file: str, room: int) -> None:
+    """Take room for so many bytes in a file that is there, before many ranks write it together.
+
+    Raises
+    ------
+    OSError : the disk, or this rank's limit, has no such room, or this rank no such file.
+    """
+    with open(file, "r+b") as opened:
+        if 0 <= resource.getrlimit(resource.RLIMIT_FSIZE)[0] < room:  # of what another rank has taken, no call would tell
+            raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))
+        if hasattr(os, "posix_fallocate"):
+            os.posix_fallocate(opened.fileno(), 0, room)

@@ -1,10 +1,8 @@
 """Fields in files: NumPy (.npz), NetCDF (.nc), ParaView (.vts, .vtr, .pvd), HDF5 (.h5). SI units throughout."""
 
 import ctypes
-import errno
 import json
 import os
-import resource
 import tempfile
 import zipfile
 from collections.abc import Iterator, Mapping
@@ -17,7 +15,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..base.parallel import Array
-from ..base.together import FOREVER, PATIENCE, all_come, on_all_ranks
+from ..base.together import FOREVER, PATIENCE, all_come, on_all_ranks, reserve
 from ..errors import InputError, nearest
 from ..problems.frame import Frame
 from ..problems.grid import Grid
@@ -100,7 +98,7 @@ def save(
         else:
             if suffix == ".h5":  # a rank that fails inside HDF5 leaves the others there
                 with on_all_ranks(grid.comm, f"{path}: could not be written"):
-                    _reserve(temporary, 8 * grid.size * len(fields))
+                    reserve(temporary, 8 * grid.size * len(fields))
             _save_by_viewer(points, fields, units, temporary)
 
 
@@ -229,20 +227,6 @@ def _save_by_viewer(grid: Grid | Frame, fields: dict[str, Array], units: dict[st
         raise
     finally:
         dm.destroy()
-
-
-def _reserve(target: str, room: int) -> None:
-    """Take room for so many bytes in a file that is there.
-
-    Raises
-    ------
-    OSError : the disk, or this rank's limit, has no such room, or this rank no such file.
-    """
-    with open(target, "r+b") as file:
-        if 0 <= resource.getrlimit(resource.RLIMIT_FSIZE)[0] < room:  # of what another rank has taken, no call would tell
-            raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))
-        if hasattr(os, "posix_fallocate"):
-            os.posix_fallocate(file.fileno(), 0, room)
 
 
 def _ends_whole(path: Path) -> bool:
