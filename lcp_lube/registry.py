@@ -232,9 +232,12 @@ RUNGS: dict[str, Entry] = {
     "barus": Entry("lcp_lube.scenes.bearing:Fluid", "viscosity with pressure"),
     "density": Entry("lcp_lube.scenes.bearing:Fluid", "density"),
     "viscosity": Entry("lcp_lube.scenes.effects.viscosity:ViscosityMap", "viscosity by place"),
+    "asperity": Entry("lcp_lube.scenes.effects.asperity:Asperity", "asperity contact"),
     "temperature": Entry("lcp_lube.scenes.effects.temperature:Temperature", "temperature"),
+    "roelands": Entry("lcp_lube.scenes.effects.roelands:RoelandsTable", "viscosity with pressure (Roelands)"),
     "shear": Entry("lcp_lube.scenes.effects.shear:Shear", "shear thinning"),
     "elastic": Entry("lcp_lube.scenes.effects.elastic:Elastic", "elasticity"),
+    "half_space": Entry("lcp_lube.scenes.effects.half_space:HalfSpace", "elasticity (half space)"),
     "roughness": Entry("lcp_lube.scenes.effects.roughness:SurfaceRoughness", "roughness"),
 }
 

@@ -6,6 +6,8 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -21,10 +23,11 @@ from ..scenes.effects.named import without
 from ..scenes.moving import motion_of
 from ..scenes.scene import Scene, Solvable
 from ..scenes.tilting import TiltingPadScene
+from .coupled_response import CoupledResponse
 from .grooves import films_of
 from .impedance import impedance
 from .pads import JournalPads
-from .response import Change, Response
+from .response import Change, Moved, Response
 
 FASTEST = 1e100  # rad/s: beyond it a factorisation overflows, and K and C are long those of void that has no time to change
 JOURNAL, TILTED, FLAT = ("x", "y"), ("x", "y", "tilt", "tilt_across"), ("z",)  # names of the motions
@@ -74,8 +77,8 @@ def coefficients(
 
     Raises
     ------
-    InputError : a scene without a film, or whose wall moves to smaller x, a fluid that depends on the pressure, a frequency
-        below zero, tilt of what has no axis.
+    InputError : a scene without a film, or whose wall moves to smaller x, pads that tilt with effects, a frequency below zero,
+        tilt of what has no axis.
     """
     scene = placed(scene, solution)
     model: Model | None = getattr(scene, "model", None)
@@ -84,8 +87,6 @@ def coefficients(
     if motion_of(scene) is not None:
         raise InputError(f"scene {scene.name}: coefficients are of films at rest in time; leave [motion] out")
     model = supplied(model, solution)
-    if model.law is not None or model.effects:
-        raise InputError(f"scene {scene.name}: coefficients are of fluids with constant viscosity and density")
     if isinstance(solution.problem, TurnedProblem):
         raise InputError(f"scene {scene.name}: its wall moves to smaller x; give its mirror image, with -U")
     turning: Turning | None = getattr(scene, "turning", None)
@@ -103,16 +104,37 @@ def coefficients(
     motions = motions_of(turning, tilt, 0.5 * model.lengths[-1], along)
     names = FLAT if turning is None else TILTED if tilt else JOURNAL
     total = np.zeros((len(frequencies), len(motions), len(motions)), dtype=complex)
-    if isinstance(scene, TiltingPadScene):
+    found: Iterator[Any] = responses(scene, model, ring, solution.fields, motions)
+    if model.law is not None or model.effects:
+        found = _with_effects(scene, solution, [partial(_moved, model.gap, motion) for motion in motions])
+    elif isinstance(scene, TiltingPadScene):
         turn = np.array([[math.cos(along), -math.sin(along)], [math.sin(along), math.cos(along)]])
         total += turn.T @ _of_pads(scene, solution, frequencies) @ turn
-    for response in responses(scene, model, ring, solution.fields, motions):
+    for response in found:
         for k, nu in enumerate(frequencies):
             total[k] += response.at(nu, stored) if nu else response.stiffness() + 1j * response.damping()
     return [
-        Coefficients(nu, found.real, found.imag / nu if nu > 0 else found.imag, names)
-        for nu, found in zip(frequencies, total, strict=True)
+        Coefficients(nu, one.real, one.imag / nu if nu > 0 else one.imag, names)
+        for nu, one in zip(frequencies, total, strict=True)
     ]
+
+
+def _moved(gap: Any, motion: Change, e: float) -> Moved:
+    return Moved(gap, motion, e, 0.0)
+
+
+def _with_effects(scene: Scene, solution: Solution, gaps: list[Any]) -> Iterator[CoupledResponse]:
+    """Of a film whose coefficients depend on its answer, as a whole: a ring's films share their oil. Collective.
+
+    Raises
+    ------
+    InputError : pads that tilt.
+    """
+    if isinstance(scene, TiltingPadScene) or getattr(scene, "pivot_part", None) is not None:
+        raise InputError(f"scene {scene.name}: coefficients of pads that tilt are of films without effects; see --model least")
+    response = CoupledResponse(scene, solution, gaps)
+    yield response
+    response.destroy()
 
 
 def _of_pads(scene: TiltingPadScene, solution: Solution, frequencies: Sequence[float]) -> Array:

@@ -144,7 +144,7 @@ def _told(scene: Solvable, ask: Ask, loop: Loop) -> Solution:
                 problem.more_measures |= told.measures
                 failure = failure or told.failure
         problem.more_measures["coupling"] = loop.change
-        if failure:
+        if failure and loop.change <= _settled(ask):
             outcome, message = Outcome.NO_SOLUTION, failure
         elif solution.converged and not loop.change <= _settled(ask):
             outcome = Outcome.MAX_ITERATIONS

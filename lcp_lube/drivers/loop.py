@@ -1,6 +1,7 @@
 """The loop of `coupling`: a film with its coefficients held, and Anderson's method for the fields that these come from."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
@@ -12,6 +13,7 @@ from ..problems.film.effects import Answer, Cells, Compressible, Effect, FaceFac
 from ..problems.film.fluid import Law
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
+from ..problems.grid import EVEN
 from ..problems.solution import Solution
 from ..scenes.scene import Derived, Solvable
 from .ask import Ask, Start
@@ -22,6 +24,7 @@ MOST_SOLVES = 100
 SETTLED = 0.1  # of eps1: relative change of the coefficients at which they count as found
 MEMORY = 30  # answers that Anderson's method combines; -coupling_snes_anderson_m changes it
 CYCLE = 25  # steps after which it begins anew: its least squares see no changes 1e-8 of the largest that they remember
+FEW, NEAR, AWAY = 1, 0.3, 30.0  # answers combined while a coefficient changes by more than NEAR; AWAY: times the least change
 LONGEST = 1.0  # relative change of a coefficient in one step, before answers are combined
 LEAST_LIFT = -0.9  # of the rigid film, of an iterate
 STEEPEST = 0.9  # of q, over 1/b, where the pressure is without bound: of an iterate, whose viscosity is then 10 times mu
@@ -42,8 +45,10 @@ class Frozen(Derived):
         model: Model = self.whole.model
         sides = (replace(side, p=float(self.law.reduced(np.array(side.p)))) for side in model.sides)
         supplies = tuple(replace(one, p=float(self.law.reduced(np.array(one.p)))) for one in model.supplies)
-        changed = {"sides": tuple(sides), "supplies": supplies, "law": None, "effects": (), "exact": None}
-        return replace(model, **changed)  # type: ignore[arg-type]
+        changed: dict[str, Any] = {"sides": tuple(sides), "supplies": supplies, "law": None, "effects": (), "exact": None}
+        if any(getattr(effect, "even_lines", False) for effect in model.effects):
+            changed["places"] = EVEN
+        return replace(model, **changed)
 
     @property
     def model(self) -> Model | None:
@@ -92,16 +97,18 @@ class Loop:
 
     def vector(self, cells: Cells) -> Array:
         """Fields as one vector, in which equal steps are equal relative changes of coefficients."""
-        parts = {"viscosity": np.log, "lift": lambda a: a / self.h}
+        parts = {"viscosity": np.log, "warmth": np.log, "lift": lambda a: a / self.h, "contact": lambda a: a / self.base.p_unit}
         return np.concatenate([parts.get(name, lambda a: a)(cells[name]) for name in self.names])  # type: ignore[operator]
 
     def cells(self, x: Array) -> Cells:
         """The other way round; what no film can have is cut."""
         found = dict(zip(self.names, np.split(x, len(self.names)), strict=True))
-        if "viscosity" in found:
-            found["viscosity"] = np.exp(np.clip(found["viscosity"], -WIDEST, WIDEST))
+        for name in {"viscosity", "warmth"} & set(found):
+            found[name] = np.exp(np.clip(found[name], -WIDEST, WIDEST))
         if "lift" in found:
             found["lift"] = self.h * np.maximum(found["lift"], LEAST_LIFT)
+        if "contact" in found:
+            found["contact"] = self.base.p_unit * np.maximum(found["contact"], 0.0)
         return found
 
     def film(self, cells: Cells) -> bool:
@@ -142,41 +149,68 @@ class Loop:
         return out
 
     def settle(self, cells: Cells, tol: float) -> None:
-        """Anderson's method from these fields on, until they change by no more than `tol` or no film can be solved."""
+        """Anderson's method from these fields on, until they change by no more than `tol` or no film can be solved.
+
+        Far from the answer old steps mislead: there it combines two answers alone, and many once coefficients change by less
+        than `NEAR`. Where steps lead away from the best fields so far, or a cycle ends, it begins anew from these.
+        """
         comm = self.base.grid.dm.comm
         x = PETSc.Vec().createMPI((len(self.names) * self.h.size, None), comm=comm)
         x.setArray(self.vector(cells))
-        snes = PETSc.SNES().create(comm)
-        snes.setOptionsPrefix("coupling_")
-        snes.setType("anderson")
-        snes.setTolerances(max_it=CYCLE)
+        best, last, near = (np.inf, x.array_r.copy()), (x.array_r.copy() + 1.0, x.array_r.copy()), False
 
         def residual(snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
+            nonlocal best, last
             before = x.array_r.copy()
-            if self.film(self.cells(before)):
-                with np.errstate(all="ignore"):
-                    after = before - self.vector(self.made())
-            else:
-                after = np.full_like(before, np.nan)  # ends the iteration
-            self.change = self.base.reduce.max(np.abs(after))
-            f.setArray(np.clip(after, -LONGEST, LONGEST))
+            if self.base.reduce.max(np.abs(before - last[0])) > 0.0:  # not those that the cycle before has ended with
+                if self.film(self.cells(before)):
+                    with np.errstate(all="ignore"):
+                        after = before - self.vector(self.made())
+                else:
+                    after = np.full_like(before, np.nan)  # ends the iteration
+                last, self.change = (before, after), self.base.reduce.max(np.abs(after))
+                if self.change < best[0]:
+                    best = self.change, before
+            f.setArray(np.clip(last[1], -LONGEST, LONGEST))
 
         def ended(snes: PETSc.SNES, it: int, norms: tuple[float, float, float]) -> int:
             if not np.isfinite(self.change):
                 return int(PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN)
-            return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS) if self.change <= tol else 0
+            if self.change > AWAY * best[0] or self.solves >= MOST_SOLVES:
+                return int(PETSc.SNES.ConvergedReason.DIVERGED_DTOL)
+            return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS) if self.change <= (tol if near else NEAR) else 0
 
-        f = x.duplicate()
+        while self.solves < MOST_SOLVES and self.change > tol:  # NaN: no film
+            self._cycle(comm, x, residual, ended, MEMORY if near else FEW)
+            near = not near
+            if best[0] < self.change < np.inf:
+                x.setArray(best[1])
+        x.destroy()
+
+    def _cycle(self, comm: PETSc.Comm, x: PETSc.Vec, residual: Any, ended: Any, memory: int) -> None:
+        """Some steps of Anderson's method. Collective."""
+        snes, f = PETSc.SNES().create(comm), x.duplicate()
+        snes.setOptionsPrefix("coupling_")
+        snes.setType("anderson")
+        snes.setTolerances(max_it=CYCLE)
         snes.setFunction(residual, f)
         snes.setConvergenceTest(ended)
         options = PETSc.Options("coupling_")
-        ours = {"snes_anderson_m": MEMORY} if not options.hasName("snes_anderson_m") else {}
-        for name, value in ours.items():
-            options[name] = value
+        ours = not options.hasName("snes_anderson_m")
+        if ours:
+            options["snes_anderson_m"] = memory
         snes.setFromOptions()
-        for name in ours:
-            options.delValue(name)
-        while self.solves < MOST_SOLVES and self.change > tol:  # NaN: no film
-            snes.solve(None, x)
-        for obj in (snes, f, x):
+        if ours:
+            options.delValue("snes_anderson_m")
+        snes.solve(None, x)
+        for obj in (snes, f):
             obj.destroy()
+
+
+def held(scene: Any, solution: Solution) -> Any:
+    """The scene of a solution, its coefficients held where effects act: its stiffness is near enough for Newton's method."""
+    if not scene.model.effects:
+        return scene
+    problem: Any = solution.problem
+    frozen = Frozen(scene.with_shape(problem.grid.shape), Law())
+    return replace(frozen, by=factors(frozen.build(problem.grid.dm.comm), problem.cells))

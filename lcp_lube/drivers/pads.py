@@ -30,6 +30,7 @@ from .chain import Chain
 from .compose import Inner
 from .grooves import films_of
 from .impedance import Mode, displacements, impedance
+from .loop import held
 
 MOST_SOLVES = 80
 MOMENTS = 1e-8  # of the load times the lever, about a pivot
@@ -113,7 +114,7 @@ class JournalPads:
 
     def films(self, scene: Scene, solution: Solution) -> Iterator[PadFilm]:
         turning = self.scene.turning
-        for problem, model, fields, first in films_of(scene, solution.problem, solution.fields):  # type: ignore[arg-type]
+        for problem, model, fields, first in films_of(held(scene, solution), solution.problem, solution.fields):  # type: ignore[arg-type]
             middle = math.degrees(float(turning.theta(np.array(first + 0.5 * problem.grid.lengths[0]))))
             off = [
                 abs(math.remainder(middle - at - (0.5 - self.scene.pivot_part) * self.scene.pad_deg, 360.0))
@@ -175,8 +176,8 @@ class ThrustPads:
     def films(self, scene: Scene, solution: Solution) -> Iterator[PadFilm]:
         assert isinstance(scene, ThrustScene) and isinstance(solution.problem, LubricationProblem)
         modes = [lambda x, y: 1.0 + 0.0 * (x + y), *scene.tilt_modes]
-        problem = scene.model.build(solution.problem.grid.shape, solution.problem.grid.dm.comm)
-        yield PadFilm(problem, scene.model, solution.fields, modes, [0, 1, 2])
+        film = held(scene, solution)
+        yield PadFilm(film.build(solution.problem.grid.dm.comm), film.model, solution.fields, modes, [0, 1, 2])
 
     def misfit(self, solution: Solution, films: Sequence[PadFilm]) -> tuple[Array, Array]:
         (film,) = films

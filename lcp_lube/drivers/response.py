@@ -137,6 +137,8 @@ class Response:
         values, grid = [], self.problem.grid
         for part in (-2.0, -1.0, 1.0, 2.0):
             other = replace(self.model, gap=replace(moved, e=part * step)).build(grid.shape, grid.dm.comm, grid)
+            if self.problem.factors is not None:
+                other = self.problem.factors.film(other)
             if self.problem.dry is not None and other.coefficients_for is not None:
                 other = other.revised(self.problem.dry)
             balance = other.balance(self.p, self.r)

@@ -15,7 +15,7 @@ from ..problems.film.model import NAMES, OPPOSITE, Model, Side
 from ..problems.film.reynolds import Film
 from ..problems.film.shapes import Shape
 from ..problems.film.supplies import Supply
-from .effects.table import WithEffects, effects_of
+from .effects.table import WithEffects
 from .film import FilmPart, JournalPart
 from .film_scene import RectangleScene, Sides
 from .motion import MotionTable
@@ -175,7 +175,7 @@ class BearingScene(RectangleScene, WithEffects):
     def _model(self) -> Model:
         model = super()._model()
         unit = self.p_unit or self._pressure_unit(model.gap)
-        return replace(model, p_unit=unit, shaft=self._shaft, law=self._law, effects=effects_of(self))
+        return replace(model, p_unit=unit, shaft=self._shaft, law=self._law)
 
     @property
     def _shaft(self) -> Shaft | None:

@@ -2,15 +2,16 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from petsc4py import PETSc
 from pydantic import Field, model_validator
 
 from ..errors import InputError
 from ..problems.facts import Facts
+from ..problems.film.effects import Effect
 from ..problems.film.exact import ExactSolution
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model, Side
@@ -18,6 +19,7 @@ from ..problems.film.shapes import Block, Shape, Sum
 from ..problems.film.supplies import Supply
 from ..problems.film.turned import exact_either_way
 from .balance import BalanceTable
+from .effects.named import FLUID, named
 from .scene import Count, Finite, Positive, Scene
 from .units import measured, metres
 
@@ -46,6 +48,29 @@ class Extent:
 class FilmScene(Scene):
     """A scene that is a film; a family says which, in `_model`."""
 
+    @model_validator(mode="after")
+    def _one_viscosity(self) -> "FilmScene":
+        temperature, field = getattr(self, "temperature", None), type(self).model_fields.get("mu")
+        mu = getattr(self, "mu", None)
+        if field is not None and temperature is not None and temperature.own_mu and mu != field.default:
+            raise ValueError(f"mu = {mu:g} and the viscosities of [temperature] are both given: one of them")
+        return self
+
+    @property
+    def mu_0(self) -> float:
+        """Viscosity, Pa s; where it varies, that from which it does: at T_in, if it follows from the temperature's data."""
+        temperature = getattr(self, "temperature", None)
+        return float((temperature.own_mu if temperature is not None else None) or self.mu)  # type: ignore[attr-defined]
+
+    def isothermal(self) -> dict[str, Any]:
+        """What changes where the temperature is left out."""
+        return {"mu": self.mu_0}
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """What the scene's tables do to its film, in the registry's order."""
+        return tuple(getattr(self, name).effect(self) for name in named(self) if name not in FLUID)
+
     def _model(self) -> Model:
         raise NotImplementedError
 
@@ -58,7 +83,7 @@ class FilmScene(Scene):
         InputError : sides that contradict one another, a profile that cannot be read.
         """
         try:
-            return self._model()
+            return replace(self._model(), effects=self.effects)
         except InputError as error:
             raise self._named(error) from None
 
@@ -124,11 +149,6 @@ class RectangleScene(FilmScene):
     @property
     def side_lengths(self) -> tuple[float, ...]:
         return (self.L,) if self.dimension == 1 else (self.L, self.width or self.L)
-
-    @property
-    def mu_0(self) -> float:
-        """Viscosity, Pa s; where it varies, that from which it does."""
-        raise NotImplementedError
 
     @property
     def cavitation_pressure(self) -> float:

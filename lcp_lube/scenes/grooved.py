@@ -11,7 +11,7 @@ from ..problems.film.grooves import Groove
 from ..problems.film.model import Model
 from ..problems.film.supplies import Patch, Supply
 from .balance import BalanceTable
-from .effects.table import WithEffects, effects_of
+from .effects.table import WithEffects
 from .film import FilmPart
 from .motion import MotionTable
 from .moving import Models
@@ -60,9 +60,6 @@ class GroovedJournalScene(ShaftScene, WithEffects):
             raise ValueError(f"grooves_deg = {self.grooves_deg}: grooves of {self.groove_deg:g} degrees overlap there")
         if self.balance is not None and (self.attitude_deg is not None or self.balance.vary not in (None, "eccentricity")):
             raise ValueError("balance: eccentricity and attitude follow from the load: neither attitude_deg nor another vary")
-        default = type(self).model_fields["mu"].default
-        if self.mu != default and self.temperature is not None and self.temperature.own_mu:
-            raise ValueError(f"mu = {self.mu:g} and the viscosities of [temperature] are both given: one of them")
         for k, table in enumerate(self.film, start=1):
             if table.changes:
                 raise ValueError(f"film.{k}: shapes of this family do not change with time; family = bearing has such")
@@ -93,15 +90,6 @@ class GroovedJournalScene(ShaftScene, WithEffects):
         middles = [(math.radians(at) - turning.start) * turning.R for at in self.grooves_deg]
         grooves = [Supply(Patch(x, 0.0, half, math.inf, period=L), p=self.p_groove) for x in middles]
         return (*supplies_of(self.supply, place), *grooves)
-
-    @property
-    def mu_0(self) -> float:
-        own = self.temperature.own_mu if self.temperature is not None else None
-        return float(own or self.mu)
-
-    def isothermal(self) -> dict[str, Any]:
-        """What changes where the temperature is left out."""
-        return {"mu": self.mu_0}
 
     @property
     def start(self) -> float:
@@ -160,5 +148,5 @@ class GroovedJournalScene(ShaftScene, WithEffects):
         return tuple(Groove(round((at - middle) * meshes) % nx, count, self.p_groove) for at in self.grooves_deg)
 
     def _model(self) -> Model:
-        model = replace(super()._model(), effects=effects_of(self))
+        model = super()._model()
         return replace(model, grooves=(), supplies=self._supplies()) if self.supply else model

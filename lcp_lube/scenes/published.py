@@ -7,12 +7,13 @@ from pydantic import Field, model_validator
 
 from ..problems.film.model import Side
 from ..problems.film.shapes import MEAN_SQUARE, Along, Block, DimpleArray, RandomSurface, Shape
+from .effects.table import WithEffects
 from .film_scene import ALL, RectangleScene, Sides
 from .scene import Finite, NotNegative, Positive
 from .units import measured, metres
 
 
-class LubricationScene(RectangleScene):
+class LubricationScene(RectangleScene, WithEffects):
     """A film between sides whose pressures are given, above the cavitation pressure p_c, which is added to what is reported."""
 
     mu: Positive = measured("Pa s", 0.015, "viscosity")
@@ -26,10 +27,6 @@ class LubricationScene(RectangleScene):
         if self.dimension == 1 and self.p_side:
             raise ValueError(f"p_side = {self.p_side}: the scene is one-dimensional")
         return self
-
-    @property
-    def mu_0(self) -> float:
-        return self.mu
 
     @property
     def cavitation_pressure(self) -> float:

@@ -55,11 +55,6 @@ class ShaftScene(FilmScene):
         return 2.0 * math.pi * self.speed_rpm / 60.0
 
     @property
-    def mu_0(self) -> float:
-        """Viscosity, Pa s; where it varies, that from which it does."""
-        return self.mu
-
-    @property
     def start(self) -> float:
         """Angle of an edge on which points of the grid lie, rad."""
         raise NotImplementedError

@@ -11,8 +11,8 @@ from ..base.parallel import Array
 from ..problems.film.model import Model, Side
 from ..problems.film.shapes import Along, Block, Shape, SpiralGrooves, Sum
 from .balance import BalanceTable
+from .effects.table import WithEffects
 from .film import FilmPart
-from .film_scene import FilmScene
 from .scene import Count, Finite, NotNegative, Positive
 from .supply import Place, SupplyTable, supplies_of
 from .units import measured, metres
@@ -44,7 +44,7 @@ class _Tilt:
         return -radius * np.sin(angle) if self.about is None else radius * np.cos(angle) - self.about
 
 
-class ThrustScene(FilmScene):
+class ThrustScene(WithEffects):
     """A thrust bearing of equal sectors under a flat runner that turns towards larger angles; 2D, polar coordinates.
 
     Lines run along the angle: x is the arc at the mean radius from where the runner enters, y the radius beyond the inner one.
@@ -170,12 +170,12 @@ class ThrustScene(FilmScene):
         along = Side("periodic") if self.pad_deg is None else Side(p=self.p_groove)
         U = self.radii[1] * self.omega
         least = self.h_min + self.h_offset
-        drag = self.mu * U * self.side_lengths[0] / least**2 if least > 0 else 1.0
+        drag = self.mu_0 * U * self.side_lengths[0] / least**2 if least > 0 else 1.0
         return Model(
             lengths=self.side_lengths,
             sides=(along, along, Side(p=self.p_inner), Side(p=self.p_outer)),
             gap=self.gap,
-            mu=self.mu,
+            mu=self.mu_0,
             U=U,
             p_c=self.p_c,
             p_unit=10.0 ** round(math.log10(max(drag, self.p_inner, self.p_outer, self.p_groove, 1e-90))),
@@ -191,6 +191,7 @@ class ThrustScene(FilmScene):
         flow = {side: n * value for side, value in values["flow"].items()}
         keys = ("load", "pressure_integral", "cavitated_area", "friction", "friction_torque", "side_leakage")
         total = {key: n * values[key] for key in keys}
+        total |= {key: n * values[key] for key in ("heat_power", "heat_out") if key in values}
         if "supply_flow" in values:
             total["supply_flow"] = [n * value for value in values["supply_flow"]]
         return total | {

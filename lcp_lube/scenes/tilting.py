@@ -8,12 +8,13 @@ from pydantic import Field, model_validator
 from ..problems.film.bore import PadBore
 from ..problems.film.grooves import Groove
 from .balance import BalanceTable
+from .effects.table import WithEffects
 from .scene import Finite, NotNegative, Positive
 from .shaft import ShaftScene
 from .units import measured, metres
 
 
-class TiltingPadScene(ShaftScene):
+class TiltingPadScene(ShaftScene, WithEffects):
     """A journal in pads that tilt about their pivots; 2D. Angles are counted from the load, in the sense of rotation.
 
     The pads' tilts are found at which no moment acts about any pivot, and with balance.load the journal's place at which the

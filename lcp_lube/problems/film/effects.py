@@ -23,7 +23,16 @@ from .supplies import Held, pressed
 
 # A field at the owned points, and its value where nothing has an effect. viscosity: over mu. density: over rho_0. lift: what is
 # added to the film, m. pressure_flow, drag_flow: factors of the flows that pressure and wall drive (roughness below the grid).
-CHANNELS = {"viscosity": 1.0, "density": 1.0, "lift": 0.0, "pressure_flow": 1.0, "drag_flow": 1.0}
+# No coefficients of the film's: contact, pressure of asperities, Pa; warmth, what of the viscosity is the temperature's factor.
+CHANNELS = {
+    "viscosity": 1.0,
+    "density": 1.0,
+    "lift": 0.0,
+    "pressure_flow": 1.0,
+    "drag_flow": 1.0,
+    "contact": 0.0,
+    "warmth": 1.0,
+}
 Cells = dict[str, Array]
 THINNEST = 0.05  # of the rigid film: no lift of an iterate leaves less
 FACTORS = ("k_W", "k_E", "k_S", "k_N", "u_W", "u_E", "mu", "stored")
@@ -120,12 +129,17 @@ class Answer:
         return self.problem.scheme.h.ravel()
 
     @cached_property
+    def speed(self) -> Array:
+        """Of the wall at the points, m/s."""
+        return np.broadcast_to(self.problem.U * self.grid.stretch(self.grid.y), self.grid.box).ravel()
+
+    @cached_property
     def gradient(self) -> tuple[Array, Array]:
         """dp/dx and dp/dy at the points, Pa/m: means of those at the two faces. Collective."""
         framed = framed_by(self.grid, self.p, self.problem.p_sides)
         here = framed[1:-1, 1:-1]
         dx = self.grid.steps(0)
-        along = (framed[1:-1, 2:] - framed[1:-1, :-2]) / (dx[:-1] + dx[1:])
+        along = (framed[1:-1, 2:] - framed[1:-1, :-2]) / (dx[:-1] + dx[1:]) / self.grid.stretch(self.grid.y)
         across = np.zeros_like(here)
         if self.grid.dim == 2:
             dy = self.grid.steps(1)[:, None]
@@ -153,7 +167,9 @@ class FaceFactors:
 
     def film(self, problem: LubricationProblem) -> LubricationProblem:
         """The film with these factors."""
-        return scaled(problem, self)
+        film = scaled(problem, self)
+        film.factors = self
+        return film
 
 
 def framed_by(grid: Grid, values: Array, at_sides: Sequence[float] | None = None) -> Array:

@@ -19,6 +19,7 @@ from petsc4py import PETSc
 from ...base.parallel import Array
 from .assembly import assemble
 from .cavity import cavity_sign
+from .contact import areas
 from .effects import Answer, around, framed_by
 from .flows import line_weights, point_weights, sheared_faces
 from .forces import open_pressures
@@ -35,7 +36,7 @@ class Carried:
     """Flows and heat of an answer; arrays of shape grid.box, W (1D: W/m) and m3/s (1D: m2/s).
 
     q : out of a cell's west, east, south and north face. free : cells whose temperature is unknown (the others lie in grooves).
-    dissipation : of each cell. power : what drag and pumps put in, as the film's own numbers have it.
+    dissipation : of each cell; sheared : the part of it that the wall drags. power : what drag and pumps put in, as the film's own numbers have it.
     area : of the cells, m2 (1D: m).
     """
 
@@ -44,6 +45,7 @@ class Carried:
     dissipation: Array
     power: float
     area: Array
+    sheared: Array
 
 
 def holders(at: Answer) -> list[Any]:
@@ -75,6 +77,9 @@ def carried(at: Answer) -> Carried:
         heat += np.where(is_free, 0.5, 1.0) * flow * (p - near)
     # Where the end is closed or a mirror nothing beyond takes its half, and nothing flows.
     shear, drag = _shear(at, dy, other_free)
+    sheared = np.where(free, shear, 0.0)
+    if problem.contact is not None:
+        shear = shear + abs(problem.U) * problem.contact.friction * contact_areas(at)
     power_shear = float(problem.reduce.sum(np.where(free, shear, 0.0)))
     pressures = problem.reduce.sum(np.sum(k, axis=0)) * problem.reduce.max(np.abs(at.p)) ** 2  # what they could turn into heat
     if not problem.U and not problem.reduce.sum(np.abs(heat)) > NOTHING * pressures:
@@ -88,9 +93,15 @@ def carried(at: Answer) -> Carried:
     for flow, near, is_free in zip(q, beside, other_free, strict=True):
         at_edge = free & ~is_free
         pumped -= float(problem.reduce.sum(np.where(at_edge, flow * (near - least), 0.0)))
-    return Carried(
-        q, free, np.where(free, heat + shear, 0.0), power_shear + push + pumped, grid.cell * point_weights(grid).reshape(box)
-    )
+    area = grid.cell * point_weights(grid).reshape(box)
+    return Carried(q, free, np.where(free, heat + shear, 0.0), power_shear + push + pumped, area, sheared)
+
+
+def contact_areas(at: Answer) -> Array:
+    """p_a of the cells times their areas and the wall's speed over U, N."""
+    problem, grid = at.problem, at.grid
+    assert problem.contact is not None  # as `carried` found
+    return problem.contact.p_a.reshape(grid.box) * areas(problem) * grid.stretch(grid.y)
 
 
 def _shear(at: Answer, dy: float, other_free: list[Any]) -> tuple[Array, Array]:
@@ -113,7 +124,7 @@ def _shear(at: Answer, dy: float, other_free: list[Any]) -> tuple[Array, Array]:
     liquid = 1.0 + s.b_C * r / np.where(s.couette_E != 0.0, s.couette_E, np.inf)
     liquid_west = grid.ghosted(np.ascontiguousarray(liquid).ravel(), outside=1.0)[1:-1, :-2]
     rims = grid.rims(1) if grid.dim == 2 else (0.0, 0.0)
-    rows = problem.U**2 * dy * (line_weights(grid) + 0.5 * (rims[0] * south + rims[1] * north))
+    rows = problem.U**2 * dy * grid.stretch(grid.y) ** 3 * (line_weights(grid) + 0.5 * (rims[0] * south + rims[1] * north))
     shear = np.zeros(box)
     for mu, h, share, is_free, wall, dx in (
         (mu_west, faces[0], liquid_west, other_free[0], closed[0], before),
@@ -139,7 +150,16 @@ class Heated:
     residual: float
 
 
-def heated(at: Answer, flow: Carried, rho_c: float, exchange: float, wall: float, carry_over: float | None) -> Heated:
+def heated(
+    at: Answer,
+    flow: Carried,
+    rho_c: float,
+    exchange: float,
+    wall: float,
+    carry_over: float | None,
+    falls: Array | float = 0.0,
+    more: Array | float = 0.0,
+) -> Heated:
     """The averaged energy equation, solved. Collective.
 
     Parameters
@@ -147,20 +167,21 @@ def heated(at: Answer, flow: Carried, rho_c: float, exchange: float, wall: float
     rho_c : J/(m3 K). exchange : with the walls, W/(m2 K), at T - T_in = wall. carry_over : share of the oil arriving at a
         groove (or at the east side, for the west one) that goes on; the rest leaves, fresh oil at T_in takes its place. None:
         all of it at grooves, nothing at sides.
+    falls, more : of a step of Newton's method: cells turn `more - falls (T - T_in)` into heat beside the dissipation, W.
     """
     grid, reduce, free, q = at.grid, at.problem.reduce, flow.free, flow.q
     leaves, enters = [np.maximum(a, 0.0) for a in q], [np.maximum(-a, 0.0) for a in q]
     inside = _inside(at, free)
-    H = exchange * flow.area
+    H, falls = exchange * flow.area, np.where(free, falls, 0.0)
     diagonal = np.where(free, rho_c * sum(leaves) + H, 0.0)  # type: ignore[operator]
     still = diagonal <= STILL * reduce.max(diagonal)  # grooves, and cells whose liquid does not go on, an empty film's say
-    diagonal = np.where(still, 1.0, diagonal)
+    diagonal = np.where(still, 1.0, diagonal + falls)
     offsets = ((0, -1), (0, 1), (-1, 0), (1, 0))
     entries = [(0, 0, diagonal)]
     for (dj, di), a, near in list(zip(offsets, enters, inside, strict=True))[: 2 * grid.dim]:
         entries.append((dj, di, np.where(still, 0.0, -rho_c * a * near)))
     solver = _Transport(assemble(grid, entries))
-    heat = np.where(still, 0.0, flow.dissipation + H * wall).ravel()
+    heat = np.where(still, 0.0, flow.dissipation + np.where(free, more, 0.0) + H * wall).ravel()
     left = reduce.sum(np.where(free & still, np.maximum(flow.dissipation, 0.0), 0.0))
     nowhere = left > STILL * reduce.sum(np.abs(flow.dissipation))  # heat that no liquid carries away
     try:

@@ -78,7 +78,8 @@ def friction(problem: LubricationProblem, p_pa: Array, r: Array, lever: Array | 
     ----------
     p_pa : pressure in Pa above the cavitation pressure, r : void fraction; owned points. lever : of each line, for a torque, m.
     """
-    return problem.reduce.sum(sum(drag(problem, problem.scheme, p_pa, r)) * lever)  # type: ignore[arg-type]
+    of_film = problem.reduce.sum(sum(drag(problem, problem.scheme, p_pa, r)) * lever)  # type: ignore[arg-type]
+    return of_film if problem.contact is None else of_film + problem.contact.drag(problem, lever)
 
 
 def drag(problem: LubricationProblem, scheme: BoxScheme, p_pa: Array, r: Array, lifted: complex = 0.0) -> tuple[Array, Array]:

@@ -61,14 +61,17 @@ def forces(problem: LubricationProblem, p_pa: Array, known: Known | None = None)
     grid, shaft, reference = problem.grid, problem.shaft, ambient(problem)
     middle = [start + 0.5 * length for start, length in zip(grid.origin, grid.lengths, strict=False)]
 
-    def over(weight: Weight, whole: Callable[[Array], Array] = np.asarray, above: float = reference) -> float:
+    def over(
+        weight: Weight, whole: Callable[[Array], Array] = np.asarray, above: float = reference, touching: Any = problem.contact
+    ) -> float:
         """Of a weight; on a line `whole` is its antiderivative."""
         found = integral(problem, p_pa, above, weight)
+        found += touching.total(problem, weight) if touching else 0.0
         if known is None:
             return found
         return found + (known.line.integral(whole, above) - integral(problem, known.p_pa, above, weight))
 
-    out: dict[str, Any] = {"pressure_integral": over(lambda x, y: np.ones(1), above=0.0)}
+    out: dict[str, Any] = {"pressure_integral": over(lambda x, y: np.ones(1), above=0.0, touching=None)}
     if shaft is None and grid.polar is not None:
         return out | _of_sector(grid.polar, over)
     if shaft is None:

@@ -51,6 +51,8 @@ class LubricationProblem:
     shares_grid = False  # a time step's with those of the others
     plain = True  # whether the coefficients are those of the film alone
     tops = False  # whether the largest pressure is looked for between the points (`peak`)
+    factors: Any = None  # of its faces, that follow from `cells`
+    contact: Any = None  # of asperities that touch (`film.contact`)
 
     def __init__(
         self,
@@ -199,7 +201,7 @@ class LubricationProblem:
 
     def quantities(self, fields: Fields) -> dict[str, Any]:
         """Load, friction, flows, largest pressure, cavity, and the scene's own `extras`. Collective."""
-        return quantities(self, fields["p"], fields["r"]) | self.more
+        return quantities(self, fields["p"], fields["r"])
 
     def physical(self, fields: Fields) -> dict[str, tuple[Array, str]]:
         """Absolute pressure in Pa, void fraction, film in m."""
@@ -270,8 +272,8 @@ class LubricationProblem:
         other = copy(self)
         other.scheme, other.c, other.mu, other.exact = scheme, scheme.c.ravel(), mu, None  # type: ignore[assignment]
         other.p_sides, other.held = p_sides or self.p_sides, held or self.held
-        other.more, other.more_fields, other.more_measures, other.cells = {}, {}, {}, {}
-        other.plain, other.coefficients_for = False, None  # which are those without the effects
+        of_others = dict.fromkeys(("coefficients_for", "factors", "contact"))
+        other.__dict__.update(plain=False, more={}, more_fields={}, more_measures={}, cells={}, **of_others)
         return other
 
     def with_lift(self, lift: Array) -> Self:

@@ -3,6 +3,7 @@
     exponential  mu = mu_1 exp(-beta (T - T_1))
     Vogel        mu = a exp(b/(T - c))
     Walther      log10 log10(nu + 0.7) = A - B log10 T,  nu = mu/rho in mm2/s (ASTM D341)
+    Roelands     log(mu) + 9.67 = a (T - 138)^-s,  mu in Pa s (the part of T in Roelands' equation)
 
 Kinematic viscosities at 40 degrees C are the middles of ISO 3448's grades; those at 100 degrees C belong to a viscosity index
 of 100, by the equations of ASTM D2270. Density and specific heat of a mineral oil are typical values, not the grade's.
@@ -20,6 +21,7 @@ from ...errors import InputError, nearest
 
 LOWEST, HIGHEST = 200.0, 600.0  # K: no oil is one outside
 WALTHER = 0.7  # mm2/s
+ROELANDS_T, ROELANDS_MU, ROELANDS_P = 138.0, 9.67, 1.96e8  # K, of log(mu/(Pa s)), Pa
 DENSITY, SPECIFIC_HEAT = 870.0, 2000.0  # kg/m3, J/(kg K): typical of mineral oils
 # Grade: mm2/s at 40 and at 100 degrees C.
 GRADES = {
@@ -111,6 +113,26 @@ class Walther:
         y = [log10(log10(one + WALTHER)) for one in nu]
         B = (y[0] - y[1]) / (log10(T[1]) - log10(T[0]))
         return cls(y[0] + B * log10(T[0]), B, rho)
+
+
+@dataclass(frozen=True)
+class Roelands:
+    """a, s of Roelands' equation."""
+
+    a: float
+    s: float
+
+    def __call__(self, T: Array) -> Array:
+        return np.exp(self.a * (np.asarray(T) - ROELANDS_T) ** -self.s - ROELANDS_MU)
+
+    @classmethod
+    def through(cls, T: Sequence[float], mu: Sequence[float]) -> "Roelands":
+        """Raises InputError for viscosities below the law's least."""
+        y = [log(one) + ROELANDS_MU for one in mu]
+        if not min(y) > 0:
+            raise InputError(f"mu = {min(mu):g}: Roelands' law is for viscosities above {exp(-ROELANDS_MU):.3g} Pa s")
+        s = log(y[0] / y[1]) / log((T[1] - ROELANDS_T) / (T[0] - ROELANDS_T))
+        return cls(y[0] * (T[0] - ROELANDS_T) ** s, s)
 
 
 def named(name: str, rho: float = DENSITY) -> Walther:

@@ -28,7 +28,7 @@ UNITS = {
     ),
     **dict.fromkeys(("p_max_at", "min_h", "min_h_at", "rupture", "reformation", "ruptures", "reformations"), "m"),
     **dict.fromkeys(("flow", "side_leakage", "flow_growth", "groove_flow", "supply_flow"), "m3/s"),
-    "deflection_max": "m",
+    **{"deflection_max": "m", "asperity_load": "N", "asperity_p_max": "Pa"},
     "cavitated_area": "m2",
     **dict.fromkeys(("moment", "friction_torque"), "N m"),
     "pad_load": "N",
@@ -113,6 +113,7 @@ def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any
         out["supply_flow"] = supply_flows(problem, p, r)
     out["friction_coefficient"] = out["friction"] / out["load"] if out["load"] > 0 else None
     out["power_loss"] = out["friction"] * problem.U
+    out |= problem.more
     return out | (problem.extras(out) if problem.extras else {})
 
 

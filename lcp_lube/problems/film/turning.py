@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...base.parallel import Array
+from .contact import areas
 from .flows import point_weights
 from .lubrication import LubricationProblem
 
@@ -35,9 +36,11 @@ class Turning:
         return self.start + x / self.R
 
     def force(self, problem: LubricationProblem, p: Array) -> tuple[float, float]:
-        """Force of the pressure p (owned points, p_unit above p_c) on the journal, N (1D: N/m). Collective."""
+        """Force of the pressure p (owned points, p_unit above p_c), and of asperities, on the journal, N (1D: N/m). Collective."""
         theta = np.broadcast_to(self.theta(problem.grid.x), problem.grid.box).ravel()
         size = -problem.grid.cell * problem.p_unit * point_weights(problem.grid) * p
+        if problem.contact is not None:
+            size = size - problem.contact.p_a * areas(problem).ravel()
         return problem.reduce.sum(size * np.cos(theta)), problem.reduce.sum(size * np.sin(theta))
 
     def numbers(self, load: float, mu: float, eccentricity: float) -> dict[str, Any]:

@@ -48,7 +48,7 @@ class Foundation(Plain):
     channels: tuple[str, ...] = ("lift",)
 
     def apply(self, at: Answer, out: Cells) -> None:
-        out["lift"] += self.compliance * at.p
+        out["lift"] += self.compliance * (at.p + out.get("contact", 0.0))
 
     def report(self, at: Answer) -> Report:
         lift = at.cells["lift"]

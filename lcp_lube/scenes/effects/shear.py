@@ -48,7 +48,7 @@ class Thinning(Plain):
     table: Shear
 
     def apply(self, at: Answer, out: Cells) -> None:
-        table, U, h = self.table, at.problem.U, at.h
+        table, U, h = self.table, at.speed, at.h
         along, across = at.gradient
         rate = np.sqrt((U / h) ** 2 + (h**2 * (along**2 + across**2)) / (12.0 * at.mu**2))
         if table.law == "eyring":

@@ -12,7 +12,7 @@ from ...problems.film.effects import Effect
 from ...registry import RUNGS
 from ..film_scene import FilmScene
 from ..units import Measured
-from .named import FLUID, named
+from .named import FLUID
 
 
 class EffectTable(Measured):
@@ -39,8 +39,3 @@ else:  # whatever the registry has, lines from outside among them
             if name not in FLUID
         },
     )
-
-
-def effects_of(scene: Any) -> tuple[Effect, ...]:
-    """What the scene's tables do to its film, in the registry's order."""
-    return tuple(getattr(scene, name).effect(scene) for name in named(scene) if name not in FLUID)

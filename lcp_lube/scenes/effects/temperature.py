@@ -15,7 +15,8 @@ from ..units import measured
 from .table import EffectTable
 
 Kelvin = Annotated[Finite, Field(ge=oils.LOWEST, le=oils.HIGHEST)]
-POINTS = {"exponential": 2, "walther": 2, "vogel": 3}
+NEWTON, FOUND, NEAR, BISECTIONS = 30, 1e-9, 1e-2, 60  # steps, and K: of T ahead; for derivatives by T
+POINTS = {"exponential": 2, "walther": 2, "roelands": 2, "vogel": 3}
 
 
 class Temperature(EffectTable):
@@ -28,7 +29,7 @@ class Temperature(EffectTable):
     model: Literal["energy", "effective"] = Field("energy", description="equation in the film, or one effective temperature")
     T_in: Kelvin = measured("K", 313.15, "temperature of the oil that is supplied")
     oil: str | None = Field(None, description="grade of a mineral oil (ISO 3448), ISO VG 32 say; viscosity index 100")
-    law: Literal["exponential", "vogel", "walther"] | None = Field(None, description="law through the points T, mu")
+    law: Literal["exponential", "vogel", "walther", "roelands"] | None = Field(None, description="law through the points T, mu")
     T: list[Kelvin] | None = measured("K", None, "temperatures at which mu is given: 2, or 3 for vogel")
     mu: list[Positive] | None = measured("Pa s", None, "viscosities at T")
     beta: Annotated[Finite, Field(ge=0, le=1)] | None = measured("1/K", None, "viscosity: mu exp(-beta (T - T_in))")
@@ -78,12 +79,23 @@ class Temperature(EffectTable):
         assert self.T is not None and self.mu is not None  # as `_one_law` found
         if self.law == "walther":
             return oils.Walther.through(self.T, [1e6 * one / self.rho for one in self.mu], self.rho)
-        return (oils.Vogel if self.law == "vogel" else oils.Exponential).through(self.T, self.mu)
+        laws: dict[str | None, Any] = {"vogel": oils.Vogel, "roelands": oils.Roelands}
+        return laws.get(self.law, oils.Exponential).through(self.T, self.mu)  # type: ignore[no-any-return]
 
     def effect(self, scene: Any) -> "Heat":
         mu = scene.mu_0
         wall = (self.T_wall or self.T_in) - self.T_in
         return Heat(self.viscosity(mu), mu, self, wall)
+
+
+def _rising(function: Any, low: float, high: float, like: Array) -> Array:
+    """Where a function that rises is zero, by bisection; the nearer end where it is nowhere."""
+    a, b = np.full(like.shape, low), np.full(like.shape, high)
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (a + b)
+        below = function(middle) < 0.0
+        a, b = np.where(below, middle, a), np.where(below, b, middle)
+    return 0.5 * (a + b)
 
 
 @dataclass(frozen=True)
@@ -95,11 +107,43 @@ class Heat(Plain):
     table: Temperature
     wall: float
     keeps = "temperature: the heat that the oil stores is not in its equation"
+    channels: tuple[str, ...] = ("viscosity", "warmth")
 
     def apply(self, at: Answer, out: Cells) -> None:
-        coldest = self.table.T_in + min(self.wall, 0.0)  # heat arises only: an iterate that is colder is no film's
-        T = np.clip(self._temperature(at)[0], coldest, oils.HIGHEST)
-        out["viscosity"] *= self.law(T) / self.mu
+        factor = self.law(self._ahead(at)) / self.mu
+        out["viscosity"] *= factor
+        out["warmth"] *= factor
+
+    def _ahead(self, at: Answer) -> Array:
+        """T at the points where the wall drags by the viscosity of these temperatures, not of those before, K. Collective.
+
+        What the wall drags, at a given speed, goes with the viscosity: heat by the old one would throw T far beyond or far below
+        the answer, and back. Where the viscosity stays what it is both are the same. By Newton's method, from the old T.
+        """
+        table, reduce, law = self.table, at.problem.reduce, self.law
+        flow, rho_c, box = carried(at), table.rho * table.specific_heat, at.grid.box
+        coldest = table.T_in + min(self.wall, 0.0)  # heat arises only: an iterate that is colder is no film's
+        old = at.cells["warmth"] * self.mu
+        if table.model == "effective":
+            fresh, power = fresh_flow(at, flow, table.carry_over), float(reduce.sum(flow.dissipation))
+            sheared, before = float(reduce.sum(flow.sheared)), reduce.max(old)
+            by_heat = lambda T: power + sheared * (law(T) / before - 1.0)  # noqa: E731
+            gain = table.share / (rho_c * fresh) if fresh > 0 else np.inf
+            with np.errstate(invalid="ignore"):
+                T = _rising(lambda T: T - table.T_in - gain * by_heat(T), coldest, oils.HIGHEST, np.zeros(1))
+            return np.full(at.p.size, T[0])
+        T = _rising(lambda T: old - law(T), coldest, oils.HIGHEST, old)
+        for _ in range(NEWTON):
+            ratio, slope = law(T) / old, (law(T + NEAR) - law(T - NEAR)) / (2.0 * NEAR * old)
+            falls = np.maximum(-slope, 0.0) * flow.sheared.ravel()
+            more = flow.sheared.ravel() * (ratio - 1.0) + falls * (T - table.T_in)
+            steps = (falls.reshape(box), more.reshape(box))
+            new = table.T_in + heated(at, flow, rho_c, table.exchange, self.wall, table.carry_over, *steps).theta
+            new = np.clip(np.nan_to_num(new, nan=oils.HIGHEST), coldest, oils.HIGHEST)
+            T, moved = new, reduce.max(np.abs(new - T))
+            if not moved > FOUND:
+                break
+        return T
 
     def _temperature(self, at: Answer) -> tuple[Array, dict[str, float], float]:
         """T at the points, K; what is told of the heat; the equations' residual. Taken once an answer. Collective."""

@@ -1,0 +1,57 @@
+"""[roelands]: viscosity by pressure, and by temperature with it (Roelands 1966).
+
+    mu(p, T) = mu_T exp((log(mu_T) + 9.67) ((1 + p/1.96e8)^z - 1)),   p above p_c (Pa),
+
+mu_T the viscosity at that temperature and p_c, whatever law it follows; by law = "roelands" of [temperature] it is his equation
+in both. z, some 0.6 for mineral oils, or from the slope alpha = dlog(mu)/dp at p_c: z = alpha 1.96e8/(log(mu) + 9.67).
+"""
+
+from dataclasses import dataclass
+from math import exp, log
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from ...errors import InputError
+from ...problems.film.effects import Answer, Cells, Plain
+from ...problems.film.oils import ROELANDS_MU, ROELANDS_P
+from ..scene import Finite
+from ..units import measured
+from .table import EffectTable
+
+LARGEST = 60.0  # of the exponent, of an iterate
+
+
+class RoelandsTable(EffectTable):
+    """Viscosity by pressure: Roelands' exponent z, or alpha."""
+
+    alpha: Annotated[Finite, Field(ge=0, lt=1e-6)] | None = measured("1/Pa", None, "dlog(mu)/dp at p_c")
+    z: Annotated[Finite, Field(ge=0, le=2)] | None = Field(None, description="Roelands' exponent")
+
+    @model_validator(mode="after")
+    def _one(self) -> "RoelandsTable":
+        if (self.alpha is None) == (self.z is None):
+            raise ValueError("alpha or z: one of them is needed")
+        return self
+
+    def effect(self, scene: Any) -> "Roelands":
+        mu = scene.mu_0
+        if getattr(getattr(scene, "fluid", None), "barus", 0.0):
+            raise InputError("fluid.barus and [roelands] are both given: one law for viscosity by pressure")
+        if not log(mu) + ROELANDS_MU > 0:
+            raise InputError(f"mu = {mu:g}: Roelands' law is for viscosities above {exp(-ROELANDS_MU):.3g} Pa s")
+        z = self.z if self.alpha is None else self.alpha * ROELANDS_P / (log(mu) + ROELANDS_MU)
+        return Roelands(float(z or 0.0))
+
+
+@dataclass(frozen=True)
+class Roelands(Plain):
+    """z : the exponent."""
+
+    z: float
+
+    def apply(self, at: Answer, out: Cells) -> None:
+        at_p_c = np.log(at.base.mu * out["viscosity"]) + ROELANDS_MU
+        growth = np.expm1(self.z * np.log1p(np.maximum(at.p, 0.0) / ROELANDS_P))
+        out["viscosity"] *= np.exp(np.minimum(np.maximum(at_p_c, 0.0) * growth, LARGEST))
