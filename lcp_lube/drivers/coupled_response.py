@@ -1,7 +1,7 @@
 """How the force of a film with effects answers to small motions of its walls: the whole coupled system, linearised.
 
-Unknowns are z, p in the full film and -r in the cavity, and the effects' fields x (`loop`). With H(z, x, e) what flows out of the
-cells, Q what they hold, and X what the effects make of an answer, a motion e exp(i nu t) gives
+Unknowns are z, p in the full film and -r in the cavity, and the effects' fields x (`loop`). With H(z, x, e) what flows out of
+the cells, Q what they hold, and X what the effects make of an answer, a motion e exp(i nu t) gives
 
     H_z z' + H_x x' + i nu (Q_z z' + Q_x x') = -H_e - i nu Q_e,      x' - X_z z' - X_x x' = X_e
 
@@ -119,7 +119,7 @@ class CoupledResponse:
         comm = self.loop.base.grid.dm.comm
 
         class Whole:
-            def mult(shell, mat: PETSc.Mat, v: PETSc.Vec, out: PETSc.Vec) -> None:  # noqa: N805
+            def mult(shell, mat: PETSc.Mat, v: PETSc.Vec, out: PETSc.Vec) -> None:
                 found = [self._along(y) for y in v.array_r.reshape(len(parts), size)]
                 whole = np.array([one for one, _ in found])
                 if nu:
@@ -128,7 +128,7 @@ class CoupledResponse:
                 out.setArray(whole.ravel())
 
         class Film:
-            def apply(shell, pc: PETSc.PC, v: PETSc.Vec, out: PETSc.Vec) -> None:  # noqa: N805
+            def apply(shell, pc: PETSc.PC, v: PETSc.Vec, out: PETSc.Vec) -> None:
                 done = v.array_r.reshape(len(parts), size).copy()
                 for y in done:
                     y[:n] = self._linear.solve(y[:n])

@@ -2,7 +2,8 @@
 
 On a coarse grid the scene is solved with all the effects that it names, and once without each. Those that change the quantity
 by less than a tenth of the tolerance (`accuracy`, else 1 %) are not solved for on the scene's own grid; each is told, with its
-sign and size. At most as many coarse films are solved as `SHARE` of the work allows; a grid too small for that has all effects.
+sign and size. Two that do the same, of which either alone may go, may not both go: where several are to be left out, it is
+solved without all of them too, and the largest are kept until what is left out together changes as little. At most as many coarse films are solved as `SHARE` of the work allows; a grid too small for that has all effects.
 """
 
 from dataclasses import replace
@@ -100,16 +101,27 @@ def _decided(scene: Any, names: list[str], ask: Ask, inner: Inner) -> tuple[list
         if not full.converged:
             return names, {}, {"reason": f"no answer on the coarse grid {shape}: {full.message}"}
         value, quantity = _quantity(full, ask.quantity, scene)
-        for name in names:
-            other = inner(without(coarse, [name]), replace(ask, **{**quick, "start": full}))
+
+        def effect(gone: list[str]) -> float | None:
+            """What these change together, dQ/Q."""
+            nonlocal work
+            other = inner(without(coarse, gone), replace(ask, **{**quick, "start": full}))
             work += total_work(other)
             reference = _quantity(other, quantity, scene)[0] if other.converged else None
             other.destroy()
-            if reference is not None and value is not None and reference != 0.0 and isfinite(value / reference):
-                effects[name] = value / reference - 1.0
+            if reference is None or value is None or reference == 0.0 or not isfinite(value / reference):
+                return None
+            return value / reference - 1.0
+
+        effects = {name: found for name in names if (found := effect([name])) is not None}
+        kept = [name for name in names if not abs(effects.get(name, 1.0)) < PART * tol]
+        gone = sorted((name for name in names if name not in kept), key=lambda name: abs(effects[name]))
+        together = effect(gone) if len(gone) > 1 else 0.0
+        while len(gone) > 1 and (together is None or not abs(together) < len(gone) * PART * tol):
+            kept.append(gone.pop())
+            together = effect(gone) if len(gone) > 1 else 0.0
     finally:
         full.destroy()
-    kept = [name for name in names if not abs(effects.get(name, 1.0)) < PART * tol]
     record = {"quantity": quantity, "tolerance": tol, "grid": list(shape), "coarse_work": work}
     return kept, effects, record
 

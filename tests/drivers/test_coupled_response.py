@@ -1,4 +1,4 @@
-"""Stiffness and damping of films with effects: the loads of displaced films, damping without effects, ranks, what is refused."""
+"""Stiffness and damping of films with effects: the loads of displaced films, what no effect leaves, ranks, refusals."""
 
 import math
 
@@ -67,7 +67,7 @@ def test_stiffness_of_a_journal():
 
 
 def test_on_ranks(cli):
-    words = ["coefficients", "lined_pad", "--n", 40, "--model", "full", "--json"]
+    words = ["coefficients", "lined_pad", "--n", 20, "--model", "elastic", "--json"]
     alone, two = cli(*words), cli(*words, ranks=2)
     assert alone.status == two.status == 0, two.err
     assert two.json["coefficients"][0]["K"] == [pytest.approx(row, rel=1e-5) for row in alone.json["coefficients"][0]["K"]]

@@ -36,7 +36,8 @@ class Carried:
     """Flows and heat of an answer; arrays of shape grid.box, W (1D: W/m) and m3/s (1D: m2/s).
 
     q : out of a cell's west, east, south and north face. free : cells whose temperature is unknown (the others lie in grooves).
-    dissipation : of each cell; sheared : the part of it that the wall drags. power : what drag and pumps put in, as the film's own numbers have it.
+    dissipation : of each cell; sheared : the part of it that the wall drags.
+    power : what drag and pumps put in, as the film's own numbers have it.
     area : of the cells, m2 (1D: m).
     """
 

@@ -36,7 +36,7 @@ class Turning:
         return self.start + x / self.R
 
     def force(self, problem: LubricationProblem, p: Array) -> tuple[float, float]:
-        """Force of the pressure p (owned points, p_unit above p_c), and of asperities, on the journal, N (1D: N/m). Collective."""
+        """Force of the pressure p (owned points, p_unit above p_c) and of asperities on it, N (1D: N/m). Collective."""
         theta = np.broadcast_to(self.theta(problem.grid.x), problem.grid.box).ravel()
         size = -problem.grid.cell * problem.p_unit * point_weights(problem.grid) * p
         if problem.contact is not None:

@@ -117,8 +117,8 @@ class Heat(Plain):
     def _ahead(self, at: Answer) -> Array:
         """T at the points where the wall drags by the viscosity of these temperatures, not of those before, K. Collective.
 
-        What the wall drags, at a given speed, goes with the viscosity: heat by the old one would throw T far beyond or far below
-        the answer, and back. Where the viscosity stays what it is both are the same. By Newton's method, from the old T.
+        What the wall drags goes with the viscosity: heat by the old one would throw T far beyond or far below the answer, and
+        back. Where the viscosity stays what it is both are the same. By Newton's method, from the old T.
         """
         table, reduce, law = self.table, at.problem.reduce, self.law
         flow, rho_c, box = carried(at), table.rho * table.specific_heat, at.grid.box
