@@ -2,8 +2,9 @@
 
 On a coarse grid the scene is solved with all the effects that it names, and once without each. Those that change the quantity
 by less than a tenth of the tolerance (`accuracy`, else 1 %) are not solved for on the scene's own grid; each is told, with its
-sign and size. Two that do the same, of which either alone may go, may not both go: where several are to be left out, it is
-solved without all of them too, and the largest are kept until what is left out together changes as little. At most as many coarse films are solved as `SHARE` of the work allows; a grid too small for that has all effects.
+sign and size. Of two that do the same either alone may go, but not both: where several are to be left out, it is solved without
+all of them too, and the largest are kept until what is left out together changes as little. At most as many coarse films are
+solved as `SHARE` of the work allows (a part of it more for that); a grid too small for that has all effects.
 """
 
 from dataclasses import replace

@@ -1,7 +1,7 @@
-"""Power in is heat out on films nobody tuned: any speed, oil, thickness, sides, exchange with the walls, one and two dimensions."""
+"""Power in is heat out on films nobody tuned: any speed, oil, thickness, sides, exchange with the walls, 1D and 2D."""
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lcp_lube import solve
@@ -36,6 +36,7 @@ def films(draw):
     return {**data, "temperature": heat}
 
 
+@settings(max_examples=30)
 @given(films())
 def test_power_in_is_heat_out(data):
     with solve(data, model="full") as s:
@@ -46,4 +47,4 @@ def test_power_in_is_heat_out(data):
             return
         assert measures["heat_defect"] < 1e-8 and measures["coupling"] < 1e-8 and measures["energy_residual"] < 1e-8
         assert s.heat_out == pytest.approx(s.heat_power, rel=1e-8, abs=1e-12)
-        assert 319.99 < s.temperature_effective and s.temperature_max <= oils.HIGHEST
+        assert s.temperature_effective > 319.99 and s.temperature_max <= oils.HIGHEST
