@@ -13,6 +13,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..problems.solution import Solution
+from ..registry import RUNGS
 from ..scenes.effects.named import check_names, named, sentence, without
 from ..scenes.scene import Scene, Solvable
 from .accuracy import DEFAULT_QUANTITY, find_value
@@ -106,7 +107,10 @@ def _decided(scene: Any, names: list[str], ask: Ask, inner: Inner) -> tuple[list
         def effect(gone: list[str]) -> float | None:
             """What these change together, dQ/Q."""
             nonlocal work
-            other = inner(without(coarse, gone), replace(ask, **{**quick, "start": full}))
+            bare = without(coarse, gone)
+            if not named(bare):  # a line's numbers are exact without effects, and the others have the grid's error
+                bare = bare.model_copy(update={"viscosity": RUNGS["viscosity"].load()(factor="1")})
+            other = inner(bare, replace(ask, **{**quick, "start": full}))
             work += total_work(other)
             reference = _quantity(other, quantity, scene)[0] if other.converged else None
             other.destroy()

@@ -4,9 +4,9 @@ A table makes an `Effect` (problems/film/effects). Barus' viscosity and the dens
 keys of the fluid; they are effects by name as well, and can be left out like the others.
 """
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
-from pydantic import Field, create_model
+from pydantic import Field, create_model, model_validator
 
 from ...problems.film.effects import Effect
 from ...registry import RUNGS
@@ -16,7 +16,16 @@ from .named import FLUID
 
 
 class EffectTable(Measured):
-    """Data of one effect."""
+    """Data of one effect. hint : on what else may be meant by its name."""
+
+    hint: ClassVar[str] = ""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _table(cls, data: Any) -> Any:
+        if isinstance(data, (int, float, str)):
+            raise ValueError(f"a table is needed{cls.hint}")
+        return data
 
     def effect(self, scene: Any) -> Effect:
         """What it does to the film of the scene."""

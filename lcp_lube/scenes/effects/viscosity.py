@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -19,6 +19,7 @@ from .table import EffectTable
 class ViscosityMap(EffectTable):
     """The viscosity as a multiple of the fluid's, by place."""
 
+    hint: ClassVar[str] = " (the viscosity itself is mu)"
     factor: str | None = Field(None, description="formula in x and y (m), of a positive factor")
     file: str | None = Field(None, description=".csv with rows x, factor or x, y, factor, or .npy from side to side")
     unit_x: Unit = Field("mm", description="the file's unit of x and y (.csv)")
