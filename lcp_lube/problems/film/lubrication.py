@@ -52,7 +52,7 @@ class LubricationProblem:
     plain = True  # whether the coefficients are those of the film alone
     tops = False  # whether the largest pressure is looked for between the points (`peak`)
     factors: Any = None  # of its faces, that follow from `cells`
-    contact: Any = None  # of asperities that touch (`film.contact`)
+    contact: Any = None  # of asperities
 
     def __init__(
         self,
@@ -242,8 +242,7 @@ class LubricationProblem:
         interior: p, r = (+-z + sqrt(z^2 + 4 m))/2, off the boundary with products p r = m P R. The front is known to a mesh
         H of the coarse grid, where p ~ (H/L)^2 and r ~ H/L: m = 10 (H/L)^3, at most 1e-3. Collective.
         """
-        P = coarse.reduce.max(fields["p"]) or 1.0
-        R = coarse.reduce.max(fields["r"]) or 1.0
+        P, R = (coarse.reduce.max(fields[name]) or 1.0 for name in "pr")
         transfer = Transfer(coarse.grid, self.grid)
         z = transfer(fields["p"] / P - fields["r"] / R)
         transfer.destroy()
@@ -272,8 +271,8 @@ class LubricationProblem:
         other = copy(self)
         other.scheme, other.c, other.mu, other.exact = scheme, scheme.c.ravel(), mu, None  # type: ignore[assignment]
         other.p_sides, other.held = p_sides or self.p_sides, held or self.held
-        of_others = dict.fromkeys(("coefficients_for", "factors", "contact"))
-        other.__dict__.update(plain=False, more={}, more_fields={}, more_measures={}, cells={}, **of_others)
+        new = {name: {} for name in ("more", "more_fields", "more_measures", "cells")}
+        other.__dict__ |= {"plain": False, "coefficients_for": None, "factors": None, "contact": None, **new}
         return other
 
     def with_lift(self, lift: Array) -> Self:
