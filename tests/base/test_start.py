@@ -107,7 +107,7 @@ def test_a_small_solve_imports_little(words):
     assert not {"bearing", "textured", "squeeze", "obstacle", "semilinear", "user"} & {
         name.rpartition(".")[2] for name in own if name.startswith("lcp_lube.scenes.")
     }
-    assert len(own) <= 135  # drivers of scenes that nobody loaded stay where they are
+    assert len(own) <= 150  # drivers of scenes that nobody loaded stay where they are; any film may name effects, one file each
 
 
 def test_the_package_alone_imports_nothing():

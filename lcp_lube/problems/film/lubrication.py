@@ -271,7 +271,7 @@ class LubricationProblem:
         other = copy(self)
         other.scheme, other.c, other.mu, other.exact = scheme, scheme.c.ravel(), mu, None  # type: ignore[assignment]
         other.p_sides, other.held = p_sides or self.p_sides, held or self.held
-        new = {name: {} for name in ("more", "more_fields", "more_measures", "cells")}
+        new: dict[str, Any] = {name: {} for name in ("more", "more_fields", "more_measures", "cells")}
         other.__dict__ |= {"plain": False, "coefficients_for": None, "factors": None, "contact": None, **new}
         return other
 
