@@ -98,7 +98,7 @@ class JournalScene(LubricationScene):
     def _model(self) -> Model:
         shaft = Shaft(0.5 * self.D, 0.0 if self.eccentricity else None)
         extras, places = self.bearing_numbers, self._places
-        return replace(super()._model(), shaft=shaft, supplies=self._supplies(), places=places, extras=extras)
+        return replace(super()._model(), shaft=shaft, places=places, extras=extras)
 
     @property
     def _places(self) -> Places | None:
