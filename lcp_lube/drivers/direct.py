@@ -23,7 +23,7 @@ from . import memory
 from .ask import Ask, Start
 from .checkpoint import CHOICES, Checkpoint, Checkpointer, load
 from .compose import Inner
-from .levels import level_shapes
+from .levels import guess, level_shapes
 from .plan import Plan, default_recipe, plan
 from .watch import watching
 
@@ -142,12 +142,12 @@ class Run:
             with self.stages("setup"):
                 level = self.problem if shape == finest else self.scene.with_shape(shape).build(self.problem.grid.dm.comm)
             with self.stages("prolongation"):
-                guess = self._guess(level, near, entry.interior)
+                start_from = guess(level, near, entry.interior)
             if previous is not None:
                 previous.destroy()
             coarse = Stopping(max(COARSE_EPS[entry.interior], self.stopping.eps1), np.inf, self.stopping.max_it)
             stopping = self.stopping if shape == finest else coarse
-            method = entry.load()(Job(level, self.stages, self.chosen.system, self.options, stopping, guess))
+            method = entry.load()(Job(level, self.stages, self.chosen.system, self.options, stopping, start_from))
             self._iterate(method, level, stopping, 0, shapes=shapes[k:], levels=self.levels)
             near, previous = (level, self.fields), level
             if shape != finest and self.outcome in (Outcome.NOT_FINITE, Outcome.LINEAR_SOLVER):
@@ -161,22 +161,13 @@ class Run:
                 }
             )
 
-    @staticmethod
-    def _guess(level: Problem, near: tuple[Problem, Fields] | None, interior: bool) -> Fields | None:
-        """Fields to start from on this grid. Those of the very same grid are taken as they are, by a method that can."""
-        if near is None or (near[0].grid is level.grid and interior):
-            return None
-        return near[1] if near[0].grid is level.grid else level.prolong(*near, interior) or None
-
     def take_over(self) -> None:
         """Where the chosen method failed, those that the registry has for that, one after another."""
         if not self.ask.rescue:
             return
-        reached, record, failures = self.fields, [], ""
-        steps = self.steps
+        reached, record, failures, steps = self.fields, [], "", self.steps
         others = METHODS[self.chosen.method].of(self.problem.kind).fallback
-        others = tuple(name for name in others if self.facts.size <= METHODS[name].at_most)
-        for k, name in enumerate(others, start=1):
+        for k, name in enumerate((name for name in others if self.facts.size <= METHODS[name].at_most), start=1):
             if self.outcome is Outcome.CONVERGED:
                 failure = self.problem.certify(self.fields, self.stopping.eps1).failure
                 if not failure:
@@ -186,16 +177,26 @@ class Run:
             failures += f"{self.method} failed ({self.message}); "
             entry = METHODS[name].of(self.problem.kind)
             system, inner = self._rescue_solver(name)
+            # An interior method begins anew; another may take up what was reached, if it is not zero everywhere.
+            anything = self.problem.reduce.max(np.concatenate([np.abs(values) for values in reached.values()]))
+            start = None if entry.interior or anything == 0.0 else reached
+            if entry.nested and not entry.interior and self.facts.periodic[0] and self.facts.dim == 2:
+                start = self._from_coarse(name)
             with recipe(inner) as self.recipe:
-                # An interior method begins anew; another may take up what was reached, if it is not zero everywhere.
-                anything = self.problem.reduce.max(np.concatenate([np.abs(values) for values in reached.values()]))
-                start = None if entry.interior or anything == 0.0 else reached
                 method = entry.load()(Job(self.problem, self.stages, system, {}, self.stopping, start))
                 self._iterate(method, self.problem, self.stopping, k, reached, failed=record)
             self.method, self.system, steps = name, system, steps + self.steps
         self.steps = steps
         if failures:
             self.message = f"{failures}{self.method} took over: {self.message}"
+
+    def _from_coarse(self, name: str) -> Fields | None:
+        """A start from half the points each way: on a ring that is hardly fed, what goes round is not in what was reached."""
+        ask = Ask(method=name, comm=self.ask.comm, memory_check=False, rescue=False)
+        coarse = solve(self.scene.with_shape(tuple(max(3, n // 2) for n in self.facts.shape)), ask)
+        start = self.problem.prolong(coarse.problem, coarse.fields, False) if coarse.converged else None
+        coarse.destroy()
+        return start
 
     def revise(self) -> Problem:
         """Of a film with round edges: solve once more, from the answer on, with their faces made for its cavities (`rims`).

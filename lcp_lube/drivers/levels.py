@@ -1,5 +1,7 @@
 """Nested iteration: the same scene on a sequence of grids, each started from the answer on the one before."""
 
+from ..problems.solution import Fields, Problem
+
 MIN_POINTS = {1: 50, 2: 24}  # coarsest grid, points a side: small enough to cost nothing, with a front to be found
 
 
@@ -12,3 +14,10 @@ def level_shapes(shape: tuple[int, ...], ranks: int = 1) -> list[tuple[int, ...]
     while min(shapes[0]) // 2 >= MIN_POINTS[len(shape)] and (len(shape) == 1 or (shapes[0][1] - 1) // 2 >= 2 * ranks):
         shapes.insert(0, tuple((n - 1) // 2 for n in shapes[0]))
     return shapes
+
+
+def guess(level: Problem, near: tuple[Problem, Fields] | None, interior: bool) -> Fields | None:
+    """Fields to start from on this grid. Those of the very same grid are taken as they are, by a method that can."""
+    if near is None or (near[0].grid is level.grid and interior):
+        return None
+    return near[1] if near[0].grid is level.grid else level.prolong(*near, interior) or None

@@ -98,7 +98,7 @@ def plan(facts: Facts, ask: Ask, scene: str) -> Plan:
 def _suits_multigrid(facts: Facts) -> bool:
     """Whether nonlinear multigrid is the fastest: in 2D, its loops compiled, nobody having asked for an inner solver."""
     plane = facts.kind == "lubrication" and facts.dim == 2
-    # A ring's coarser grids need even numbers of points; one that is hardly fed is better off with a direct solver.
+    # A ring's coarser grids need even numbers of points; one that is hardly fed stalls at once and is handed over.
     ring = facts.periodic == (True, False) and facts.size > LARGE_RING and facts.shape[0] % 8 == 0
     suits = plane and (ring or not any(facts.periodic))
     return suits and find_spec("numba") is not None and not wants_ksp()

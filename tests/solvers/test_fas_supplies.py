@@ -112,3 +112,14 @@ def test_pressures_of_a_large_film_follow(monkeypatch):
         assert solution.converged and closes(solution) < 1e-10
     for name in ("supply_p", "supply_flow", "load"):
         assert found[name] == pytest.approx(expected[name], rel=1e-8)
+
+
+def test_a_ring_that_is_hardly_fed_is_handed_over_at_once():
+    """What circulates in its cavities no coarse grid sees: four cycles, then an active set from half the points each way."""
+    keys = {"nx": 1024, "ny": 65, "attitude_deg": 50.0, "p_end": 1.0, "eccentricity": 0.9, "L_over_D": 2.0}
+    with solve("ring_journal", method="fas", reduction=False, **keys) as solution:
+        assert solution.converged and solution.settings["took_over"] == "fas"
+        assert solution.iterations <= 12
+        values = solution.problem.quantities(solution.fields)
+    with solve("ring_journal", method="active-set", **keys) as direct:
+        assert values["load"] == pytest.approx(direct.problem.quantities(direct.fields)["load"], rel=1e-6)

@@ -183,6 +183,8 @@ class Fas(Cycles):
         The finest grid that can be solved exactly takes their place: the problem's own one if it is small.
         """
         own = self._levels[0].nx * self._levels[0].ny
+        if self._levels[0].periodic[0] and own > EXACT[-1]:  # a ring that is hardly fed: what goes round has no coarse grid
+            return False
         for points in EXACT if own > EXACT[-1] else EXACT[-1:]:
             for k, level in enumerate(self._levels[: self._depth - 1]):
                 if level.nx * level.ny <= points:
