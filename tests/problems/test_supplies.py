@@ -152,6 +152,15 @@ def test_fluid_that_depends_on_pressure():
     assert values["supply_flow"][0] == pytest.approx(1e-12 * (9e6 - values["supply_p"][0]), rel=1e-7)
 
 
+@pytest.mark.parametrize("source", [{"flow": 0.0}, {"restrictor": "capillary", "K": 1e-25, "p_s": 1e9}])
+def test_a_blocked_source_is_a_pocket_that_follows_the_film(source):
+    """No flow is parted from none by what goes through the film, not by the flow itself."""
+    outcome, values, _, certificate = answer({**PAD, "supply": [{**RECESS, **source}]})
+    assert outcome == "converged" and certificate.holds
+    assert abs(values["supply_flow"][0]) < 1e-10 * max(map(abs, values["flow"].values()))
+    assert 1e5 < values["supply_p"][0] < values["p_max"] + 1e5
+
+
 def test_film_draws_more_than_the_source_gives():
     data = {
         **LINE,

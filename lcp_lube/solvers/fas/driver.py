@@ -30,6 +30,7 @@ EXACT = (1200, 5000, 10_000)  # points of the coarsest grid once the cycles have
 EXTREME = 1000.0  # film ratio above which a small ||G|| says little of p, and the corrections have to be small too
 SETTLED = 1e-8  # of the largest pressure: what they may then be in the mean
 SCALED = 1e-3  # the most by which all pressures and voids are scaled (`Fas._balance`)
+CLOSE = 1e-6  # ||G|| below which a ring that is hardly fed is not what has stalled
 FED = 3e-5  # of the certificate's tolerance: the flow that a film with supplies may lose, 3e-12 in parts of what flows
 BORDER = 4  # lines on either side of the border between two ranks
 
@@ -183,7 +184,7 @@ class Fas(Cycles):
         The finest grid that can be solved exactly takes their place: the problem's own one if it is small.
         """
         own = self._levels[0].nx * self._levels[0].ny
-        if self._levels[0].periodic[0] and own > EXACT[-1]:  # a ring that is hardly fed: what goes round has no coarse grid
+        if self._levels[0].periodic[0] and own > EXACT[-1] and self.norm > CLOSE:  # what goes round has no coarse grid
             return False
         for points in EXACT if own > EXACT[-1] else EXACT[-1:]:
             for k, level in enumerate(self._levels[: self._depth - 1]):
