@@ -21,85 +21,76 @@ from ...base.parallel import Array
 def sweep(z: Array, kx: Array, ky: Array, c: Array, count: int, down: bool, carry: Array | None = None) -> None:
     """`count` nonlinear Gauss-Seidel sweeps in place, every x line along the flow, lines upwards or down.
 
-    Three at a time: the second one follows the first a line and a point behind, the third one the second. The values are those
-    of sweeps one after the other, but memory is passed over once, and three chains of dependent operations overlap.
+    Three at a time: the second one follows the first two lines behind, the third one the second. The values are those of
+    sweeps one after the other, but memory is passed over once, and three chains of dependent operations overlap.
     """
     ny, nx = z.shape[0] - 2, z.shape[1] - 2
     step, first = (-1, ny) if down else (1, 1)
-    left = count
-    if carry is None and nx > 3:
-        diagonals = np.empty((3, nx + 2))
-        while left >= 3:
-            for s in range(ny + 2):
-                m = first + step * s
-                if s < ny:
-                    inverse_diagonal(kx, ky, m, diagonals[s % 3])
-                if 2 <= s < ny:
-                    three = (diagonals[s % 3], diagonals[(s - 1) % 3], diagonals[(s - 2) % 3])
-                    relax_three(z, kx, ky, c, m, m - step, m - 2 * step, three[0], three[1], three[2])
-                    continue
-                for lag in range(3):
-                    if lag <= s < ny + lag:
-                        relax(z, kx, ky, c, m - lag * step, 1, nx + 1, None)
-            left -= 3
-    for _ in range(left):
-        for s in range(ny):
-            relax(z, kx, ky, c, first + step * s, 1, nx + 1, carry)
+    t, over, g = np.zeros((3, nx)), np.zeros((5, nx)), np.zeros((5, nx))
+    for done in range(0, count, 3):
+        fused = min(count - done, 3)
+        for s in range(ny + 2 * (fused - 1)):
+            if s < ny:
+                diagonals(kx[first + step * s], ky[first + step * s], ky[first + step * s + 1], over[s % 5], g[s % 5])
+            for k in range(fused):
+                if 0 <= s - 2 * k < ny:
+                    arriving(z, kx, ky, c, first + step * (s - 2 * k), t[k], carry)
+                    if carry is not None:
+                        pass_on_part(t[k], g[(s - 2 * k) % 5], carry[first + step * (s - 2 * k)])
+            if carry is None:
+                pass_on(t[0], t[1], t[2], g[s % 5], g[(s - 2) % 5], g[(s - 4) % 5])
+            for k in range(fused):
+                if 0 <= s - 2 * k < ny:
+                    settle(t[k], over[(s - 2 * k) % 5], z[first + step * (s - 2 * k)])
 
 
 @kernel
-def inverse_diagonal(kx: Array, ky: Array, m: int, out: Array) -> None:
-    """One over the sum of the conductances of the points of row m, into out[1:-1]."""
-    for i in range(1, out.size - 1):
-        out[i] = 1.0 / ((kx[m, i] + kx[m, i + 1]) + (ky[m, i] + ky[m + 1, i]))
+def diagonals(k_x: Array, k_S: Array, k_N: Array, over: Array, g: Array) -> None:
+    """Of a row: one over the sum of each point's conductances, and what part of its west neighbour's t they make arrive."""
+    for i in range(over.size):
+        over[i] = 1.0 / ((k_x[i + 1] + k_x[i + 2]) + (k_S[i + 1] + k_N[i + 1]))
+    for i in range(1, g.size):
+        g[i] = k_x[i + 1] * over[i - 1]
 
 
 @kernel
-def relax_three(
-    z: Array, kx: Array, ky: Array, c: Array, m1: int, m2: int, m3: int, over1: Array, over2: Array, over3: Array
-) -> None:
-    """`relax` on the whole of rows m1, m2 and m3, each a point behind the one before; over: one over their diagonals."""
-    nx = z.shape[1] - 2
-    relax(z, kx, ky, c, m1, 1, 3, None)
-    relax(z, kx, ky, c, m2, 1, 2, None)
-    # Shifted so that one index serves all three; their own, southern and northern rows of z may be one another's.
-    z1, z2, z3 = z[m1, 2:], z[m2, 1:], z[m3]
-    e1, e2, e3 = z[m1, 3:], z[m2, 2:], z[m3, 1:]
-    s1, s2, s3 = z[m1 - 1, 2:], z[m2 - 1, 1:], z[m3 - 1]
-    n1, n2, n3 = z[m1 + 1, 2:], z[m2 + 1, 1:], z[m3 + 1]
-    c1, c2, c3 = c[m1, 2:], c[m2, 1:], c[m3]
-    kw1, kw2, kw3 = kx[m1, 2:], kx[m2, 1:], kx[m3]
-    ke1, ke2, ke3 = kx[m1, 3:], kx[m2, 2:], kx[m3, 1:]
-    ks1, ks2, ks3 = ky[m1, 2:], ky[m2, 1:], ky[m3]
-    kn1, kn2, kn3 = ky[m1 + 1, 2:], ky[m2 + 1, 1:], ky[m3 + 1]
-    over1, over2 = over1[2:], over2[1:]
-    w1, w2, w3 = z1[0], z2[0], z3[0]
-    for i in range(1, nx - 1):
-        k1, k2, k3, d1, d2, d3 = kw1[i], kw2[i], kw3[i], over1[i], over2[i], over3[i]
-        t1 = c1[i] + ke1[i] * max(e1[i], 0.0) + ks1[i] * max(s1[i], 0.0) + kn1[i] * max(n1[i], 0.0)
-        t2 = c2[i] + ke2[i] * max(e2[i], 0.0) + ks2[i] * max(s2[i], 0.0) + kn2[i] * max(n2[i], 0.0)
-        t3 = c3[i] + ke3[i] * max(e3[i], 0.0) + ks3[i] * max(s3[i], 0.0) + kn3[i] * max(n3[i], 0.0)
-        t1 += w1 * (k1 if w1 > 0.0 else 1.0)
-        t2 += w2 * (k2 if w2 > 0.0 else 1.0)
-        t3 += w3 * (k3 if w3 > 0.0 else 1.0)
-        w1 = t1 * (d1 if t1 > 0.0 else 1.0)
-        w2 = t2 * (d2 if t2 > 0.0 else 1.0)
-        w3 = t3 * (d3 if t3 > 0.0 else 1.0)
-        z1[i], z2[i], z3[i] = w1, w2, w3
-    relax(z, kx, ky, c, m2, nx, nx + 1, None)
-    relax(z, kx, ky, c, m3, nx - 1, nx + 1, None)
+def arriving(z: Array, kx: Array, ky: Array, c: Array, m: int, t: Array, carry: Array | None = None) -> None:
+    """What arrives at the points of row m, from all sides but west; at the first one from there too."""
+    for i in range(t.size):
+        t[i] = (c[m, i + 1] + kx[m, i + 2] * max(z[m, i + 2], 0.0)) + (
+            ky[m, i + 1] * max(z[m - 1, i + 1], 0.0) + ky[m + 1, i + 1] * max(z[m + 1, i + 1], 0.0)
+        )
+    t[0] += z[m, 0] * (kx[m, 1] if z[m, 0] > 0.0 else 1.0 if carry is None else carry[m, 0])
 
 
 @kernel
-def relax(z: Array, kx: Array, ky: Array, c: Array, m: int, start: int, end: int, carry: Array | None = None) -> None:
-    """The points of row m in columns start to end - 1, one after the other: each balance has one solution."""
-    west = z[m, start - 1]
-    for i in range(start, end):
-        k_W, k_E, k_S, k_N = kx[m, i], kx[m, i + 1], ky[m, i], ky[m + 1, i]
-        t = c[m, i] + k_E * max(z[m, i + 1], 0.0) + k_S * max(z[m - 1, i], 0.0) + k_N * max(z[m + 1, i], 0.0)
-        t += k_W * west if west > 0.0 else west if carry is None else carry[m, i - 1] * west
-        west = t / (k_W + k_E + k_S + k_N) if t > 0.0 else t
-        z[m, i] = west
+def pass_on(t1: Array, t2: Array, t3: Array, g1: Array, g2: Array, g3: Array) -> None:
+    """Add to each point's t what arrives from the west: void as it is, of a pressure t over the diagonal what the face lets."""
+    w1, w2, w3 = t1[0], t2[0], t3[0]
+    for i in range(1, t1.size):
+        if min(w1, w2, w3) > 0.0:  # nearly always all are the same: a branch, which is foreseen, and no choices in the chain
+            w1, w2, w3 = t1[i] + w1 * g1[i], t2[i] + w2 * g2[i], t3[i] + w3 * g3[i]
+        elif max(w1, w2, w3) <= 0.0:
+            w1, w2, w3 = t1[i] + w1, t2[i] + w2, t3[i] + w3
+        else:
+            w1 = t1[i] + w1 * (g1[i] if w1 > 0.0 else 1.0)
+            w2 = t2[i] + w2 * (g2[i] if w2 > 0.0 else 1.0)
+            w3 = t3[i] + w3 * (g3[i] if w3 > 0.0 else 1.0)
+        t1[i], t2[i], t3[i] = w1, w2, w3
+
+
+@kernel
+def pass_on_part(t: Array, g: Array, carry: Array) -> None:
+    """The same for one row whose cells store void."""
+    for i in range(1, t.size):
+        t[i] += t[i - 1] * (g[i] if t[i - 1] > 0.0 else carry[i])
+
+
+@kernel
+def settle(t: Array, over: Array, z: Array) -> None:
+    """Each point's balance solved: a pressure where something arrives, else the flow of void."""
+    for i in range(t.size):
+        z[i + 1] = t[i] * (over[i] if t[i] > 0.0 else 1.0)
 
 
 @kernel
@@ -120,20 +111,15 @@ def balance_row(z: Array, kx: Array, ky: Array, m: int, out: Array, carry: Array
 def norms(z: Array, kx: Array, ky: Array, c: Array, carry: Array | None = None) -> tuple[float, float]:
     """Sums of squares over the rank's points: of the residual c - G, and of the size of its largest terms."""
     ny, nx = z.shape[0] - 2, z.shape[1] - 2
-    G = np.zeros(nx + 2)
-    residual, terms = 0.0, 0.0
+    G, residual, terms = np.zeros(nx + 2), np.zeros(nx + 2), np.zeros(nx + 2)  # sums column by column: vector instructions
     for m in range(1, ny + 1):
         balance_row(z, kx, ky, m, G, carry)
-        r, t = 0.0, 0.0
         for i in range(1, nx + 1):
-            here = z[m, i]
-            size = abs(c[m, i])
-            size += (kx[m, i] + kx[m, i + 1] + ky[m, i] + ky[m + 1, i]) * here if here > 0.0 else -here
-            r += (c[m, i] - G[i]) ** 2
-            t += size * size
-        residual += r
-        terms += t
-    return residual, terms
+            residual[i] += (c[m, i] - G[i]) ** 2
+        for i in range(1, nx + 1):
+            diagonal = kx[m, i] + kx[m, i + 1] + ky[m, i] + ky[m + 1, i]
+            terms[i] += (abs(c[m, i]) + max(diagonal * z[m, i], -z[m, i])) ** 2
+    return residual.sum(), terms.sum()
 
 
 @kernel

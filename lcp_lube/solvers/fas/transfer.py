@@ -11,9 +11,16 @@ from .kernels import balance_row
 @kernel
 def share(a: float, b: float, harmonic: bool) -> float:
     """Weight of the neighbour behind conductance a, 1 minus that of the one behind b, in the interpolation between them."""
-    if a + b > 0.0 and (harmonic or a == 0.0 or b == 0.0):
-        return a / (a + b)
-    return 0.5
+    return a / (a + b) if a + b > 0.0 and (harmonic or a == 0.0 or b == 0.0) else 0.5
+
+
+@kernel
+def west_shares(k_x: Array, harmonic: bool, out: Array) -> None:
+    """Weights of the west neighbours of the points of a row between two coarse ones, and behind the last one; x faces k_x."""
+    n = min(out.size, (k_x.size - 1) // 2)
+    for k in range(n):
+        out[k] = share(k_x[2 * k + 1], k_x[2 * k + 2], harmonic)
+    out[n:] = 0.5
 
 
 @kernel
@@ -38,8 +45,8 @@ def restrict(
     the coarse line y0 // 2 - 1.
     """
     ny, nx = z.shape[0] - 2, z.shape[1] - 2
-    r, coarse = np.zeros(nx + 2), np.zeros(out.shape[1])
     n_coarse = out.shape[1] - 2
+    r, w, coarse, south = np.zeros(nx + 2), np.zeros(n_coarse + 1), np.zeros(n_coarse + 2), np.zeros(n_coarse + 2)
     for m in range(1, ny + 1):
         if residual:
             balance_row(z, kx, ky, m, r, carry)
@@ -47,35 +54,31 @@ def restrict(
                 r[i] = c[m, i] - r[i]
         else:
             r[1:-1] = c[m, 1:-1]
-        j = y0 + m - 1
-        odd = j % 2 == 1
-        row = (j - 1) // 2 - y0 // 2 + 1 if odd else j // 2 - y0 // 2
-        if not by_y:
-            row = m
-        if not by_x:
-            coarse[:] = r
-        else:
-            coarse[:] = 0.0
-            for k in range(n_coarse):
-                coarse[k + 1] = r[2 * k + 2]
-            for i in range(0, nx, 2):
-                w = share(kx[m, i + 1], kx[m, i + 2], harmonic)
-                coarse[i // 2] += w * r[i + 1]
-                coarse[i // 2 + 1] += (1.0 - w) * r[i + 1]
-            if wrap:  # periodic in x: what goes to the frame belongs to the last point
-                coarse[n_coarse] += coarse[0]
-        if not by_y:
-            for k in range(out.shape[1]):
-                out[row, k] += coarse[k]
-        elif odd:
-            for k in range(out.shape[1]):
-                out[row, k] += 0.5 * coarse[k]
-        else:
+        if by_x:
+            west_shares(kx[m], harmonic, w)
             for k in range(1, n_coarse + 1):
-                i = 2 * k if by_x else k
-                w = 0.5 * share(ky[m, i], ky[m + 1, i], harmonic)
-                out[row, k] += w * coarse[k]
-                out[row + 1, k] += (0.5 - w) * coarse[k]
+                coarse[k] = r[2 * k] + ((1.0 - w[k - 1]) * r[2 * k - 1] + w[k] * r[2 * k + 1])
+            if wrap:  # periodic in x: what goes to the frame belongs to the last point
+                coarse[n_coarse] += w[0] * r[1]
+        else:
+            coarse[:] = r
+        j = y0 + m - 1
+        if not by_y:
+            out[m] += coarse
+        elif j % 2 == 1:
+            out[(j - 1) // 2 - y0 // 2 + 1] += 0.5 * coarse
+        else:
+            row = j // 2 - y0 // 2
+            if by_x:
+                for k in range(1, n_coarse + 1):
+                    south[k] = share(ky[m, 2 * k], ky[m + 1, 2 * k], harmonic)
+            else:
+                for k in range(1, n_coarse + 1):
+                    south[k] = share(ky[m, k], ky[m + 1, k], harmonic)
+            for k in range(1, n_coarse + 1):
+                part = 0.5 * south[k] * coarse[k]
+                out[row, k] += part
+                out[row + 1, k] += 0.5 * coarse[k] - part
 
 
 @kernel
@@ -99,38 +102,35 @@ def correct(
     truncation: 0 none; 1 that, and a point that would cross its front stops there; 2 no correction at all at points that
     would, or that have a coarse neighbour that lies, or lay, on the other side.
     """
-    ny, nx = z.shape[0] - 2, z.shape[1] - 2
-    south, north, e = np.zeros(nx + 2), np.zeros(nx + 2), np.zeros(nx + 2)
-    before = -2  # the coarse row whose correction stands in south
-    added = 0.0
-    for m in range(1, ny + 1):
-        j = y0 + m - 1
-        row = m if not by_y else ((j + 1) // 2 - y0 // 2 if j % 2 == 1 else j // 2 - y0 // 2)
-        if row != before:
-            interpolate_row(new[row] - old[row], kx, m, by_x, harmonic, south)
-            before = row
-        if not by_y or j % 2 == 1:
-            e[:] = south
-        else:
-            interpolate_row(new[row] - old[row], kx, m, by_x, harmonic, south)
-            interpolate_row(new[row + 1] - old[row + 1], kx, m, by_x, harmonic, north)
-            for i in range(1, nx + 1):
-                v = share(ky[m, i], ky[m + 1, i], harmonic)
-                e[i] = v * south[i] + (1.0 - v) * north[i]
-            if truncation == 1:
+    nx, size = z.shape[1] - 2, new.shape[1]
+    w, d = np.zeros(size - 1), np.zeros(size)
+    south, north, e, added = np.zeros(nx + 2), np.zeros(nx + 2), np.zeros(nx + 2), np.zeros(nx + 2)
+    for m in range(1, z.shape[0] - 1):
+        row, last = coarse_rows(y0 + m - 1, y0, m, by_y)
+        if by_x:
+            west_shares(kx[m], harmonic, w)
+        for k in range(size):
+            d[k] = new[row, k] - old[row, k]
+        interpolate_row(d, w, by_x, south)
+        if last > row:
+            for k in range(size):
+                d[k] = new[last, k] - old[last, k]
+            interpolate_row(d, w, by_x, north)
+            mix(south, north, ky[m], ky[m + 1], harmonic, e)
+            if truncation == 1 and differ(z[m - 1], z[m + 1]):
                 for i in range(1, nx + 1):
                     if z[m, i] > 0.0:
                         if z[m - 1, i] <= 0.0 and z[m + 1, i] > 0.0 and reforms(z, m - 1, i):
                             e[i] = north[i]
                         elif z[m + 1, i] <= 0.0 and z[m - 1, i] > 0.0 and reforms(z, m + 1, i):
                             e[i] = south[i]
-            before = -2
+        else:
+            e[:] = south
         if truncation == 1 and by_x:
-            for i in range(1, nx, 2):
+            for i in range(1, nx + 1, 2):
                 if z[m, i] > 0.0 and z[m, i - 1] <= 0.0 and z[m, i + 1] > 0.0:
                     e[i] = e[i + 1]
         if truncation == 2:
-            last = row + (by_y and j % 2 == 0)
             for i in range(1, nx + 1):
                 left, right = (i // 2, (i + 1) // 2) if by_x else (i, i)
                 full = z[m, i] > 0.0
@@ -138,60 +138,77 @@ def correct(
                     for k in (left, right):
                         if ((new[J, k] > 0.0) != full or (old[J, k] > 0.0) != full) and new[J, k] != old[J, k]:
                             e[i] = 0.0
-        stop = 0.0 if truncation == 2 else 1.0
         for i in range(1, nx + 1):
             here = z[m, i]
             moved = here + e[i]
             if truncation > 0 and (moved > 0.0) != (here > 0.0):
-                moved = (1e-300 if here > 0.0 else 0.0) if stop > 0.0 else here
+                moved = here if truncation == 2 else 1e-300 if here > 0.0 else 0.0
             z[m, i] = moved
-            added += (moved - here) ** 2
-    return added
+            added[i] += (moved - here) ** 2
+    return added.sum()
 
 
 @kernel
-def interpolate_row(coarse: Array, kx: Array, m: int, by_x: bool, harmonic: bool, out: Array) -> None:
-    """A coarse line's values at the points of row m, whose x faces give the weights."""
+def coarse_rows(j: int, y0: int, m: int, by_y: bool) -> tuple[int, int]:
+    """Rows of the coarse lines south and north of the fine line j, which is the rank's row m; one where it is among them."""
+    if not by_y:
+        return m, m
+    row = (j + 1) // 2 - y0 // 2
+    return row, row + 1 - j % 2
+
+
+@kernel
+def differ(a: Array, b: Array) -> bool:
+    """Whether two rows are full at different points."""
+    count = 0
+    for i in range(a.size):
+        count += (a[i] > 0.0) != (b[i] > 0.0)
+    return count > 0
+
+
+@kernel
+def interpolate_row(coarse: Array, w: Array, by_x: bool, out: Array) -> None:
+    """A coarse line's values at all points of a line; w: `west_shares`."""
     if not by_x:
         out[:] = coarse
         return
-    for k in range(1, coarse.size - 1):
+    for k in range(out.size // 2):
         out[2 * k] = coarse[k]
-    for k in range((out.size - 1) // 2):
-        u = share(kx[m, 2 * k + 1], kx[m, 2 * k + 2], harmonic)
-        out[2 * k + 1] = u * coarse[k] + (1.0 - u) * coarse[k + 1]
+        out[2 * k + 1] = w[k] * coarse[k] + (1.0 - w[k]) * coarse[k + 1]
+
+
+@kernel
+def mix(south: Array, north: Array, k_S: Array, k_N: Array, harmonic: bool, out: Array) -> None:
+    """Between two lines, by the conductances of the y faces to them."""
+    for i in range(1, out.size - 1):
+        v = share(k_S[i], k_N[i], harmonic)
+        out[i] = v * south[i] + (1.0 - v) * north[i]
 
 
 @kernel
 def interpolate(z: Array, coarse: Array, kx: Array, ky: Array, y0: int, by_x: bool, by_y: bool, harmonic: bool) -> None:
     """A start from the coarse grid's answer: p and q interpolated one by one, the larger flow decides which one a point has."""
-    ny, nx = z.shape[0] - 2, z.shape[1] - 2
-    for m in range(1, ny + 1):
-        j = y0 + m - 1
-        if not by_y:
-            a = b = m
-        elif j % 2 == 1:
-            a = b = (j - 1) // 2 - y0 // 2 + 1
-        else:
-            a = j // 2 - y0 // 2
-            b = a + 1
-        for i in range(1, nx + 1):
-            if not by_x:
-                left = right = i
-            elif i % 2 == 0:
-                left = right = i // 2
+    nx, size = z.shape[1] - 2, coarse.shape[1]
+    w, part, flows = np.zeros(size - 1), np.zeros(size), np.zeros((2, nx + 2))  # flows: p, q
+    south, north = np.zeros(nx + 2), np.zeros(nx + 2)
+    for m in range(1, z.shape[0] - 1):
+        row, last = coarse_rows(y0 + m - 1, y0, m, by_y)
+        if by_x:
+            west_shares(kx[m], harmonic, w)
+        for s in range(2):
+            sign = 1.0 - 2.0 * s
+            for k in range(size):
+                part[k] = max(sign * coarse[row, k], 0.0)
+            interpolate_row(part, w, by_x, south)
+            for k in range(size):
+                part[k] = max(sign * coarse[last, k], 0.0)
+            interpolate_row(part, w, by_x, north)
+            if last > row:
+                mix(south, north, ky[m], ky[m + 1], harmonic, flows[s])
             else:
-                left = (i - 1) // 2
-                right = left + 1
-            u = 0.5 if left == right else share(kx[m, i], kx[m, i + 1], harmonic)
-            v = 0.5 if a == b else share(ky[m, i], ky[m + 1, i], harmonic)
-            p, q = 0.0, 0.0
-            for J, weight_y in ((a, v), (b, 1.0 - v)):
-                for k, weight_x in ((left, u), (right, 1.0 - u)):
-                    if coarse[J, k] > 0.0:
-                        p += weight_x * weight_y * coarse[J, k]
-                    else:
-                        q -= weight_x * weight_y * coarse[J, k]
+                flows[s] = south
+        for i in range(1, nx + 1):
+            p, q = flows[0, i], flows[1, i]
             z[m, i] = p if p * (kx[m, i] + kx[m, i + 1] + ky[m, i] + ky[m + 1, i]) > q else -q
 
 
