@@ -44,7 +44,7 @@ class Reduce:
         """Pickled on one rank it is one rank's, else that of all."""
         return _over, (self.comm.size == 1,)
 
-    def sum(self, a: Array) -> float:
+    def sum(self, a: NDArray) -> float:
         return self.comm.allreduce(float(np.sum(a)))
 
     def dot(self, a: Array, b: Array) -> float:
@@ -61,6 +61,10 @@ class Reduce:
     def max(self, a: Array) -> float:
         """Largest entry, -inf where there is none; NaN if any entry is NaN."""
         return self._extremum(a, -np.inf, MPI.MAX)
+
+    def largest(self, a: Array) -> float:
+        """Largest |entry|, as `max`, without an array of them."""
+        return self.max(np.array([np.max(a), -np.min(a)]) if a.size else a)
 
     def _extremum(self, a: Array, empty: float, op: MPI.Op) -> float:
         value = float(op(float(np.min(a) if op == MPI.MIN else np.max(a)), empty)) if a.size else empty

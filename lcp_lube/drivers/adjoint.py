@@ -54,7 +54,7 @@ class Adjoint:
         self.pressures = [float(P) for P in solution.settings.get("supply_pressures", ())]
         solved: Any = getattr(solution.problem, "moving", solution.problem)
         self.dry = getattr(solved, "dry", None)
-        self.equations = Equations(self.scene, solution.problem.grid.dm.comm, self.pressures, dry=self.dry)
+        self.equations = Equations(self.scene, solution.problem.grid.petsc_comm, self.pressures, dry=self.dry)
         if self.equations.grid.shape != solution.problem.grid.shape:
             raise InputError(f"{scene.name}: the solution is on another grid than the scene")
         self._reduction = solution.settings.get("details", {}).get("reduction")
@@ -102,7 +102,7 @@ class Adjoint:
         With P the symmetric extension J_half = P' J P/2, the lines on the mirror having half cells: J_half' mu = P' b/2.
         """
         eq, half = self.equations, Part(self.scene, "mirror")
-        small, whole = half.build(eq.grid.dm.comm), eq.constant
+        small, whole = half.build(eq.grid.petsc_comm), eq.constant
         take = Pick(eq.grid, small.grid, *numbers(small.grid))
         spread = Pick(small.grid, eq.grid, *half.places(eq.grid))
         try:
@@ -136,7 +136,7 @@ class Adjoint:
         same = scene is self.scene and pressures is None
         eq = self.equations
         if not same:
-            eq = Equations(scene, eq.grid.dm.comm, pressures or self.pressures, eq, self.dry)
+            eq = Equations(scene, eq.grid.petsc_comm, pressures or self.pressures, eq, self.dry)
         try:
             if eq.grid.shape != self.equations.grid.shape:
                 raise InputError("the grid has another number of points")

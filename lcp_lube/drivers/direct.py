@@ -9,8 +9,9 @@ import numpy as np
 from ..base.options import recipe
 from ..base.stages import Stages
 from ..problems.box import BoxProblem
+from ..problems.certificate import Certificate
 from ..problems.facts import Facts
-from ..problems.film.cavity import cavity_sign
+from ..problems.film.cavity import cavitated
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Enclosure, Fields, Outcome, Problem, Solution, Step
 from ..registry import METHODS
@@ -69,7 +70,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner | None = None) -> Solution:
     run.take_over()
     problem = run.revise()
     outcome, message = run.outcome, run.message
-    certificate = problem.certify(run.fields, run.stopping.eps1)
+    certificate = run.certificate or problem.certify(run.fields, run.stopping.eps1)
     enclosure = run.enclose(problem) if ask.certify and isinstance(problem, LubricationProblem) else None
     if outcome is not Outcome.CONVERGED and isinstance(problem, BoxProblem):
         outcome, message = problem.explain(outcome, message)
@@ -123,6 +124,7 @@ class Run:
         self.steps: list[Step] = []
         self.levels: list[dict[str, Any]] = []
         self.details: dict[str, Any] = {}
+        self.certificate: Certificate | None = None  # of the fields, where somebody has made one
         self.method, self.system = chosen.method, chosen.system
         self.recipe: str | None = None
         self.ksp_type: str | None = None
@@ -140,7 +142,7 @@ class Run:
         for k, shape in enumerate(shapes):
             begin = perf_counter()
             with self.stages("setup"):
-                level = self.problem if shape == finest else self.scene.with_shape(shape).build(self.problem.grid.dm.comm)
+                level = self.problem if shape == finest else self.scene.with_shape(shape).build(self.problem.grid.petsc_comm)
             with self.stages("prolongation"):
                 start_from = guess(level, near, entry.interior)
             if previous is not None:
@@ -169,8 +171,8 @@ class Run:
         others = METHODS[self.chosen.method].of(self.problem.kind).fallback
         for k, name in enumerate((name for name in others if self.facts.size <= METHODS[name].at_most), start=1):
             if self.outcome is Outcome.CONVERGED:
-                failure = self.problem.certify(self.fields, self.stopping.eps1).failure
-                if not failure:
+                self.certificate = self.certificate or self.problem.certify(self.fields, self.stopping.eps1)
+                if not (failure := self.certificate.failure):
                     break
                 self.outcome, self.message = Outcome.WRONG_SOLUTION, f"{self.message}, but the certificate fails: {failure}"
             record.append((self.outcome, self.message, [astuple(step) for step in self.steps]))
@@ -206,9 +208,10 @@ class Run:
         first = self.problem
         if not isinstance(first, LubricationProblem) or first.coefficients_for is None or self.outcome is not Outcome.CONVERGED:
             return first
-        dry = (cavity_sign(first.reduce, self.fields["p"], self.fields["r"]) < 0).astype(float)
+        dry = cavitated(first.reduce, self.fields["p"], self.fields["r"]).astype(float)
         if not first.reduce.max(dry) > 0:
             return first
+        self.certificate = None
         again = first.revised(dry)
         entry, chosen = METHODS[self.method].of(again.kind), self.method == self.chosen.method
         start, options = None if entry.interior else self.fields, self.options if chosen else {}
@@ -260,7 +263,7 @@ class Run:
                 monitor = watching(self.ask, level, self.problem, stopping)
                 ended = self._keeper.iterate(method, level.grid, stopping, monitor, before, reached, **record)
                 self.outcome, self.message, self.steps = ended
-            self.fields = method.fields
+            self.fields, self.certificate = method.fields, method.certificate
             if not tried:
                 self.details = getattr(method, "details", {})
             krylov = method.krylov

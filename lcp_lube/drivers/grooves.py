@@ -74,7 +74,7 @@ def films_of(
     The problems are the caller's to free.
     """
     for pad, film in pad_films(scene):
-        problem = film.build(ring.grid.dm.comm)
+        problem = film.build(ring.grid.petsc_comm)
         take = pick_pad(ring.grid, problem.grid, pad.first)
         taken = {name: take(values) for name, values in fields.items()}
         take.destroy()

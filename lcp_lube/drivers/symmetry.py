@@ -125,7 +125,7 @@ def solve_part(part: Part, problem: Problem, ask: Ask, inner: Inner) -> Solution
         return Solution(problem, known, Outcome.CONVERGED, "nothing to solve", certificate, [], settings).judged()
     start = None
     if ask.start is not None:
-        small = part.build(problem.grid.dm.comm)
+        small = part.build(problem.grid.petsc_comm)
         same = ask.start.problem.grid is problem.grid
         near = ask.start.fields if same else problem.prolong(ask.start.problem, ask.start.fields, False)  # type: ignore[arg-type]
         take = Pick(problem.grid, small.grid, *numbers(small.grid))

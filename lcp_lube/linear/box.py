@@ -78,7 +78,7 @@ class NewtonMatrix:
 
     def __init__(self, problem: BoxProblem):
         self.problem = problem
-        self._own = Owned(self, problem.grid.dm.comm)
+        self._own = Owned(self, problem.grid.petsc_comm)
         self.mat = self._own(problem.jacobian(problem.v0).duplicate(copy=True))
         self.x, self.b = map(self._own, self.mat.createVecs())
 

@@ -27,7 +27,7 @@ class FullSystem:
         self.stages = stages or Stages()
         grid = problem.grid
         nl = grid.local_size
-        comm = grid.dm.comm
+        comm = grid.petsc_comm
         with self.stages("assembly"):
             starts = grid.starts
             own_p = (2 * grid.first + np.arange(nl)).astype(PETSc.IntType)

@@ -41,8 +41,8 @@ class ReducedSystem:
             self._a, self._b_entries, self._neighbour = a[order], b[order], neighbour[order]
             size = (grid.local_size, grid.size)
             csr_arrays = (self._pointers, self._columns, self._a)
-            self._own = Owned(self, grid.dm.comm)
-            self.mat = self._own(PETSc.Mat().createAIJ((size, size), csr=csr_arrays, comm=grid.dm.comm))
+            self._own = Owned(self, grid.petsc_comm)
+            self.mat = self._own(PETSc.Mat().createAIJ((size, size), csr=csr_arrays, comm=grid.petsc_comm))
             self._diagonal_A = scheme.diagonal.ravel()
             self._diagonal_B = -scheme.b_C.ravel()
             self._x, self._b = map(self._own, self.mat.createVecs())

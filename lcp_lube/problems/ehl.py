@@ -49,12 +49,12 @@ class LineContact:
         # dh_j/dp_m but for the ends' weights: column m of the own faces is a stretch of these, from the end.
         self._differences = (self._kernel[:-2] - self._kernel[2:])[::-1].copy()
         self._rows = np.arange(count - self.has_k)
-        self._own = Owned(self, grid.dm.comm)
+        self._own = Owned(self, grid.petsc_comm)
 
     @made
     def mat(self) -> PETSc.Mat:
         size = (self.grid.local_size, self.grid.size)
-        mat = PETSc.Mat().createDense((size, size), comm=self.grid.dm.comm)
+        mat = PETSc.Mat().createDense((size, size), comm=self.grid.petsc_comm)
         mat.setUp()
         return mat
 

@@ -80,7 +80,7 @@ class Frame:
             dof=1,
             stencil_width=1,
             stencil_type=PETSc.DMDA.StencilType.STAR,
-            comm=self.grid.dm.comm,
+            comm=self.grid.petsc_comm,
         )
 
 

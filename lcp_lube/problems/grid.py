@@ -84,10 +84,11 @@ class Grid:
         comm = PETSc.Comm(comm or PETSc.COMM_WORLD)  # mpi4py's will do too
         self._check_size(comm)
         collect(comm)  # what earlier solves have left behind
-        self._own, self._comm = Owned(self, comm), comm
+        self._own, self.petsc_comm = Owned(self, comm), comm
         self.comm = comm.tompi4py()  # not the DM's own: that ends with it, and a solution is asked for more when it is freed
         self.reduce = Reduce(self.comm)
-        ranges = self.dm.getRanges()
+        # One rank has them all: its DMDA, some 30 bytes a point, waits for a matrix that asks for it.
+        ranges = self.dm.getRanges() if comm.size > 1 else [(0, n) for n in self.shape]
         self.x_start, self.x_end = (int(i) for i in ranges[0])
         self.y_start, self.y_end = (int(j) for j in ranges[1]) if self.dim == 2 else (0, 1)
         self.box = (self.y_end - self.y_start, self.x_end - self.x_start)
@@ -98,7 +99,7 @@ class Grid:
     def dm(self) -> PETSc.DMDA:
         """Deals the points to the ranks."""
         # Lines of the flow direction stay whole where there are enough of them: what the void does is told along them.
-        ranks = self._comm.size
+        ranks = self.petsc_comm.size
         try:
             return PETSc.DMDA().create(
                 dim=self.dim,
@@ -108,7 +109,7 @@ class Grid:
                 stencil_width=1,
                 stencil_type=PETSc.DMDA.StencilType.STAR,
                 boundary_type=tuple("periodic" if periodic else "none" for periodic in self.periodic),
-                comm=self._comm,
+                comm=self.petsc_comm,
             )
         except PETSc.Error:
             raise InputError(
@@ -240,14 +241,16 @@ class Grid:
         at_points, at_faces = (self.origin[side] + line * self.spacing[side] for line in lines)
         return at_points, at_faces
 
-    def ghosted(self, owned: Array, outside: float = np.nan) -> Array:
+    def ghosted(self, owned: NDArray, outside: float = np.nan) -> Array:
         """Owned values with one layer of the neighbours' around them, `outside` beyond the domain.
 
         Returns an array of shape (ny_local + 2, nx_local + 2); its corners are not to be used. Collective.
         """
-        if self.comm.size == 1 and not any(self.periodic):
-            out = np.full((self.box[0] + 2, self.box[1] + 2), outside)
+        if self.comm.size == 1:
+            out = np.empty((self.box[0] + 2, self.box[1] + 2))
             out[1:-1, 1:-1] = np.reshape(owned, self.box)
+            out[:, 0], out[:, -1] = (out[:, -2], out[:, 1]) if self.periodic[0] else (outside, outside)
+            out[0], out[-1] = (out[-2], out[1]) if self.periodic[-1] and self.dim == 2 else (outside, outside)
             return out
         source = self.dm.getGlobalVec()
         target = self.dm.getLocalVec()

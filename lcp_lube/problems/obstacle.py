@@ -30,7 +30,7 @@ class ObstacleEquations:
 
     def __init__(self, semilinear: SemilinearProblem):
         self.semilinear, self.b = semilinear, semilinear.b
-        self._own = Owned(self, semilinear.grid.dm.comm)
+        self._own = Owned(self, semilinear.grid.petsc_comm)
 
     @made
     def _jacobian(self) -> PETSc.Mat:
@@ -159,7 +159,7 @@ class ObstacleProblem(BoxProblem):
         axes = folded_axes(self.grid)
         shape = tuple((n - 1) // 2 for n in whole_shape(self.grid))
         if self._coarser is None and min(shape) >= COARSEST and min(part_shape(shape, axes)) >= self.grid.comm.size:
-            grid = part_grid(shape, whole_lengths(self.grid), axes, self.grid.dm.comm, self.grid.origin)
+            grid = part_grid(shape, whole_lengths(self.grid), axes, self.grid.petsc_comm, self.grid.origin)
             self._coarser = ObstacleProblem(grid, self.lam, *self._data, coarse=True)
         return None if self._coarser is None else (self._coarser, self._interpolation(self._coarser.grid))
 

@@ -158,7 +158,7 @@ class SemilinearProblem:
         west_east, south_north = (self.faces[k] + self.faces[k + 1] for k in (0, 2))
         self.diagonal = np.broadcast_to(west_east + south_north, grid.box).ravel()
         self.largest_diagonal = 2.0 * (dy / dx + dx / dy)
-        self._own = Owned(self, grid.dm.comm)
+        self._own = Owned(self, grid.petsc_comm)
         self.b = np.zeros(grid.local_size) if boundary is None else _boundary_terms(grid, boundary)
 
     @made

@@ -44,13 +44,15 @@ class Transfer:
             points = np.arange(*ranges[side])
             along = _weights(points, coarse, fine, side, zero_boundary)
             weights = kron(along, weights, format="csr")
-        weights.indices = coarse.dm.getAO().app2petsc(weights.indices.astype(PETSc.IntType))
+        weights.indices = weights.indices.astype(PETSc.IntType)
+        if coarse.comm.size > 1:
+            weights.indices = coarse.dm.getAO().app2petsc(weights.indices)
         weights.has_sorted_indices = False
         weights.sort_indices()
         csr = (weights.indptr.astype(PETSc.IntType), weights.indices, weights.data)
         sizes = ((fine.local_size, fine.size), (coarse.local_size, coarse.size))
-        self._own = Owned(self, fine.dm.comm)
-        self.mat = self._own(PETSc.Mat().createAIJ(sizes, csr=csr, comm=fine.dm.comm))
+        self._own = Owned(self, fine.petsc_comm)
+        self.mat = self._own(PETSc.Mat().createAIJ(sizes, csr=csr, comm=fine.petsc_comm))
         self._x, self._y = map(self._own, self.mat.createVecs())
 
     def __call__(self, field: Array) -> Array:
@@ -117,12 +119,16 @@ class Pick:
     """Values at the points of one grid taken from numbered points of another: line j, column i. Collective."""
 
     def __init__(self, source: Grid, target: Grid, j: NDArray[np.int64], i: NDArray[np.int64]):
-        self.source, self.target = source, target
+        self.source, self.target, self._at = source, target, (j, i)
+        if target.comm.size == 1:
+            return
         natural = np.broadcast_to(j * source.shape[0] + i, target.box).ravel().astype(PETSc.IntType)
-        self._from = PETSc.IS().createGeneral(source.dm.getAO().app2petsc(natural), comm=target.dm.comm)
-        self._to = PETSc.IS().createStride(target.local_size, target.first, 1, comm=target.dm.comm)
+        self._from = PETSc.IS().createGeneral(source.dm.getAO().app2petsc(natural), comm=target.petsc_comm)
+        self._to = PETSc.IS().createStride(target.local_size, target.first, 1, comm=target.petsc_comm)
 
     def __call__(self, field: Array) -> Array:
+        if self.target.comm.size == 1:
+            return np.broadcast_to(field.reshape(self.source.box)[self._at], self.target.box).flatten()
         source, target = self.source.dm.createGlobalVec(), self.target.dm.createGlobalVec()
         source.setArray(field)
         scatter = PETSc.Scatter().create(source, self._from, target, self._to)
@@ -133,7 +139,7 @@ class Pick:
         return values
 
     def destroy(self) -> None:
-        for obj in (self._from, self._to):
+        for obj in (self._from, self._to) if self.target.comm.size > 1 else ():
             obj.destroy()
 
 

@@ -119,7 +119,7 @@ class Callbacks:
         self._fixed = lower == upper
         self._any_fixed = grid.reduce.sum(self._fixed.astype(float)) > 0
         self._mat: PETSc.Mat | None = None
-        self._own = Owned(self, grid.dm.comm)
+        self._own = Owned(self, grid.petsc_comm)
 
     def residual(self, v: Array) -> Array:
         """F(v). Collective.
@@ -159,7 +159,7 @@ class Callbacks:
         if values.shape != (n, n):
             raise InputError(f"J(x) has shape {values.shape}: {(n, n)} is needed")
         if self._mat is None:
-            self._mat = self._own(PETSc.Mat().createDense((n, n), comm=self.grid.dm.comm))
+            self._mat = self._own(PETSc.Mat().createDense((n, n), comm=self.grid.petsc_comm))
             self._mat.setUp()
         self._mat.getDenseArray()[:] = values
         self._mat.assemble()
@@ -171,7 +171,7 @@ class Callbacks:
         if csr.shape != (n, n):
             raise InputError(f"J(x) has shape {csr.shape}: {(n, n)} is needed")
         if self._mat is None:
-            self._mat = self._own(_aij(csr, self.grid.dm.comm))
+            self._mat = self._own(_aij(csr, self.grid.petsc_comm))
         self._mat.zeroEntries()
         try:
             self._mat.setValuesCSR(csr.indptr.astype(PETSc.IntType), csr.indices.astype(PETSc.IntType), csr.data.astype(float))

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..base.parallel import Array
 from ..linear.krylov import Krylov
+from ..problems.certificate import Certificate
 from ..problems.solution import Fields, Step
 from .method_options import MethodOptions, make_options
 
@@ -28,12 +29,14 @@ class Method:
     state : the attributes that a step starts from: numbers, arrays of this rank's points, or tuples and dataclasses of these.
         A checkpoint keeps them, all else is made anew; a method without any cannot be taken up again.
     norm : ||F|| at the present fields, in the method's own measure.
+    certificate : of the present fields, where a step has needed it.
     system : the matrix behind the steps and its KSP; None for a method without one.
     """
 
     Options: type[MethodOptions] = MethodOptions
     state: tuple[str, ...] = ()
     norm: float
+    certificate: Certificate | None = None
     system: Any = None
 
     def __init__(self, job: Job, **defaults: Any):

@@ -47,4 +47,4 @@ def assemble(grid: Grid, entries: list[tuple[int, int, Array]]) -> PETSc.Mat:
     pointers = np.zeros(ny * nx + 1, dtype=PETSc.IntType)
     np.cumsum(inside.sum(axis=-1).ravel(), out=pointers[1:])
     size = (grid.local_size, grid.size)
-    return PETSc.Mat().createAIJWithArrays((size, size), (pointers, columns[inside], values[inside]), comm=grid.dm.comm)
+    return PETSc.Mat().createAIJWithArrays((size, size), (pointers, columns[inside], values[inside]), comm=grid.petsc_comm)

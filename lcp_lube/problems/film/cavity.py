@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...base.parallel import Array, Reduce
 
@@ -19,6 +20,12 @@ def cavity_sign(reduce: Reduce, p: Array, r: Array) -> Array:
     ----------
     p : owned points, above the cavitation pressure, in any unit. r : void fraction there.
     """
-    p_max = reduce.max(np.abs(p))
+    p_max = reduce.largest(p)
     z = p / p_max if p_max > 0 else p
     return np.where(r > VOID, z - r, np.maximum(z, 0.0))
+
+
+def cavitated(reduce: Reduce, p: Array, r: Array) -> NDArray[np.bool_]:
+    """Where `cavity_sign` is negative. Collective."""
+    p_max = reduce.largest(p)
+    return (r > VOID) & ((p / p_max if p_max > 0 else p) < r)

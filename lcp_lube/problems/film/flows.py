@@ -8,7 +8,7 @@ import numpy as np
 
 from ...base.parallel import Array
 from ..grid import Grid
-from .cavity import cavity_sign
+from .cavity import cavitated
 from .edges import Around, strips
 from .reynolds import BoxScheme, sides
 
@@ -92,23 +92,30 @@ def drag(problem: LubricationProblem, scheme: BoxScheme, p_pa: Array, r: Array, 
     grid, s = problem.grid, scheme
     before, behind = grid.steps(0)[:-1], grid.steps(0)[1:]
     muU, weight, rims = problem.mu * problem.U, line_weights(grid), grid.rims(1) if grid.dim == 2 else (0.0, 0.0)
-    full = (cavity_sign(problem.reduce, p_pa, r) >= 0).reshape(grid.box)
     p, r = p_pa.reshape(grid.box), r.reshape(grid.box)
     first, last, south, north = sides(grid)
-    walls = sides(grid, ("closed",))[:2]
-    p_east = np.where(last, problem.p_sides[1], grid.ghosted(p_pa)[1:-1, 2:])
-    h_west, *west = sheared_faces(problem, grid.x - before / 2, lifted)
     h_east, resting, h_moving = sheared_faces(problem, grid.x + behind / 2, lifted)
-    passes = ~np.broadcast_to(walls[1], grid.box)  # the east face
-    liquid = 1.0 + s.b_E * r / np.where(passes & (s.couette_E != 0.0), s.couette_E, np.inf)
-    east = np.where(passes, resting + liquid / h_moving, 0.0)
-    own = np.where(first, before / behind * (west[0] + 1.0 / west[1]), 0.0)
-    for wall, share in zip(walls, (0.5 * before / behind, 0.5), strict=True):
-        own = own + np.where(wall, share * np.where(full, 4.0, 1.0 - r) / s.h, 0.0)
-    push = np.where(passes, 0.5 * h_east * (p_east - p), 0.0), np.where(first, 0.5 * h_west * (p - problem.p_sides[0]), 0.0)
+    still, p_east = s.couette_E == 0.0, grid.ghosted(p_pa)[1:-1, 2:]
+    liquid = s.b_E * r / (np.where(still, np.inf, s.couette_E) if still.any() else s.couette_E)
+    east = resting + (1.0 + liquid) / h_moving
+    own, push_own = np.zeros_like(east), np.zeros_like(east)
+    if first.any():
+        h_west, *west = sheared_faces(problem, grid.x[:, :1] - before[0] / 2, lifted)
+        own[:, :1] = before[0] / behind[0] * (west[0] + 1.0 / west[1])
+        push_own[:, :1] = 0.5 * h_west * (p[:, :1] - problem.p_sides[0])
+    if last.any():
+        p_east[:, -1] = problem.p_sides[1]
+    for at, wall in zip((0, -1), sides(grid, ("closed",))[:2], strict=True):
+        if wall.any():
+            full = ~cavitated(problem.reduce, p_pa, r.ravel()).reshape(grid.box)[:, at]
+            share = 0.5 if at else 0.5 * before[0] / behind[0]
+            own[:, at] += share * np.where(full, 4.0, 1.0 - r[:, at]) / s.h[:, at]
+    if wall.any():  # the east one: its faces have neither
+        east[:, -1], p_east[:, -1] = 0.0, p[:, -1]
+    push = 0.5 * h_east * (p_east - p)
     per_row = muU * grid.stretch(grid.y) ** 2 * behind * (1.0 + 0.5 * (rims[0] * south + rims[1] * north) / weight)
     scale = weight * (grid.spacing[1] if grid.dim == 2 else 1.0)
-    return (per_row * east + push[0]) * scale, (per_row * own + push[1]) * scale
+    return (per_row * east + push) * scale, (per_row * own + push_own) * scale
 
 
 def sheared_faces(problem: LubricationProblem, x: Array, lifted: complex = 0.0) -> tuple[Array, Array, Array]:
@@ -119,8 +126,8 @@ def sheared_faces(problem: LubricationProblem, x: Array, lifted: complex = 0.0) 
     t/h^2, and 1/h. That is linear in what flows between a film that is full in the thinnest strip alone and one that is full.
     """
     grid, film = problem.grid, Around(problem.film, problem.grid)
-    h = np.broadcast_to(film(x, grid.y) + lifted, grid.box)
-    resting, moving = np.zeros_like(h), h
+    h = np.broadcast_to(film(x, grid.y) + lifted, (grid.box[0], x.shape[1]))
+    resting, moving = np.broadcast_to(h.dtype.type(0.0), h.shape), h
     jumps = film.jumps("y") if grid.dim == 2 else ()
     if jumps:
         rows, in_strips, shares = strips(film, x[0], grid.y[:, 0], grid.steps(1), jumps)
@@ -129,6 +136,6 @@ def sheared_faces(problem: LubricationProblem, x: Array, lifted: complex = 0.0) 
             parts = in_strips + lifted
             mean, full, layer = (np.sum(shares * part, axis=0) for part in (parts, 1.0 / parts, thinnest / parts**2))
             slope = np.where(uneven, (full - layer) / np.where(uneven, 1.0 - thinnest / mean, 1.0), full)
-            h, moving = np.array(h), np.array(h)
+            h, resting, moving = np.array(h), np.array(resting), np.array(h)
             h[rows], resting[rows], moving[rows] = mean, full - slope, 1.0 / slope
     return h, resting, moving

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...base.parallel import Array
 from ..grid import Grid
-from .cavity import cavity_sign
+from .cavity import cavitated
 from .flows import line_weights, point_weights, stream_weights
 from .reynolds import Film, sides
 
@@ -45,26 +45,25 @@ def line_fronts(problem: LubricationProblem, p: Array, r: Array) -> Fronts:
     grid, film, s = problem.grid, problem.film, problem.scheme
     start, steps = grid.origin[0], grid.steps(0)
     behind, ahead = steps[:-1], steps[1:]
-    z = grid.ghosted(cavity_sign(problem.reduce, p, r))[1:-1]
+    cavity = grid.ghosted(cavitated(problem.reduce, p, r), outside=0.0)[1:-1] > 0
     opens = [kind == "open" for kind in grid.ends[0]]
     if grid.x_start == 0 and opens[0]:
-        z[:, 0] = -1.0 if problem.r_in > 0 else 1.0
-    cavity = z < 0
+        cavity[:, 0] = problem.r_in > 0
     if grid.dim == 1 and opens[0]:
-        Q = np.full(grid.box, problem.boundary_flows(p, r)[0])
-    else:
-        Q = s.flow_unit * (s.couette_E + s.b_E * r.reshape(grid.box)) / stream_weights(grid)
+        Q = problem.boundary_flows(p, r)[0]
     row, i = np.nonzero(cavity[:, 1:-1] & ~cavity[:, :-2])
+    if not (grid.dim == 1 and opens[0]):
+        Q = s.flow_unit * (s.couette_E[row, i] + s.b_E[row, i] * r.reshape(grid.box)[row, i]) / stream_weights(grid)[row, 0]
     x, y = grid.x[0], grid.y[:, 0]
     before = (x - 2.0 * behind)[i]
     before = before if grid.periodic[0] else np.maximum(before, start)
-    ruptures = _rises_through(film, Q[row, i] / problem.U, before, (x + ahead)[i], y[row])
+    ruptures = _rises_through(film, np.broadcast_to(Q, i.shape) / problem.U, before, (x + ahead)[i], y[row])
     shift = np.zeros(grid.box[0])
     np.add.at(shift, row, (x - 0.5 * behind)[i] - ruptures)
     starts = row, i, ruptures
     row, i = np.nonzero(~cavity[:, 1:-1] & cavity[:, :-2])
-    pressed = (s.k_W * p.reshape(grid.box))[row, i]
-    lacking = (s.b_W * grid.ghosted(r, outside=0.0)[1:-1, :-2])[row, i]
+    pressed = s.k_W[row, i] * p.reshape(grid.box)[row, i]
+    lacking = s.b_W[row, i] * grid.ghosted(r, outside=0.0)[row + 1, i]
     known = pressed + lacking > 0.0
     back = np.where(known & (lacking > 0.0), pressed / np.where(known, pressed + lacking, 1.0), 0.5)
     np.add.at(shift, row, ((0.5 - back) * behind[i]))
@@ -105,7 +104,7 @@ def cavitated_area(problem: LubricationProblem, found: Fronts | None, p: Array, 
     Across the flow a front lies where the pressure beside it, followed by its slope, is zero.
     """
     grid = problem.grid
-    cavity = cavity_sign(problem.reduce, p, r) < 0
+    cavity = cavitated(problem.reduce, p, r)
     area = problem.reduce.sum(cavity * point_weights(grid)) * grid.cell
     if found is None:
         return area

@@ -22,7 +22,7 @@ PATIENCE = HALVES + 5  # and of all of them before
 
 def within_reach(grid: Grid) -> bool:
     """Whether a factorisation is a matter of less than a second, and its band one of 100 MB."""
-    return grid.size * _order(grid)[1] ** 2 <= WORK[find_spec("numba") is not None]
+    return grid.size * _bands(grid)[1] ** 2 <= WORK[find_spec("numba") is not None]
 
 
 class GradedJacobian:
@@ -164,11 +164,15 @@ def whole(grid: Grid, *fields: Array) -> list[Array]:
 def _order(grid: Grid) -> tuple[NDArray[np.int64], int]:
     """Each point's place in the elimination, shape (ny, nx), and the band that this makes: lines across the shorter way."""
     (nx, ny), (round_x, round_y) = (*grid.shape, 1)[:2], (*grid.periodic, False)[:2]
-    x, y = _places(nx, round_x), _places(ny, round_y)
-    orders = [y[:, None] * nx + x, x * ny + y[:, None]]
-    bands = [_band(nx, round_x, ny, round_y), _band(ny, round_y, nx, round_x)]
-    best = int(np.argmin(bands))
-    return orders[best], bands[best]
+    x, y, (by_lines, band) = _places(nx, round_x), _places(ny, round_y), _bands(grid)
+    return y[:, None] * nx + x if by_lines else x * ny + y[:, None], band
+
+
+def _bands(grid: Grid) -> tuple[bool, int]:
+    """Whether lines along the flow, one after the other, make the narrower band; and that band."""
+    (nx, ny), (round_x, round_y) = (*grid.shape, 1)[:2], (*grid.periodic, False)[:2]
+    along, across = _band(nx, round_x, ny, round_y), _band(ny, round_y, nx, round_x)
+    return along <= across, min(along, across)
 
 
 def _places(n: int, around: bool) -> NDArray[np.int64]:

@@ -83,7 +83,7 @@ class LubricationProblem:
         self.cells: dict[str, Array] = {}  # what effects made of its coefficients (`film.effects`)
         self.reduce = grid.reduce
         self.c = scheme.c.ravel()
-        self._own = Owned(self, grid.dm.comm)
+        self._own = Owned(self, grid.petsc_comm)
 
     @made
     def A(self) -> PETSc.Mat:
@@ -297,4 +297,4 @@ class LubricationProblem:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
-        self._own = Owned(self, self.grid.dm.comm)
+        self._own = Owned(self, self.grid.petsc_comm)

@@ -9,7 +9,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ...base.parallel import Array
-from .cavity import cavity_sign
+from .cavity import cavitated
 from .flows import friction, side_flows
 from .forces import ambient, corner_flows, forces, open_pressures
 from .fronts import cavitated_area, first_cavity, fronts, line_fronts
@@ -68,7 +68,7 @@ def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any
     flow : out of each side, m3/s (`flows.side_flows`). side_leakage : south and north together (2D). flow_growth : of each when
     the spacings are halved, None if they converge (`forces.corner_flows`; 2D).
     min_h, min_h_at : thinnest film and where, m, sides included.
-    cavitated_fraction : share of the points (`cavity.cavity_sign`); cavitated_area : between the
+    cavitated_fraction : share of the points (`cavity.cavitated`); cavitated_area : between the
     fronts, m2 (`fronts.cavitated_area`).
     ruptures, reformations : x of all of them, m; in 2D on the middle line (`fronts.fronts`). rupture : the first one, None
     where absent. reformation : the first one behind it, or behind the void that enters.
@@ -77,7 +77,7 @@ def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any
     """
     grid, reduce = problem.grid, problem.reduce
     p_pa = p * problem.p_unit
-    cavity = (cavity_sign(reduce, p, r) < 0).astype(float)
+    cavity = cavitated(reduce, p, r)
     min_h, min_h_at = thinnest(problem)
     known = known_of(problem)
     read = _read(problem, p_pa, r)

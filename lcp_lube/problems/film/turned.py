@@ -38,7 +38,7 @@ class TurnedProblem(LubricationProblem):
         ends = tuple((pair[::-1] if k == 0 else pair) for k, pair in enumerate(grid.ends))
         x, y = grid.places
         places = (None if x is None else grid.lengths[0] - x[::-1], y)
-        own = Grid(grid.shape, grid.lengths, grid.dm.comm, ends=ends, places=places, polar=grid.polar)  # type: ignore[arg-type]
+        own = Grid(grid.shape, grid.lengths, grid.petsc_comm, ends=ends, places=places, polar=grid.polar)  # type: ignore[arg-type]
         columns = np.arange(own.x_start, own.x_end)[None, :]
         lines = np.arange(own.y_start, own.y_end)[:, None]
         there, back = grid.shape[0] - 1 - columns, grid.shape[0] - 1 - np.arange(grid.x_start, grid.x_end)[None, :]

@@ -73,10 +73,10 @@ class Cycles(Method):
         self._recent = (*self._recent[1:], self.norm if self._taken > 1 else inf)
 
     def _full_multigrid(self) -> None:
-        """From the coarsest grid up, one cycle on each. Collective."""
+        """From the coarsest grid up, one V cycle on each: more is lost beside the grid's own error. Collective."""
         for k in reversed(range(self._depth)):
             self._rise_to(k)
-            self._cycle(k, self.options.cycle)
+            self._cycle(k, "V")
 
     def _cycle(self, k: int, kind: str) -> None:
         """One cycle from level k down and back. Collective."""

@@ -117,9 +117,10 @@ class Fas(Cycles):
         """
         residual, terms = self._norms()
         norm = float(residual / (max(self._c_norm, 16 * EPS * terms / self.eps1) or 1.0))
-        if norm > self._rest:
+        self.certificate = None
+        if not norm <= self._rest:
             return norm
-        seen = self.problem.certify(self.fields, self.eps1)
+        self.certificate = seen = self.problem.certify(self.fields, self.eps1)
         lost = seen.measures["mass_defect"] / (self._share if self.problem.held is None else FED)
         return max(norm, self._rest * max(lost, seen.measures["residual"] / self._share) / seen.tol)
 
