@@ -89,8 +89,8 @@ class Grid:
         self.reduce = Reduce(self.comm)
         # One rank has them all: its DMDA, some 30 bytes a point, waits for a matrix that asks for it.
         ranges = self.dm.getRanges() if comm.size > 1 else [(0, n) for n in self.shape]
-        self.x_start, self.x_end = (int(i) for i in ranges[0])
-        self.y_start, self.y_end = (int(j) for j in ranges[1]) if self.dim == 2 else (0, 1)
+        self._owned = [(int(start), int(end)) for start, end in (*ranges, (0, 1))][:2]
+        (self.x_start, self.x_end), (self.y_start, self.y_end) = self._owned
         self.box = (self.y_end - self.y_start, self.x_end - self.x_start)
         # Rank k owns the global (PETSc) numbers starts[k] to starts[k + 1].
         self.starts = np.concatenate([[0], np.cumsum(self.comm.allgather(self.local_size))])
@@ -191,22 +191,19 @@ class Grid:
         """Length of an arc at y over its x: 1 in the plane, in a sector the radius over the one on which x is measured."""
         return np.ones_like(y) if self.polar is None else (self.polar[0] + y) / self.polar[1]
 
-    def _owned(self, side: int) -> tuple[int, int]:
-        return ((self.x_start, self.x_end), (self.y_start, self.y_end))[side]
-
     def steps(self, side: int) -> Array:
         """Distances in m, in x (side 0) or y (1), across the faces before, between and behind the owned points.
 
         Across a closed or mirror end to the mirror image: nothing flows there.
         """
-        start, end = self._owned(side)
+        start, end = self._owned[side]
         around = self._around[side]
         steps = np.full(self.shape[side] + 1, self.spacing[side]) if around is None else np.diff(around)
         return (np.append(steps[:-1], steps[0]) if self.periodic[side] else steps)[start : end + 1]
 
     def widths(self, side: int, everywhere: bool = False) -> Array:
         """Widths of the owned columns (side 0) or lines (1) of cells, or of all, in spacings: 1, and 1/2 on a mirror."""
-        start, end = (0, self.shape[side]) if everywhere else self._owned(side)
+        start, end = (0, self.shape[side]) if everywhere else self._owned[side]
         around, number, (first, last) = self._around[side], np.arange(start, end), self.ends[side]
         halved = (number == 0) & (first == "mirror") | (number == self.shape[side] - 1) & (last == "mirror")
         whole = 1.0 if around is None else (0.5 * (around[2:] - around[:-2]) / self.spacing[side])[start:end]
@@ -226,7 +223,7 @@ class Grid:
         Each comes from its number alone, so that the two cells of a face see the same film even where it jumps there, and what
         leaves one cell enters the next. Nothing lies beyond a closed or mirror end: its own coordinate stands there.
         """
-        start, end = self._owned(side)
+        start, end = self._owned[side]
         around, n, offset, L = self._around[side], self.shape[side], self.offset[side], self.lengths[side]
         if around is not None:
             at_points, at_faces = np.clip(around, 0.0, L), np.clip(0.5 * (around[1:] + around[:-1]), 0.0, L)
