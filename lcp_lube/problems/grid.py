@@ -276,7 +276,7 @@ class Grid:
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "Grid":
         """A grid of its own DMDA. Collective."""
-        return Grid(self.shape, self.lengths, self.dm.comm, self.origin, self._ends, self.places, self.polar)
+        return Grid(self.shape, self.lengths, self.petsc_comm, self.origin, self._ends, self.places, self.polar)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """What is pickled: the numbers, from which as many ranks make the grid again, together."""
