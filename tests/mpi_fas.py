@@ -40,6 +40,7 @@ CASES: dict[str, tuple[Any, dict[str, Any]]] = {
         "obstacle_bratu",
         {"nx": 50, "ny": 61, "v_upper": 0.3, "v_lower": "0.28 - 10*((x - 0.2)^2 + (y - 0.2)^2)"},
     ),
+    "pad": ("dimpled_pad", {"nx": 101, "ny": 101}),
     "hard": ("textured_slider", {"K": 3, "nx": 60, "ny": 64, "depth": 135e-6}),
 }
 
