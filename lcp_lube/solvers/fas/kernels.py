@@ -94,6 +94,18 @@ def settle(t: Array, over: Array, z: Array) -> None:
 
 
 @kernel
+def relax(z: Array, kx: Array, ky: Array, c: Array, m: int, start: int, end: int, carry: Array | None = None) -> None:
+    """The points of row m in columns start to end - 1, one after the other: each balance has one solution."""
+    west = z[m, start - 1]
+    for i in range(start, end):
+        k_W, k_E, k_S, k_N = kx[m, i], kx[m, i + 1], ky[m, i], ky[m + 1, i]
+        t = c[m, i] + k_E * max(z[m, i + 1], 0.0) + k_S * max(z[m - 1, i], 0.0) + k_N * max(z[m + 1, i], 0.0)
+        t += k_W * west if west > 0.0 else west if carry is None else carry[m, i - 1] * west
+        west = t / (k_W + k_E + k_S + k_N) if t > 0.0 else t
+        z[m, i] = west
+
+
+@kernel
 def balance_row(z: Array, kx: Array, ky: Array, m: int, out: Array, carry: Array | None = None) -> None:
     """G of the points of row m into out[1:-1]."""
     for i in range(1, z.shape[1] - 1):
