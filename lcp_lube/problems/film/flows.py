@@ -105,12 +105,12 @@ def drag(problem: LubricationProblem, scheme: BoxScheme, p_pa: Array, r: Array, 
         push_own[:, :1] = 0.5 * h_west * (p[:, :1] - problem.p_sides[0])
     if last.any():
         p_east[:, -1] = problem.p_sides[1]
-    for at, wall in zip((0, -1), sides(grid, ("closed",))[:2], strict=True):
-        if wall.any():
-            full = ~cavitated(problem.reduce, p_pa, r.ravel()).reshape(grid.box)[:, at]
-            share = 0.5 if at else 0.5 * before[0] / behind[0]
-            own[:, at] += share * np.where(full, 4.0, 1.0 - r[:, at]) / s.h[:, at]
-    if wall.any():  # the east one: its faces have neither
+    walls = sides(grid, ("closed",))[:2]
+    dry = cavitated(problem.reduce, p_pa, r.ravel()).reshape(grid.box) if "closed" in grid.ends[0] else None
+    for at, wall, share in zip((0, -1), walls, (0.5 * before[0] / behind[0], 0.5), strict=True):
+        if dry is not None and wall.any():
+            own[:, at] += share * np.where(dry[:, at], 1.0 - r[:, at], 4.0) / s.h[:, at]
+    if walls[1].any():  # its faces have neither
         east[:, -1], p_east[:, -1] = 0.0, p[:, -1]
     push = 0.5 * h_east * (p_east - p)
     per_row = muU * grid.stretch(grid.y) ** 2 * behind * (1.0 + 0.5 * (rims[0] * south + rims[1] * north) / weight)
