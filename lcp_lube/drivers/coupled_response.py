@@ -47,7 +47,7 @@ class CoupledResponse:
 
     def __init__(self, scene: Any, solution: Solution, gaps: Sequence[Any]):
         problem: Any = solution.problem
-        grid, comm = problem.grid, problem.grid.dm.comm
+        grid, comm = problem.grid, problem.grid.petsc_comm
         if problem.held is not None and any(one.open for one in problem.held.supplies):
             raise InputError(f"scene {scene.name}: coefficients with effects are of supplies at given pressures")
         self.loop = loop = Loop(scene.with_shape(grid.shape), Ask(comm=comm), None)  # type: ignore[arg-type]
@@ -116,7 +116,7 @@ class CoupledResponse:
     def _solve(self, b: Array, nu: float, stored: bool = True) -> Any:
         """Complex (z', x') of a complex right-hand side; at nu = 0 both are real. Collective."""
         size, n, parts = b.size, self.n, (b.real,) if nu == 0.0 else (b.real, b.imag)
-        comm = self.loop.base.grid.dm.comm
+        comm = self.loop.base.grid.petsc_comm
 
         class Whole:
             def mult(shell, mat: PETSc.Mat, v: PETSc.Vec, out: PETSc.Vec) -> None:

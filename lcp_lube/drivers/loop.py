@@ -154,7 +154,7 @@ class Loop:
         Far from the answer old steps mislead: there it combines two answers alone, and many once coefficients change by less
         than `NEAR`. Where steps lead away from the best fields so far, or a cycle ends, it begins anew from these.
         """
-        comm = self.base.grid.dm.comm
+        comm = self.base.grid.petsc_comm
         x = PETSc.Vec().createMPI((len(self.names) * self.h.size, None), comm=comm)
         x.setArray(self.vector(cells))
         best, last, near = (np.inf, x.array_r.copy()), (x.array_r.copy() + 1.0, x.array_r.copy()), False
@@ -213,4 +213,4 @@ def held(scene: Any, solution: Solution) -> Any:
         return scene
     problem: Any = solution.problem
     frozen = Frozen(scene.with_shape(problem.grid.shape), Law())
-    return replace(frozen, by=factors(frozen.build(problem.grid.dm.comm), problem.cells))
+    return replace(frozen, by=factors(frozen.build(problem.grid.petsc_comm), problem.cells))

@@ -177,7 +177,7 @@ class ThrustPads:
         assert isinstance(scene, ThrustScene) and isinstance(solution.problem, LubricationProblem)
         modes = [lambda x, y: 1.0 + 0.0 * (x + y), *scene.tilt_modes]
         film = held(scene, solution)
-        yield PadFilm(film.build(solution.problem.grid.dm.comm), film.model, solution.fields, modes, [0, 1, 2])
+        yield PadFilm(film.build(solution.problem.grid.petsc_comm), film.model, solution.fields, modes, [0, 1, 2])
 
     def misfit(self, solution: Solution, films: Sequence[PadFilm]) -> tuple[Array, Array]:
         (film,) = films

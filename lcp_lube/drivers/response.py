@@ -136,7 +136,7 @@ class Response:
         step = STEP * self.problem.reduce.min(self.problem.scheme.h) / (size or 1.0)
         values, grid = [], self.problem.grid
         for part in (-2.0, -1.0, 1.0, 2.0):
-            other = replace(self.model, gap=replace(moved, e=part * step)).build(grid.shape, grid.dm.comm, grid)
+            other = replace(self.model, gap=replace(moved, e=part * step)).build(grid.shape, grid.petsc_comm, grid)
             if self.problem.factors is not None:
                 other = self.problem.factors.film(other)
             if self.problem.dry is not None and other.coefficients_for is not None:
