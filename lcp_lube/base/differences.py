@@ -10,12 +10,13 @@ from .parallel import Array
 
 STEP, SMALLER, TRIES = 1e-4, 0.1, 4  # of a number, relative; where its effect is not smooth, smaller ones
 SMOOTH = 1e-5  # relative difference between differences of second and fourth order that is left to truncation
+QUICK, BENT = 1e-5, 1e-4  # of a number, relative; least part of the slope that the second difference must have to be heeded
 KINK = 1e-2  # relative difference between both sides
 CHORD, SLIGHT = 1e-2, 1e-2  # relative: width and least slope of a function that changes by steps
 ROUNDING, TINY = 1e-15, 1e-300
 
 
-def differences(f: Callable[[float], Array], a: float, scale: float, sizes: Array) -> tuple[Array, Array]:
+def differences(f: Callable[[float], Array], a: float, scale: float, sizes: Array, quick: bool = False) -> tuple[Array, Array]:
     """df/da of a vector function to rounding, and by how much its derivatives to both sides differ where it has a kink.
 
     A kink's derivative is the mean of both sides. Where f changes by steps (it jumps at a, or nothing changes but over a wider
@@ -24,6 +25,7 @@ def differences(f: Callable[[float], Array], a: float, scale: float, sizes: Arra
     Parameters
     ----------
     scale : a change of a that is not small. sizes : of the terms that f is made of, whose rounding is left in it.
+    quick : f is expensive: where it hardly bends, two values of it have to do beside f(a).
 
     Raises
     ------
@@ -40,6 +42,13 @@ def differences(f: Callable[[float], Array], a: float, scale: float, sizes: Arra
         value = known[change]
         return None if isinstance(value, InputError) else value
 
+    d = QUICK * scale
+    if quick and all(at(m * d) is not None for m in (-1, 0, 1)):
+        low, here, high = (known[m * d] for m in (-1, 0, 1))
+        noise = 10.0 * ROUNDING * sizes / d
+        slope, bend = (high - low) / (2.0 * d), np.abs(high - 2.0 * here + low) / d  # type: ignore[operator]
+        if (np.abs(slope) > noise).all() and (bend <= BENT * np.abs(slope) + noise).all():
+            return slope, np.zeros_like(slope)
     best: tuple[float, Array] | None = None
     before, kinks = np.zeros_like(sizes), np.zeros_like(sizes)
     for k in range(TRIES):

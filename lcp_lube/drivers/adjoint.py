@@ -8,6 +8,7 @@ solution. Where v was found such that C = 0 holds (an attitude, the eccentricity
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ from ..scenes.grooved import GroovedJournalScene
 from ..scenes.scene import Scene
 from ..scenes.values import values_of, with_values
 from .coefficients import placed
-from .equations import MISFIT, Equations, cavity_of, check_film, fields_of
+from .equations import DRAGS, MISFIT, Equations, cavity_of, check_film, fields_of
 from .film_part import Part
 from .linearised import transposed
 
@@ -54,7 +55,8 @@ class Adjoint:
         self.pressures = [float(P) for P in solution.settings.get("supply_pressures", ())]
         solved: Any = getattr(solution.problem, "moving", solution.problem)
         self.dry = getattr(solved, "dry", None)
-        self.equations = Equations(self.scene, solution.problem.grid.petsc_comm, self.pressures, dry=self.dry)
+        comm = solution.problem.grid.petsc_comm
+        self.equations = Equations(self.scene, comm, self.pressures, dry=self.dry, solved=solution.problem)
         if self.equations.grid.shape != solution.problem.grid.shape:
             raise InputError(f"{scene.name}: the solution is on another grid than the scene")
         self._reduction = solution.settings.get("details", {}).get("reduction")
@@ -82,11 +84,18 @@ class Adjoint:
         self.lambdas = dict(zip(parts, self._solve(rows), strict=True))
         self.parts = parts
         self.flow_unit = eq.problem(p).scheme.flow_unit
-        terms = eq.terms(p, r) / self.flow_unit
-        self.sizes = {
-            name: sum(abs(w * self.numbers[part]) for part, w in parts[name].items()) + eq.grid.reduce.dot(np.abs(one), terms)
-            for name, one in self.lambdas.items()
-        }
+
+    @cached_property
+    def sizes(self) -> dict[str, float]:
+        """Of the terms that every L is the sum of. Collective."""
+        eq = self.equations
+        terms, dot = eq.terms(self.p, self.r) / self.flow_unit, eq.grid.reduce.dot
+        own = {name: sum(abs(w * self.numbers[part]) for part, w in weights.items()) for name, weights in self.parts.items()}
+        return {name: own[name] + dot(np.abs(one), terms) for name, one in self.lambdas.items()}
+
+    @cached_property
+    def _here(self) -> Array:
+        return self.lagrangians(self.scene)
 
     def _solve(self, rows: list[Array]) -> list[Array]:
         eq = self.equations
@@ -140,7 +149,7 @@ class Adjoint:
         try:
             if eq.grid.shape != self.equations.grid.shape:
                 raise InputError("the grid has another number of points")
-            numbers = eq.numbers(self.p, self.r)
+            numbers = eq.numbers(self.p, self.r, any(part in DRAGS for weights in self.parts.values() for part in weights))
             report = eq.report(numbers)
             G = eq.balance(self.p, self.r) / self.flow_unit
             if (held := eq.held) is not None:
@@ -169,7 +178,12 @@ class Adjoint:
             slope, jump = differences(at, value, max(abs(value), 1e-3 * unit), sizes)
         else:
             scale = abs(value) or self._scale(key)
-            slope, jump = differences(lambda a: self.lagrangians(with_values(self.scene, {key: a})), value, scale, sizes)
+            quick = self.equations.grid.size > SMALL
+
+            def near(a: float) -> Array:
+                return self._here if a == value else self.lagrangians(with_values(self.scene, {key: a}))
+
+            slope, jump = differences(near, value, scale, sizes, quick)
         return dict(zip(names, slope, strict=True)), dict(zip(names, jump, strict=True))
 
     @property

@@ -50,6 +50,7 @@ class Equations:
     ----------
     pressures : of all supplies, Pa above p_c; heeded where a supply's own is to be found.
     dry : the points for whose cavities round edges have been made (`LubricationProblem.dry`).
+    solved : the solution's own problem, which is taken, not freed, where the scene's would be the same.
     near : those of a scene near by, whose grid this one has: uneven lines follow the film's edges, none changes sides.
 
     Raises
@@ -64,6 +65,7 @@ class Equations:
         pressures: Sequence[float] = (),
         near: "Equations | None" = None,
         dry: Array | None = None,
+        solved: Any = None,
     ):
         model = check_film(scene)
         if model.effects:
@@ -75,11 +77,14 @@ class Equations:
         film = Frozen(film, self.law) if self.law else film
         self._model: Model = film.constant if self.law else model
         places = None if near is None or near.grid.even else _followed(near.grid, near._model, self._model)
-        if near is None or places is None:
-            self.constant: LubricationProblem = film.build(comm)
+        self._lent = type(solved) is LubricationProblem and not (self.turned or self.law or solved.held)
+        if self._lent:
+            self.constant: LubricationProblem = solved
+        elif near is None or places is None:
+            self.constant = film.build(comm)
         else:
             self.constant = replace(self._model, places=places).build(near.grid.shape, comm)
-        if dry is not None and self.constant.coefficients_for is not None:
+        if dry is not None and self.constant.coefficients_for is not None and not self._lent:
             self.constant = self.constant.revised(dry)
         self.grid: Grid = self.constant.grid
         if pressures and (held := self.constant.held) is not None:
@@ -122,10 +127,10 @@ class Equations:
         k = s.diagonal.ravel() * p / problem.p_unit
         return (np.abs(k) + np.abs(s.couette_W).ravel() + np.abs(s.couette_E).ravel()) * s.flow_unit
 
-    def numbers(self, p: Array, r: Array) -> dict[str, float]:
+    def numbers(self, p: Array, r: Array, drags: bool = True) -> dict[str, float]:
         """`slopes.numbers` as the scene has them. Collective."""
         problem = self.problem(p)
-        found = slopes.numbers(problem, p / problem.p_unit, r)
+        found = slopes.numbers(problem, p / problem.p_unit, r, drags)
         if (fields := known_fields(problem)) is not None:  # a line's numbers are free of the grid's error (`film.line`)
             told, discrete = _flat(problem.quantities(fields)), slopes.numbers(problem, fields["p"], fields["r"])
             found = {name: value + (told.get(name, discrete[name]) - discrete[name]) for name, value in found.items()}
@@ -197,7 +202,8 @@ class Equations:
         return out
 
     def destroy(self) -> None:
-        self.constant.destroy()
+        if not self._lent:
+            self.constant.destroy()
 
 
 def _flat(told: dict[str, Any]) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,6 @@ from petsc4py import PETSc
 
 from ..base.options import recipe
 from ..base.parallel import Array
-from ..linear.cavity import CavitySystem
 from ..linear.krylov import Krylov
 from ..problems.facts import Facts
 from ..problems.film.assembly import assemble
@@ -19,7 +19,6 @@ from ..registry import SMALL
 from .plan import default_recipe
 
 Entries = list[tuple[int, int, Array]]
-RTOL = 1e-10  # of iterations for lambda
 
 
 class Linear:
@@ -101,20 +100,18 @@ class Linear:
 def transposed(
     problem: LubricationProblem, cavity: NDArray[np.bool_], rows: Sequence[Array], entries: Entries | None, given: Any
 ) -> list[Array]:
-    """J'^-1 b for each b: by the factors of `Linear`, in large films in the plane by multigrid on what elimination leaves.
+    """J'^-1 b for each b: by the factors of `Linear`, in large films in the plane by multigrid where its cycles converge.
 
     entries, given : as `Linear` takes them. Collective.
     """
-    grid = problem.grid
-    facts = Facts(problem.kind, grid.shape, grid.comm.size)
-    plain = entries is None and given is None and problem.held is None and not any(grid.periodic)
-    if plain and grid.dim == 2 and grid.size > SMALL and facts.whole_lines:
-        with recipe(default_recipe(facts, "cavity", large=True)[0]):
-            system = CavitySystem(problem)
-            try:
-                return system.solve_transposed(~cavity, rows, RTOL)
-            finally:
-                system.destroy()
+    grid, found = problem.grid, None
+    plain = entries is None and given is None and problem.held is None
+    if plain and grid.dim == 2 and grid.size > SMALL and find_spec("numba"):
+        from ..solvers.fas import adjoint  # here: numba starts with it
+
+        found = adjoint.transposed(problem, cavity, rows)
+    if found is not None:
+        return found
     linear = Linear(problem, cavity, entries, given)
     try:
         return linear.solve_transposed(rows)

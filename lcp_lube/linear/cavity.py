@@ -13,7 +13,6 @@ The KSP sees S diag(w), w the near-null vector of S (`nearnull`): row and column
 multigrid wants them, whatever the fronts look like.
 """
 
-from collections.abc import Sequence
 from importlib.util import find_spec
 
 import numpy as np
@@ -109,37 +108,6 @@ class CavitySystem:
     def resolve(self, f1: Array, f2: Array, rtol: float) -> tuple[Array, Array, int]:
         """The same for another right-hand side and the cells of the last `solve`, whose set-up is kept. Collective."""
         return self.solve((~self._full).astype(float), self._full.astype(float), f1, f2, rtol)
-
-    def solve_transposed(self, full: NDArray[np.bool_], rows: Sequence[Array], rtol: float) -> list[Array]:
-        """J'^-1 b for each b, J having A's columns in the full film and -B's in the cavity. Collective.
-
-        Along a cavitated run lambda is that of the full cell downstream, and what b has of the run adds up: with that, S' is
-        what remains for the full cells.
-        """
-        ny, nx = self.problem.grid.box
-        target = self._targets(full)
-        S = self._assemble(full, target)
-        if self.problem.reduce.sum(full.astype(float)) > COARSEST:
-            self._scale(S, full, CYCLES)
-        transposed = PETSc.Mat()
-        S.transpose(transposed)
-        krylov = Krylov(transposed)
-        found = []
-        kept = target >= 0
-        for b in rows:
-            steps = np.where(full, 0.0, -b / self._b_C).reshape(ny, nx)[:, ::-1]
-            added, cells = np.cumsum(steps, axis=1), full.reshape(ny, nx)[:, ::-1]
-            last = np.maximum.accumulate(np.where(cells, np.arange(nx), -1), axis=1)  # the full cell downstream
-            before = np.where(last >= 0, np.take_along_axis(added, np.maximum(last, 0), axis=1), 0.0)
-            g = np.where(full, 0.0, (added - before)[:, ::-1].ravel())
-            any_void = self.problem.reduce.max(np.abs(g)) > 0.0
-            rhs = b - self.problem.multiply(self.problem.A, g) if any_void else b  # A is symmetric
-            _, at_full = _solve(krylov, self._w[full] * rhs[full], rtol)
-            found.append(g + np.where(kept, at_full[np.maximum(target, 0)] if at_full.size else 0.0, 0.0))
-        krylov.destroy()
-        transposed.destroy()
-        S.destroy()
-        return found
 
     def _assemble(self, full: NDArray[np.bool_], target: NDArray[np.int64]) -> PETSc.Mat:
         """S for these full cells. Collective."""
