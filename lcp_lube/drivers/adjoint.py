@@ -103,7 +103,12 @@ class Adjoint:
         entries = None if eq.law is None else eq.tangent(self.p, self.r).entries(problem.scheme)
         if self._halved:
             return self._solve_half(rows)
-        return transposed(problem, self.cavity, rows, entries, eq.held)
+        return transposed(problem, self.cavity, rows, self._z, entries, eq.held)
+
+    @property
+    def _z(self) -> Array:
+        """p (p_unit) where the film is full, -r where it is not."""
+        return np.where(self.cavity, -self.r, self.p / self.equations.constant.p_unit)
 
     def _solve_half(self, rows: list[Array]) -> list[Array]:
         """On half the width of a film that is symmetric about its middle, where what is asked of it is so too.
@@ -120,10 +125,10 @@ class Adjoint:
             even = [np.abs(b - spread(take(b))) <= EVEN * eq.grid.reduce.max(np.abs(b)) for b in rows]
             alike = eq.grid.reduce.min(np.array([float(one.all()) for one in even])) if rows else 1.0
             if not alike or small.scheme.flow_unit != whole.scheme.flow_unit:
-                return transposed(whole, self.cavity, rows, None, None)
+                return transposed(whole, self.cavity, rows, self._z)
             share = np.broadcast_to(np.where(sides(small.grid, ("mirror",))[3], 0.5, 1.0), small.grid.box).ravel()
             cavity = take(self.cavity.astype(float)) > 0.5
-            return [spread(one) for one in transposed(small, cavity, [share * take(b) for b in rows], None, None)]
+            return [spread(one) for one in transposed(small, cavity, [share * take(b) for b in rows], take(self._z))]
         finally:
             for made in (take, spread, small):
                 made.destroy()

@@ -98,18 +98,23 @@ class Linear:
 
 
 def transposed(
-    problem: LubricationProblem, cavity: NDArray[np.bool_], rows: Sequence[Array], entries: Entries | None, given: Any
+    problem: LubricationProblem,
+    cavity: NDArray[np.bool_],
+    rows: Sequence[Array],
+    z: Array,
+    entries: Entries | None = None,
+    given: Any = None,
 ) -> list[Array]:
     """J'^-1 b for each b: by the factors of `Linear`, in large films in the plane by multigrid where its cycles converge.
 
-    entries, given : as `Linear` takes them. Collective.
+    z : the solution, p and -r. entries, given : as `Linear` takes them. Collective.
     """
     grid, found = problem.grid, None
     plain = entries is None and given is None and problem.held is None
     if plain and grid.dim == 2 and grid.size > SMALL and find_spec("numba"):
         from ..solvers.fas import adjoint  # here: numba starts with it
 
-        found = adjoint.transposed(problem, cavity, rows)
+        found = adjoint.transposed(problem, cavity, rows, z)
     if found is not None:
         return found
     linear = Linear(problem, cavity, entries, given)
