@@ -24,6 +24,8 @@ def add(command: Callable[[str, str], argparse.ArgumentParser]) -> None:
     sensitivity.add_argument("--monte-carlo", type=whole, metavar="N", help=text)
     sensitivity.add_argument("--seed", type=whole, default=1, help="of these numbers, default 1")
     sensitivity.add_argument("--plot", metavar="FILE.png", help="bars, and the film's own derivative at every point")
+    text = "where the grid's error of the first quantity comes from, cell by cell: one more solve, at half the spacing"
+    sensitivity.add_argument("--errors", metavar="FILE.png", help=text)
     sensitivity.add_argument("--output", metavar="FILE", help="fields with d(Q)/dh per area: .npz, .vts (ParaView) or .h5")
     json_option(sensitivity)
 

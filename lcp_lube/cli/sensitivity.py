@@ -11,6 +11,7 @@ from ..drivers.adjoint import Adjoint
 from ..drivers.ask import Ask
 from ..drivers.equations import check_film
 from ..drivers.film_gradient import FilmGradient
+from ..drivers.goal_error import finer_shape, goal_error
 from ..drivers.gradient import Gradient, gradients
 from ..errors import InputError
 from ..output import files, sensitivity
@@ -43,6 +44,8 @@ def run(args: argparse.Namespace) -> int:
         files.check_target(args.plot, plot=True)
     if args.output:
         files.check_target(args.output)
+    if args.errors:
+        files.check_target(args.errors, plot=True)
     deviation = deviations(scene, {**(scene.tolerance or {}), **dict(map(_assignment, args.tolerance))})
     if args.monte_carlo is not None and not deviation:
         raise InputError(f"--monte-carlo {args.monte_carlo}: --tolerance KEY=U is needed too")
@@ -53,6 +56,8 @@ def run(args: argparse.Namespace) -> int:
         check_unread()
         data = as_dict(solution)
         record: dict[str, Any] = {key: data.get(key) for key in HEAD}
+        if args.errors:
+            finer_shape(solution)  # refused before the work that it costs
         if solution.converged:
             found = gradients(scene, solution, names, keys)
             record |= sensitivity.as_dict(found[0], solution)
@@ -62,12 +67,17 @@ def run(args: argparse.Namespace) -> int:
             for one, into in zip(found, [record, *record.get("others", [])], strict=True):
                 into |= {"error_bar": bars[one.quantity]} if bars else {}
             pictures(args, scene, solution, found)
+            if args.errors:
+                record["grid_error"] = grid_error(args, scene, solution, names[0], ask)
         if args.json:
             say(json.dumps(finite(record)))
         else:
             say(text(record, scene, solution, found if solution.converged else []))
             if solution.converged and bars:
                 say("\n".join(bar_line(name, bar, sensitivity.unit_of(solution, name)) for name, bar in bars.items()))
+            if told := record.get("grid_error"):
+                shares = f"{told['cells']:.2g} of it from the cells, half of their sizes from {told['worst']:.1%} of them"
+                say(f"grid: {told['finer']:.6g} at half the spacing, error near {told['error']:.2g}; {shares}")
     finally:
         solution.destroy()
     return 0 if solution.converged else 1
@@ -110,6 +120,14 @@ def error_bars(
                 }
             }
     return bars
+
+
+def grid_error(args: argparse.Namespace, scene: Scene, solution: Solution, quantity: str, ask: Ask) -> dict[str, float]:
+    """What the grid costs a number, drawn where it comes from; one more solve, at half the spacing. Collective."""
+    with solve(scene.with_shape(finer_shape(solution)), ask, start=solution) as finer:
+        found = goal_error(scene, solution, finer, quantity)
+    sensitivity.plot_error(found, solution, args.errors)
+    return {name: getattr(found, name) for name in ("value", "finer", "error", "cells", "worst")}
 
 
 def bar_line(name: str, bar: dict[str, Any], unit: str) -> str:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.parallel import Array
+from ..drivers.goal_error import GoalError
 from ..drivers.gradient import Gradient
 from ..problems.solution import Solution
 from .files import gather
@@ -104,10 +105,7 @@ def plot(gradient: Gradient, solution: Solution, field: Array, path: str | Path)
     InputError : the file cannot be written; then nothing is left behind.
     """
     grid = solution.problem.grid
-    picture = collect(solution)
-    stride = (1, 1) if picture is None else tuple(max(1, -(-n // m.size)) for n, m in _pairs(picture, grid))
-    stride = grid.comm.bcast(stride)
-    values = gather(grid, field, stride)
+    picture, values = _gathered(solution, field)
 
     def figure() -> Any:
         keys = [key for key in gradient.ranked if gradient.elasticity[key]][:MOST_BARS]
@@ -121,6 +119,38 @@ def plot(gradient: Gradient, solution: Solution, field: Array, path: str | Path)
         return figure
 
     save_figure(figure, Path(path), grid.comm, DOTS)
+
+
+def plot_error(error: GoalError, solution: Solution, path: str | Path) -> None:
+    """Where the error of a number comes from. Collective; rank 0 draws.
+
+    Raises
+    ------
+    InputError : the file cannot be written; then nothing is left behind.
+    """
+    picture, values = _gathered(solution, error.field)
+    unit = unit_of(solution, error.quantity)
+
+    def figure() -> Any:
+        figure = new_figure(6.4, 4.6)
+        axes = figure.subplots()
+        axes.set_xlabel(picture.along[1])  # type: ignore[union-attr]
+        name = f"error of {error.quantity} ({unit or '1'} per mm²)"
+        _map(figure, axes, picture, 1e-6 * values, name)  # type: ignore[arg-type, operator]
+        head = f"{solution.settings.get('scene', '')}: {error.quantity} {quantity(error.value, unit)}".rstrip()
+        shares = f"error near {quantity(error.error, unit)}; half of what cells add lies in {error.worst:.1%} of them"
+        axes.set_title(f"{head}\n{shares}", fontsize=9, loc="left")
+        return figure
+
+    save_figure(figure, Path(path), solution.problem.grid.comm, DOTS)
+
+
+def _gathered(solution: Solution, field: Array) -> tuple[Picture | None, Array]:
+    """A field on the picture's points, on rank 0. Collective."""
+    grid = solution.problem.grid
+    picture = collect(solution)
+    stride = (1, 1) if picture is None else tuple(max(1, -(-n // m.size)) for n, m in _pairs(picture, grid))
+    return picture, gather(grid, field, grid.comm.bcast(stride))  # type: ignore[return-value]
 
 
 def _pairs(picture: Picture, grid: Any) -> list[tuple[int, Array]]:
@@ -145,8 +175,6 @@ def _film(figure: Any, axes: Axes, picture: Picture, gradient: Gradient, values:
     scale_x, label_x = picture.along
     line = picture.y.size == 0
     values = values * (1e-9 if line else 1e-12)
-    finite = values[np.isfinite(values)]
-    largest = float(np.quantile(np.abs(finite), 0.995)) if finite.size else 0.0
     name = f"d({gradient.quantity})/dh ({unit or '1'} per µm and {'mm' if line else 'mm²'})"
     axes.set_xlabel(label_x)
     if line:
@@ -158,9 +186,20 @@ def _film(figure: Any, axes: Axes, picture: Picture, gradient: Gradient, values:
             axes.fill_between(scale_x * picture.x, 0, 1, where=cavity, color="0.91", transform=axes.get_xaxis_transform(), lw=0)
             axes.set_title("grey: cavitated", loc="left")
         return
+    _map(figure, axes, picture, values, name)
+    axes.set_title(
+        f"red: a thinner film gives more {gradient.quantity}" + (" (dotted: cavitated)" * bool((picture.sign < 0).any())),
+        loc="left",
+    )
+
+
+def _map(figure: Any, axes: Axes, picture: Picture, values: Array, name: str) -> None:
+    """A field in red (below 0) and blue, with the cavity's outline."""
+    finite = values[np.isfinite(values)]
+    largest = float(np.quantile(np.abs(finite), 0.995)) if finite.size else 0.0
     scale_y, label_y = picture.across
     image = axes.pcolormesh(
-        scale_x * picture.x,
+        picture.along[0] * picture.x,
         scale_y * picture.y,
         values,
         cmap="RdBu",
@@ -174,7 +213,3 @@ def _film(figure: Any, axes: Axes, picture: Picture, gradient: Gradient, values:
         L, width = picture.solution.problem.grid.lengths
         axes.set_aspect("equal" if 0.2 < width / L < 5 else "auto")
     figure.colorbar(image, ax=axes, label=name, extend="both")
-    axes.set_title(
-        f"red: a thinner film gives more {gradient.quantity}" + (" (dotted: cavitated)" * bool((picture.sign < 0).any())),
-        loc="left",
-    )

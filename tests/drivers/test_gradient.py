@@ -1,15 +1,19 @@
 """Derivatives of every quantity by every number of every bearing scene: differences of solves, laws, ranks, bad input."""
 
+import json
 import math
 
 import numpy as np
 import pytest
 
 from lcp_lube import InputError, load_scene, solve
+from lcp_lube.cli.arguments import parse
+from lcp_lube.cli.main import run
 from lcp_lube.drivers import adjoint as adjoint_module
 from lcp_lube.drivers import attitude, linearised, supplies
 from lcp_lube.drivers.adjoint import Adjoint
 from lcp_lube.drivers.film_gradient import FilmGradient, areas
+from lcp_lube.drivers.goal_error import finer_shape, goal_error
 from lcp_lube.drivers.gradient import gradients
 from lcp_lube.problems.film.line import known_fields
 from lcp_lube.scenes.values import key_of, values_of, with_values
@@ -252,35 +256,45 @@ def test_keys():
 
 
 @pytest.mark.parametrize(
-    ("ranks", "words"),
+    ("ranks", "name", "changes", "keys"),
     [
-        (2, ("two_groove_journal", "--set", "nx=36", "--set", "ny=11", "--by", "mu,D,p_end")),
-        (3, ("dimpled_pad", "--nx", 31, "--ny", 29)),
+        (2, "two_groove_journal", {"nx": 36, "ny": 11}, "mu,D,p_end"),
+        (3, "dimpled_pad", {"nx": 150, "ny": 140}, "fluid.mu,film.dimples.depth,U"),  # by multigrid
     ],
 )
-def test_ranks(cli, ranks, words):
-    words = ("sensitivity", *words, "--quantity", "load,friction", "--json")
-    alone, together = cli(*words), cli(*words, ranks=ranks)
-    assert alone.status == together.status == 0, together.err
-    for key, value in alone.json["gradient"].items():
-        assert together.json["gradient"][key] == pytest.approx(value, rel=1e-7), key
+def test_ranks(cli, ranks, name, changes, keys):
+    scene = load_scene(name, changes)
+    with solve(scene) as solution:
+        alone = gradients(scene, solution, ["load"], keys.split(","))[0].gradient
+    words = (word for key, value in changes.items() for word in ("--set", f"{key}={value}"))
+    together = cli("sensitivity", name, *words, "--by", keys, "--quantity", "load,friction", "--json", ranks=ranks)
+    assert together.status == 0, together.err
+    assert together.json["gradient"] == pytest.approx(alone, rel=1e-7)
 
 
-def test_the_command(cli, tmp_path):
-    done = cli("sensitivity", "pocketed_pad_2d", "--nx", 33, "--ny", 15, "--plot", "a.png", "--output", "a.npz", "--json")
-    assert done.status == 0, done.err
-    data = done.json
-    assert {"quantity", "value", "gradient", "elasticity"} <= set(data) and (tmp_path / "a.png").stat().st_size > 10_000
+def run_here(*words):
+    """The command in this process: its checks, without a start of Python for each."""
+    return run(parse(list(map(str, words))))
+
+
+def test_the_command(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    words = ("--nx", 33, "--ny", 15, "--plot", "a.png", "--output", "a.npz", "--errors", "e.png", "--json")
+    assert run_here("sensitivity", "pocketed_pad_2d", *words) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert {"quantity", "value", "gradient", "elasticity", "grid_error"} <= set(data)
+    assert all((tmp_path / name).stat().st_size > 10_000 for name in ("a.png", "e.png"))
     assert np.load(tmp_path / "a.npz")["dload_dh"].shape == (15, 33)
     assert next(iter(data["elasticity"])) == max(data["elasticity"], key=lambda key: abs(data["elasticity"][key] or 0.0))
-    done = cli("sensitivity", "journal", "--nx", 36, "--ny", 9, "--quantity", "friction_coefficient", "--plot", "b.png")
-    assert done.status == 0 and "eccentricity" in done.out and (tmp_path / "b.png").is_file()
+    assert (
+        run_here("sensitivity", "journal", "--nx", 36, "--ny", 9, "--quantity", "friction_coefficient", "--plot", "b.png") == 0
+    )
+    assert "eccentricity" in capsys.readouterr().out and (tmp_path / "b.png").is_file()
 
 
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("pocketed_pad", "--by", "n"), "a count, which has no derivative"),
         (("pocketed_pad", "--by", "film.pocket.depht"), "nearest is"),
         (("pocketed_pad", "--quantity", "iterations"), "derivatives are known of"),
         (("pocketed_pad", "--quantity", "fricton"), "nearest is friction"),
@@ -288,16 +302,40 @@ def test_the_command(cli, tmp_path):
         (("squeeze",), "gradients are of films"),
         (("tilting_pad_thrust",), "do not go through its 'pads' yet"),
         (("pocketed_pad", "--plot", "a.npz"), "--plot"),
+        (("pocketed_pad", "--errors", "a.npz"), "a.npz"),
+        (("pocketed_pad", "--errors", "a.png"), "films in the plane"),
+        (("hybrid_journal", "--by", "mu", "--errors", "a.png"), "without supplies"),
     ],
 )
-def test_bad_input(cli, words, message):
-    done = cli("sensitivity", *words)
-    assert done.status == 2 and message in done.lines[0] and len(done.lines) == 1
+def test_bad_input(words, message):
+    with pytest.raises(InputError, match=message):
+        run_here("sensitivity", *words)
+
+
+def test_bad_input_is_one_line(cli):
+    done = cli("sensitivity", "pocketed_pad", "--by", "n")
+    assert done.status == 2 and "a count, which has no derivative" in done.lines[0] and len(done.lines) == 1
+
+
+def test_the_errors_of_cells_are_the_largest_pressures():
+    """Reading it off the points adds nothing where the finer grid has its largest value at one of them, fronts aside."""
+    scene = load_scene("dimpled_pad", nx=79, ny=79)
+    with solve(scene) as solution, solve(scene.with_shape(finer_shape(solution))) as finer:
+        found = goal_error(scene, solution, finer, "p_max")
+        truth = solve(scene, nx=319, ny=319)
+        error = solution.p_max - truth.p_max
+        truth.destroy()
+        assert 0.3 < found.error / error < 3.0 and found.cells == pytest.approx(found.error, rel=0.05)
+        assert reduced(found.field, solution) == pytest.approx(found.cells, rel=1e-9) and found.worst < 0.1
+
+
+def reduced(field, solution):
+    return float(field.sum()) * solution.problem.grid.cell
 
 
 @pytest.mark.parametrize(("name", "halved"), [("dimpled_pad", False), ("problem4", True)])
 def test_large_films_have_the_same_adjoint(monkeypatch, name, halved):
-    """By multigrid on what elimination leaves, on half the width too, as by factors of the whole."""
+    """By multigrid, on half the width too, as by factors of the whole."""
     scene = load_scene(name, nx=70, ny=61)
     solution = solve(scene, method="fas") if not halved else solve(scene)
     assert (solution.settings["details"].get("reduction") == "mirror") is halved

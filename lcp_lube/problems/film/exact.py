@@ -261,8 +261,10 @@ def _gauss(f: Callable[[Array], Array], a: Array, b: Array) -> Array:
 
 def _bisect(f: Callable[[Array], Array], a: Array, b: Array) -> Array:
     """Return the roots of f, positive at a and not at b, in all brackets at once; rounding cannot make it fail."""
-    for _ in range(60):
+    for _ in range(60 if np.size(a) else 0):
         m = (a + b) / 2
+        if not ((a < m) & (m < b)).any():
+            break
         left = f(m) > 0
         a, b = np.where(left, m, a), np.where(left, b, m)
     return b

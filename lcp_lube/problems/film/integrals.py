@@ -52,6 +52,7 @@ class LineIntegrals:
 
     def __init__(self, film: Callable[[Array, Array], Array], points: Array, edges: Iterable[float] = ()):
         self.film, self.points = film, points
+        self.known: dict[tuple[float, ...], Any] = {}  # `line.known_of` by what else it needs
         self.ends = self._panels(np.asarray(list(edges), dtype=float))
         self.at_gauss = _gauss_points(self.ends[:-1], self.ends[1:])  # shape (panels, 8)
         self.h = self.film_at(self.at_gauss)
@@ -104,6 +105,7 @@ class LineIntegrals:
     def lifted(self, by: complex) -> LineIntegrals:
         """Those of the film with a number added."""
         out = copy(self)
+        out.known = {}
         h: Any = self.h + by
         out.parts = np.add.reduceat(self._integrals(self.ends[:-1], self.ends[1:], h), self.first[:-1], axis=1)
         return out

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -188,10 +188,12 @@ def known_of(problem: LubricationProblem) -> Known | None:
     grid, line = problem.grid, problem.integrals
     if line is None or not problem.plain or problem.U < 0 or grid.ends[0] != ("open", "open") or problem.held is not None:
         return None
-    data = (line, problem.mu, problem.U, *problem.p_sides[:2], problem.r_in)
-    with np.errstate(all="ignore"):
-        known = solve_line(*data)
-        p, r = (field[grid.x_start : grid.x_end] for field in solve_points(*data))
+    data: Any = (problem.mu, problem.U, *problem.p_sides[:2], problem.r_in)
+    if data not in line.known:
+        with np.errstate(all="ignore"):
+            line.known[data] = solve_line(line, *data), *solve_points(line, *data)
+    known, p, r = line.known[data]
+    p, r = (field[grid.x_start : grid.x_end] for field in (p, r))
     return Known(known, p, r) if np.isfinite(known.Q) else None
 
 
