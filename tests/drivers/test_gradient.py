@@ -135,9 +135,8 @@ def compare(scene, solution, keys=None, step=STEP):
 @pytest.mark.parametrize("name", SMALL)
 def test_every_number_by_every_number(name):
     scene, solution = solved(name)
-    # An edge of a supply is found to 1e-8 of a spacing: that is much of a small step.
-    few = ("clearance", "mu", "speed_rpm", "supply.1.extent_deg", "supply.1.K", "supply.1.p_s")
-    found = compare(scene, solution, few, 2e-4) if name == "hybrid_journal" else compare(scene, solution)
+    few = ("clearance", "D", "speed_rpm", "supply.1.extent_deg", "supply.1.length", "supply.1.K", "supply.1.p_s")
+    found = compare(scene, solution, few if name == "hybrid_journal" else None)
     assert found[0].switching == 0
     values = solution.numbers
     for one in found:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 MARGIN = 1e-9  # of a shape's extent: a point so near an edge is on it, and belongs to the supply
 NEAREST = 1e-4  # part of a spacing: a face to an edge that is nearer resists over this
 KNOWN, IDLE, ROUNDINGS = 1e-8, 1e-8, 64  # parts of a pressure and a flow that count as none; of 2^-53 in a supply's flows
-HALVINGS = 26  # of the interval in which an edge is looked for: coarse enough that both cells of a face find the same
+HALVINGS = 40  # of the interval in which an edge is looked for: derivatives see no steps, both cells of a face find the same
 
 
 class Region(Protocol):
