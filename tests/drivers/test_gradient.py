@@ -317,14 +317,14 @@ def test_bad_input_is_one_line(cli):
 
 
 def test_the_errors_of_cells_are_the_largest_pressures():
-    """Reading it off the points adds nothing where the finer grid has its largest value at one of them, fronts aside."""
+    """Most of it: reading it off the points adds the rest."""
     scene = load_scene("dimpled_pad", nx=79, ny=79)
     with solve(scene) as solution, solve(scene.with_shape(finer_shape(solution))) as finer:
         found = goal_error(scene, solution, finer, "p_max")
         truth = solve(scene, nx=319, ny=319)
         error = solution.p_max - truth.p_max
         truth.destroy()
-        assert 0.3 < found.error / error < 3.0 and found.cells == pytest.approx(found.error, rel=0.05)
+        assert 0.3 < found.error / error < 3.0 and 0.5 < found.cells / found.error < 1.5
         assert reduced(found.field, solution) == pytest.approx(found.cells, rel=1e-9) and found.worst < 0.1
 
 
