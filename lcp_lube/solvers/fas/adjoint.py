@@ -102,9 +102,9 @@ def transposed(problem: LubricationProblem, cavity: NDArray[np.bool_], rows: Seq
     """
     cycle, grid, dot = Cycle(problem, cavity), problem.grid, problem.grid.reduce.dot
     n = (grid.local_size, grid.size)
-    mat = PETSc.Mat().createPython((n, n), cycle, comm=grid.dm.comm)
+    mat = PETSc.Mat().createPython((n, n), cycle, comm=grid.petsc_comm)
     mat.setUp()
-    ksp = PETSc.KSP().create(grid.dm.comm)
+    ksp = PETSc.KSP().create(grid.petsc_comm)
     x, b = mat.createVecs()
     try:
         ksp.setOperators(mat)
