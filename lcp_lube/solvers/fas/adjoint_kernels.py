@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...base.compiled import kernel
 from ...base.parallel import Array
 from .fronts import reforms
-from .transfer import interpolate_row, share
+from .transfer import share
 
 Mask = NDArray[np.bool_]
 
@@ -94,7 +94,7 @@ def restrict(
 
 @kernel
 def gather_row(r: Array, kx: Array, m: int, by_x: bool, ring: bool, factor: float, out: Array) -> None:
-    """Add a line's values, times the factor, to the coarse points of a line: `kernels.interpolate_row` transposed."""
+    """Add a line's values, times the factor, to the coarse points of a line: `spread_row` transposed."""
     n = out.size - 2
     if not by_x:
         for k in range(1, n + 1):
@@ -119,13 +119,26 @@ def correct(l: Array, coarse: Array, kx: Array, ky: Array, y0: int, by_x: bool, 
         j = y0 + m - 1
         if by_y and j % 2 == 0:
             row = j // 2 - y0 // 2
-            interpolate_row(coarse[row], kx, m, by_x, True, south)
-            interpolate_row(coarse[row + 1], kx, m, by_x, True, north)
+            spread_row(coarse[row], kx, m, by_x, south)
+            spread_row(coarse[row + 1], kx, m, by_x, north)
             for i in range(1, nx + 1):
                 v = share(ky[m, i], ky[m + 1, i], True)
                 l[m, i] += v * south[i] + (1.0 - v) * north[i]
         else:
             row = m if not by_y else (j + 1) // 2 - y0 // 2
-            interpolate_row(coarse[row], kx, m, by_x, True, south)
+            spread_row(coarse[row], kx, m, by_x, south)
             for i in range(1, nx + 1):
                 l[m, i] += south[i]
+
+
+@kernel
+def spread_row(coarse: Array, kx: Array, m: int, by_x: bool, out: Array) -> None:
+    """A coarse line's values at the points of row m, whose x faces give the weights."""
+    if not by_x:
+        out[:] = coarse
+        return
+    for k in range(1, coarse.size - 1):
+        out[2 * k] = coarse[k]
+    for k in range((out.size - 1) // 2):
+        u = share(kx[m, 2 * k + 1], kx[m, 2 * k + 2], True)
+        out[2 * k + 1] = u * coarse[k] + (1.0 - u) * coarse[k + 1]
