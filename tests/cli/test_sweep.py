@@ -135,7 +135,7 @@ def test_a_failed_point_is_a_row_and_no_start():
         return load_scene("journal", {**JOURNAL, **point})
 
     def solve_at(point, near):
-        nears.append(near and near.problem.film.eccentricity)
+        nears.append(near and near.problem.film.parts[0].eccentricity)
         limit = 1 if point["eccentricity"] == 0.4 else 99
         return solve(scene_at(point), start=near, method="din", stopping={"max_it": limit})
 
