@@ -80,6 +80,12 @@ GROUPS: dict[str, Group] = {
         "docs/pictures/model_lined_pad.png",
         ["lcp_lube/output/model_picture.py", "lcp_lube/output/style.py", "lcp_lube/scenes/lined_pad.toml"],
     ),
+    "grid_error": Group(
+        ["-m", "lcp_lube", *"sensitivity dimpled_pad --nx 79 --ny 79 --errors docs/pictures/grid_error.png".split()],
+        "docs/pictures/grid_error.png",
+        ["lcp_lube/output/style.py", "lcp_lube/drivers/goal_error.py", "lcp_lube/scenes/dimpled_pad.toml"],
+    ),
+    "dynamics": Group(["tools/dynamics_pictures.py"], "docs/pictures/stored_void.png", ["tools/dynamics_pictures.py"]),
     "explorer": Group(
         ["tools/explorer_picture.py", "docs/images/explore.png"],
         "docs/images/explore.png",
