@@ -127,8 +127,11 @@ def sheared_faces(problem: LubricationProblem, x: Array, lifted: complex = 0.0) 
     """
     grid, film = problem.grid, Around(problem.film, problem.grid)
     h = np.broadcast_to(film(x, grid.y) + lifted, (grid.box[0], x.shape[1]))
+    if not problem.edged:  # an edge may lie on the face
+        d = 1e-6 * grid.spacing[0]
+        h = 2.0 / (1.0 / (film(x - d, grid.y) + lifted) + 1.0 / (film(x + d, grid.y) + lifted))
     resting, moving = np.broadcast_to(h.dtype.type(0.0), h.shape), h
-    jumps = film.jumps("y") if grid.dim == 2 else ()
+    jumps = film.jumps("y") if grid.dim == 2 and problem.edged else ()
     if jumps:
         rows, in_strips, shares = strips(film, x[0], grid.y[:, 0], grid.steps(1), jumps)
         if rows.size:

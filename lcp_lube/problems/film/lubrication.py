@@ -50,6 +50,7 @@ class LubricationProblem:
     kind = "lubrication"
     shares_grid = False  # a time step's with those of the others
     plain = True  # whether the coefficients are those of the film alone
+    edged = True  # whether the coefficients know the film's edges inside cells; not where mean_cubes
     tops = False  # whether the largest pressure is looked for between the points (`peak`)
     factors: Any = None  # of its faces, that follow from `cells`
     contact: Any = None  # of asperities

@@ -173,7 +173,8 @@ class Model:
             integrals=integrals,
         )
         problem.shares_grid, problem.extras = shared, self.extras
-        problem.tops = self.scheme == "face" and not self.mean_cubes
+        problem.edged = not self.mean_cubes
+        problem.tops = self.scheme == "face" and problem.edged
         if isinstance(problem, GroovedProblem):
             problem.grooves = self.grooves
         if getattr(self.gap, "rims", ()) and not self.supplies and self.law is None:
