@@ -81,7 +81,11 @@ GROUPS: dict[str, Group] = {
         ["lcp_lube/output/model_picture.py", "lcp_lube/output/style.py", "lcp_lube/scenes/lined_pad.toml"],
     ),
     "grid_error": Group(
-        ["-m", "lcp_lube", *"sensitivity dimpled_pad --nx 79 --ny 79 --errors docs/pictures/grid_error.png".split()],
+        [
+            "-m",
+            "lcp_lube",
+            *["sensitivity", "dimpled_pad", "--nx", "79", "--ny", "79", "--errors", "docs/pictures/grid_error.png"],
+        ],
         "docs/pictures/grid_error.png",
         ["lcp_lube/output/style.py", "lcp_lube/drivers/goal_error.py", "lcp_lube/scenes/dimpled_pad.toml"],
     ),
