@@ -29,7 +29,7 @@ def small(name):
     for factor in (8, 4, 2):
         few = [max(9, (n + 1) // factor - 1) for n in shape]
         try:
-            return load_scene(name, steps | {"n": few[0]} if len(few) == 1 else {"nx": few[0], "ny": few[1]})
+            return load_scene(name, steps | ({"n": few[0]} if len(few) == 1 else {"nx": few[0], "ny": few[1]}))
         except InputError:  # a number of points that its rules forbid
             continue
     return load_scene(name)
