@@ -82,8 +82,7 @@ class LubricationProblem:
         self.more_fields: dict[str, tuple[Array, str]] = {}
         self.more_measures: dict[str, float] = {}  # of its equations, for the certificate
         self.cells: dict[str, Array] = {}  # what effects made of its coefficients (`film.effects`)
-        self.reduce = grid.reduce
-        self.c = scheme.c.ravel()
+        self.reduce, self.c = grid.reduce, scheme.c.ravel()
         self._own = Owned(self, grid.petsc_comm)
 
     @made
