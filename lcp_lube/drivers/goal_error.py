@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.parallel import Array
+from ..base.parallel import Array, Reduce
 from ..errors import InputError
 from ..problems.film.turned import TurnedProblem
 from ..problems.solution import Solution
@@ -22,6 +22,7 @@ from ..problems.transfer import Transfer
 from ..scenes.scene import Scene
 from .adjoint import Adjoint, Implicit
 
+BISECTIONS = 60
 SECOND = 4.0 / 3.0  # error over the difference from half the spacing, where it is of second order
 
 
@@ -82,11 +83,17 @@ def goal_error(scene: Scene, solution: Solution, finer: Solution, quantity: str)
         row = -implicit.by_found[quantity] @ implicit.inverse
         lam = adjoint.lambdas[quantity] + sum(w * adjoint.lambdas[c] for c, w in zip(implicit.conditions, row, strict=True))
         parts = -SECOND * lam * G
-        sizes = np.sort(np.concatenate(grid.comm.allgather(np.abs(parts))))[::-1]
-        half = np.searchsorted(np.cumsum(sizes), 0.5 * sizes.sum()) + 1
-        return GoalError(
-            quantity, value, best, SECOND * (value - best), reduce.sum(parts), half / sizes.size, parts / grid.cell
-        )
+        worst = _half(np.abs(parts), reduce) / grid.size
+        return GoalError(quantity, value, best, SECOND * (value - best), reduce.sum(parts), worst, parts / grid.cell)
     finally:
         adjoint.destroy()
         other.destroy()
+
+
+def _half(sizes: Array, reduce: Reduce) -> float:
+    """How many of the largest make half of the sum, of all ranks' points: by bisection for the least of them. Collective."""
+    half, low, high = 0.5 * reduce.sum(sizes), 0.0, reduce.max(sizes)
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if reduce.sum(np.where(sizes > middle, sizes, 0.0)) >= half else (low, middle)
+    return max(reduce.sum((sizes > low).astype(float)), 1.0)
