@@ -12,6 +12,7 @@ film's own Jacobian at fixed coefficients for a preconditioner.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -157,17 +158,19 @@ class CoupledResponse:
             raise InputError(f"scene {self.loop.scene.name}: coefficients: the linearised effects were not solved ({reason})")
         return found[0] if nu == 0.0 else found[0] + 1j * found[1]
 
+    @cached_property
     def _slow(self) -> list[Array]:
+        """What stiffness and damping are both made of."""
         return [self._solve(-H_e, 0.0) for H_e, _ in self._forward]
 
     def stiffness(self) -> Array:
         """-dF/de with nothing but e changed, shape (motions, motions)."""
-        return self._forces(self._slow()).real
+        return self._forces(self._slow).real
 
     def damping(self) -> Array:
         """-dF/d(de/dt) in the limit of slow motion."""
         found = []
-        for (_, Q_e), y in zip(self._forward, self._slow(), strict=True):
+        for (_, Q_e), y in zip(self._forward, self._slow, strict=True):
             rhs = np.zeros_like(y)
             rhs[: self.n] = -(Q_e + self._along(y)[1])
             found.append(self._solve(rhs, 0.0))

@@ -93,7 +93,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     apart = not hasattr(scene, "by") and not scene.facts(ask.comm).moving
     groups = min(comm.size, len(films)) if apart else 1
     some = comm.Split(comm.rank % groups, comm.rank) if groups > 1 else comm
-    mine = [k for k in range(len(films)) if _group(films, groups)[k] == comm.rank % groups]
+    mine = [k for k, group in enumerate(_group(films, groups)) if group == comm.rank % groups]
     ask = replace(ask, comm=some) if groups > 1 else ask
     starts = _starts(ring, films, mine, ask, comm)
     done: dict[int, Solution] = {}
