@@ -6,11 +6,11 @@ import signal
 import subprocess
 import sys
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import pytest
 from conftest import ENVIRONMENT
+from marches import WEDGE
 
 from lcp_lube import InputError, load_scene, solve
 
@@ -23,18 +23,6 @@ PLATES = {
     "fluid": {"mu": 1 / 6, "p_supply": 0.5},
     "film": {"shape": "formula", "h": "0.375 + 0.125*cos(4*pi*t)"},
     "motion": {"t_end": 0.4, "steps": 40, "start": "full"},
-}
-WEDGE: dict[str, Any] = {
-    "family": "bearing",
-    "L_mm": 10,
-    "U": 1.0,
-    "n": 30,
-    "fluid": {"mu": 0.01, "p_supply": 1e5},
-    "film": [
-        {"shape": "sinusoid", "h_min_um": 1, "h_max_um": 3, "waves": 2},
-        {"shape": "formula", "unit": "um", "h": "0.4*sin(300*t)"},
-    ],
-    "motion": {"t_end": 0.02, "steps": 20},
 }
 RING = {
     "family": "bearing",

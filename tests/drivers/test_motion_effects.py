@@ -2,24 +2,14 @@
 
 from typing import Any
 
+import marches
 import numpy as np
 import pytest
 
 from lcp_lube import InputError, load_scene, solve
 from lcp_lube.problems.film.fluid import Law
 
-WEDGE: dict[str, Any] = {
-    "family": "bearing",
-    "L_mm": 10,
-    "U": 1.0,
-    "n": 24,
-    "fluid": {"mu": 0.01, "p_supply": 1e5},
-    "film": [
-        {"shape": "sinusoid", "h_min_um": 1, "h_max_um": 3, "waves": 2},
-        {"shape": "formula", "unit": "um", "h": "0.4*sin(300*t)"},
-    ],
-    "motion": {"t_end": 0.02, "steps": 12},
-}
+WEDGE = marches.WEDGE | {"n": 24, "motion": {"t_end": 0.02, "steps": 12}}
 EFFECTS: dict[str, dict[str, Any]] = {
     "density": {"fluid": {"mu": 0.01, "p_supply": 1e5, "density": "dowson-higginson"}},
     "shear": {"shear": {"law": "eyring", "tau_0": 5e5}},

@@ -40,16 +40,21 @@ class Elastic(EffectTable):
         return Foundation(given)
 
 
-@dataclass(frozen=True)
-class Foundation(Plain):
-    """compliance : m/Pa."""
+class GivingWay(Plain):
+    """Walls that pressure moves apart."""
 
-    compliance: float
     channels: tuple[str, ...] = ("lift",)
-
-    def apply(self, at: Answer, out: Cells) -> None:
-        out["lift"] += self.compliance * (at.p + out.get("contact", 0.0))
 
     def report(self, at: Answer) -> Report:
         lift = at.cells["lift"]
         return Report({"deflection_max": at.problem.reduce.max(np.abs(lift))}, {}, {"lift": (lift, "m")})
+
+
+@dataclass(frozen=True)
+class Foundation(GivingWay):
+    """compliance : m/Pa."""
+
+    compliance: float
+
+    def apply(self, at: Answer, out: Cells) -> None:
+        out["lift"] += self.compliance * (at.p + out.get("contact", 0.0))

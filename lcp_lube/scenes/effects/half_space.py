@@ -15,10 +15,11 @@ import numpy as np
 
 from ...base.parallel import Array
 from ...errors import InputError
-from ...problems.film.effects import Answer, Cells, Plain, Report
+from ...problems.film.effects import Answer, Cells
 from ...problems.grid import Grid
 from ..scene import Positive
 from ..units import measured, metres
+from .elastic import GivingWay
 from .table import EffectTable
 
 
@@ -35,21 +36,16 @@ class HalfSpace(EffectTable):
 
 
 @dataclass(frozen=True)
-class Deflection(Plain):
+class Deflection(GivingWay):
     """E : E', Pa. reference : m. kernels : transforms of the kernel between two blocks, as they were needed."""
 
     E: float
     reference: float | None
-    channels: tuple[str, ...] = ("lift",)
     even_lines = True
     kernels: dict[Any, Any] = field(default_factory=dict, compare=False, repr=False)
 
     def apply(self, at: Answer, out: Cells) -> None:
         out["lift"] += self.of(at.grid, at.p + out.get("contact", 0.0))
-
-    def report(self, at: Answer) -> Report:
-        lift = at.cells["lift"]
-        return Report({"deflection_max": at.problem.reduce.max(np.abs(lift))}, {}, {"lift": (lift, "m")})
 
     def of(self, grid: Grid, p: Array) -> Array:
         """Deflection at the owned points, m. Collective.

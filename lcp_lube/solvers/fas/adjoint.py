@@ -63,9 +63,7 @@ class Cycle:
         return self._own(out)
 
     def _own(self, a: Array) -> Array:
-        whole = self.levels[0].comm is None and self.grid.comm.size > 1
-        rows = slice(self.grid.y_start + 1, self.grid.y_end + 1) if whole else slice(1, -1)
-        return a[rows, self.grid.x_start + 1 : self.grid.x_end + 1].ravel()
+        return levels.own(self.levels[0], self.grid, a).ravel()
 
     def _run(self, k: int, kind: str) -> None:
         level = self.levels[k]

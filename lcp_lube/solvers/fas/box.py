@@ -98,7 +98,7 @@ class BoxFas(Cycles):
     @property
     def v(self) -> Array:
         """This rank's points."""
-        return self._tools.own(self._grids[0].level, self.problem.grid).ravel()
+        return self._tools.own(self._grids[0].level, self.problem.grid, self._grids[0].level.z).ravel()
 
     @v.setter
     def v(self, value: Array) -> None:

@@ -83,7 +83,7 @@ class Fas(Cycles):
     @property
     def z(self) -> Array:
         """p, or minus the flow of void, at this rank's points."""
-        return self._tools.own(self._levels[0], self.problem.grid).ravel()
+        return self._own().ravel()
 
     @z.setter
     def z(self, value: Array) -> None:
@@ -92,9 +92,13 @@ class Fas(Cycles):
         if level.held is not None:
             level.z[level.held] = level.given
 
+    def _own(self) -> Array:
+        level = self._levels[0]
+        return self._tools.own(level, self.problem.grid, level.z)  # type: ignore[no-any-return]
+
     @property
     def fields(self) -> Fields:
-        z = self._tools.own(self._levels[0], self.problem.grid)
+        z = self._own()
         p, r = self._kernels.pressure_and_void(z, self.problem.scheme.b_C)
         return {"p": p.ravel(), "r": r.ravel()}
 

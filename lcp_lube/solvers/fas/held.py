@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ...base.compiled import kernel
 from ...base.parallel import Array
 from . import transfer
+from .fronts import without
 from .kernels import balance_row, relax
 
 if TYPE_CHECKING:
@@ -80,20 +81,10 @@ def marked(level: Level) -> tuple[Array, Array]:
 def free_spans(held: NDArray[np.bool_]) -> NDArray[np.int32]:
     """Row, first column and last column + 1 of the runs of points that are not held, upwards."""
     ny, nx = held.shape[0] - 2, held.shape[1] - 2
-    spans, found = np.empty((ny + 64, 3), dtype=np.int32), 0
-    for m in range(1, ny + 1):
-        i = 1
-        while i <= nx:
-            while i <= nx and held[m, i]:
-                i += 1
-            begin = i
-            while i <= nx and not held[m, i]:
-                i += 1
-            if i > begin:
-                if found == spans.shape[0]:
-                    spans = np.concatenate((spans, np.empty((found, 3), dtype=np.int32)))
-                spans[found, 0], spans[found, 1], spans[found, 2] = m, begin, i
-                found += 1
+    rows = np.empty((ny, 3), dtype=np.int32)
+    for k in range(ny):
+        rows[k, 0], rows[k, 1], rows[k, 2] = k + 1, 1, nx + 1
+    spans, found = without(rows, ny, held)
     return spans[:found]
 
 

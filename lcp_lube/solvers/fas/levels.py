@@ -192,10 +192,10 @@ def whole(grid: Grid, a: Array) -> Array:
     return out
 
 
-def own(level: Level, grid: Grid) -> Array:
-    """This rank's points of the finest level's z, without a frame."""
+def own(level: Level, grid: Grid, a: Array) -> Array:
+    """This rank's points of an array of the finest level, without a frame."""
     columns = slice(grid.x_start + 1, grid.x_end + 1)
-    return level.z[slice(grid.y_start + 1, grid.y_end + 1) if level.comm is None else slice(1, -1), columns]
+    return a[slice(grid.y_start + 1, grid.y_end + 1) if level.comm is None else slice(1, -1), columns]
 
 
 def put(level: Level, grid: Grid, into: Array, values: Array) -> None:
