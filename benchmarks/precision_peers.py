@@ -24,7 +24,6 @@ import peers  # benchmarks/peers.py
 from peers import MAX_IT, PEERS, TOL, Answer
 from petsc4py import PETSc
 
-from lcp_lube import load_scene
 from lcp_lube.problems.film.lubrication import LubricationProblem
 from lcp_lube.studies import precision
 from lcp_lube.studies.compare import read_off
@@ -93,7 +92,9 @@ def ranked(name: str, scene: RectangleScene, starts: list[tuple[float, float]]) 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("scenes", nargs="*", default=["problem1", "problem3", "journal", "problem4", "textured_slider"])
+    parser.add_argument(
+        "scenes", nargs="*", default=["problem1", "problem3", "journal", "problem4", "textured_slider", "dimpled_pad"]
+    )
     parser.add_argument("--peers", default="scipy,ssls,rsls,tao_ssils")
     parser.add_argument("--results", type=Path, default=Path(__file__).parent / "results")
     parser.add_argument("--quick", action="store_true")
@@ -101,7 +102,7 @@ def main() -> None:
     stem = "precision_quick" if arguments.quick else "precision"
     store = open_store(arguments.results / f"{stem}.csv", precision.KEY, precision.COLUMNS)
     for source in arguments.scenes:
-        scene = precision.film(load_scene(source))
+        scene = precision.film(source)
         repeats = 1 if arguments.quick else precision.REPEATS
         bench = precision.Bench(
             scene, known_answer(scene, arguments.results / f"{stem}_references.csv", arguments.quick), repeats

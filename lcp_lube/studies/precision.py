@@ -28,7 +28,11 @@ from .log import write_log
 from .precision_picture import draw_all, seconds
 from .precision_words import cheapest, sentence, which
 
-SCENES = ("problem1", "problem2", "problem3", "parabolic_slider", "journal", "problem4", "textured_slider")
+SCENES = (
+    *("problem1", "problem2", "problem3", "parabolic_slider", "journal", "problem4", "textured_slider"),
+    *("dimpled_pad", "dimpled_pad_round"),
+)
+VARIANTS = {"dimpled_pad_round": ("dimpled_pad", {"film.dimples.form": "round"})}  # scenes of this chart alone
 SIZES = {1: (50, 100, 200, 500, 1000, 2000, 5000), 2: (31, 63, 127, 255, 511)}  # points a side by dimension
 QUICK_SIZES = {1: (50, 100), 2: (15, 31)}
 TOLERANCES = (1e-4, 1e-8)  # eps1 = eps2
@@ -114,7 +118,7 @@ def chart(sources: Sequence[str], quick: bool = False, results: Path = Path("lcp
 
     Parameters
     ----------
-    sources : scenes of films, by name or file; none: SCENES.
+    sources : scenes of films, by name or file, or of VARIANTS; none: SCENES.
     quick : two small grids, one recipe a system, each run made once; kept apart from the full chart.
     results : folder of precision.csv, precision_references.csv and the pictures (precision_quick...).
 
@@ -126,7 +130,7 @@ def chart(sources: Sequence[str], quick: bool = False, results: Path = Path("lcp
     ------
     InputError : a scene that is no film; see also `open_store`.
     """
-    scenes = [film(load_scene(source)) for source in sources or SCENES]
+    scenes = [film(source) for source in sources or SCENES]
     stem = "precision_quick" if quick else "precision"
     store = open_store(results / f"{stem}.csv", KEY, COLUMNS)
     before = len(store.rows)
@@ -160,13 +164,15 @@ def grids(scene: Scene, quick: bool) -> tuple[int, ...]:
     return (QUICK_SIZES if quick else SIZES)[len(scene.shape)]
 
 
-def film(scene: Scene) -> RectangleScene:
-    """The scene, if its load can be told.
+def film(source: str) -> RectangleScene:
+    """The scene of a name or file, or of VARIANTS, if its load can be told.
 
     Raises
     ------
     InputError : it is no film with cavitation.
     """
+    name, changes = VARIANTS.get(source, (source, {}))
+    scene = load_scene(name, **changes, **({"name": source} if changes else {}))
     if not isinstance(scene, RectangleScene):
         raise InputError(f"scene {scene.name}: it has no load; a film with cavitation is needed, as {', '.join(SCENES)} are")
     return scene

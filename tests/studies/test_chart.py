@@ -87,7 +87,7 @@ def test_accuracy_that_was_asked_for_is_in_the_chart(quick: Path) -> None:
 
 def test_limit_of_fine_grids_is_the_exact_solution() -> None:
     """Where both are known: Richardson's limit is as near to the exact numbers as it says, within a factor."""
-    scene = precision.film(load_scene("problem3"))
+    scene = precision.film("problem3")
     exact, limit = known.known_answer(scene, Path("unused.csv")), known.fine(scene, (255, 511, 1023))
     assert exact.how == "exact"
     for name in ("load", "p_max"):
@@ -248,7 +248,7 @@ def test_failures_are_rows_and_crosses(tmp_path: Path, monkeypatch: pytest.Monke
     """A run past the Krylov limit is a row, larger grids are then left out; a wrong solution is no point of a line."""
     monkeypatch.setattr(precision, "KRYLOV_MOST", 100)
     store = experiment.open_store(tmp_path / "a.csv", precision.KEY, precision.COLUMNS)
-    scene = precision.film(load_scene("problem1"))
+    scene = precision.film("problem1")
     bench = precision.Bench(scene, known.known_answer(scene, tmp_path / "known.csv"), 1)
     bench.fill(store, precision.Configuration("din", False, "full", "gmres_ilu", 1e-8), (50, 100, 200))
     assert [row["outcome"] for row in store.rows] == [experiment.KRYLOV_LIMIT]
