@@ -1,4 +1,4 @@
-"""The one exception for bad input."""
+"""The exceptions: for bad input, and for numbers that were not found."""
 
 from collections.abc import Iterable
 
@@ -15,6 +15,10 @@ class InputError(ValueError):
         line = " ".join(message.splitlines())
         line = "".join(char if char.isprintable() else char.encode("unicode_escape").decode() for char in line)
         super().__init__(line if len(line) <= LONGEST else f"{line[: LONGEST // 2]} ... {line[-LONGEST // 2 :]}")
+
+
+class NotFound(RuntimeError):
+    """Numbers that no iteration found: an outcome, after which the command line ends with exit status 1."""
 
 
 def nearest(word: str, legal: Iterable[str], dash: str = "") -> str:

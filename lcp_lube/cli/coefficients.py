@@ -12,12 +12,13 @@ from mpi4py import MPI
 from ..api import solve
 from ..base.options import check_unread
 from ..drivers.coefficients import Coefficients, coefficients, placed, stability
-from ..errors import InputError
+from ..errors import InputError, NotFound
 from ..output.console import say
 from ..output.files import check_target, replacing
 from ..output.results import as_dict, finite
 from ..problems.film.model import Model
 from ..problems.film.turning import Turning
+from ..problems.solution import Outcome, Solution
 from ..scenes.moving import motion_of
 from ..scenes.scene import Scene, as_scene
 from .asked import ask_of, scene_of
@@ -48,16 +49,19 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"--plot {args.plot}: --speeds FROM:TO:N is needed too")
     solution = solve(scene, ask_of(args))
     try:
-        check_unread()
         data = as_dict(solution)
         record = {key: data.get(key) for key in ("scene", "nx", "ny", "outcome", "converged", "message", *KEYS)}
-        if solution.converged:
-            found = coefficients(scene, solution, frequencies, args.tilt)
-            record |= report(found, placed(scene, solution), data)
+        if record["converged"]:
+            try:
+                found = coefficients(scene, solution, frequencies, args.tilt)
+                record |= report(found, placed(scene, solution), data)
+            except NotFound as error:
+                record |= {"outcome": str(Outcome.LINEAR_SOLVER), "converged": False, "message": str(error)}
+        check_unread()  # the linearised film has options of its own
         say(json.dumps(finite(record)) if args.json else text(record))
     finally:
         solution.destroy()
-    return 0 if solution.converged else 1
+    return 0 if record["converged"] else 1
 
 
 def table(args: argparse.Namespace, scene: Scene, frequencies: list[float]) -> int:
@@ -68,10 +72,10 @@ def table(args: argparse.Namespace, scene: Scene, frequencies: list[float]) -> i
 
     Raises
     ------
-    InputError : a scene without speed_rpm, a file that cannot be written.
+    InputError : no journal with a speed_rpm, a file that cannot be written.
     """
-    if "speed_rpm" not in type(scene).model_fields:
-        raise InputError(f"--speeds: scene {scene.name} has no speed_rpm")
+    if "speed_rpm" not in type(scene).model_fields or getattr(scene, "turning", None) is None:
+        raise InputError(f"--speeds: scene {scene.name} is no journal with a speed_rpm")
     speeds = parse_axis(f"speed_rpm={args.speeds}").values
     if args.plot is not None:
         check_target(args.plot, plot=True)
@@ -83,13 +87,13 @@ def table(args: argparse.Namespace, scene: Scene, frequencies: list[float]) -> i
         check_unread()
         if near is not None:
             near.destroy()
-        if solution.converged:
-            (one,) = coefficients(at, solution, frequencies[:1])
+        one = _first(at, solution, frequencies) if solution.converged else None
+        if one is not None:
             turn = np.array([[0.0, -1.0], [1.0, 0.0]])  # our axes as columns, in theirs
             K, C = (turn.T @ matrix @ turn for matrix in (one.K, one.C))
             rows.append([at.omega, *K.ravel(), *C.ravel()])  # type: ignore[attr-defined]
             drawn.append(report([one], placed(at, solution), as_dict(solution)))
-        failed += not solution.converged
+        failed += one is None
         near = solution
     if near is not None:
         near.destroy()
@@ -106,6 +110,14 @@ def table(args: argparse.Namespace, scene: Scene, frequencies: list[float]) -> i
 
         draw(np.array(rows)[:, 0] * 30.0 / math.pi, drawn, scene.name, Path(args.plot))
     return 1 if failed else 0
+
+
+def _first(scene: Scene, solution: Solution, frequencies: list[float]) -> Coefficients | None:
+    """At the first frequency; None where they are not found. Collective."""
+    try:
+        return coefficients(scene, solution, frequencies[:1])[0]
+    except NotFound:
+        return None
 
 
 def check_film(scene: Scene, tilt: bool) -> None:

@@ -22,11 +22,12 @@ from ..problems.solution import Fields, Solution
 from ..scenes.effects.named import without
 from ..scenes.moving import motion_of
 from ..scenes.scene import Scene, Solvable
+from ..scenes.thrust import ThrustScene
 from ..scenes.tilting import TiltingPadScene
 from .coupled_response import CoupledResponse
 from .grooves import films_of
 from .impedance import impedance
-from .pads import JournalPads
+from .pads import Bearing, JournalPads, ThrustPads, bearing_of
 from .response import Change, Moved, Response
 
 FASTEST = 1e100  # rad/s: beyond it a factorisation overflows, and K and C are long those of void that has no time to change
@@ -77,10 +78,10 @@ def coefficients(
 
     Raises
     ------
-    InputError : a scene without a film, or whose wall moves to smaller x, pads that tilt with effects, a frequency below zero,
-        tilt of what has no axis.
+    InputError : a scene without a film, or whose wall moves to smaller x, a frequency below zero, tilt of what has no axis.
+    NotFound : effects whose linearised equations GMRES does not solve.
     """
-    scene = placed(scene, solution)
+    pads, scene = bearing_of(scene), placed(scene, solution)
     model: Model | None = getattr(scene, "model", None)
     if not isinstance(model, Model):
         raise InputError(f"scene {scene.name}: coefficients are of films; it has no part that could be displaced")
@@ -105,14 +106,18 @@ def coefficients(
     names = FLAT if turning is None else TILTED if tilt else JOURNAL
     total = np.zeros((len(frequencies), len(motions), len(motions)), dtype=complex)
     found: Iterator[Any] = responses(scene, model, ring, solution.fields, motions)
-    if model.law is not None or model.effects:
+    with_effects = model.law is not None or bool(model.effects)
+    if with_effects:
         found = _with_effects(scene, solution, [partial(_moved, model.gap, motion) for motion in motions])
-    elif isinstance(scene, TiltingPadScene):
-        turn = np.array([[math.cos(along), -math.sin(along)], [math.sin(along), math.cos(along)]])
-        total += turn.T @ _of_pads(scene, solution, frequencies) @ turn
+    if isinstance(scene, TiltingPadScene) or pads is not None:
+        found, turn = iter(()), np.array([[math.cos(along), -math.sin(along)], [math.sin(along), math.cos(along)]])
+        follow = np.zeros(0, dtype=bool) if pads is None else pads.free
+        own = _of_pads(scene, solution, frequencies, follow, with_effects)
+        total += turn.T @ own @ turn if turning is not None else own
     for response in found:
         for k, nu in enumerate(frequencies):
             total[k] += response.at(nu, stored) if nu else response.stiffness() + 1j * response.damping()
+    total *= scene.pads if isinstance(scene, ThrustScene) else 1  # one of which was solved
     return [
         Coefficients(nu, one.real, one.imag / nu if nu > 0 else one.imag, names)
         for nu, one in zip(frequencies, total, strict=True)
@@ -124,50 +129,56 @@ def _moved(gap: Any, motion: Change, e: float) -> Moved:
 
 
 def _with_effects(scene: Scene, solution: Solution, gaps: list[Any]) -> Iterator[CoupledResponse]:
-    """Of a film whose coefficients depend on its answer, as a whole: a ring's films share their oil. Collective.
-
-    Raises
-    ------
-    InputError : pads that tilt.
-    """
-    if isinstance(scene, TiltingPadScene) or getattr(scene, "pivot_part", None) is not None:
-        raise InputError(f"scene {scene.name}: coefficients of pads that tilt are of films without effects; see --model least")
+    """Of a film whose coefficients depend on its answer, as a whole: a ring's films share their oil. Collective."""
     response = CoupledResponse(scene, solution, gaps)
     yield response
     response.destroy()
 
 
-def _of_pads(scene: TiltingPadScene, solution: Solution, frequencies: Sequence[float]) -> Array:
-    """The journal's K + i nu C (at nu = 0: K + i C) with massless pads that follow. Collective."""
-    total = np.zeros((len(frequencies), 2, 2), dtype=complex)
-    bearing = JournalPads(scene)
-    for film in bearing.films(scene, solution):
-        found = impedance(film.problem, film.model, film.fields, film.modes, frequencies)
-        film.problem.destroy()
-        for k, nu in enumerate(frequencies):
-            total[k] += found[k, :2, :2] if "coordinates" not in solution.settings else _reduced(found[k], nu)
-    return total
+def _of_pads(scene: Any, solution: Solution, frequencies: Sequence[float], free: Any, with_effects: bool) -> Array:
+    """K + i nu C (at nu = 0: K + i C) of what pads carry, with massless pads that follow where they are free. Collective."""
+    bearing: Bearing = JournalPads(scene) if isinstance(scene, TiltingPadScene) else ThrustPads(scene)
+    n, felt = bearing.sizes.size, 2 if isinstance(scene, TiltingPadScene) else 1
+    total = np.zeros((len(frequencies), n, n), dtype=complex)
+    if with_effects:
+        q, each = bearing.start(None), np.eye(n)
+        gaps = [lambda e, one=one: bearing.at(q + e * one).gap for one in each]  # type: ignore[attr-defined]
+        for response in _with_effects(scene, solution, gaps):
+            for k, nu in enumerate(frequencies):
+                total[k] = response.at(nu) if nu else response.stiffness() + 1j * response.damping()
+    else:
+        for film in bearing.films(scene, solution):
+            found = impedance(film.problem, film.model, film.fields, film.modes, frequencies)
+            film.problem.destroy()
+            rows, columns = np.ix_(film.numbers, film.numbers)
+            total[:, rows, columns] += found
+    return np.array(
+        [_reduced(Z, nu, felt, np.flatnonzero(free[felt:]) + felt) for Z, nu in zip(total, frequencies, strict=True)]
+    )
 
 
-def _reduced(Z: Array, nu: float) -> Array:
-    """What two coordinates feel where the third one is free of force; of K + i C at nu = 0."""
-    e, d = slice(0, 2), 2
+def _reduced(Z: Array, nu: float, felt: int, tilts: Any) -> Array:
+    """What the first coordinates feel where tilts are free of moments; of K + i C at nu = 0."""
     K, C = Z.real, Z.imag
-    if not abs(K[d, d]) > 0:  # a pad that idles
-        return Z[e, e]
+    d, e = [k for k in tilts if abs(K[k, k]) > 0], slice(0, felt)  # the others idle
+    Kd = K[np.ix_(d, d)]
     if nu:
-        return Z[e, e] - np.outer(Z[e, d], Z[d, e]) / Z[d, d]
-    follows, pushed = -K[d, e] / K[d, d], -K[e, d] / K[d, d]  # tilt by displacement; forces by moment
-    damped = C[e, e] + np.outer(C[e, d], follows) + np.outer(pushed, C[d, e]) + C[d, d] * np.outer(pushed, follows)
-    return K[e, e] + np.outer(K[e, d], follows) + 1j * damped
+        return Z[e, e] - Z[e, d] @ np.linalg.solve(Z[np.ix_(d, d)], Z[d, e])
+    follows, pushed = (
+        -np.linalg.solve(Kd, K[d, e]),
+        -np.linalg.solve(Kd.T, K[e, d].T).T,
+    )  # tilts by displacement; forces by moment
+    damped = C[e, e] + C[e, d] @ follows + pushed @ C[d, e] + pushed @ C[np.ix_(d, d)] @ follows
+    return K[e, e] + K[e, d] @ follows + 1j * damped
 
 
 def placed(scene: Scene, solution: Solution) -> Scene:
     """The scene with the journal, and its pads, where the solution found them, without the effects that were left out."""
     if gone := solution.settings.get("model", {}).get("left_out"):
         scene = without(scene, gone)
-    if isinstance(scene, TiltingPadScene) and "coordinates" in solution.settings:
-        return JournalPads(scene).at(np.array(solution.settings["coordinates"]))
+    pads = bearing_of(scene)
+    if pads is not None and "coordinates" in solution.settings:
+        return pads.at(np.array(solution.settings["coordinates"]))
     found = {"attitude_deg": solution.settings["attitude_deg"]} if "attitude_deg" in solution.settings else {}
     if balance := solution.settings.get("balance"):
         found |= {balance["vary"]: balance["value"]}

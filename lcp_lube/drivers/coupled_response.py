@@ -7,7 +7,7 @@ the cells, Q what they hold, and X what the effects make of an answer, a motion 
 
 Effects follow at once: walls give way and oil shears, thickens and warms as in a steady film at each moment (heat that the oil
 itself stores is left out, as are the walls' own). All derivatives are differences along a direction; GMRES solves, with the
-film's own Jacobian at fixed coefficients for a preconditioner.
+film's own Jacobian at fixed coefficients for a preconditioner. Pressures behind restrictors follow as in `linearised.Feed`.
 """
 
 from collections.abc import Sequence
@@ -19,19 +19,22 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..base.parallel import Array
-from ..errors import InputError
+from ..errors import NotFound
 from ..problems.film.cavity import cavity_sign
 from ..problems.film.contact import areas
 from ..problems.film.effects import Answer, answer, factors
 from ..problems.film.flows import point_weights
 from ..problems.film.grooves import GroovedProblem
+from ..problems.film.supplies import Supply, supply_flows
 from ..problems.solution import Solution
 from .ask import Ask
 from .linearised import Linear
 from .loop import Loop
+from .supplies import Fed
 
 STEP = 1e-4  # of differences: their error is its square
 RTOL, RESTART, MOST = 1e-8, 150, 1500
+Changes = tuple[Array, Array, Array]  # of a state's H and x - X, of Q, and of what supplies give and hold
 
 
 class CoupledResponse:
@@ -40,18 +43,17 @@ class CoupledResponse:
     Parameters
     ----------
     gaps : the film for each motion, by its coordinate e.
-
-    Raises
-    ------
-    InputError : supplies whose pressures would follow.
     """
 
     def __init__(self, scene: Any, solution: Solution, gaps: Sequence[Any]):
         problem: Any = solution.problem
         grid, comm = problem.grid, problem.grid.petsc_comm
-        if problem.held is not None and any(one.open for one in problem.held.supplies):
-            raise InputError(f"scene {scene.name}: coefficients with effects are of supplies at given pressures")
-        self.loop = loop = Loop(scene.with_shape(grid.shape), Ask(comm=comm), None)  # type: ignore[arg-type]
+        self.supplies = problem.held.supplies if problem.held is not None else ()
+        self.free = [k for k, one in enumerate(self.supplies) if one.open]
+        scene = scene.with_shape(grid.shape)
+        if self.free:
+            scene = Fed(scene, tuple(Supply(one.region, one.p) for one in self.supplies))
+        self.loop = loop = Loop(scene, Ask(comm=comm), None)  # type: ignore[arg-type]
         base, self.p, self.r = loop.base, solution.fields["p"], solution.fields["r"]
         self.n, self.unit = grid.local_size, base.scheme.flow_unit
         columns = np.logical_or.reduce(base.columns) if isinstance(base, GroovedProblem) else np.zeros(self.n, dtype=bool)
@@ -64,6 +66,12 @@ class CoupledResponse:
         self._size = 2.0 * grid.spacing[0] / self.unit * point_weights(grid)
         self._linear = Linear(at.problem, self.cavity, given=columns if columns.any() else None)
         self._areas = areas(base).ravel()
+        taken = supply_flows(at.problem, at.p / at.problem.p_unit, at.r)
+        self._sources = np.array([one.misfit(one.p, q)[1:] for one, q in zip(self.supplies, taken, strict=True)])
+        self._owner = problem.held.owner.ravel() if self.free else np.zeros(0)
+        d = at.problem.scheme.diagonal.ravel() * (at.problem.scheme.flow_unit / self.unit / at.problem.p_unit)
+        self._pushes = [np.concatenate([np.where(self._owner == k, d, 0.0), 0.0 * self.x]) for k in self.free]
+        self._answers: dict[tuple[float, bool], list[Any]] = {}
         weight = grid.cell * base.p_unit * point_weights(grid) * np.where(self.cavity, 0.0, 1.0)
         self._forward, self._sides, self._contacts = [], [], []
         model, h = loop.frozen.constant, base.scheme.h.ravel()
@@ -73,8 +81,7 @@ class CoupledResponse:
             e /= base.reduce.max(np.abs(change)) or 1.0
             change = self._change(gap, e)
             pair = [replace(model, gap=gap(k * e)).build(grid.shape, comm, grid) for k in (1.0, -1.0)]
-            (a, qa), (b, qb) = (self._system(np.zeros(self.n), self.x, other) for other in pair)
-            self._forward.append(((a - b) / (2.0 * e), (qa - qb) / (2.0 * e)))
+            self._forward.append(_slopes([self._system(np.zeros(self.n), self.x, other) for other in pair], 2.0 * e))
             self._sides.append(weight * change)
             self._contacts.append(base.p_unit * self._areas * change)
             for other in pair:
@@ -93,26 +100,51 @@ class CoupledResponse:
         p = (self.p + np.where(self.cavity, 0.0, z)) * base.p_unit
         return answer(base, loop.law, cells, by, p, self.r - np.where(self.cavity, z, 0.0), loop.p_sides)
 
-    def _system(self, z: Array, x: Array, base: Any) -> tuple[Array, Array]:
-        """H and x - X, one behind the other, and Q of a state."""
+    def _system(self, z: Array, x: Array, base: Any) -> tuple[Array, Array, Array]:
+        """H and x - X, one behind the other, and Q of a state; what flows out of supplies that follow, and what they hold."""
         at = self._answer(z, x, base)
         film = at.problem
         H = film.balance(at.p / film.p_unit, at.r) * (film.scheme.flow_unit / self.unit)
         Q = self._size * at.cells.get("density", 1.0) * film.scheme.h.ravel() * (1.0 - at.r)
         self.loop.answer = at
         made = x - self.loop.vector(self.loop.made()) if self.loop.names else x
-        return np.concatenate([np.where(self.columns, z, H), made]), np.where(self.given, 0.0, Q)
+        fed = np.zeros((2, 0))
+        if self.free:
+            unit = 0.5 * self.unit * film.grid.spacing[-1] ** (film.grid.dim - 1)
+            holds = [unit * film.reduce.sum(np.where(self._owner == k, Q, 0.0)) for k in self.free]
+            fed = np.array([np.array(supply_flows(film, at.p / film.p_unit, at.r))[self.free], holds])
+        return np.concatenate([np.where(self.columns, z, H), made]), np.where(self.given, 0.0, Q), fed
 
-    def _along(self, y: Array) -> tuple[Array, Array]:
-        """What a direction (z', x') changes of both."""
+    def _along(self, y: Array) -> Changes:
+        """What a direction (z', x') changes of all of them."""
         z, x = y[: self.n], y[self.n :]
         by_size = np.where(self.cavity, 1.0, 1.0 / self.p_max) * z
         size = self.loop.base.reduce.max(np.abs(np.concatenate([by_size, x])))
         if not size > 0.0:
-            return np.zeros_like(y), np.zeros(self.n)
+            return np.zeros_like(y), np.zeros(self.n), np.zeros((2, len(self.free)))
         t = STEP / size
-        (a, qa), (b, qb) = (self._system(k * t * z, self.x + k * t * x, self.loop.base) for k in (1.0, -1.0))
-        return (a - b) / (2.0 * t), (qa - qb) / (2.0 * t)
+        return _slopes([self._system(k * t * z, self.x + k * t * x, self.loop.base) for k in (1.0, -1.0)], 2.0 * t)
+
+    def _settled(self, b: Array, own: Any, nu: float, stored: bool = True) -> Any:
+        """The answer to b with the supplies' pressures that follow; own : what b's cause makes them give by itself, m3/s."""
+        y = self._solve(b, nu, stored)
+        if not self.free:
+            return y
+        if (nu, stored) not in self._answers:
+            self._answers[nu, stored] = [self._solve(one + 0.0j if nu else one, nu, stored) for one in self._pushes]
+        answers = self._answers[nu, stored]
+        by_p, by_flow = self._sources[self.free].T
+        slopes = np.stack([self._given(one, nu) for one in answers], axis=1)
+        P = np.linalg.solve(by_flow[:, None] * slopes + np.diag(by_p), -by_flow * (self._given(y, nu) + own))
+        return y + sum(p * one for p, one in zip(P, answers, strict=True))
+
+    def _given(self, y: Any, nu: float) -> Any:
+        """What supplies that follow give more for a change of the state."""
+        flows, holds = self._along(np.ascontiguousarray(y.real))[2]
+        if not nu:
+            return flows
+        more, hold = self._along(np.ascontiguousarray(y.imag))[2]
+        return flows - nu * hold + 1j * (more + nu * holds)
 
     def _solve(self, b: Array, nu: float, stored: bool = True) -> Any:
         """Complex (z', x') of a complex right-hand side; at nu = 0 both are real. Collective."""
@@ -122,7 +154,7 @@ class CoupledResponse:
         class Whole:
             def mult(shell, mat: PETSc.Mat, v: PETSc.Vec, out: PETSc.Vec) -> None:
                 found = [self._along(y) for y in v.array_r.reshape(len(parts), size)]
-                whole = np.array([one for one, _ in found])
+                whole = np.array([one[0] for one in found])
                 if nu:
                     whole[0, :n] -= nu * stored * found[1][1]
                     whole[1, :n] += nu * stored * found[0][1]
@@ -155,13 +187,13 @@ class CoupledResponse:
         for obj in (v, rhs, ksp, mat):
             obj.destroy()
         if reason < 0:
-            raise InputError(f"scene {self.loop.scene.name}: coefficients: the linearised effects were not solved ({reason})")
+            raise NotFound(f"coefficients: the linearised effects were not solved (GMRES ended with {reason})")
         return found[0] if nu == 0.0 else found[0] + 1j * found[1]
 
     @cached_property
     def _slow(self) -> list[Array]:
         """What stiffness and damping are both made of."""
-        return [self._solve(-H_e, 0.0) for H_e, _ in self._forward]
+        return [self._settled(-H_e, fed[0], 0.0) for H_e, _, fed in self._forward]
 
     def stiffness(self) -> Array:
         """-dF/de with nothing but e changed, shape (motions, motions)."""
@@ -170,19 +202,19 @@ class CoupledResponse:
     def damping(self) -> Array:
         """-dF/d(de/dt) in the limit of slow motion."""
         found = []
-        for (_, Q_e), y in zip(self._forward, self._slow, strict=True):
-            rhs = np.zeros_like(y)
-            rhs[: self.n] = -(Q_e + self._along(y)[1])
-            found.append(self._solve(rhs, 0.0))
+        for (_, Q_e, fed), y in zip(self._forward, self._slow, strict=True):
+            rhs, (_, stored, held) = np.zeros_like(y), self._along(y)
+            rhs[: self.n] = -(Q_e + stored)
+            found.append(self._settled(rhs, fed[1] + held[1], 0.0))
         return self._forces(found).real
 
     def at(self, nu: float, stored: bool = True) -> Any:
         """K + i nu C at this frequency, rad/s > 0; stored = False: as if nothing were stored but what the walls displace."""
         found = []
-        for H_e, Q_e in self._forward:
+        for H_e, Q_e, fed in self._forward:
             rhs = -H_e.astype(complex)
             rhs[: self.n] -= 1j * nu * Q_e
-            found.append(self._solve(rhs, nu, stored))
+            found.append(self._settled(rhs, fed[0] + 1j * nu * fed[1], nu, stored))
         return self._forces(found)
 
     def _forces(self, found: Sequence[Any]) -> Any:
@@ -203,3 +235,8 @@ class CoupledResponse:
         """Free the PETSc objects. Collective."""
         self._linear.destroy()
         self.loop.base.destroy()
+
+
+def _slopes(ends: Sequence[Changes], width: float) -> Changes:
+    one, two, three = ((above - below) / width for above, below in zip(*ends, strict=True))
+    return one, two, three

@@ -102,8 +102,11 @@ class JournalPads:
                 return q
         angle = math.radians(scene.attitude_deg)
         e = scene.clearance * scene.eccentricity * np.array([math.cos(angle), math.sin(angle)])
-        open_inlet = self.sizes[2] / math.radians(scene.pad_deg)
-        return np.array([*e, *(scene.tilts if scene.tilts is not None else [open_inlet] * n)])
+        # Pads that follow the journal, each inlet open by a part of the film at its pivot: no film is below 0 that need not be.
+        towards = np.radians(scene.pivots_deg) - angle
+        film = np.maximum(1.0 - scene.eccentricity * np.cos(towards), 0.0)
+        tilts = self.sizes[2:] * (scene.eccentricity * np.sin(towards) + film / math.radians(scene.pad_deg))
+        return np.array([*e, *(scene.tilts if scene.tilts is not None else tilts)])
 
     def at(self, q: Array) -> Scene:
         e = {

@@ -50,8 +50,13 @@ def test_lund_and_thomsen(row):
 
 @pytest.mark.parametrize(
     "changes",
-    [{"eccentricity": 0.3}, {"eccentricity": 0.8, "p_groove": 2e5, "p_end": 1e5}, {"grooves_deg": [], "p_end": 1e5}],
-    ids=["two", "fed", "ring"],
+    [
+        {"eccentricity": 0.3},
+        {"eccentricity": 0.8, "p_groove": 2e5, "p_end": 1e5},
+        {"grooves_deg": [], "p_end": 1e5},
+        {"grooves_deg": [], "supply": [{"shape": "circumferential_groove", "length_mm": 10, "p": 2e5}]},
+    ],
+    ids=["two", "fed", "ring", "fed round"],
 )
 def test_stiffness_is_what_solves_differ_by(changes):
     """Central differences of two solves, in both directions; the attitude is given, and the load not vertical."""
@@ -208,7 +213,7 @@ def test_text_and_bad_input(cli):
         (("dynamic_journal",), "leave [motion] out"),
         (("problem1", "--plot", "a.png"), "--speeds FROM:TO:N"),
         (("journal", "--frequency", "1,1e300"), "--frequency 1e+300"),
-        (("journal", "--speeds", "1:2:2"), "has no speed_rpm"),
+        (("journal", "--speeds", "1:2:2"), "is no journal with a speed_rpm"),
         (("journal", "--frequency", "a"), "numbers in rad/s"),
         (("two_groove_journal", "--set", "groove_deg=179", "--set", "grooves_deg=[0,90]"), "overlap"),
         (("two_groove_journal", "--set", "grooves_deg=[]"), "p_end > 0"),

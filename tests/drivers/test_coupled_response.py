@@ -1,11 +1,11 @@
-"""Stiffness and damping of films with effects: the loads of displaced films, what no effect leaves, ranks, refusals."""
+"""Stiffness and damping of films with effects: the loads of displaced films, what no effect leaves, ranks."""
 
 import math
 
 import numpy as np
 import pytest
 
-from lcp_lube import InputError, load_scene, solve
+from lcp_lube import load_scene, solve
 from lcp_lube.drivers.coefficients import coefficients
 
 PAD = {"family": "bearing", "L": 0.1, "U": 4.0, "n": 40, "fluid": {"mu": 0.05}}
@@ -73,7 +73,25 @@ def test_on_ranks(cli):
     assert two.json["coefficients"][0]["K"] == [pytest.approx(row, rel=1e-5) for row in alone.json["coefficients"][0]["K"]]
 
 
-def test_refused():
-    scene = load_scene("tilting_pad_thrust", {"nx": 15, "ny": 7, "temperature": {"beta": 0.03}})
-    with solve(scene, model="full") as s, pytest.raises(InputError, match="pads that tilt are of films without effects"):
-        coefficients(scene, s)
+def test_equations_that_are_not_solved_are_an_outcome(cli):
+    words = ["coefficients", "lined_pad", "--n", 20, "--model", "elastic", "--json", "-coupled_response_ksp_max_it", 1]
+    found = cli(*words)
+    assert found.status == 1 and found.json["outcome"] == "linear_solver" and "GMRES" in found.json["message"]
+
+
+LINER = {"elastic": {"compliance": 1e-12}}
+
+
+@pytest.mark.parametrize(
+    ("name", "effects"), [("tapered_land", {}), ("tilting_pad_thrust", {}), ("tilting_pad_thrust", LINER)], ids=str
+)
+def test_stiffness_of_a_thrust_bearing(name, effects):
+    """Of all its pads, which follow on their pivots: what another load makes of the film."""
+    heights = []
+    for load in (1e4 * (1 + 1e-3), 1e4 * (1 - 1e-3), 1e4):
+        scene = load_scene(name, {"nx": 15, "ny": 7, **effects, "balance": {"load": load, "tol": 1e-9}})
+        with solve(scene, model="full", stopping=TIGHT) as s:
+            heights.append(s.settings["balance"]["value"])
+            if load == 1e4:
+                (one,) = coefficients(scene, s)
+    assert one.K[0, 0] == pytest.approx(20.0 / (heights[1] - heights[0]), rel=1e-5) and one.C[0, 0] > 0

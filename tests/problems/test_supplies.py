@@ -178,19 +178,21 @@ def test_band():
         assert solution.enclosure.certified and solution.enclosure.bounds["band_p"] < 10.0
 
 
-def test_stiffness_of_a_hybrid_bearing_against_differences():
-    """K with the pressures behind restrictors following, against two solves with the journal displaced."""
+@pytest.mark.parametrize("effects", [{}, {"elastic": {"compliance": 2e-13}, "nx": 32, "ny": 7}])
+def test_stiffness_of_a_hybrid_bearing_against_differences(effects):
+    """K with the pressures behind restrictors following, and effects, against two solves with the journal displaced."""
     from lcp_lube.drivers.coefficients import coefficients
 
     recess = {"extent_deg": 50.0, "length_mm": 30, "restrictor": "capillary", "K": 3e-11, "p_s": 5e6}
     tables = [{**recess, "angle_deg": angle} for angle in (45.0, 135.0, 225.0, 315.0)]
-    scene = load_scene({**RING, "clearance_um": 50, "eccentricity": 0.3, "attitude_deg": 40.0, "supply": tables})
+    scene = load_scene({**RING, "clearance_um": 50, "eccentricity": 0.3, "attitude_deg": 40.0, "supply": tables, **effects})
+    ask = {"model": "full", "stopping": {"eps1": 1e-10}} if effects else {}
 
     def force(scene):
-        with solve(scene) as solution:
+        with solve(scene, **ask) as solution:
             return np.array(solution.problem.quantities(solution.fields)["force"])
 
-    with solve(scene) as solution:
+    with solve(scene, **ask) as solution:
         (one,) = coefficients(scene, solution)
     at, shift = math.radians(40.0), 1e-4
     f = force(scene)
@@ -205,7 +207,7 @@ def test_stiffness_of_a_hybrid_bearing_against_differences():
             there = {"eccentricity": float(np.hypot(*e)), "attitude_deg": math.degrees(math.atan2(e[1], e[0]))}
             ends.append(force(scene.model_copy(update=there)))
         K[:, k] = -(ends[0] - ends[1]) / (2 * shift * scene.clearance)
-    assert np.abs(turn @ one.K @ turn.T - K).max() < 1e-6 * np.abs(K).max()
+    assert np.abs(turn @ one.K @ turn.T - K).max() < (1e-4 if effects else 1e-6) * np.abs(K).max()
 
 
 @pytest.mark.parametrize(

@@ -93,6 +93,63 @@ def test_spirals_pump_inwards_and_outwards():
     assert outwards["load"] < inwards["load"]
 
 
+def muijderman(H, angle, ratio):
+    """g of the narrow-groove theory (Muijderman 1966, Whipple): dp/ds = 6 mu U g/film^2 across the motion, with no flow."""
+    gamma, cot = (1 - ratio) / ratio, 1 / math.tan(angle)
+    across = (1 + gamma * H**3) * (gamma + H**3) + H**3 * (cot * (1 + gamma)) ** 2
+    return gamma * H**2 * cot * (1 - H) * (1 - H**3) / across
+
+
+def narrow_grooves(mu, omega, film, depth, angle, ratio, inner, outer, seal):
+    """Load and inner flow of a full film with infinitely many spirals, between equal pressures.
+
+    What flows through is held back by the grooves, in series and side by side, and by the seal's film.
+    """
+    g = muijderman(film / (film + depth), angle, ratio)
+    cubes = [ratio * (film + depth) ** k + (1 - ratio) * film**k for k in (-3, 3)]
+    conducts = math.cos(angle) ** 2 / cubes[0] + math.sin(angle) ** 2 * cubes[1]
+    edge = inner + seal
+    pumped = 3 * mu * omega * g / film**2 * (outer**2 - edge**2)
+    slope = pumped / (math.log(outer / edge) / conducts + math.log(edge / inner) / film**3)  # 6 mu Q/pi
+    r = np.linspace(inner, outer, 100001)
+    in_seal, beyond = slope * np.log(np.minimum(r, edge) / inner) / film**3, np.maximum(r, edge)
+    p = in_seal + slope * np.log(beyond / edge) / conducts - 3 * mu * omega * g / film**2 * (beyond**2 - edge**2)
+    return 2 * math.pi * np.mean(p * r) * (outer - inner), math.pi * slope / (6 * mu)
+
+
+def test_many_spirals_are_the_narrow_groove_theory():
+    """Errors of first order in the spacing and in one over the number of grooves; both extrapolated: 0.5 %."""
+    found = {}
+    for grooves in (30, 60):
+        for nx in (12, 24):  # edges move on by a column a row
+            ny = round(nx * grooves * 0.015 / (2 * math.pi * 0.0225 * math.tan(math.radians(16))))
+            values = numbers("spiral_groove", pads=grooves, p_inner=1e6, p_outer=1e6, nx=nx, ny=ny)
+            found[grooves, nx] = np.array([values["load"], values["inner_flow"]])
+    many, fewer = (2 * found[grooves, 24] - found[grooves, 12] for grooves in (60, 30))
+    theory = np.array(narrow_grooves(0.01, 200 * math.pi, 1e-5, 2e-5, math.radians(16), 0.6, 0.015, 0.03, 0.004))
+    assert 2 * many - fewer == pytest.approx(np.abs(theory), rel=5e-3)
+    assert found[60, 24] == pytest.approx(np.abs(theory), rel=0.05)
+
+
+@pytest.mark.parametrize("angle", [20.0, 45.0])
+def test_many_grooves_of_a_herringbone_are_the_narrow_groove_theory(angle):
+    """Pressure rises to the middle of the width along straight lines; pitches of 1/32 and 1/64 of it, extrapolated: 1 %."""
+    width, film, depth, mu, U = 0.04, 1e-5, 2e-5, 0.01, 10.0
+    found = {}
+    for grooves in (32, 64):
+        for nx in (12, 24):
+            L = width / grooves
+            groove = {"shape": "herringbone", "depth": depth, "count": 1, "angle_deg": angle, "ratio": 0.5}
+            scene = {"family": "bearing", "dimension": 2, "L": L, "width": width, "U": U, "nx": nx}
+            scene |= {"ny": round(nx * grooves / math.tan(math.radians(angle))), "scheme": "face"}
+            scene |= {"film": [{"shape": "constant", "h": film}, groove], "fluid": {"mu": mu, "p_supply": 1e6}}
+            values = numbers({**scene, "sides": {"west": "periodic", "east": "periodic"}})
+            found[grooves, nx] = values["load"] / L
+    many, fewer = (2 * found[grooves, 24] - found[grooves, 12] for grooves in (64, 32))
+    rise = 6 * mu * U * muijderman(film / (film + depth), math.radians(angle), 0.5) / film**2
+    assert 2 * many - fewer == pytest.approx(rise * width**2 / 4, rel=0.01)
+
+
 @pytest.mark.parametrize("method", ["active-set", "din", "fas", "monotone"])
 def test_methods_agree(method):
     reference = numbers("tapered_land", **SMALL)["load"]

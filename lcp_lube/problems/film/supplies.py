@@ -149,8 +149,10 @@ class Supply:
     def misfit(self, p: float, flow: float) -> tuple[float, float, float]:
         """What source and film disagree by where the film takes `flow` at the pressure p, and its derivatives by both.
 
-        A flow (m3/s), or behind an orifice a pressure (Pa), p - p_s + (flow/K)^2: the root has no derivative where none flows.
+        A flow (m3/s), or behind an orifice a pressure (Pa), p - p_s + (flow/K)^2: the root has none where nothing flows.
         """
+        if not self.open:
+            return 0.0, 1.0, 0.0
         if self.flow is not None:
             return flow - self.flow, 0.0, 1.0
         if self.law == "capillary":
