@@ -47,8 +47,11 @@ def differences(f: Callable[[float], Array], a: float, scale: float, sizes: Arra
         low, here, high = (known[m * d] for m in (-1, 0, 1))
         noise = 10.0 * ROUNDING * sizes / d
         slope, bend = (high - low) / (2.0 * d), np.abs(high - 2.0 * here + low) / d  # type: ignore[operator]
-        if (np.abs(slope) > noise).all() and (bend <= BENT * np.abs(slope) + noise).all():
-            return slope, np.zeros_like(slope)
+        none = np.abs(slope) <= noise
+        if (bend <= BENT * np.abs(slope) + noise).all():
+            chord = _chord(at, CHORD * scale) if none.any() else slope
+            if not (none & (np.abs(chord) * scale > SLIGHT * (np.abs(here) + SLIGHT * sizes))).any():
+                return np.where(none, 0.0, slope), np.zeros_like(slope)
     best: tuple[float, Array] | None = None
     before, kinks = np.zeros_like(sizes), np.zeros_like(sizes)
     for k in range(TRIES):

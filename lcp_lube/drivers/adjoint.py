@@ -16,21 +16,18 @@ import numpy as np
 from ..base.differences import differences
 from ..base.parallel import Array
 from ..errors import InputError
-from ..problems.film.reynolds import sides
 from ..problems.solution import Solution
-from ..problems.transfer import Pick, numbers
 from ..registry import SMALL
 from ..scenes.effects.named import without
 from ..scenes.grooved import GroovedJournalScene
 from ..scenes.scene import Scene
 from ..scenes.values import values_of, with_values
 from .coefficients import placed
-from .equations import DRAGS, MISFIT, Equations, cavity_of, check_film, fields_of
-from .film_part import Part
-from .linearised import transposed
+from .equations import MISFIT, Equations, cavity_of, check_film, fields_of
+from .halved import Halved
+from .linearised import Linear
 
 CANCELLED = 1e-10
-EVEN = 1e-12  # relative difference between both halves of what is symmetric
 SUPPLY = "supply.{}.p"  # the key of a supply's pressure, Pa above p_c
 
 
@@ -100,38 +97,20 @@ class Adjoint:
     def _solve(self, rows: list[Array]) -> list[Array]:
         eq = self.equations
         problem = eq.problem(self.p)
-        entries = None if eq.law is None else eq.tangent(self.p, self.r).entries(problem.scheme)
         if self._halved:
-            return self._solve_half(rows)
-        return transposed(problem, self.cavity, rows, self._z, entries, eq.held)
+            linear: Linear | Halved = Halved(problem, self.cavity, self.scene)
+        else:
+            entries = None if eq.law is None else eq.tangent(self.p, self.r).entries(problem.scheme)
+            linear = Linear(problem, self.cavity, entries, eq.held)
+        try:
+            return linear.solve_transposed(rows, self._z)
+        finally:
+            linear.destroy()
 
     @property
     def _z(self) -> Array:
         """p (p_unit) where the film is full, -r where it is not."""
         return np.where(self.cavity, -self.r, self.p / self.equations.constant.p_unit)
-
-    def _solve_half(self, rows: list[Array]) -> list[Array]:
-        """On half the width of a film that is symmetric about its middle, where what is asked of it is so too.
-
-        With P the symmetric extension J_half = P' J P/2, the lines on the mirror having half cells: J_half' mu = P' b/2.
-        """
-        eq, half = self.equations, Part(self.scene, "mirror")
-        small, whole = half.build(eq.grid.petsc_comm), eq.constant
-        take = Pick(eq.grid, small.grid, *numbers(small.grid))
-        spread = Pick(small.grid, eq.grid, *half.places(eq.grid))
-        try:
-            if self.dry is not None:
-                small = small.revised(take(self.dry))
-            even = [np.abs(b - spread(take(b))) <= EVEN * eq.grid.reduce.max(np.abs(b)) for b in rows]
-            alike = eq.grid.reduce.min(np.array([float(one.all()) for one in even])) if rows else 1.0
-            if not alike or small.scheme.flow_unit != whole.scheme.flow_unit:
-                return transposed(whole, self.cavity, rows, self._z)
-            share = np.broadcast_to(np.where(sides(small.grid, ("mirror",))[3], 0.5, 1.0), small.grid.box).ravel()
-            cavity = take(self.cavity.astype(float)) > 0.5
-            return [spread(one) for one in transposed(small, cavity, [share * take(b) for b in rows], take(self._z))]
-        finally:
-            for made in (take, spread, small):
-                made.destroy()
 
     @property
     def _halved(self) -> bool:
@@ -154,7 +133,8 @@ class Adjoint:
         try:
             if eq.grid.shape != self.equations.grid.shape:
                 raise InputError("the grid has another number of points")
-            numbers = eq.numbers(self.p, self.r, any(part in DRAGS for weights in self.parts.values() for part in weights))
+            wanted = {part for weights in self.parts.values() for part in weights}
+            numbers = self.numbers if same else eq.numbers(self.p, self.r, wanted)
             report = eq.report(numbers)
             G = eq.balance(self.p, self.r) / self.flow_unit
             if (held := eq.held) is not None:

@@ -105,7 +105,8 @@ def coefficients(
     motions = motions_of(turning, tilt, 0.5 * model.lengths[-1], along)
     names = FLAT if turning is None else TILTED if tilt else JOURNAL
     total = np.zeros((len(frequencies), len(motions), len(motions)), dtype=complex)
-    found: Iterator[Any] = responses(scene, model, ring, solution.fields, motions)
+    symmetric = solution.settings.get("details", {}).get("reduction") == "mirror"
+    found: Iterator[Any] = responses(scene, model, ring, solution.fields, motions, symmetric)
     with_effects = model.law is not None or bool(model.effects)
     if with_effects:
         found = _with_effects(scene, solution, [partial(_moved, model.gap, motion) for motion in motions])
@@ -194,21 +195,25 @@ def supplied(model: Model, solution: Solution) -> Model:
 
 
 def responses(
-    scene: Solvable, model: Model, ring: LubricationProblem, fields: Fields, motions: Sequence[Change]
+    scene: Solvable, model: Model, ring: LubricationProblem, fields: Fields, motions: Sequence[Change], symmetric: bool = False
 ) -> Iterator[Response]:
     """Of the problems that were solved, films between grooves or the whole; each is freed when the next one is asked for.
 
-    None of tilting pads: see `_of_pads`. Collective.
+    None of tilting pads: see `_of_pads`. symmetric : they were solved on half their width. Collective.
     """
     if isinstance(scene, TiltingPadScene):
         return
-    parts = films_of(scene, ring, fields) if isinstance(ring, GroovedProblem) else [(ring, model, fields, 0.0)]
-    for problem, part, own, first in parts:
-        response = Response(problem, part, own, motions, first)
-        yield response
-        response.destroy()
-        if problem is not ring:
-            problem.destroy()
+    if not isinstance(ring, GroovedProblem):
+        yield from _freed(Response(ring, model, fields, motions, film=scene if symmetric else None))
+        return
+    for problem, film, own, first in films_of(scene, ring, fields):
+        yield from _freed(Response(problem, film.model, own, motions, first, film=film if symmetric else None))
+        problem.destroy()
+
+
+def _freed(response: Response) -> Iterator[Response]:
+    yield response
+    response.destroy()
 
 
 def stability(K: Array, C: Array) -> tuple[float | None, float | None]:

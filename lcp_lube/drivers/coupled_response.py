@@ -64,7 +64,7 @@ class CoupledResponse:
         self.p_max = base.reduce.max(np.abs(self.p)) or 1.0
         at = self._answer(np.zeros(self.n), self.x, base)
         self._size = 2.0 * grid.spacing[0] / self.unit * point_weights(grid)
-        self._linear = Linear(at.problem, self.cavity, given=columns if columns.any() else None)
+        self._linear = Linear(at.problem, self.cavity, given=columns if columns.any() else None, factored=True)
         self._areas = areas(base).ravel()
         taken = supply_flows(at.problem, at.p / at.problem.p_unit, at.r)
         self._sources = np.array([one.misfit(one.p, q)[1:] for one, q in zip(self.supplies, taken, strict=True)])
@@ -164,7 +164,7 @@ class CoupledResponse:
             def apply(shell, pc: PETSc.PC, v: PETSc.Vec, out: PETSc.Vec) -> None:
                 done = v.array_r.reshape(len(parts), size).copy()
                 for y in done:
-                    y[:n] = self._linear.solve(y[:n])
+                    y[:n] = self._linear.solve([y[:n]])[0]
                 out.setArray(done.ravel())
 
         sizes = (len(parts) * size, None)

@@ -5,7 +5,7 @@ same points of the grid, which moves where the number moves it.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -127,10 +127,11 @@ class Equations:
         k = s.diagonal.ravel() * p / problem.p_unit
         return (np.abs(k) + np.abs(s.couette_W).ravel() + np.abs(s.couette_E).ravel()) * s.flow_unit
 
-    def numbers(self, p: Array, r: Array, drags: bool = True) -> dict[str, float]:
+    def numbers(self, p: Array, r: Array, wanted: Collection[str] | None = None) -> dict[str, float]:
         """`slopes.numbers` as the scene has them. Collective."""
+        wanted = {FLIPPED.get(name, name) for name in wanted} if wanted is not None and self.turned else wanted
         problem = self.problem(p)
-        found = slopes.numbers(problem, p / problem.p_unit, r, drags)
+        found = slopes.numbers(problem, p / problem.p_unit, r, wanted)
         if (fields := known_fields(problem)) is not None:  # a line's numbers are free of the grid's error (`film.line`)
             told, discrete = _flat(problem.quantities(fields)), slopes.numbers(problem, fields["p"], fields["r"])
             found = {name: value + (told.get(name, discrete[name]) - discrete[name]) for name, value in found.items()}

@@ -68,7 +68,7 @@ def pad_films(scene: Solvable) -> Films:
 
 def films_of(
     scene: Solvable, ring: LubricationProblem, fields: Fields
-) -> Iterator[tuple[LubricationProblem, Model, Fields, float]]:
+) -> Iterator[tuple[LubricationProblem, PadFilm, Fields, float]]:
     """The films between the grooves of a solved ring, with their fields and the x where each begins. Collective.
 
     The problems are the caller's to free.
@@ -78,7 +78,7 @@ def films_of(
         take = pick_pad(ring.grid, problem.grid, pad.first)
         taken = {name: take(values) for name, values in fields.items()}
         take.destroy()
-        yield problem, film.model, taken, (pad.first - 0.5) * ring.grid.lengths[0] / ring.grid.shape[0]
+        yield problem, film, taken, (pad.first - 0.5) * ring.grid.lengths[0] / ring.grid.shape[0]
 
 
 def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 from importlib.util import find_spec
 from typing import Any
 
@@ -22,43 +23,76 @@ Entries = list[tuple[int, int, Array]]
 
 
 class Linear:
-    """J = A where the film is full, -B where it is not, factored once; and J + i nu M as a real matrix of twice the size."""
+    """J = A where the film is full, -B where it is not, and J + i nu M, solved with for several right-hand sides at once.
 
-    def __init__(self, problem: LubricationProblem, cavity: Any, entries: Entries | None = None, given: Any = None):
+    Large films in the plane by multigrid on frozen signs where its cycles converge; else by factors of the matrix, which of
+    J + i nu M is a real one of twice the size.
+    """
+
+    def __init__(
+        self,
+        problem: LubricationProblem,
+        cavity: NDArray[np.bool_],
+        entries: Entries | None = None,
+        given: Any = None,
+        M: Array | None = None,
+        factored: bool = False,
+    ):
         """entries : of dG/dp, where that is not A (of a fluid with a law). given : points in a groove, whose rows are those of
-        the identity."""
-        self.problem = problem
+        the identity. M : the diagonal of what void is stored (`at`). factored : it is
+        solved with so often that factors pay."""
+        self.problem, self.cavity, self.entries, self.given, self.M = problem, cavity, entries, given, M
+        grid, self.frozen = problem.grid, None
+        apart = entries is None and not factored and (given is None or problem.held is None)
+        if apart and grid.dim == 2 and grid.size > SMALL and find_spec("numba"):
+            from ..solvers.fas.frozen import Frozen  # here: numba starts with it
+
+            self.frozen = Frozen(problem, cavity, M, given)
+
+    def solve(self, rows: Sequence[Array]) -> list[Array]:
+        """J^-1 b for each b. Collective."""
+        found = self.frozen and self.frozen.solve(rows)
+        return found or [self._solve(self._factors, self.J, b) for b in rows]
+
+    def solve_transposed(self, rows: Sequence[Array], z: Array) -> list[Array]:
+        """J'^-1 b for each b; z : the solution, p where the film is full and -r where it is not. Collective."""
+        found = self.frozen and self.frozen.solve(rows, transposed=True, z=z)
+        return found or [self._solve(self._factors, self.J, b, transposed=True) for b in rows]
+
+    def at(self, nu: float, rows: Sequence[Any], stored: bool = True) -> list[Any]:
+        """(J + i nu M)^-1 b for each complex b; stored = False: J^-1 b. Collective."""
+        if not stored:
+            parts = self.solve([part for b in rows for part in (b.real, b.imag)])
+            return [real + 1j * imaginary for real, imaginary in zip(parts[::2], parts[1::2], strict=True)]
+        found = self.frozen and self.frozen.solve(rows, nu=nu)
+        return found or self._by_matrix(nu, rows)
+
+    @cached_property
+    def J(self) -> PETSc.Mat:
+        problem = self.problem
         full, void = problem.A.createVecs()
-        full.setArray(np.where(cavity, 0.0, 1.0))
-        void.setArray(np.where(cavity, -1.0, 0.0))
-        self.J = problem.A.copy() if entries is None else assemble(problem.grid, entries).copy()
-        self.J.diagonalScale(None, full)
+        full.setArray(np.where(self.cavity, 0.0, 1.0))
+        void.setArray(np.where(self.cavity, -1.0, 0.0))
+        J = problem.A.copy() if self.entries is None else assemble(problem.grid, self.entries).copy()
+        J.diagonalScale(None, full)
         B = problem.B.copy()
         B.diagonalScale(None, void)
-        self.J.axpy(1.0, B, structure=PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
-        if given is not None:
-            self.J.zeroRows((problem.grid.first + np.flatnonzero(given)).astype(PETSc.IntType), 1.0)
+        J.axpy(1.0, B, structure=PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+        if self.given is not None:
+            J.zeroRows((problem.grid.first + np.flatnonzero(self.given)).astype(PETSc.IntType), 1.0)
         for obj in (B, full, void):
             obj.destroy()
-        self._krylov: Krylov | None = None
+        return J
 
-    def solve(self, b: Array) -> Array:
-        """J^-1 b. Collective."""
-        if self._krylov is None:
-            self._krylov = self._factored(self.J)
-        return self._solve(self._krylov, self.J, b)
+    @cached_property
+    def _factors(self) -> Krylov:
+        return self._factored(self.J)
 
-    def solve_transposed(self, rows: Sequence[Array]) -> list[Array]:
-        """J'^-1 b for each b. Collective."""
-        if self._krylov is None:
-            self._krylov = self._factored(self.J)
-        return [self._solve(self._krylov, self.J, b, transposed=True) for b in rows]
-
-    def at(self, nu: float, M: Array, real: Array, imaginary: Array) -> Any:
-        """(J + i nu M)^-1 (real + i imaginary). Collective."""
+    def _by_matrix(self, nu: float, rows: Sequence[Any]) -> list[Any]:
+        assert self.M is not None  # for the type checker
         J, n = self.J, self.problem.grid.local_size
         diagonal = J.createVecLeft()
-        diagonal.setArray(nu * M)
+        diagonal.setArray(nu * self.M)
         plus = PETSc.Mat().createAIJ(J.getSizes(), nnz=1, comm=J.comm)
         plus.setDiagonal(diagonal)
         plus.assemble()
@@ -67,11 +101,11 @@ class Linear:
         nest = PETSc.Mat().createNest([[J, minus], [plus, J]], comm=J.comm)
         big = nest.convert("aij", PETSc.Mat())
         krylov = self._factored(big)
-        z = self._solve(krylov, big, np.concatenate([real, imaginary]))
+        found = [self._solve(krylov, big, np.concatenate([b.real, b.imag])) for b in rows]
         krylov.destroy()
         for obj in (nest, big, minus, plus, diagonal):
             obj.destroy()
-        return z[:n] + 1j * z[n:]
+        return [z[:n] + 1j * z[n:] for z in found]
 
     def _factored(self, mat: PETSc.Mat) -> Krylov:
         grid = self.problem.grid
@@ -92,36 +126,9 @@ class Linear:
         return z
 
     def destroy(self) -> None:
-        if self._krylov is not None:
-            self._krylov.destroy()
-        self.J.destroy()
-
-
-def transposed(
-    problem: LubricationProblem,
-    cavity: NDArray[np.bool_],
-    rows: Sequence[Array],
-    z: Array,
-    entries: Entries | None = None,
-    given: Any = None,
-) -> list[Array]:
-    """J'^-1 b for each b: by the factors of `Linear`, in large films in the plane by multigrid where its cycles converge.
-
-    z : the solution, p and -r. entries, given : as `Linear` takes them. Collective.
-    """
-    grid, found = problem.grid, None
-    plain = entries is None and given is None and problem.held is None
-    if plain and grid.dim == 2 and grid.size > SMALL and find_spec("numba"):
-        from ..solvers.fas import adjoint  # here: numba starts with it
-
-        found = adjoint.transposed(problem, cavity, rows, z)
-    if found is not None:
-        return found
-    linear = Linear(problem, cavity, entries, given)
-    try:
-        return linear.solve_transposed(rows)
-    finally:
-        linear.destroy()
+        for name in ("_factors", "J"):
+            if name in self.__dict__:
+                self.__dict__[name].destroy()
 
 
 class Feed:

@@ -117,7 +117,7 @@ class JournalPads:
 
     def films(self, scene: Scene, solution: Solution) -> Iterator[PadFilm]:
         turning = self.scene.turning
-        for problem, model, fields, first in films_of(held(scene, solution), solution.problem, solution.fields):  # type: ignore[arg-type]
+        for problem, film, fields, first in films_of(held(scene, solution), solution.problem, solution.fields):  # type: ignore[arg-type]
             middle = math.degrees(float(turning.theta(np.array(first + 0.5 * problem.grid.lengths[0]))))
             off = [
                 abs(math.remainder(middle - at - (0.5 - self.scene.pivot_part) * self.scene.pad_deg, 360.0))
@@ -129,7 +129,7 @@ class JournalPads:
             def tilt(x: Array, y: Array, first: float = first, pivot: float = pivot) -> Array:
                 return -turning.R * np.sin(turning.theta(x + first) - pivot) + 0.0 * y
 
-            yield PadFilm(problem, model, fields, [*displacements(turning, first), tilt], [0, 1, 2 + k])
+            yield PadFilm(problem, film.model, fields, [*displacements(turning, first), tilt], [0, 1, 2 + k])
 
     def misfit(self, solution: Solution, films: Sequence[PadFilm]) -> tuple[Array, Array]:
         fx, fy = solution.problem.quantities(solution.fields)["force"]

@@ -13,6 +13,7 @@ the step's end.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -27,9 +28,12 @@ from ..problems.film.stored import Stored
 from ..problems.film.supplies import supply_flows
 from ..problems.film.views import View
 from ..problems.solution import Fields
+from ..registry import SMALL
+from ..scenes.scene import Solvable
+from .halved import Halved
 from .linearised import Feed, Linear
 
-STEP = 0.125  # of the thinnest film: G is a cubic in the displacement, which four values give exactly whatever the step
+STEP = 1e-5  # of the thinnest film
 Change = Callable[[Array, Array], Array]  # dh/de at x and y (m) of the scene's film
 
 
@@ -59,6 +63,7 @@ class Response:
     motions : dh/de of each.
     first : x of the scene where this film's x is 0, m.
     cavity : cells whose void answers, in place of those of the fields. counted : cells whose pressure counts in the force.
+    film : what was solved on half its width, as it is symmetric.
     """
 
     def __init__(
@@ -70,6 +75,7 @@ class Response:
         first: float = 0.0,
         cavity: Any = None,
         counted: Any = None,
+        film: Solvable | None = None,
     ):
         grid, self.p, self.r = problem.grid, fields["p"], fields["r"]
         self.problem = problem
@@ -85,7 +91,10 @@ class Response:
         unit = 2.0 * grid.spacing[0] / problem.scheme.flow_unit * size
         self._M = np.where(self.cavity, unit * problem.scheme.h.ravel(), 0.0)
         self._S = [unit * (1.0 - self.r) * change for change in self.changes]
-        self._solver, held = Linear(problem, self.cavity), problem.held
+        self._solver: Linear | Halved = Linear(problem, self.cavity, M=self._M)
+        if film is not None and grid.size > SMALL:
+            self._solver = Halved(problem, self.cavity, film, self._M)
+        held = problem.held
         supplies = held.supplies if held is not None else ()
         taken = supply_flows(problem, self.p, self.r)
         self._sources = np.array([one.misfit(one.p, q)[1:] for one, q in zip(supplies, taken, strict=True)])
@@ -95,17 +104,23 @@ class Response:
         swept = (lambda S: S) if held is None else (lambda S: np.where(held.mask.ravel(), 0.0, S))  # type: ignore[union-attr]
         self._swept = [swept(S) for S in self._S]
         self._dG, self._raw = zip(*(self._derivative(moved) for moved in self._moved), strict=True)
-        self._slow = [self._settled(self._solver.solve(-dG), raw, 0.0) for dG, raw in zip(self._dG, self._raw, strict=True)]
 
-    def _settled(self, z: Any, raw: Any, nu: float) -> Any:
-        """z with the change of the supplies' pressures that follow."""
+    def _solved(self, rows: Sequence[Any], raws: Sequence[Any], nu: float = 0.0, stored: bool = True) -> list[Any]:
+        """The film's answers, with the change of the supplies' pressures that follow."""
+        solve = partial(self._solver.at, nu, stored=stored) if nu else self._solver.solve
+        found = solve(rows)
         if self._feed is None:
-            return z
-        if nu not in self._answers:
-            pushed, none = [self._feed.pushed(t) for t in self._feed.free], np.zeros_like(self._M)
-            at = (lambda b: self._solver.at(nu, self._M, b, none)) if nu else self._solver.solve
-            self._answers[nu] = [at(b) for b in pushed]
-        return self._feed.corrected(z, raw, self._answers[nu], self._sources)
+            return found
+        key = nu if stored else 0.0
+        if key not in self._answers:
+            self._answers[key] = solve([self._feed.pushed(t) for t in self._feed.free])
+        answers = self._answers[key]
+        return [self._feed.corrected(z, raw, answers, self._sources) for z, raw in zip(found, raws, strict=True)]
+
+    @cached_property
+    def _slow(self) -> list[Any]:
+        """What stiffness and damping are both made of."""
+        return self._solved([-dG for dG in self._dG], self._raw)
 
     def stiffness(self) -> Array:
         """-dF/de with nothing but e changed, shape (motions, motions)."""
@@ -113,16 +128,14 @@ class Response:
 
     def damping(self) -> Array:
         """-dF/d(de/dt) in the limit of slow motion."""
-        steps = zip(self._S, self._swept, self._slow, strict=True)
-        found = [self._settled(self._solver.solve(-(swept + self._M * z)), S, 0.0) for S, swept, z in steps]
-        return self._forces(found).real
+        rows = [-(swept + self._M * z) for swept, z in zip(self._swept, self._slow, strict=True)]
+        return self._forces(self._solved(rows, self._S)).real
 
     def at(self, nu: float, stored: bool = True) -> Any:
         """K + i nu C at this frequency, rad/s > 0; stored = False: as if the cavity's void were not stored (M = 0)."""
-        M, found = self._M if stored else 0.0 * self._M, []
-        for dG, raw, S, swept in zip(self._dG, self._raw, self._S, self._swept, strict=True):
-            found.append(self._settled(self._solver.at(nu, M, -dG, -nu * swept), raw + 1j * nu * S, nu))
-        return self._forces(found)
+        rows = [-dG - 1j * nu * swept for dG, swept in zip(self._dG, self._swept, strict=True)]
+        raws = [raw + 1j * nu * S for raw, S in zip(self._raw, self._S, strict=True)]
+        return self._forces(self._solved(rows, raws, nu, stored))
 
     def _forces(self, found: Any) -> Any:
         """-F of each motion's answer, shape (motions, motions)."""
@@ -130,12 +143,12 @@ class Response:
         return np.array([[-complex(dot(row, z.real), dot(row, z.imag)) for z in found] for row in self._sides])
 
     def _derivative(self, moved: Moved) -> tuple[Array, Array]:
-        """dG/de at fixed fields, and that of the cells' own balances, were none held: exact, as G is a cubic in e (conductances
-        in h^3, Couette and stored terms in h)."""
+        """dG/de at fixed fields, and that of the cells' own balances, were none held: G is a cubic in e (conductances in h^3,
+        Couette and stored terms in h), whose third derivative the step makes small."""
         size = self.problem.reduce.max(np.abs(moved.change(self.problem.grid.x, self.problem.grid.y)))
         step = STEP * self.problem.reduce.min(self.problem.scheme.h) / (size or 1.0)
         values, grid = [], self.problem.grid
-        for part in (-2.0, -1.0, 1.0, 2.0):
+        for part in (-1.0, 1.0):
             other = replace(self.model, gap=replace(moved, e=part * step)).build(grid.shape, grid.petsc_comm, grid)
             if self.problem.factors is not None:
                 other = self.problem.factors.film(other)
@@ -145,8 +158,7 @@ class Response:
             raw = balance if other.held is None else other.face_flows(self.p, self.r)
             values.append(np.stack([balance, raw]) * (other.scheme.flow_unit / self.problem.scheme.flow_unit))
             other.destroy()
-        a, b, c, d = values
-        dG, raw = (8.0 * (c - b) - (d - a)) / (12.0 * step)
+        dG, raw = (values[1] - values[0]) / (2.0 * step)
         return dG, raw
 
     def destroy(self) -> None:

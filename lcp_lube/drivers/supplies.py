@@ -184,7 +184,7 @@ def _slopes(problem: LubricationProblem, fields: Any, free: Any) -> Array:
     cavity = (cavity_sign(problem.reduce, fields["p"], fields["r"]) < 0) & ~held.mask.ravel()
     linear, feed = Linear(problem, cavity), Feed(problem, cavity, free)
     try:
-        return feed.slopes([linear.solve(feed.pushed(t)) for t in feed.free])
+        return feed.slopes(linear.solve([feed.pushed(t) for t in feed.free]))
     finally:
         linear.destroy()
         feed.destroy()

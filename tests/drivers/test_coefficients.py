@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from lcp_lube import InputError, load_scene, solve
+from lcp_lube.drivers import linearised, response
 from lcp_lube.drivers.coefficients import coefficients, stability
 from lcp_lube.registry import PACKAGE
+from lcp_lube.solvers.fas.frozen import Frozen
 
 TABLE = next(
     path
@@ -246,3 +248,36 @@ def test_grooves_give_what_the_ends_lose():
 def test_grooves_that_are_refused():
     with pytest.raises(InputError, match="not for scene two_groove_journal"):
         solve("two_groove_journal", certify=True, **SMALL)
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [("ring_journal", {}), ("two_groove_journal", {}), ("dimpled_pad", {}), ("hybrid_journal", {}), ("misaligned_journal", {})],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_multigrid_has_the_coefficients_of_the_matrix(monkeypatch, name, changes):
+    """At rest and at frequencies, supplies that follow, films solved on half their width and whole ones."""
+    scene = load_scene(name, nx=96, ny=41, **changes)
+    solution = solve(scene)
+    found = []
+    for least in (10**9, 100):
+        for module in (linearised, response):
+            monkeypatch.setattr(module, "SMALL", least)
+        found.append(coefficients(scene, solution, [0.0, 1.0, 300.0]))
+    for matrix, multigrid in zip(*found, strict=True):
+        assert pytest.approx(matrix.K, abs=1e-8 * np.abs(matrix.K).max()) == multigrid.K
+        assert pytest.approx(matrix.C, abs=3e-8 * np.abs(matrix.C).max()) == multigrid.C
+    solution.destroy()
+
+
+def test_coefficients_cost_some_cycles(monkeypatch):
+    """Two pairs of right-hand sides, some ten cycles each, and no matrix."""
+    scene = load_scene("problem4", n=255)
+    solution = solve(scene)
+    monkeypatch.setattr(linearised.Linear, "_factors", property(lambda self: pytest.fail("a matrix was factored")))
+    cycles = []
+    solved = Frozen._gmres
+    monkeypatch.setattr(Frozen, "_gmres", lambda self, *given: (solved(self, *given), cycles.append(self.work))[0])
+    (found,) = coefficients(scene, solution)
+    assert found.K[0, 0] > 0.0 and len(cycles) == 2 and cycles[-1] <= 24
+    solution.destroy()

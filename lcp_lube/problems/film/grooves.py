@@ -63,7 +63,7 @@ class GroovedProblem(LubricationProblem):
 
     def groove_flows(self, p: Array, r: Array) -> list[float]:
         """Volume flow that each groove gives to the film, m3/s (1D: m2/s). Collective."""
-        balance = self.flow(p, r)
+        balance = self.face_flows(p, r)
         dy = self.grid.spacing[1] if self.grid.dim == 2 else 1.0
         unit = 0.5 * dy * self.scheme.flow_unit
         return [unit * self.reduce.sum(np.where(inside, balance, 0.0)) for inside in self.columns]

@@ -4,7 +4,7 @@ Load, force, moments, friction and flows are linear in p and r as long as no cel
 pressure is that of one point. Whatever else is asked for is a function of these numbers (`drivers.gradient`).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -36,11 +36,15 @@ class Slope:
     ties: int = 0
 
 
-def numbers(problem: LubricationProblem, p: Array, r: Array, drags: bool = True) -> dict[str, float]:
+def numbers(problem: LubricationProblem, p: Array, r: Array, wanted: Collection[str] | None = None) -> dict[str, float]:
     """The numbers that have slopes, SI units; vectors by their parts, force_x, flow_west. Collective.
 
-    drags : whether what drags at the wall is wanted; NaN without, which saves half the time.
+    wanted : of those that take time, what drags, flows and the largest pressure, the others are NaN; None: all.
     """
+
+    def asked(start: str) -> bool:
+        return wanted is None or any(name.startswith(start) for name in wanted)
+
     p_pa = p * problem.p_unit
     found = forces(problem, p_pa)
     out = {"pressure_integral": found["pressure_integral"]}
@@ -52,16 +56,16 @@ def numbers(problem: LubricationProblem, p: Array, r: Array, drags: bool = True)
         out |= dict(zip(("moment_x", "moment_y"), found["moment"], strict=True))
     elif "moment" in found:
         out["moment"] = found["moment"]
-    out["friction"] = friction(problem, p_pa, r) if drags else np.nan
+    out["friction"] = friction(problem, p_pa, r) if asked("friction") else np.nan
     if problem.grid.polar is not None:
         lever = problem.grid.polar[0] + problem.grid.y
-        out["friction_torque"] = friction(problem, p_pa, r, lever) if drags else np.nan
-    out["p_max"] = largest_pressure(problem, p_pa)[0] + problem.p_c
+        out["friction_torque"] = friction(problem, p_pa, r, lever) if asked("friction_torque") else np.nan
+    out["p_max"] = largest_pressure(problem, p_pa)[0] + problem.p_c if asked("p_max") else np.nan
     out["min_h"] = thinnest(problem)[0]
     kinds = [kind for pair in problem.grid.ends for kind in pair]
-    flows = side_flows(problem, p, r)
+    flows = side_flows(problem, p, r) if asked("flow_") else dict.fromkeys(SIDES, np.nan)
     out |= {f"flow_{name}": flows[name] for name, kind in zip(SIDES, kinds, strict=False) if kind == "open"}
-    if isinstance(problem, GroovedProblem):
+    if isinstance(problem, GroovedProblem) and asked("groove_flow"):
         out |= {f"groove_flow_{k}": flow for k, flow in enumerate(problem.groove_flows(p, r), start=1)}
     out |= {f"supply_flow_{k}": flow for k, flow in enumerate(supply_flows(problem, p, r), start=1)}
     return out

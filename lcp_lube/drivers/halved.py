@@ -1,0 +1,66 @@
+"""Linearised films that are symmetric about the middle of their width, solved on half of it where what is asked is so too.
+
+With P the symmetric extension, J of half the film is P' J P/2, the lines on the mirror having half cells: J z = b with b
+symmetric is J_half u = P' b/2 with z = P u, and J' alike.
+"""
+
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..base.parallel import Array
+from ..problems.film.lubrication import LubricationProblem
+from ..problems.film.reynolds import sides
+from ..problems.transfer import Pick, numbers
+from ..scenes.scene import Solvable
+from .film_part import Part
+from .linearised import Linear
+
+EVEN = 1e-9  # relative difference that rounding leaves between both halves of what is symmetric
+
+
+class Halved:
+    """As `linearised.Linear`, of a problem whose scene is symmetric. Collective, as its methods."""
+
+    def __init__(self, problem: LubricationProblem, cavity: Any, film: Solvable, M: Array | None = None):
+        grid, part = problem.grid, Part(film, "mirror")
+        self.problem, self.cavity, self.M = problem, cavity, M
+        half = part.build(grid.petsc_comm)
+        self._take, self._spread = Pick(grid, half.grid, *numbers(half.grid)), Pick(half.grid, grid, *part.places(grid))
+        self.half = half if problem.dry is None or half.coefficients_for is None else half.revised(self._take(problem.dry))
+        self._share = np.broadcast_to(np.where(sides(half.grid, ("mirror",))[3], 0.5, 1.0), half.grid.box).ravel()
+        of_half = None if M is None else self._share * self._take(M)
+        self._small = Linear(self.half, self._take(cavity.astype(float)) > 0.5, M=of_half)
+
+    @cached_property
+    def _whole(self) -> Linear:
+        return Linear(self.problem, self.cavity, M=self.M)
+
+    def _of(self, change: Callable[[Array], Array], a: Any) -> Any:
+        return change(a.real) + 1j * change(a.imag) if np.iscomplexobj(a) else change(a)
+
+    def _solved(self, ask: Callable[[Linear, list[Any], Callable[[Any], Any]], list[Any]], rows: Sequence[Any]) -> list[Any]:
+        reduce, halves = self.problem.reduce, [self._of(self._take, b) for b in rows]
+        odd = [np.abs(b - self._of(self._spread, half)) for b, half in zip(rows, halves, strict=True)]
+        even = all(reduce.max(part) <= EVEN * reduce.max(np.abs(b)) for part, b in zip(odd, rows, strict=True))
+        if not even or self.half.scheme.flow_unit != self.problem.scheme.flow_unit:
+            return ask(self._whole, list(rows), lambda a: a)
+        found = ask(self._small, [self._share * half for half in halves], self._take)
+        return [self._of(self._spread, one) for one in found]
+
+    def solve(self, rows: Sequence[Array]) -> list[Array]:
+        return self._solved(lambda linear, some, _: linear.solve(some), rows)
+
+    def solve_transposed(self, rows: Sequence[Array], z: Array) -> list[Array]:
+        return self._solved(lambda linear, some, on: linear.solve_transposed(some, on(z)), rows)
+
+    def at(self, nu: float, rows: Sequence[Any], stored: bool = True) -> list[Any]:
+        return self._solved(lambda linear, some, _: linear.at(nu, some, stored), rows)
+
+    def destroy(self) -> None:
+        if "_whole" in self.__dict__:
+            self._whole.destroy()
+        for one in (self._small, self._take, self._spread, self.half):
+            one.destroy()

@@ -1,0 +1,136 @@
+"""Sweeps and balances of the film linearised at the signs of a solution, and of the transposed system (`frozen`).
+
+Arrays have the frame of `kernels`, before it one axis of several right-hand sides, or of a real and an imaginary part. `full`
+says where the film is full, `free` (None: everywhere) where it is not held at a pressure. A point's row of J is there
+
+    sum of k (p_i - p_neighbour) - q_i + carry q_west = c_i,      p where the film is full, -q in the cavity,
+
+and of J', its transpose, a full point's sum of k (l_i - l_neighbour) = c_i, a cavitated one's l_i - carry l_east = c_i: void
+hands what is asked of it on to the east. carry + i turn is the part of a cell's void that leaves it; None, None: all of it.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.compiled import kernel
+from ...base.parallel import Array
+
+Mask = NDArray[np.bool_]
+
+
+@kernel
+def sweep(
+    z: Array, full: Mask, free: Mask | None, kx: Array, ky: Array, c: Array, down: bool,
+    carry: Array | None, turn: Array | None,
+) -> None:  # fmt: skip
+    """One Gauss-Seidel sweep of J z = c in place, every x line along the flow, lines upwards or down."""
+    several, ny, nx = z.shape[0], z.shape[1] - 2, z.shape[2] - 2
+    given, west, across = np.empty((2, nx + 2)), np.empty(nx + 2), np.zeros(nx + 2)
+    for s in range(ny):
+        m = ny - s if down else 1 + s
+        for i in range(1, nx + 1):  # loops of their own: they need no neighbour's new value, and go by vectors
+            over = 1.0 / ((kx[m, i] + kx[m, i + 1]) + (ky[m, i] + ky[m + 1, i])) if full[m, i] else 1.0
+            if free is not None:
+                over = over if free[m, i] else 0.0
+            west[i] = over * (kx[m, i] if full[m, i - 1] else (1.0 if carry is None else carry[m, i - 1]))
+            if turn is not None:
+                across[i] = 0.0 if full[m, i - 1] else over * turn[m, i - 1]
+        for n in range(several):
+            for i in range(1, nx + 1):
+                over = 1.0 / ((kx[m, i] + kx[m, i + 1]) + (ky[m, i] + ky[m + 1, i])) if full[m, i] else 1.0
+                if free is not None:
+                    over = over if free[m, i] else 0.0
+                east = z[n, m, i + 1] if full[m, i + 1] else 0.0
+                south = z[n, m - 1, i] if full[m - 1, i] else 0.0
+                north = z[n, m + 1, i] if full[m + 1, i] else 0.0
+                given[n, i] = over * (c[n, m, i] + kx[m, i + 1] * east + ky[m, i] * south + ky[m + 1, i] * north)
+        if several == 1:
+            a = z[0, m, 0]
+            for i in range(1, nx + 1):
+                a = given[0, i] + west[i] * a
+                z[0, m, i] = a
+        else:  # both chains at once
+            a, b = z[0, m, 0], z[1, m, 0]
+            for i in range(1, nx + 1):
+                if turn is None:
+                    a, b = given[0, i] + west[i] * a, given[1, i] + west[i] * b
+                else:
+                    a, b = given[0, i] + (west[i] * a - across[i] * b), given[1, i] + (west[i] * b + across[i] * a)
+                z[0, m, i], z[1, m, i] = a, b
+
+
+@kernel
+def residual(
+    z: Array, full: Mask, free: Mask | None, kx: Array, ky: Array, c: Array, carry: Array | None, turn: Array | None, out: Array
+) -> None:
+    """c - J z at all of the rank's points; none where a pressure is held."""
+    several, ny, nx = z.shape[0], z.shape[1] - 2, z.shape[2] - 2
+    for m in range(1, ny + 1):
+        for n in range(several):
+            for i in range(1, nx + 1):
+                here = z[n, m, i] if full[m, i] else 0.0
+                west, passed = (z[n, m, i - 1], 0.0) if full[m, i - 1] else (0.0, z[n, m, i - 1])
+                if turn is not None and carry is not None:
+                    other = 0.0 if full[m, i - 1] else z[1 - n, m, i - 1]
+                    passed = passed * carry[m, i - 1] + (2.0 * n - 1.0) * turn[m, i - 1] * other
+                elif carry is not None:
+                    passed = passed * carry[m, i - 1]
+                east = z[n, m, i + 1] if full[m, i + 1] else 0.0
+                south = z[n, m - 1, i] if full[m - 1, i] else 0.0
+                north = z[n, m + 1, i] if full[m + 1, i] else 0.0
+                flows = (kx[m, i] * (here - west) + kx[m, i + 1] * (here - east)) + (
+                    ky[m, i] * (here - south) + ky[m + 1, i] * (here - north)
+                )
+                rest = c[n, m, i] - flows - ((0.0 if full[m, i] else z[n, m, i]) - passed)
+                if free is not None:
+                    rest = rest if free[m, i] else 0.0
+                out[n, m, i] = rest
+
+
+@kernel
+def transposed_sweep(
+    l: Array, full: Mask, free: Mask | None, kx: Array, ky: Array, c: Array, down: bool, carry: Array | None
+) -> None:
+    """One Gauss-Seidel sweep of J' l = c in place, each x line against the flow, lines upwards or down."""
+    several, ny, nx = l.shape[0], l.shape[1] - 2, l.shape[2] - 2
+    given, east = np.empty((2, nx + 2)), np.empty(nx + 2)
+    for s in range(ny):
+        m = ny - s if down else 1 + s
+        for n in range(several):
+            for i in range(1, nx + 1):
+                k_W, k_E, k_S, k_N = kx[m, i], kx[m, i + 1], ky[m, i], ky[m + 1, i]
+                over = 1.0 / ((k_W + k_E) + (k_S + k_N))
+                t = over * (c[n, m, i] + k_W * l[n, m, i - 1] + k_S * l[n, m - 1, i] + k_N * l[n, m + 1, i])
+                t, along = (t, over * k_E) if full[m, i] else (c[n, m, i], 1.0 if carry is None else carry[m, i])
+                if free is not None:
+                    t, along = (t, along) if free[m, i] else (0.0, 0.0)
+                given[n, i], east[i] = t, along
+        if several == 1:
+            a = l[0, m, nx + 1]
+            for i in range(nx, 0, -1):
+                a = given[0, i] + east[i] * a
+                l[0, m, i] = a
+        else:
+            a, b = l[0, m, nx + 1], l[1, m, nx + 1]
+            for i in range(nx, 0, -1):
+                a, b = given[0, i] + east[i] * a, given[1, i] + east[i] * b
+                l[0, m, i], l[1, m, i] = a, b
+
+
+@kernel
+def transposed_residual(
+    l: Array, full: Mask, free: Mask | None, kx: Array, ky: Array, c: Array, carry: Array | None, out: Array
+) -> None:
+    """c - J' l at all of the rank's points; none where a pressure is held."""
+    for n in range(l.shape[0]):
+        for m in range(1, l.shape[1] - 1):
+            for i in range(1, l.shape[2] - 1):
+                here, east = l[n, m, i], l[n, m, i + 1]
+                flows = (kx[m, i] * (here - l[n, m, i - 1]) + kx[m, i + 1] * (here - east)) + (
+                    ky[m, i] * (here - l[n, m - 1, i]) + ky[m + 1, i] * (here - l[n, m + 1, i])
+                )
+                passed = east if carry is None else carry[m, i] * east
+                rest = c[n, m, i] - (flows if full[m, i] else here - passed)
+                if free is not None:
+                    rest = rest if free[m, i] else 0.0
+                out[n, m, i] = rest
