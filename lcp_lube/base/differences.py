@@ -50,7 +50,7 @@ def differences(f: Callable[[float], Array], a: float, scale: float, sizes: Arra
         none = np.abs(slope) <= noise
         if (bend <= BENT * np.abs(slope) + noise).all():
             chord = _chord(at, CHORD * scale) if none.any() else slope
-            if not (none & (np.abs(chord) * scale > SLIGHT * (np.abs(here) + SLIGHT * sizes))).any():
+            if not (none & (np.abs(chord) * scale > SLIGHT * (np.abs(here) + SLIGHT * sizes))).any():  # type: ignore[arg-type]
                 return np.where(none, 0.0, slope), np.zeros_like(slope)
     best: tuple[float, Array] | None = None
     before, kinks = np.zeros_like(sizes), np.zeros_like(sizes)
