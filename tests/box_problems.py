@@ -20,13 +20,15 @@ def obstacle(changes: dict[str, Any] | None = None, **how: Any) -> Solution:
     return solve(load_scene("obstacle_bratu", changes or {}), **how)
 
 
-class Affine:
-    """f(v) = M v + q on one rank."""
+class Affine(BoxProblem):
+    """f(v) = M v + q on one rank, on a line of points that means nothing."""
 
-    def __init__(self, M, q):
+    def __init__(self, M, q, lower, upper, v0):
         self.M, self.q = np.asarray(M, dtype=float), np.asarray(q, dtype=float)
+        super().__init__(Grid((len(q),), (1.0,), PETSc.COMM_SELF), lower, upper, v0)
         full = scipy.sparse.csr_matrix(np.ones_like(self.M))
-        self.mat = PETSc.Mat().createAIJ(self.M.shape, csr=(full.indptr, full.indices, self.M.ravel()), comm=PETSc.COMM_SELF)
+        csr = (full.indptr, full.indices, self.M.ravel())
+        self.mat = self._own(PETSc.Mat().createAIJ(self.M.shape, csr=csr, comm=PETSc.COMM_SELF))
 
     def residual(self, v):
         return self.M @ v + self.q
@@ -37,14 +39,9 @@ class Affine:
     def scale(self, v):
         return 1.0
 
-    def destroy(self):
-        self.mat.destroy()
-
 
 def affine(M, q, lower, upper, v0=None) -> BoxProblem:
-    """The affine problem on a line of points that means nothing."""
+    """The affine problem; one bound may stand for all."""
     n = len(q)
-    grid = Grid((n,), (1.0,), PETSc.COMM_SELF)
-    start = np.zeros(n) if v0 is None else v0
     l, u = (np.broadcast_to(np.asarray(bound, dtype=float), n) for bound in (lower, upper))
-    return BoxProblem(grid, Affine(M, q), l, u, start)
+    return Affine(M, q, l, u, np.zeros(n) if v0 is None else v0)

@@ -7,11 +7,12 @@ all of them, these are the equations f(v) = 0.
 """
 
 from functools import cached_property
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
 from petsc4py import PETSc
 
+from ..base.owned import Owned
 from ..base.parallel import Array, Reduce
 from ..errors import InputError
 from .certificate import Certificate, certificate_tol
@@ -20,31 +21,12 @@ from .solution import Fields, Outcome
 from .transfer import Transfer
 
 
-class Equations(Protocol):
-    """f and its Jacobian, on arrays of this rank's points."""
-
-    def residual(self, v: Array) -> Array:
-        """f(v); entries that overflow are inf or NaN. Collective."""
-        ...
-
-    def jacobian(self, v: Array) -> PETSc.Mat:
-        """f'(v), an n-by-n AIJ matrix that stores its whole diagonal; the next call overwrites it. Collective."""
-        ...
-
-    def scale(self, v: Array) -> float:
-        """Mean size of the terms of f(v): a residual counts as small against this. Collective."""
-        ...
-
-    def destroy(self) -> None: ...
-
-
 class BoxProblem:
-    """l <= v <= u, f(v) complementary to the bounds. The one field is v.
+    """l <= v <= u, f(v) complementary to the bounds; a subclass has f and its Jacobian. The one field is v.
 
     Parameters
     ----------
     grid : the points; a Grid of one dimension serves where the unknowns are no points of a grid.
-    equations : f and its Jacobian.
     lower, upper : bounds at this rank's points; -inf and inf where there are none.
     v0 : where to start; moved into the bounds.
 
@@ -56,9 +38,10 @@ class BoxProblem:
     kind = "box"
     units: ClassVar[dict[str, str]] = {}
 
-    def __init__(self, grid: Grid, equations: Equations, lower: Array, upper: Array, v0: Array):
-        self.grid, self.equations, self.lower, self.upper = grid, equations, lower, upper
+    def __init__(self, grid: Grid, lower: Array, upper: Array, v0: Array):
+        self.grid, self.lower, self.upper = grid, lower, upper
         self.reduce: Reduce = grid.reduce
+        self._own = Owned(self, grid.petsc_comm)
         self._check_bounds()
         self.v0 = np.clip(v0, lower, upper)
         if not np.isfinite(self.reduce.sum(self.v0)):
@@ -84,12 +67,16 @@ class BoxProblem:
         return self.grid.size
 
     def residual(self, v: Array) -> Array:
-        """f(v). Collective."""
-        return self.equations.residual(v)
+        """f(v); entries that overflow are inf or NaN. Collective."""
+        raise NotImplementedError
 
     def jacobian(self, v: Array) -> PETSc.Mat:
-        """f'(v); the next call overwrites it. Collective."""
-        return self.equations.jacobian(v)
+        """f'(v), an n-by-n AIJ matrix that stores its whole diagonal; the next call overwrites it. Collective."""
+        raise NotImplementedError
+
+    def scale(self, v: Array) -> float:
+        """Mean size of the terms of f(v): a residual counts as small against this. Collective."""
+        raise NotImplementedError
 
     def natural_residual(self, v: Array, f: Array, v_scale: float = 1.0, f_scale: float | Array = 1.0) -> Array:
         """mid((v - u)/v_scale, f/f_scale, (v - l)/v_scale): zero at the solutions alone, no less than a bound is violated."""
@@ -105,7 +92,7 @@ class BoxProblem:
 
     def scales(self, v: Array) -> tuple[float, float]:
         """max |v| and the mean size of the terms of f; 1 in place of 0. Collective."""
-        return self.reduce.max(np.abs(v)) or 1.0, self.equations.scale(v) or 1.0
+        return self.reduce.max(np.abs(v)) or 1.0, self.scale(v) or 1.0
 
     def certify(self, fields: Fields, eps1: float) -> Certificate:
         """Certificate of v, from f and the bounds alone. Collective.
@@ -172,5 +159,5 @@ class BoxProblem:
 
     def destroy(self) -> None:
         """Free the PETSc objects."""
-        self.equations.destroy()
+        self._own.free()
         self.grid.destroy()

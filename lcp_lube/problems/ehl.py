@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from ..base.owned import Owned, made
+from ..base.owned import made
 from ..base.parallel import Array
 from .box import BoxProblem
 from .certificate import Certificate, certificate_tol
@@ -26,18 +26,22 @@ from .solution import Fields
 BLOCK = 16  # columns
 
 
-class LineContact:
-    """The n equations and their dense Jacobian, by rows of this rank; the last unknown is k, at the place of p_n = 0.
+class EhlProblem(BoxProblem):
+    """Line contact as a box problem of n equations with a dense Jacobian; the last unknown, k, is free, in p_n = 0's place.
 
     Parameters
     ----------
     grid : x_1 ... x_n; its last point is the end b of the interval.
     alpha, lam : viscosity's exponent and the speed parameter.
-    scale : factor of the flow equations q_i - q_{i-1}; 1/dx makes them the published divergence.
+    k0 : where k starts; p starts from the positive part of 1 - x^2/4.
+    row_scale : factor of the flow equations q_i - q_{i-1}; 1/dx makes them the published divergence.
     """
 
-    def __init__(self, grid: Grid, alpha: float, lam: float, scale: float = 1.0):
-        self.grid, self.alpha, self.lam, self.scale_of_rows = grid, alpha, lam, scale
+    kind = "mixed"
+    dense = True
+
+    def __init__(self, grid: Grid, alpha: float, lam: float, k0: float, row_scale: float = 1.0):
+        self.alpha, self.lam, self.row_scale, self._k0 = alpha, lam, row_scale, k0
         self.dx = grid.spacing[0]
         self.has_k = grid.x_end == grid.size
         n, first, count = grid.size, grid.x_start, grid.local_size
@@ -49,7 +53,14 @@ class LineContact:
         # dh_j/dp_m but for the ends' weights: column m of the own faces is a stretch of these, from the end.
         self._differences = (self._kernel[:-2] - self._kernel[2:])[::-1].copy()
         self._rows = np.arange(count - self.has_k)
-        self._own = Owned(self, grid.petsc_comm)
+        lower, upper = np.zeros(count), np.full(count, np.inf)
+        v0 = np.maximum(1.0 - grid.x[0] ** 2 / 4.0, 0.0)
+        if self.has_k:
+            lower[-1], v0[-1] = -np.inf, k0
+        super().__init__(grid, lower, upper, v0)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return EhlProblem, (self.grid, self.alpha, self.lam, self._k0, self.row_scale)
 
     @made
     def mat(self) -> PETSc.Mat:
@@ -90,7 +101,7 @@ class LineContact:
         """The flow equations times scale, and the load balance as the last row. Collective."""
         p, k = self.split(v)
         with np.errstate(invalid="ignore"):
-            F = self.scale_of_rows * np.diff(self.flow(p, self.gap(p, k))[0])
+            F = self.row_scale * np.diff(self.flow(p, self.gap(p, k))[0])
         if self.has_k:
             F[-1] = self.load_defect(p)
         return F
@@ -104,9 +115,9 @@ class LineContact:
         p, k = self.split(v)
         h = self.gap(p, k)
         _, mobility, slope = self.flow(p, h)
-        by_h = self.scale_of_rows * (self.lam - 3.0 * mobility * slope / h)
-        by_left = self.scale_of_rows * mobility * (1.0 / self.dx + 0.5 * self.alpha * slope)
-        by_right = self.scale_of_rows * mobility * (-1.0 / self.dx + 0.5 * self.alpha * slope)
+        by_h = self.row_scale * (self.lam - 3.0 * mobility * slope / h)
+        by_left = self.row_scale * mobility * (1.0 / self.dx + 0.5 * self.alpha * slope)
+        by_right = self.row_scale * mobility * (-1.0 / self.dx + 0.5 * self.alpha * slope)
         n, first, rows = self.grid.size, self.grid.x_start, self._rows
         J = self.mat.getDenseArray()  # column-major: its transpose is filled along memory
         columns = np.lib.stride_tricks.sliding_window_view(self._differences, by_h.size)[::-1]
@@ -132,36 +143,7 @@ class LineContact:
     def scale(self, v: Array) -> float:
         """Largest flow that the walls drag into a cell, lambda |h_i - h_{i-1}|. Collective."""
         p, k = self.split(v)
-        return self.scale_of_rows * self.lam * self.grid.reduce.max(np.abs(np.diff(self.gap(p, k))))
-
-    def destroy(self) -> None:
-        self._own.free()
-
-
-class EhlProblem(BoxProblem):
-    """Line contact as a box problem whose last unknown is free.
-
-    Parameters
-    ----------
-    grid : see `LineContact`.
-    k0 : where k starts; p starts from the positive part of 1 - x^2/4.
-    """
-
-    kind = "mixed"
-    dense = True
-
-    def __init__(self, grid: Grid, alpha: float, lam: float, k0: float, scale: float = 1.0):
-        self.contact = LineContact(grid, alpha, lam, scale)
-        self._k0 = k0
-        lower, upper = np.zeros(grid.local_size), np.full(grid.local_size, np.inf)
-        v0 = np.maximum(1.0 - grid.x[0] ** 2 / 4.0, 0.0)
-        if self.contact.has_k:
-            lower[-1], v0[-1] = -np.inf, k0
-        super().__init__(grid, self.contact, lower, upper, v0)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        contact = self.contact
-        return EhlProblem, (self.grid, contact.alpha, contact.lam, self._k0, contact.scale_of_rows)
+        return self.row_scale * self.lam * self.reduce.max(np.abs(np.diff(self.gap(p, k))))
 
     def certify(self, fields: Fields, eps1: float) -> Certificate:
         """Certificate of p and k, from the data alone. Collective.
@@ -171,7 +153,7 @@ class EhlProblem(BoxProblem):
         """
         v = fields["v"]
         natural = np.minimum(*self.scaled(v))
-        defect = self.contact.load_defect(self.contact.split(v)[0])
+        defect = self.load_defect(self.split(v)[0])
         return Certificate(
             measures={"residual": self.reduce.max(np.abs(natural)), "balance": abs(defect)},
             tol=certificate_tol(eps1),
@@ -179,17 +161,17 @@ class EhlProblem(BoxProblem):
 
     def scaled(self, v: Array) -> tuple[Array, Array]:
         """p_i/p_max and F_i/s at this rank's points, both about 1 at most; the larger one holds. Collective."""
-        own = slice(v.size - self.contact.has_k)
+        own = slice(v.size - self.has_k)
         p_max = self.reduce.max(np.abs(v[own])) or 1.0
-        return v[own] / p_max, self.residual(v)[own] / (self.contact.scale(v) or 1.0)
+        return v[own] / p_max, self.residual(v)[own] / (self.scale(v) or 1.0)
 
     def quantities(self, fields: Fields) -> dict[str, Any]:
         """k, x_b, h_min, p_max, dimensionless. Collective."""
-        p, k = self.contact.split(fields["v"])
+        p, k = self.split(fields["v"])
         return {
             "k": k,
             "x_b": self.end_of_contact(p, fields),
-            "h_min": self.reduce.min(self.contact.gap(p, k)[: -1 if self.contact.has_k else None]),
+            "h_min": self.reduce.min(self.gap(p, k)[: -1 if self.has_k else None]),
             "p_max": float(np.max(p)),
         }
 
@@ -207,11 +189,11 @@ class EhlProblem(BoxProblem):
         at = int(last) - np.arange(4, 0, -1)
         t, y = at - last, np.sqrt(np.maximum(p[at], 0.0))
         rate, value = np.polyfit(t, y, 1)
-        return float(self.grid.origin[0] + self.contact.dx * (last - value / rate)) if rate < 0 else None
+        return float(self.grid.origin[0] + self.dx * (last - value / rate)) if rate < 0 else None
 
     def physical(self, fields: Fields) -> dict[str, tuple[Array, str]]:
         """p and h at the points; they have no unit. Collective."""
-        p, k = self.contact.split(fields["v"])
-        h = self.contact.gap(p, k)
+        p, k = self.split(fields["v"])
+        h = self.gap(p, k)
         first = self.grid.first
         return {"p": (p[first + 1 : first + 1 + self.grid.local_size].copy(), ""), "h": (0.5 * (h[1:] + h[:-1]), "")}

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from ..base.owned import Owned, made
+from ..base.owned import made
 from ..base.parallel import Array
 from .box import BoxProblem
 from .fold import folded_axes, part_grid, part_shape, whole_lengths, whole_shape
@@ -23,43 +23,6 @@ from .transfer import Transfer
 TURNING_POINT, FIVE_POINT = 6.808124, 1.5
 LEFT = 1e-3  # part of a start that is as good as none
 COARSEST = 8  # points a side of the whole rectangle on multigrid's coarsest grid, at least
-
-
-class ObstacleEquations:
-    """f and f' from a semilinear equation's."""
-
-    def __init__(self, semilinear: SemilinearProblem):
-        self.semilinear, self.b = semilinear, semilinear.b
-        self._own = Owned(self, semilinear.grid.petsc_comm)
-
-    @made
-    def _jacobian(self) -> PETSc.Mat:
-        mat = self.semilinear.A.duplicate(copy=True)
-        for option in (PETSc.Mat.Option.SYMMETRIC, PETSc.Mat.Option.SYMMETRY_ETERNAL):
-            mat.setOption(option, True)
-        return mat
-
-    @made
-    def _diagonal(self) -> PETSc.Vec:
-        return self._jacobian.createVecLeft()
-
-    def residual(self, v: Array) -> Array:
-        return self.semilinear.residual(v)
-
-    def jacobian(self, v: Array) -> PETSc.Mat:
-        self._diagonal.setArray(self.semilinear.jacobian_diagonal(v))
-        self._jacobian.setDiagonal(self._diagonal)
-        self._jacobian.assemble()
-        return self._jacobian
-
-    def scale(self, v: Array) -> float:
-        """Mean of |A v - b| + |dx dy g(v)|: the two sides of the equation."""
-        terms = np.abs(self.semilinear.flow(v)) + np.abs(self.semilinear.supply(v))
-        return self.semilinear.reduce.sum(terms) / self.semilinear.unknowns
-
-    def destroy(self) -> None:
-        self._own.free()
-        self.semilinear.destroy()
 
 
 class ObstacleProblem(BoxProblem):
@@ -94,8 +57,8 @@ class ObstacleProblem(BoxProblem):
         l, u = (surface(grid.x, grid.y).ravel() for surface in (lower, upper))
         if coarse:
             l = np.minimum(l, u)
-        equations = ObstacleEquations(SemilinearProblem(grid, Bratu(lam), boundary=boundary))
-        least, most = grid.reduce.min(equations.b), grid.reduce.max(equations.b)
+        self.semilinear = SemilinearProblem(grid, Bratu(lam), boundary=boundary)
+        least, most = grid.reduce.min(self.semilinear.b), grid.reduce.max(self.semilinear.b)
         self.homogeneous = least == most == 0.0
         L, width = whole_lengths(grid)
         square, h = np.isclose(L, width, rtol=1e-12), max(grid.spacing)
@@ -110,7 +73,32 @@ class ObstacleProblem(BoxProblem):
             start = u if contact else np.full(grid.local_size, 0.01)
         self._coarser: ObstacleProblem | None = None
         self._transfer: Transfer | None = None
-        super().__init__(grid, equations, l, u, start)
+        super().__init__(grid, l, u, start)
+
+    @made
+    def _jacobian(self) -> PETSc.Mat:
+        mat = self.semilinear.A.duplicate(copy=True)
+        for option in (PETSc.Mat.Option.SYMMETRIC, PETSc.Mat.Option.SYMMETRY_ETERNAL):
+            mat.setOption(option, True)
+        return mat
+
+    @made
+    def _diagonal(self) -> PETSc.Vec:
+        return self._jacobian.createVecLeft()
+
+    def residual(self, v: Array) -> Array:
+        return self.semilinear.residual(v)
+
+    def jacobian(self, v: Array) -> PETSc.Mat:
+        self._diagonal.setArray(self.semilinear.jacobian_diagonal(v))
+        self._jacobian.setDiagonal(self._diagonal)
+        self._jacobian.assemble()
+        return self._jacobian
+
+    def scale(self, v: Array) -> float:
+        """Mean of |A v - b| + |dx dy g(v)|: the two sides of the equation."""
+        terms = np.abs(self.semilinear.flow(v)) + np.abs(self.semilinear.supply(v))
+        return self.reduce.sum(terms) / self.unknowns
 
     @cached_property
     def idle(self) -> tuple[float, float]:
@@ -119,7 +107,7 @@ class ObstacleProblem(BoxProblem):
         if self.lam != 0.0 or not self.homogeneous or not zero:
             return 0.0, 0.0
         start = self.v0 if self.reduce.max(np.abs(self.v0)) > 0 else np.ones_like(self.v0)
-        return LEFT * self.reduce.max(np.abs(start)), LEFT * self.equations.scale(start)
+        return LEFT * self.reduce.max(np.abs(start)), LEFT * self.scale(start)
 
     def scales(self, v: Array) -> tuple[float, float]:
         (v_scale, f_scale), (v_least, f_least) = super().scales(v), self.idle
@@ -187,7 +175,8 @@ class ObstacleProblem(BoxProblem):
             self._coarser.destroy()
         if self._transfer is not None:
             self._transfer.destroy()
-        super().destroy()
+        self._own.free()
+        self.semilinear.destroy()
 
     def __reduce__(self) -> tuple[Any, ...]:
         return ObstacleProblem, (self.grid, self.lam, *self._data)

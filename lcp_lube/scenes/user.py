@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike
 from petsc4py import PETSc
 from pydantic import PrivateAttr
 
-from ..base.owned import Owned
 from ..base.parallel import Array
 from ..base.together import on_all_ranks
 from ..errors import InputError
@@ -100,7 +99,7 @@ class Complementarity(Scene):
         for rank, (given, owned) in enumerate(sizes):  # all ranks look at all of them, and raise together
             if given != owned:
                 raise InputError(f"x0 has {given} entries on rank {rank}, which owns {owned} of {self.n}")
-        return UserProblem(grid, Callbacks(grid, self.F, self.J, self.lower, self.upper), self.lower, self.upper, self.x0)
+        return UserProblem(grid, self.F, self.J, self.lower, self.upper, self.x0)
 
 
 def users_own(comm: MPI.Comm, what: str) -> AbstractContextManager[None]:
@@ -110,16 +109,25 @@ def users_own(comm: MPI.Comm, what: str) -> AbstractContextManager[None]:
     return on_all_ranks(comm, what, caught=(Exception,))
 
 
-class Callbacks:
-    """F and J of the user as `Equations`; where l = u the equation is x = l."""
+class UserProblem(BoxProblem):
+    """The box problem behind a `Complementarity`; where l = u the equation is x = l.
 
-    def __init__(self, grid: Grid, F: Callable[[Array], Any], J: Callable[[Array], Any], lower: Array, upper: Array):
-        self.grid, self._F, self._J = grid, F, J
-        self._lower, self._upper, self._value = lower, upper, lower
-        self._fixed = lower == upper
+    dense: J gives dense matrices, for LAPACK.
+    """
+
+    kind = "user"
+
+    def __init__(self, grid: Grid, F: Callable[[Array], Any], J: Callable[[Array], Any], lower: Array, upper: Array, x0: Array):
+        self._F, self._J, self._bounds, self._fixed = F, J, (lower, upper), lower == upper
         self._any_fixed = grid.reduce.sum(self._fixed.astype(float)) > 0
         self._mat: PETSc.Mat | None = None
-        self._own = Owned(self, grid.petsc_comm)
+        super().__init__(grid, lower, upper, x0)
+        # An equation x = l needs no bounds, and interior methods no inside of its box.
+        self.lower, self.upper = np.where(self._fixed, -np.inf, lower), np.where(self._fixed, np.inf, upper)
+        self.dense = "dense" in self.jacobian(self.v0).getType()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return UserProblem, (self.grid, self._F, self._J, *self._bounds, self.v0)
 
     def residual(self, v: Array) -> Array:
         """F(v). Collective.
@@ -129,11 +137,11 @@ class Callbacks:
         InputError : F gives no vector of n real numbers.
         """
         # inf and NaN are told by the outer loop, or avoided by the line search
-        with self._users_own("F(x)"), np.errstate(all="ignore"):
+        with users_own(self.grid.comm, "F(x)"), np.errstate(all="ignore"):
             F = _vector(self._F(v), "F(x)")
             if F.size != v.size:
                 raise InputError(f"F(x) has {F.size} entries, x has {v.size}")
-        return np.where(self._fixed, v - self._value, F)
+        return np.where(self._fixed, v - self._bounds[0], F)
 
     def jacobian(self, v: Array) -> PETSc.Mat:
         """F'(v). Collective.
@@ -142,18 +150,15 @@ class Callbacks:
         ------
         InputError : J gives no n-by-n matrix, or a sparse one of another pattern than before.
         """
-        with self._users_own("J(x)"), np.errstate(all="ignore"):
+        with users_own(self.grid.comm, "J(x)"), np.errstate(all="ignore"):
             J = self._J(v)
-        mat = J if isinstance(J, PETSc.Mat) else self._sparse(J) if hasattr(J, "tocsr") else self._dense(J)
+        mat = J if isinstance(J, PETSc.Mat) else self._sparse(J) if hasattr(J, "tocsr") else self._of_dense(J)
         if self._any_fixed:
             mat.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
             mat.zeroRows((self.grid.first + np.flatnonzero(self._fixed)).astype(PETSc.IntType), 1.0)
         return mat
 
-    def _users_own(self, what: str) -> AbstractContextManager[None]:
-        return users_own(self.grid.comm, what)
-
-    def _dense(self, J: Any) -> PETSc.Mat:
+    def _of_dense(self, J: Any) -> PETSc.Mat:
         values = np.asarray(J, dtype=float)
         n = self.grid.size
         if values.shape != (n, n):
@@ -183,32 +188,6 @@ class Callbacks:
     def scale(self, v: Array) -> float:
         """F is the user's: its own units count."""
         return 1.0
-
-    def destroy(self) -> None:
-        self._own.free()
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Callbacks, (self.grid, self._F, self._J, self._lower, self._upper)
-
-
-class UserProblem(BoxProblem):
-    """The box problem behind a `Complementarity`.
-
-    dense: J gives dense matrices, for LAPACK.
-    """
-
-    kind = "user"
-
-    def __init__(self, grid: Grid, equations: Callbacks, lower: Array, upper: Array, x0: Array):
-        super().__init__(grid, equations, lower, upper, x0)
-        # An equation x = l needs no bounds, and interior methods no inside of its box.
-        fixed = lower == upper
-        self.lower, self.upper = np.where(fixed, -np.inf, lower), np.where(fixed, np.inf, upper)
-        self.dense = "dense" in self.jacobian(self.v0).getType()
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        equations: Any = self.equations
-        return UserProblem, (self.grid, equations, equations._lower, equations._upper, self.v0)
 
     def certify(self, fields: Fields, eps1: float) -> Certificate:
         """Certificate of v, in the units of F. Collective.

@@ -144,7 +144,7 @@ def test_the_quarter_has_the_wholes_rows():
     spread = v[np.ix_([0, 1, 2, 2, 1, 0], [0, 1, 2, 1, 0])]
     rows = whole.residual(spread.ravel()).reshape(6, 5)[:3, :3] * np.where(i == 2, 0.5, 1.0)
     np.testing.assert_allclose(quarter.residual(v.ravel()).reshape(3, 3), rows, rtol=0, atol=1e-14)
-    A = quarter.equations.semilinear.A
+    A = quarter.semilinear.A
     assert A.isSymmetric(1e-15)
     for problem in (whole, quarter):
         problem.destroy()

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lcp_lube import InputError, load_scene, solve
-from lcp_lube.problems.ehl import EhlProblem, LineContact
+from lcp_lube.problems.ehl import EhlProblem
 
 pytestmark = pytest.mark.rounding
 
@@ -44,8 +44,7 @@ def test_equations_as_printed(n):
     rng = np.random.default_rng(n)
     v = np.append(rng.uniform(0, 1, n - 1), 1.3)
     h, F = equations_by_loops(n, v[:-1], v[-1])
-    contact = problem.contact
-    assert np.allclose(contact.gap(*contact.split(v))[:-1], h, rtol=1e-13)
+    assert np.allclose(problem.gap(*problem.split(v))[:-1], h, rtol=1e-13)
     assert np.allclose(problem.residual(v), F, rtol=1e-11)
     assert np.allclose(problem_of(n, rows="divergence").residual(v)[:-1], F[:-1] * n / 5, rtol=1e-11)
     problem.destroy()
@@ -95,7 +94,7 @@ def test_solution_is_one():
         assert solution.converged, solution.message
         answers.append(solution.fields["v"])
         if method == "semismooth":
-            contact, v = solution.problem.contact, solution.fields["v"]
+            contact, v = solution.problem, solution.fields["v"]
             p, k = contact.split(v)
             q = contact.flow(p, contact.gap(p, k))[0][:-1]
             pressure, opening = solution.problem.scaled(v)
@@ -114,8 +113,8 @@ def test_solution_is_one():
 def test_kept_jacobian(monkeypatch, n):
     """The same answer with fewer Jacobians and a step or two more; with n = 100 one turns out too old and is renewed."""
     calls = []
-    jacobian = LineContact.jacobian
-    monkeypatch.setattr(LineContact, "jacobian", lambda self, v: calls.append(1) or jacobian(self, v))
+    jacobian = EhlProblem.jacobian
+    monkeypatch.setattr(EhlProblem, "jacobian", lambda self, v: calls.append(1) or jacobian(self, v))
     its, evaluations, answers = {}, {}, {}
     for keep in (1, 3):
         calls.clear()

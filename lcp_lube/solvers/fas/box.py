@@ -15,7 +15,8 @@ import numpy as np
 from ...base.parallel import Array
 from ...errors import InputError
 from ...problems.box import BoxProblem
-from ...problems.obstacle import ObstacleEquations
+from ...problems.obstacle import ObstacleProblem
+from ...problems.semilinear import SemilinearProblem
 from ...problems.solution import Fields, Step
 from ..job import Job
 from ..method_options import least
@@ -57,27 +58,26 @@ class BoxFas(Cycles):
         from . import box_kernels, fronts, levels, transfer
 
         self._kernels, self._fronts, self._transfer, self._tools = box_kernels, fronts, transfer, levels
-        equations = problem.equations
-        if not isinstance(equations, ObstacleEquations):
+        if not isinstance(problem, ObstacleProblem):
             raise InputError("--method fas: for obstacle problems on a rectangle; use active-set")
-        self._source = equations.semilinear.source
+        self._source = problem.semilinear.source
         with self.stages("assembly"):
-            self._grids = self._hierarchy(equations)
+            self._grids = self._hierarchy(problem.semilinear)
         self._levels = [grid.level for grid in self._grids]
         self._begin(start is not None)
         self.v = problem.v0 if start is None else np.clip(start["v"], problem.lower, problem.upper)
         self.norm = self._first = self._residual(self._grids[0])
 
-    def _hierarchy(self, equations: ObstacleEquations) -> list[_Grid]:
+    def _hierarchy(self, semilinear: SemilinearProblem) -> list[_Grid]:
         grid, tools = self.problem.grid, self._tools
         dx, dy = grid.spacing
-        faces = (np.broadcast_to(k, grid.box) for k in equations.semilinear.faces)
-        finest = tools.level_of(grid, *faces, equations.b.reshape(grid.box))
+        faces = (np.broadcast_to(k, grid.box) for k in semilinear.faces)
+        finest = tools.level_of(grid, *faces, semilinear.b.reshape(grid.box))
         levels = tools.hierarchy(finest, False)
         bounds, m = np.zeros((2, *finest.z.shape)), np.zeros_like(finest.z)
         for k, bound in enumerate((self.problem.lower, self.problem.upper)):
             tools.put(finest, grid, bounds[k], bound)
-        tools.put(finest, grid, m, equations.semilinear.cells)
+        tools.put(finest, grid, m, semilinear.cells)
         rows = slice(None) if finest.comm is None else slice(grid.y_start, grid.y_end)
         x = grid.origin[0] + dx * np.arange(1, grid.shape[0] + 1)
         y = (grid.origin[1] + dy * np.arange(1, grid.shape[1] + 1))[rows]
