@@ -13,8 +13,6 @@ The KSP sees S diag(w), w the near-null vector of S (`nearnull`): row and column
 multigrid wants them, whatever the fronts look like.
 """
 
-from importlib.util import find_spec
-
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
@@ -23,9 +21,9 @@ from ..base.parallel import Array
 from ..base.stages import Stages
 from ..errors import InputError
 from ..problems.film.lubrication import LubricationProblem
-from .cavity_rows import schur_rows
 from .krylov import Krylov
 from .nearnull import COARSEST, NearNull
+from .system import System
 
 CYCLES = 1  # from w = 1 or the last w; more of them gain nothing (benchmarks/README.md)
 
@@ -41,7 +39,7 @@ def _solve(krylov: Krylov, rhs: Array, rtol: float) -> tuple[int, Array]:
     return iterations, values
 
 
-class CavitySystem:
+class CavitySystem(System):
     """Steps of the active-set method (theta in {0, 1}) through a KSP on the Schur complement of the full film.
 
     Raises
@@ -52,8 +50,7 @@ class CavitySystem:
     state: tuple[str, ...] = ("_w", "_full")  # what a step starts from
 
     def __init__(self, problem: LubricationProblem, stages: Stages | None = None):
-        self.problem = problem
-        self.stages = stages or Stages()
+        super().__init__(problem, stages)
         grid = problem.grid
         if any(grid.periodic):
             raise InputError("--system cavity: x lines need a beginning and an end, y columns too; take --system reduced")
@@ -73,12 +70,6 @@ class CavitySystem:
         self._full = np.zeros(grid.local_size, dtype=bool)  # the cells of the last set-up
         self._w = np.ones(grid.local_size)  # near-null vector of the last S, 1 where there was none
         self._column, self._line = (a.ravel() for a in np.broadcast_arrays(np.arange(nx)[None, :], np.arange(ny)[:, None]))
-        self.krylov: Krylov | None = None
-        self._mat: PETSc.Mat | None = None
-
-    @property
-    def direct(self) -> bool:
-        return self.krylov is not None and self.krylov.direct
 
     def solve(self, D_p: Array, D_r: Array, f1: Array, f2: Array, rtol: float) -> tuple[Array, Array, int]:
         """dp, dr and the number of linear iterations, for D_r = theta in {0, 1}, D_p = 1 - theta and f2 = 0. Collective."""
@@ -90,14 +81,14 @@ class CavitySystem:
             rhs = np.bincount(target[kept], weights=f1[kept], minlength=int(full.sum())).astype(float, copy=False)
             changed, total = (reduce.sum(mask.astype(float)) for mask in (full != self._full, full))
         if changed or self.krylov is None:
-            self._release()
+            self.destroy()
             self._full = full
-            self._mat = self._assemble(full, target)
+            mat = self._own(self._assemble(full, target))
             with self.stages("near-null"):
                 if total > COARSEST:
-                    self._scale(self._mat, full, CYCLES if changed else 0)
+                    self._scale(mat, full, CYCLES if changed else 0)
             with self.stages("KSP"):
-                self.krylov = Krylov(self._mat)
+                self.krylov = Krylov(mat)
         with self.stages("KSP"):
             iterations, y = _solve(self.krylov, rhs, rtol)
         dp = np.zeros_like(f1)
@@ -111,11 +102,25 @@ class CavitySystem:
 
     def _assemble(self, full: NDArray[np.bool_], target: NDArray[np.int64]) -> PETSc.Mat:
         """S for these full cells. Collective."""
+        from scipy.sparse import coo_array  # here: it takes a while, and small films do without
+
         with self.stages("Jacobian"):
             local, comm = int(full.sum()), self.problem.grid.comm
             first, total = int(comm.exscan(local) or 0), comm.allreduce(local)
-            rows = self._rows(full, target, first, local, total)
-            return PETSc.Mat().createAIJWithArrays(((local, total), (local, total)), rows, comm=comm)
+            numbers = np.where(full, first + np.cumsum(full) - 1.0, -1.0)
+            framed = np.nan_to_num(self.problem.grid.ghosted(numbers), nan=-1.0).astype(np.int64).ravel()
+            rows, columns, values = [], [], []
+            for value, place in self._offsets:
+                column = framed[place]
+                used = (column >= 0) & (target >= 0)
+                rows.append(target[used])
+                columns.append(column[used])
+                values.append(value[used])
+            entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+            S = coo_array(entries, shape=(local, total)).tocsr()
+            S.sort_indices()
+            csr = (S.indptr.astype(PETSc.IntType), S.indices.astype(PETSc.IntType), S.data)
+            return PETSc.Mat().createAIJWithArrays(((local, total), (local, total)), csr, comm=comm)
 
     def _scale(self, S: PETSc.Mat, full: NDArray[np.bool_], cycles: int) -> None:
         """Improve w and multiply the columns of S by it; a run that is taken up again has it already. Collective."""
@@ -137,29 +142,6 @@ class CavitySystem:
         found = np.take_along_axis(number, np.minimum(downstream, nx - 1), axis=1)
         return np.where(downstream < nx, found, -1).ravel()
 
-    def _rows(
-        self, full: NDArray[np.bool_], target: NDArray[np.int64], first: int, local: int, total: int
-    ) -> tuple[NDArray, NDArray, Array]:
-        """S in CSR form: pointers, columns (global, sorted) and values. Compiled where numba is, array arithmetic elsewhere."""
-        numbers = np.where(full, first + np.cumsum(full) - 1.0, -1.0)
-        framed = np.nan_to_num(self.problem.grid.ghosted(numbers), nan=-1.0).astype(np.int64)
-        if find_spec("numba"):
-            return schur_rows(self.problem.scheme, framed, PETSc.IntType)
-        framed = framed.ravel()
-        rows, columns, values = [], [], []
-        for value, place in self._offsets:
-            column = framed[place]
-            used = (column >= 0) & (target >= 0)
-            rows.append(target[used])
-            columns.append(column[used])
-            values.append(value[used])
-        entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-        from scipy.sparse import coo_array  # here: it takes a while, and small films do without
-
-        S = coo_array(entries, shape=(local, total)).tocsr()
-        S.sort_indices()
-        return S.indptr.astype(PETSc.IntType), S.indices.astype(PETSc.IntType), S.data
-
     def _void(self, full: NDArray[np.bool_], balance: Array) -> Array:
         """dr of the cavitated cells from what A dp leaves of f1: b_C dr adds up along each run."""
         ny, nx = self.problem.grid.box
@@ -168,14 +150,3 @@ class CavitySystem:
         last_full = np.maximum.accumulate(np.where(cells, np.arange(nx), -1), axis=1)
         at_rupture = np.where(last_full >= 0, np.take_along_axis(carried, np.maximum(last_full, 0), axis=1), 0.0)
         return np.where(full, 0.0, (carried - at_rupture).ravel() / self._b_C)
-
-    def _release(self) -> None:
-        if self.krylov is not None:
-            self.krylov.destroy()
-        if self._mat is not None:
-            self._mat.destroy()
-        self.krylov = self._mat = None
-
-    def destroy(self) -> None:
-        """Free the PETSc objects."""
-        self._release()

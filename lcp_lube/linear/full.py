@@ -4,17 +4,17 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from ..base.owned import Owned
 from ..base.parallel import Array
 from ..base.stages import Stages
 from ..problems.film.assembly import coo, csr
 from ..problems.film.lubrication import LubricationProblem
 from .krylov import Krylov
+from .system import System
 
 TINY = 1e-10  # entries that are far from PETSc's zero pivot, 2e-14, on one side
 
 
-class FullSystem:
+class FullSystem(System):
     """A dp + B dr = f1, D_p dp + D_r dr = f2 through a KSP on the 2n-by-2n matrix.
 
     The sparsity is fixed when the object is made; `solve` refreshes the values of D_p and D_r alone changing. Rank k
@@ -23,8 +23,7 @@ class FullSystem:
     """
 
     def __init__(self, problem: LubricationProblem, stages: Stages | None = None):
-        self.problem = problem
-        self.stages = stages or Stages()
+        super().__init__(problem, stages)
         grid = problem.grid
         nl = grid.local_size
         comm = grid.petsc_comm
@@ -52,7 +51,6 @@ class FullSystem:
                     values[k] = values[k] * self._scale[rows[k] - 2 * grid.first]
             pointers, sorted_columns, order = csr(np.concatenate(rows), np.concatenate(columns), 2 * grid.first, 2 * nl)
             size = (2 * nl, 2 * grid.size)
-            self._own = Owned(self, comm)
             csr_arrays = (pointers, sorted_columns, np.concatenate(values)[order])
             self.mat = self._own(PETSc.Mat().createAIJ((size, size), csr=csr_arrays, comm=comm))
             parts = {"p": own_p, "r": own_r}
@@ -62,17 +60,7 @@ class FullSystem:
             self._x, self._b = map(self._own, self.mat.createVecs())
             self.krylov = Krylov(self.mat, self.fields)
 
-    @property
-    def direct(self) -> bool:
-        return self.krylov.direct
-
     def solve(self, D_p: Array, D_r: Array, f1: Array, f2: Array, rtol: float) -> tuple[Array, Array, int]:
-        """dp, dr and the number of linear iterations. Collective.
-
-        Raises
-        ------
-        LinearSolverError : breakdown, a failed factorisation, or a result that is not finite.
-        """
         with self.stages("Jacobian"):
             self._values[0::2], self._values[1::2] = D_p, D_r
             self.mat.setValuesIJV(self._pointers, self._columns, self._values, rowmap=self._rows)
@@ -80,7 +68,6 @@ class FullSystem:
         return self.resolve(f1, f2, rtol)
 
     def resolve(self, f1: Array, f2: Array, rtol: float) -> tuple[Array, Array, int]:
-        """Solve once more with the matrix of the last `solve`: a factorisation is not repeated. Collective."""
         nl = f1.size
         b = self._b.array_w
         b[:nl], b[nl:] = f1 if self._scale is None else self._scale * f1, f2
@@ -100,11 +87,6 @@ class FullSystem:
         if not self.problem.reduce.min(largest) < TINY:
             return None
         return 2.0 ** -np.round(np.log2(largest))
-
-    def destroy(self) -> None:
-        """Free the PETSc objects; a python PC must not outlive this."""
-        self.krylov.destroy()
-        self._own.free()
 
 
 def _number(points: NDArray, field: int, starts: NDArray) -> NDArray:

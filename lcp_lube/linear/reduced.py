@@ -14,15 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from ..base.owned import Owned
 from ..base.parallel import Array
 from ..base.stages import Stages
 from ..problems.film.assembly import coo, csr
 from ..problems.film.lubrication import LubricationProblem
 from .krylov import Krylov
+from .system import System
 
 
-class ReducedSystem:
+class ReducedSystem(System):
     """The step of any method through a KSP on J(theta), with its columns scaled to the diagonal of A.
 
     Column scaling balances full-film columns (conductances h^3/dx) and cavitated ones (U h): after it the diagonal is A's
@@ -31,8 +31,7 @@ class ReducedSystem:
     """
 
     def __init__(self, problem: LubricationProblem, stages: Stages | None = None):
-        self.problem = problem
-        self.stages = stages or Stages()
+        super().__init__(problem, stages)
         grid, scheme = problem.grid, problem.scheme
         with self.stages("assembly"):
             rows, columns, a, b, neighbour = self._stencil()
@@ -41,16 +40,11 @@ class ReducedSystem:
             self._a, self._b_entries, self._neighbour = a[order], b[order], neighbour[order]
             size = (grid.local_size, grid.size)
             csr_arrays = (self._pointers, self._columns, self._a)
-            self._own = Owned(self, grid.petsc_comm)
             self.mat = self._own(PETSc.Mat().createAIJ((size, size), csr=csr_arrays, comm=grid.petsc_comm))
             self._diagonal_A = scheme.diagonal.ravel()
             self._diagonal_B = -scheme.b_C.ravel()
             self._x, self._b = map(self._own, self.mat.createVecs())
             self.krylov = Krylov(self.mat)
-
-    @property
-    def direct(self) -> bool:
-        return self.krylov.direct
 
     def _stencil(self) -> tuple[NDArray, ...]:
         """Rows, columns, entries of A and of B, and the column's place in an array with ghosts, for A's sparsity."""
@@ -78,12 +72,7 @@ class ReducedSystem:
         return scaling
 
     def solve(self, D_p: Array, D_r: Array, f1: Array, f2: Array, rtol: float) -> tuple[Array, Array, int]:
-        """dp, dr and the number of linear iterations; D_p and D_r of the same sign, not both zero. Collective.
-
-        Raises
-        ------
-        LinearSolverError : breakdown, a failed factorisation, or a result that is not finite.
-        """
+        """As `System.solve`; D_p and D_r of the same sign, not both zero. Collective."""
         with self.stages("Jacobian"):
             self._w = D_p + D_r
             self._theta = D_r / self._w
@@ -91,7 +80,6 @@ class ReducedSystem:
         return self.resolve(f1, f2, rtol)
 
     def resolve(self, f1: Array, f2: Array, rtol: float) -> tuple[Array, Array, int]:
-        """Solve once more with the matrix of the last `solve`: a factorisation is not repeated. Collective."""
         problem, theta = self.problem, self._theta
         g = f2 / self._w
         if g.any() or problem.grid.comm.size > 1:
@@ -101,8 +89,3 @@ class ReducedSystem:
             iterations = self.krylov.solve(self._b, self._x, rtol)
         y = self._scaling * self._x.array_r
         return theta * y + g, -(1.0 - theta) * y + g, iterations
-
-    def destroy(self) -> None:
-        """Free the PETSc objects."""
-        self.krylov.destroy()
-        self._own.free()

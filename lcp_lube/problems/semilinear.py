@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
 from petsc4py import PETSc
@@ -23,8 +23,14 @@ Surface = Callable[[Array, Array], Array]
 ROUNDING = 4.0 * float(np.finfo(float).eps)  # of one entry of A v - b, relative to its largest terms
 
 
-class Source(Protocol):
-    """The right-hand side g(x, y, v)."""
+@dataclass(frozen=True)
+class Bratu:
+    """g = lambda e^v. On the unit square: two solutions for 0 < lambda < 6.8081, the turning point; none beyond.
+
+    A source g(x, y, v) has its value, its slope dg/dv, the exact solution or None, and words for where there is none.
+    """
+
+    lam: float
 
     def climbs_from(self, v0: float) -> bool:
         """Whether g(v) is convex, increasing and >= 0 for v >= v0, and v0 <= 0.
@@ -32,31 +38,6 @@ class Source(Protocol):
         With v >= 0 on the boundary, Newton from v0 then climbs to the smallest solution above v0 without any damping, if
         there is one (see `solvers.plain_newton`).
         """
-        ...
-
-    def value(self, x: Array, y: Array, v: Array) -> Array: ...
-
-    def slope(self, x: Array, y: Array, v: Array) -> Array:
-        """dg/dv."""
-        ...
-
-    def exact(self, x: Array, y: Array) -> Array | None:
-        """The solution, where it is known."""
-        ...
-
-    @property
-    def no_solution(self) -> str:
-        """What to say when the equations have none."""
-        ...
-
-
-@dataclass(frozen=True)
-class Bratu:
-    """g = lambda e^v. On the unit square: two solutions for 0 < lambda < 6.8081, the turning point; none beyond."""
-
-    lam: float
-
-    def climbs_from(self, v0: float) -> bool:
         return self.lam > 0 and v0 <= 0
 
     def value(self, x: Array, y: Array, v: Array) -> Array:
@@ -121,6 +102,9 @@ class ManufacturedCubic:
 
     def exact(self, x: Array, y: Array) -> Array:
         return 16.0 * self.peak * x * (1.0 - x) * y * (1.0 - y)
+
+
+Source = Bratu | PoissonCubic | ManufacturedCubic
 
 
 class SemilinearProblem:

@@ -4,22 +4,22 @@ import cmath
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from ..problems.film.fluid import Law
-from ..problems.film.forces import Shaft
 from ..problems.film.model import NAMES, OPPOSITE, Model, Side
 from ..problems.film.reynolds import Film
 from ..problems.film.shapes import Shape
 from ..problems.film.supplies import Supply
+from ..problems.film.turning import Turning
 from .effects.table import WithEffects
 from .film import FilmPart, JournalPart
 from .film_scene import RectangleScene, Sides
 from .motion import MotionTable
-from .moving_film import check_motion, moving_film, place_of, turning_of
+from .moving import Models
 from .scene import Finite, Positive
 from .supply import Place, SupplyTable, supplies_of
 from .units import Measured, is_quantity, measured, metres
@@ -109,15 +109,28 @@ class BearingScene(RectangleScene, WithEffects):
             if getattr(self.sides, name).kind == "periodic" and getattr(self.sides, OPPOSITE[name]).kind != "periodic":
                 raise ValueError(f"sides.{name} is periodic, sides.{OPPOSITE[name]} is not: both of them or none")
         self._supplies()
-        check_motion(self)
+        self._check_motion()
         return self
+
+    def _check_motion(self) -> None:
+        """Raise ValueError where shapes and [motion] contradict one another."""
+        for k, table in enumerate(self.film, start=1):
+            if self.motion is None and table.changes and not isinstance(table, JournalPart):
+                raise ValueError(f"film.{k} ({table.shape}) changes with time: a table [motion] is needed")  # type: ignore[attr-defined]
+            if table.moves and isinstance(table, JournalPart):
+                raise ValueError(f"film.{k}.moves: a journal's place is motion.journal, motion.file or motion.free")
+        if self.motion is None:
+            return
+        if self.balance is not None:
+            raise ValueError("balance and motion are both given: one of them; a load in time is that of motion.free")
+        if self.motion.moves_journal and (count := len(self._journals)) != 1:
+            raise ValueError(f"motion: its journal is the shape 'journal' of [[film]]; there are {count}, 1 is needed")
 
     def _supplies(self) -> tuple[Supply, ...]:
         """The supplies inside the film; angles are counted from x = 0 of a film with a journal."""
         names = [name for name in NAMES[: 2 * self.dimension] if getattr(self.sides, name).kind == "pressure"]
         least = min((self._pressure(name) for name in names), default=self.fluid.p_c)
-        journal = any(isinstance(table, JournalPart) for table in self.film)
-        radius = self.L / (2.0 * math.pi) if journal else None
+        radius = self.L / (2.0 * math.pi) if self._journals else None
         place = Place(self.side_lengths, self.sides.west.kind == "periodic", self.fluid.p_c, radius, 0.0, least)
         return supplies_of(self.supply, place)
 
@@ -168,23 +181,48 @@ class BearingScene(RectangleScene, WithEffects):
     def _parts(self) -> Sequence[Shape]:
         return [table.part(self.extent) for table in self.film]
 
-    models: ClassVar[Any] = moving_film
-    place: ClassVar[Any] = property(place_of)
-    turning: ClassVar[Any] = property(turning_of)
+    def models(self) -> Models:
+        """The film at the time t (s), its journal, if that moves, at [X, Y] of its clearance; shapes at rest are made once."""
+        first, extent = replace(self.model, exact=None), self.extent
+        known = [None if table.changes else table.part(extent) for table in self.film]
+
+        def at(t: float, journal: tuple[float, float] | None) -> Model:
+            now = replace(extent, t=t, travel=self.U * t, journal=journal)
+            parts = [table.placed(now) if part is None else part for table, part in zip(self.film, known, strict=True)]
+            shaft = first.shaft
+            if shaft is not None and journal is not None:
+                shaft = replace(shaft, widest=math.pi + math.atan2(journal[1], journal[0]))
+            return replace(first, gap=self.sum_of(parts), shaft=shaft)
+
+        return at
+
+    @property
+    def _journals(self) -> list[JournalPart]:
+        return [table for table in self.film if isinstance(table, JournalPart)]
+
+    @property
+    def place(self) -> tuple[float, float]:
+        """[X, Y] of the journal among the shapes, in parts of its clearance."""
+        if not self._journals:
+            return 0.0, 0.0
+        table = self._journals[0]
+        e = cmath.rect(table.eccentricity, math.pi + 2.0 * math.pi * table.widest / self.L)
+        return e.real, e.imag
+
+    @property
+    def turning(self) -> Turning | None:
+        """What the film is wrapped round: the journal among its shapes; eccentricities of several add up as vectors."""
+        if not self._journals:
+            return None
+        R, B = self.L / (2.0 * math.pi), self.side_lengths[1] if self.dimension == 2 else 1.0
+        offset = sum(one.c * one.eccentricity * cmath.exp(2j * math.pi * one.widest / self.L) for one in self._journals)
+        widest = cmath.phase(offset) if offset else None
+        return Turning(R, 0.0, widest, c=self._journals[0].c, B=B, omega=self.U / R)
 
     def _model(self) -> Model:
         model = super()._model()
         unit = self.p_unit or self._pressure_unit(model.gap)
-        return replace(model, p_unit=unit, shaft=self._shaft, law=self._law)
-
-    @property
-    def _shaft(self) -> Shaft | None:
-        """What the film is wrapped round: it has a journal among its shapes, whose eccentricities add up as vectors."""
-        journals = [table for table in self.film if isinstance(table, JournalPart)]
-        if not journals:
-            return None
-        offset = sum(table.c * table.eccentricity * cmath.exp(2j * math.pi * table.widest / self.L) for table in journals)
-        return Shaft(self.L / (2.0 * math.pi), cmath.phase(offset) if offset else None)
+        return replace(model, p_unit=unit, shaft=self.turning, law=self._law)
 
     @property
     def _law(self) -> Law | None:

@@ -7,7 +7,6 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from ..problems.film.forces import Shaft
 from ..problems.film.lines import graded_across, graded_round
 from ..problems.film.model import Model, Side
 from ..problems.film.shapes import Journal, Shape
@@ -90,15 +89,14 @@ class JournalScene(LubricationScene):
     def turning(self) -> Turning:
         """Angles are counted from the widest gap."""
         width = self.width if self.dimension == 2 and self.width else 1.0
-        return Turning(0.5 * self.D, 0.5 * self.psi * self.D, width, self.omega, 0.0)
+        widest = 0.0 if self.eccentricity else None
+        return Turning(0.5 * self.D, 0.0, widest, c=0.5 * self.psi * self.D, B=width, omega=self.omega)
 
     def _parts(self) -> Sequence[Shape]:
         return [Journal(0.5 * self.psi * self.D, self.eccentricity, self.L)]
 
     def _model(self) -> Model:
-        shaft = Shaft(0.5 * self.D, 0.0 if self.eccentricity else None)
-        extras, places = self.bearing_numbers, self._places
-        return replace(super()._model(), shaft=shaft, places=places, extras=extras)
+        return replace(super()._model(), shaft=self.turning, places=self._places, extras=self.bearing_numbers)
 
     @property
     def _places(self) -> Places | None:

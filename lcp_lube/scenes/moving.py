@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from ..problems.film.model import Model
@@ -12,10 +13,8 @@ if TYPE_CHECKING:
     from .motion import MotionTable
 
 
-class Models(Protocol):
-    """The film at the time t, its journal at [X, Y] in parts of the clearance."""
-
-    def __call__(self, t: float, journal: tuple[float, float] | None, /) -> Model: ...
+# The film at the time t, its journal at [X, Y] in parts of the clearance.
+Models = Callable[[float, tuple[float, float] | None], Model]
 
 
 @runtime_checkable

@@ -6,7 +6,6 @@ from typing import Any
 
 from pydantic import Field, field_validator
 
-from ..problems.film.forces import Shaft
 from ..problems.film.grooves import Groove
 from ..problems.film.model import Model, Side
 from ..problems.film.reynolds import Film
@@ -63,7 +62,8 @@ class ShaftScene(FilmScene):
     def turning(self) -> Turning:
         """Place x = 0 lies half a mesh before `start`."""
         start = self.start - math.pi / self.shape[0]
-        return Turning(0.5 * self.D, self.clearance, self.L_over_D * self.D, self.omega, start)
+        widest = math.radians(self.attitude_deg or 0.0) + math.pi if self.eccentricity else None
+        return Turning(0.5 * self.D, start, widest, c=self.clearance, B=self.L_over_D * self.D, omega=self.omega)
 
     @property
     def gap(self) -> Film:
@@ -77,7 +77,6 @@ class ShaftScene(FilmScene):
 
     def _model(self) -> Model:
         turning, ends = self.turning, Side(p=self.p_end)
-        thinnest = math.radians(self.attitude_deg or 0.0)
         numbers: Callable[[dict[str, Any]], dict[str, Any]] = self.bearing_numbers
         return Model(
             lengths=self.side_lengths,
@@ -88,7 +87,7 @@ class ShaftScene(FilmScene):
             p_c=self.p_c,
             p_unit=self.mu_0 * self.omega * (turning.R / self.clearance) ** 2,
             scheme="face",
-            shaft=Shaft(turning.R, thinnest + math.pi if self.eccentricity else None, turning.start),
+            shaft=turning,
             grooves=self.grooves,
             extras=numbers,
         )

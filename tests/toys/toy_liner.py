@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from lcp_lube.problems.film.effects import Plain
+from lcp_lube.problems.film.effects import Effect
 from lcp_lube.scenes.effects.table import EffectTable
 
 
@@ -16,7 +16,7 @@ class ToyLiner(EffectTable):
 
 
 @dataclass(frozen=True)
-class Bends(Plain):
+class Bends(Effect):
     """D : m/Pa."""
 
     D: float

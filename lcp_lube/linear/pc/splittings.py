@@ -4,7 +4,7 @@ from petsc4py import PETSc
 
 from ...base.parallel import Array
 from .fields import Inner, TwoFields, choice
-from .sweeps import GaussSeidel, Jacobi, SchurSplitting, Splitting
+from .sweeps import GaussSeidel, Jacobi
 
 SPLITTINGS = ("jacobi", "gauss_seidel", "none")
 SCHUR = ("exact", "lines", "diagonal")
@@ -34,7 +34,7 @@ class SaddlePC:
 
     def __init__(self) -> None:
         self._fields: TwoFields | None = None
-        self._parts: list[Splitting] = []
+        self._parts: list[Jacobi | GaussSeidel | Whole] = []
 
     def setFromOptions(self, pc: PETSc.PC) -> None:
         self._kind = choice(pc, "pc_saddle_splitting", SPLITTINGS)
@@ -52,8 +52,8 @@ class SaddlePC:
 
     def _make(self, fields: TwoFields, prefix: str) -> None:
         """The splitting for F, and the one whose Schur complement is used."""
-        self._F: Splitting
-        self._S: SchurSplitting
+        self._F: Jacobi | GaussSeidel | Whole
+        self._S: Jacobi | GaussSeidel
         if self._kind == "gauss_seidel" and self._schur == "exact":
             self._F = self._S = GaussSeidel(fields)
         else:

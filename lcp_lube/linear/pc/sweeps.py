@@ -1,7 +1,5 @@
 """Splittings A = F - E with their exact Schur complements S = P - R F^-1 B, solved by forward substitution along x."""
 
-from typing import Protocol
-
 import numpy as np
 from petsc4py import PETSc
 from scipy.linalg import lapack
@@ -12,26 +10,6 @@ from ..krylov import LinearSolverError
 from .fields import TwoFields
 
 FORWARD = PETSc.Mat.SORType.FORWARD_SWEEP | PETSc.Mat.SORType.ZERO_INITIAL_GUESS
-
-
-class Splitting(Protocol):
-    """F of A = F - E for the blocks' present values."""
-
-    def refresh(self) -> None: ...
-
-    def solve_F(self, g: Array) -> Array:
-        """F^-1 g. Collective."""
-        ...
-
-    def destroy(self) -> None: ...
-
-
-class SchurSplitting(Splitting, Protocol):
-    """A splitting whose S = P - R F^-1 B can be solved exactly."""
-
-    def solve_S(self, g: Array) -> Array:
-        """S^-1 g. Collective."""
-        ...
 
 
 class Pipeline:

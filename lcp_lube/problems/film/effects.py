@@ -8,7 +8,7 @@ and with whatever solves the film. `drivers.coupling` finds the fields that repr
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,46 +55,27 @@ class Report:
 NOTHING = Report({}, {}, {})
 
 
-class Effect(Protocol):
-    """A rung: what one effect makes of an answer.
+class Effect:
+    """A rung: what one effect makes of an answer; these are most: even, the same in the mirror image, nothing to tell.
 
     channels : what it may change. even : whether what it makes of an answer that is symmetric in y is so too. keeps : what it
     would have to remember of earlier times in a film that moves; empty: its law is local in time.
     """
 
-    @property
-    def keeps(self) -> str: ...
-
-    @property
-    def channels(self) -> tuple[str, ...]: ...
-
-    @property
-    def even(self) -> bool: ...
-
-    def apply(self, at: "Answer", out: Cells) -> None:
-        """Change `out` by what follows from the answer. Collective."""
-        ...
-
-    def report(self, at: "Answer") -> Report:
-        """Numbers and measures of the answer. Collective."""
-        ...
-
-    def mirrored(self, length: float) -> "Effect":
-        """The effect in the mirror image of a film of this length."""
-        ...
-
-
-class Plain:
-    """What most effects are: even, the same in the mirror image, and with nothing to tell."""
-
     channels: tuple[str, ...] = ("viscosity",)
     even = True
     keeps = ""
 
+    def apply(self, at: "Answer", out: Cells) -> None:
+        """Change `out` by what follows from the answer. Collective."""
+        raise NotImplementedError
+
     def report(self, at: "Answer") -> Report:
+        """Numbers and measures of the answer. Collective."""
         return NOTHING
 
     def mirrored(self, length: float) -> Any:
+        """The effect in the mirror image of a film of this length."""
         return self
 
 
@@ -272,7 +253,7 @@ def neutral(effects: Sequence[Effect], size: int) -> Cells:
 
 
 @dataclass(frozen=True)
-class Compressible(Plain):
+class Compressible(Effect):
     """Dowson and Higginson's density, from the pressure."""
 
     law: Law

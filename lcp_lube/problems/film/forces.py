@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from math import hypot, inf
 from typing import TYPE_CHECKING, Any
 
@@ -18,18 +17,6 @@ if TYPE_CHECKING:
     from .lubrication import LubricationProblem
 
 Weight = Callable[[Array, Array], Array]
-
-
-@dataclass(frozen=True)
-class Shaft:
-    """What a film is wrapped round: at x lies the angle phi = start + x/radius; y along the axis.
-
-    radius : m. widest : phi of the widest gap that the shaft's eccentricity makes, rad; None for a concentric one.
-    """
-
-    radius: float
-    widest: float | None
-    start: float = 0.0
 
 
 def open_pressures(problem: LubricationProblem) -> list[float | None]:
@@ -80,10 +67,7 @@ def forces(problem: LubricationProblem, p_pa: Array, known: Known | None = None)
         out["moment"] = [over(lambda x, y: y - middle[1]), about_y] if grid.dim == 2 else about_y
         return out
 
-    def phi(x: Array) -> Array:
-        return shaft_angle(problem, shaft, x)
-
-    R = shaft.radius
+    R, phi = shaft.R, shaft.theta
     force = [
         -over(lambda x, y: np.cos(phi(x)), lambda x: R * np.sin(phi(x))),
         -over(lambda x, y: np.sin(phi(x)), lambda x: -R * np.cos(phi(x))),
@@ -97,11 +81,6 @@ def forces(problem: LubricationProblem, p_pa: Array, known: Known | None = None)
             -over(lambda x, y: (y - middle[1]) * np.sin(phi(x))),
         ]
     return out
-
-
-def shaft_angle(problem: LubricationProblem, shaft: Shaft, x: Array) -> Array:
-    """phi (rad) of the places x (m)."""
-    return shaft.start + (x - problem.grid.origin[0]) / shaft.radius
 
 
 def attitude(widest: float, force: Sequence[float], U: float) -> float:

@@ -18,13 +18,13 @@ from ..transfer import Transfer
 from .assembly import assemble
 from .certify import certify
 from .exact import ExactSolution
-from .forces import Shaft
 from .integrals import LineIntegrals
-from .lifted import LiftedFilm
 from .quantities import open_pressures, quantities, units
 from .reynolds import BoxScheme, side_points, sides
 from .stored import rates
 from .supplies import Held, Supply, pressed
+from .turning import Shaft
+from .views import LiftedFilm
 
 
 class LubricationProblem:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
+import numpy as np
 from petsc4py import PETSc
 
 from ...errors import InputError
@@ -13,20 +14,20 @@ from ..grid import EVEN, Grid, Places, Polar
 from .edges import jumps_of
 from .effects import Effect
 from .exact import ExactSolution
-from .film_slopes import film_slopes
 from .fluid import Law
-from .forces import Shaft
 from .grooves import Groove, GroovedProblem, Pad, pads_between
 from .integrals import line_integrals
 from .lines import on_edges
 from .lubrication import LubricationProblem
-from .reynolds import BoxScheme, Film, box_scheme
+from .reynolds import BoxScheme, Film, box_scheme, coefficients
 from .stored import Stored
 from .supplies import Supply, hold
 from .turned import TurnedProblem
-from .views import FromHere, Inside, MirroredFilm
+from .turning import Shaft
+from .views import FromHere, Inside, MirroredFilm, Raised
 
 NAMES = ("west", "east", "south", "north")
+STEP = 1e-30  # relative, of a complex step: nothing is subtracted, so no digits are lost however small it is
 OPPOSITE = dict(zip(NAMES, ("east", "west", "north", "south"), strict=True))
 
 
@@ -154,8 +155,8 @@ class Model:
         film = self.film
         exact = self.integrals and grid.dim == 1 and self.scheme == "face" and not self.mean_cubes and not self.stored
         integrals = line_integrals(grid, film) if exact and "mirror" not in grid.ends[0] else None
-        coefficients = partial(box_scheme, grid, self.gap, **self._data, integrals=integrals)
-        scheme = coefficients()
+        scheme_for = partial(box_scheme, grid, self.gap, **self._data, integrals=integrals)
+        scheme = scheme_for()
         scheme, held = hold(grid, scheme, self.supplies, self.p_unit) if self.supplies else (scheme, None)
         problem = kind(
             grid,
@@ -178,7 +179,7 @@ class Model:
         if isinstance(problem, GroovedProblem):
             problem.grooves = self.grooves
         if getattr(self.gap, "rims", ()) and not self.supplies and self.law is None:
-            problem.coefficients_for = coefficients
+            problem.coefficients_for = scheme_for
         return problem
 
     @property
@@ -189,9 +190,19 @@ class Model:
         return {**given, "p_sides": p_sides, "r_in": self.sides[0].r, "stored": self.stored}
 
     def film_slopes(self, problem: LubricationProblem) -> BoxScheme:
-        """Derivatives of the coefficients of a problem that was built from this (U >= 0) by its film. Collective."""
-        slopes = film_slopes(problem, self.gap, self._data)
-        return hold(problem.grid, slopes, self.supplies, self.p_unit)[0] if self.supplies else slopes
+        """Derivatives of the coefficients of a problem that was built from this (U >= 0) by its film. Collective.
+
+        A coefficient depends on the film at its own face or point alone (`mean_cubes`: at both points; `integrals`: between
+        its two points), so one complex step through the code that makes them gives each its own derivative; h has 1.
+        """
+        grid, integrals, flow_unit = problem.grid, problem.integrals, problem.scheme.flow_unit
+        step = STEP * grid.reduce.max(np.abs(np.asarray(self.gap(grid.x, grid.y))))
+        moved: Any = Raised(self.gap, 1j * step)
+        along = None if integrals is None else integrals.lifted(1j * step)
+        box = coefficients(grid, moved, **{**self._data, "stored": None}, cavity=problem.dry, integrals=along)
+        changes = {name: np.imag(getattr(box, name)) / step for name in box.arrays}
+        slopes = BoxScheme(**{name: a if name == "h" else a / flow_unit for name, a in changes.items()}, flow_unit=flow_unit)
+        return hold(grid, slopes, self.supplies, self.p_unit)[0] if self.supplies else slopes
 
     def pads(self, shape: Sequence[int]) -> list[tuple[Pad, "Model"]]:
         """The films between the grooves on a ring of nx columns, whose points they keep."""

@@ -9,10 +9,9 @@ Kinematic viscosities at 40 degrees C are the middles of ISO 3448's grades; thos
 of 100, by the equations of ASTM D2270. Density and specific heat of a mineral oil are typical values, not the grade's.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import exp, log, log10
-from typing import Protocol
 
 import numpy as np
 
@@ -41,10 +40,7 @@ GRADES = {
 NAMES = [f"ISO VG {grade}" for grade in GRADES]
 
 
-class Viscosity(Protocol):
-    """mu(T), Pa s, of temperatures in K."""
-
-    def __call__(self, T: Array) -> Array: ...
+Viscosity = Callable[[Array], Array]  # mu(T), Pa s, of temperatures in K
 
 
 @dataclass(frozen=True)

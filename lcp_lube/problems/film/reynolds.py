@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,8 +11,7 @@ from ...base.parallel import Array
 from ...errors import InputError
 from ..grid import Grid
 from .edges import Around, face_film, jumps_of
-from .integrals import LineIntegrals
-from .positive import check_film
+from .integrals import LineIntegrals, check_film
 from .rims import rims_across_x, rims_across_y
 from .stored import Stored
 
@@ -90,7 +90,37 @@ class BoxScheme:
         return [(0, 0, self.b_C), (0, -1, self.entering)]
 
 
-def box_scheme(
+def box_scheme(grid: Grid, film: Film, **data: Any) -> BoxScheme:
+    """`coefficients` of these data, checked; in a unit of flow by which the largest is near 1 where it would be far from it.
+
+    Raises
+    ------
+    InputError : a film that is not positive, or data so large or small that a coefficient overflows or vanishes.
+    """
+    with np.errstate(all="ignore"):
+        box = coefficients(grid, film, **data)
+    reduce = grid.reduce
+    faces = [box.k_W, box.k_E] + ([box.k_S, box.k_N] if grid.dim == 2 else [])
+    walls = zip(sides(grid, ("closed", "mirror")), faces, strict=False)
+    stores = [] if box.storage is None else [box.storage]
+    conducting = [np.where(wall, np.inf, k) if wall.any() else k for wall, k in walls]
+    smallest = min(map(reduce.min, [box.h, *conducting, *stores]))
+    largest = max(map(reduce.max, [*faces, np.abs(box.b_C), np.abs(box.c)]))
+    if not (smallest > 1 / LARGE and largest < LARGE):
+        with np.errstate(all="ignore"):
+            check_film(grid, film)
+        raise InputError(
+            f"film {reduce.min(box.h):g} to {reduce.max(box.h):g} m, mu = {data['mu']:g} Pa s, U = {data['U']:g} m/s, "
+            f"p_unit = {data['p_unit']:g} Pa: flow balance with coefficients {smallest:g} to {largest:g}, "
+            f"allowed are {1 / LARGE:g} to {LARGE:g} (SI units?)"
+        )
+    if 1 / USUAL < largest < USUAL:
+        return box
+    unit = 2.0 ** np.round(np.log2(largest))
+    return replace(box, **{name: getattr(box, name) / unit for name in box.arrays if name != "h"}, flow_unit=float(unit))
+
+
+def coefficients(
     grid: Grid,
     film: Film,
     *,
@@ -122,47 +152,7 @@ def box_scheme(
     cavity : 1 at the owned points that are taken to be cavitated where round edges cut a face (`rims`), else 0; default 0.
     stored : what the cells store, in a time step.
     integrals : of a line's film (1D): fluxes between its points are exact for a full film; default: from the film at the faces.
-
-    Raises
-    ------
-    InputError : a film that is not positive, or data so large or small that a coefficient overflows or vanishes.
     """
-    with np.errstate(all="ignore"):
-        box = _coefficients(grid, film, mu, U, scheme, p_sides, p_unit, mean_cubes, r_in, cavity, integrals, stored)
-    reduce = grid.reduce
-    faces = [box.k_W, box.k_E] + ([box.k_S, box.k_N] if grid.dim == 2 else [])
-    walls = zip(sides(grid, ("closed", "mirror")), faces, strict=False)
-    stores = [] if box.storage is None else [box.storage]
-    conducting = [np.where(wall, np.inf, k) if wall.any() else k for wall, k in walls]
-    smallest = min(map(reduce.min, [box.h, *conducting, *stores]))
-    largest = max(map(reduce.max, [*faces, np.abs(box.b_C), np.abs(box.c)]))
-    if not (smallest > 1 / LARGE and largest < LARGE):
-        with np.errstate(all="ignore"):
-            check_film(grid, film)
-        raise InputError(
-            f"film {reduce.min(box.h):g} to {reduce.max(box.h):g} m, mu = {mu:g} Pa s, U = {U:g} m/s, p_unit = {p_unit:g} Pa: "
-            f"flow balance with coefficients {smallest:g} to {largest:g}, allowed are {1 / LARGE:g} to {LARGE:g} (SI units?)"
-        )
-    if 1 / USUAL < largest < USUAL:
-        return box
-    unit = 2.0 ** np.round(np.log2(largest))
-    return replace(box, **{name: getattr(box, name) / unit for name in box.arrays if name != "h"}, flow_unit=float(unit))
-
-
-def _coefficients(
-    grid: Grid,
-    film: Film,
-    mu: float,
-    U: float,
-    scheme: str,
-    p_sides: tuple[float, float, float, float],
-    p_unit: float,
-    mean_cubes: bool,
-    r_in: float,
-    cavity: Array | None,
-    integrals: LineIntegrals | None,
-    stored: Stored | None = None,
-) -> BoxScheme:
     dx, (ny, nx) = grid.steps(0), grid.box
     x_share, y_share = grid.widths(0), grid.widths(1)[:, None] if grid.dim == 2 else np.ones((1, 1))
     x_nodes, x_faces = grid.nodes_and_faces(0)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...base.parallel import Array
 from .cavity import cavity_sign
 from .flows import friction, line_weights, point_weights, sheared_faces, side_flows
-from .forces import forces, shaft_angle
+from .forces import forces
 from .grooves import GroovedProblem
 from .lubrication import LubricationProblem
 from .peak import Window
@@ -107,7 +107,7 @@ def slope(problem: LubricationProblem, tangent: Tangent, p: Array, r: Array, nam
         "moment": lambda: -(x - middle[0]),
     }
     if shaft is not None:
-        angle = shaft_angle(problem, shaft, x)
+        angle = shaft.theta(x)
         weights |= {"force_x": lambda: -np.cos(angle), "force_y": lambda: -np.sin(angle)}
         weights |= {"moment_x": lambda: -(y - middle[1]) * np.cos(angle), "moment_y": lambda: -(y - middle[1]) * np.sin(angle)}
     elif grid.polar is not None:

@@ -4,36 +4,50 @@ Angles theta are counted from the line of the load, in the sense of rotation; ax
 turn ahead. An eccentricity (ex, ey) makes the film h = c - ex cos(theta) - ey sin(theta).
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...base.parallel import Array
 from .contact import areas
 from .flows import point_weights
-from .lubrication import LubricationProblem
+
+if TYPE_CHECKING:
+    from .lubrication import LubricationProblem
 
 
 @dataclass(frozen=True)
-class Turning:
-    """Radius R and clearance c, m; width B, m (1D: 1); omega, rad/s; theta at x = 0."""
+class Shaft:
+    """What a film is wrapped round, y along the axis. R : radius, m; start : theta at x = 0, rad.
+
+    widest : theta of the widest gap that the shaft's eccentricity makes, rad; None for a concentric one.
+    """
 
     R: float
+    start: float = 0.0
+    widest: float | None = None
+
+    def theta(self, x: Array) -> Array:
+        """Angle of the places x (m) of the unwrapped film."""
+        return self.start + x / self.R
+
+
+@dataclass(frozen=True, kw_only=True)
+class Turning(Shaft):
+    """A journal. c : clearance, m; B : width, m (1D: 1); omega : rad/s."""
+
     c: float
     B: float
     omega: float
-    start: float
 
     @property
     def length(self) -> float:
         """Of the unwrapped film, m."""
         return 2.0 * math.pi * self.R
-
-    def theta(self, x: Array) -> Array:
-        """Angle of the places x (m) of the unwrapped film."""
-        return self.start + x / self.R
 
     def force(self, problem: LubricationProblem, p: Array) -> tuple[float, float]:
         """Force of the pressure p (owned points, p_unit above p_c) and of asperities on it, N (1D: N/m). Collective."""

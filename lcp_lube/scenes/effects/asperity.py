@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import Field
 
 from ...problems.film.contact import Contact
-from ...problems.film.effects import Answer, Cells, Plain, Report
+from ...problems.film.effects import Answer, Cells, Effect, Report
 from ..scene import NotNegative, Positive
 from ..units import measured, metres
 from .table import EffectTable
@@ -36,7 +36,7 @@ class Asperity(EffectTable):
 
 
 @dataclass(frozen=True)
-class Summits(Plain):
+class Summits(Effect):
     """The pressure of the asperities, by the film."""
 
     table: Asperity

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field, model_validator
 
-from ...problems.film.effects import Answer, Cells, Plain, Report
+from ...problems.film.effects import Answer, Cells, Effect, Report
 from ..scene import Finite, Positive
 from ..units import measured, metres
 from .table import EffectTable
@@ -40,7 +40,7 @@ class Elastic(EffectTable):
         return Foundation(given)
 
 
-class GivingWay(Plain):
+class GivingWay(Effect):
     """Walls that pressure moves apart."""
 
     channels: tuple[str, ...] = ("lift",)

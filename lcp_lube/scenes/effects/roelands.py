@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ...errors import InputError
-from ...problems.film.effects import Answer, Cells, Plain
+from ...problems.film.effects import Answer, Cells, Effect
 from ...problems.film.oils import ROELANDS_MU, ROELANDS_P
 from ..scene import Finite
 from ..units import measured
@@ -46,7 +46,7 @@ class RoelandsTable(EffectTable):
 
 
 @dataclass(frozen=True)
-class Roelands(Plain):
+class Roelands(Effect):
     """z : the exponent."""
 
     z: float

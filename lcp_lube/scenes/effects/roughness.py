@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from ...problems.film.effects import Answer, Cells, Plain
+from ...problems.film.effects import Answer, Cells, Effect
 from ..scene import Finite, Positive
 from ..units import metres
 from .table import EffectTable
@@ -32,7 +32,7 @@ class SurfaceRoughness(EffectTable):
 
 
 @dataclass(frozen=True)
-class FlowFactors(Plain):
+class FlowFactors(Effect):
     """sigma : m. excess : of the moving wall's part of sigma^2 over the other's."""
 
     sigma: float

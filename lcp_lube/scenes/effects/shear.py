@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from ...problems.film.effects import Answer, Cells, Plain
+from ...problems.film.effects import Answer, Cells, Effect
 from ..scene import Finite, Positive
 from ..units import measured
 from .table import EffectTable
@@ -42,7 +42,7 @@ class Shear(EffectTable):
 
 
 @dataclass(frozen=True)
-class Thinning(Plain):
+class Thinning(Effect):
     """Viscosity over mu_N from the shear rate of an answer."""
 
     table: Shear

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from ...base.parallel import Array
 from ...problems.film import oils
-from ...problems.film.effects import Answer, Cells, Plain, Report
+from ...problems.film.effects import Answer, Cells, Effect, Report
 from ...problems.film.energy import carried, fresh_flow, heated
 from ..scene import Finite, NotNegative, Positive
 from ..units import measured
@@ -99,7 +99,7 @@ def _rising(function: Any, low: float, high: float, like: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Heat(Plain):
+class Heat(Effect):
     """Viscosity from the temperatures of an answer. law : mu(T), Pa s. mu : where there is no effect. wall : T_wall - T_in."""
 
     law: oils.Viscosity

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ...errors import InputError
-from ...problems.film.effects import Answer, Cells, Plain
+from ...problems.film.effects import Answer, Cells, Effect
 from ...problems.film.profile import read_profile
 from ..film import UNITS, Unit
 from ..formula import Formula
@@ -45,7 +45,7 @@ class ViscosityMap(EffectTable):
 
 
 @dataclass(frozen=True)
-class Places(Plain):
+class Places(Effect):
     """mu over the fluid's at x, y; end: x is counted back from there, in a mirror image."""
 
     factor: Any
