@@ -51,10 +51,6 @@ class BoxSystem:
         rhs : right-hand side; at held points, x itself.
         shift : added to the diagonal.
         held : points where x is known: their rows and columns become those of a diagonal matrix.
-
-        Raises
-        ------
-        LinearSolverError : breakdown, a failed factorisation, or a result that is not finite.
         """
         with self.stages("Jacobian"):
             self.matrix.update(shift, held)

@@ -5,10 +5,8 @@ of the last cell; for an odd number the last point lies on it, in half a cell. T
 symmetric unknowns, halved on a middle line, so that a symmetric matrix stays one.
 """
 
-import numpy as np
 from petsc4py import PETSc
 
-from ..base.parallel import Array
 from .grid import OPEN, Grid
 
 Axes = tuple[bool, ...]  # whether x, and in 2D y, are folded
@@ -54,18 +52,3 @@ def whole_shape(grid: Grid) -> tuple[int, ...]:
 def whole_lengths(grid: Grid) -> tuple[float, ...]:
     """Sides of the whole that a part belongs to."""
     return tuple(2.0 * length if f else length for length, f in zip(grid.lengths, folded_axes(grid), strict=True))
-
-
-def column_shares(grid: Grid) -> Array:
-    """What the owned columns, shape (1, nx_local), have of a cell: 1, on a mirror line 1/2."""
-    return _shares(grid, 0, grid.x_start, grid.x_end)[None, :]
-
-
-def line_shares(grid: Grid) -> Array:
-    """The same for the owned lines of a rectangle, shape (ny_local, 1)."""
-    return _shares(grid, 1, grid.y_start, grid.y_end)[:, None]
-
-
-def _shares(grid: Grid, side: int, start: int, end: int) -> Array:
-    halved = (np.arange(start, end) == grid.shape[side] - 1) & (grid.ends[side][1] == "mirror")
-    return np.where(halved, 0.5, 1.0)

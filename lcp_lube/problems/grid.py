@@ -288,12 +288,7 @@ class Grid:
 
 
 def _on_ranks(ranks: int, shape: tuple[int, ...], lengths: tuple[float, ...], *how: Any) -> Grid:
-    """A pickled grid, on one rank or all of them. Collective.
-
-    Raises
-    ------
-    InputError : it was another number of ranks.
-    """
+    """A pickled grid, on one rank or all of them. Collective."""
     comm = PETSc.COMM_SELF if ranks == 1 else PETSc.COMM_WORLD
     if comm.getSize() != ranks:
         raise InputError(f"pickled on {ranks} ranks, each with its part: {comm.getSize()} ranks cannot take it up")

@@ -13,7 +13,7 @@ from ..errors import InputError
 from .certificate import Certificate, certificate_tol
 from .film.assembly import assemble
 from .film.reynolds import sides
-from .fold import FOLDED, column_shares, line_shares
+from .fold import FOLDED
 from .grid import Grid
 from .solution import Fields
 from .transfer import Transfer
@@ -133,7 +133,7 @@ class SemilinearProblem:
         self.reduce: Reduce = grid.reduce
         self._x, self._y = (np.ravel(a) for a in np.broadcast_arrays(grid.x, grid.y))
         dx, dy = grid.spacing
-        x_share, y_share = column_shares(grid), line_shares(grid)
+        x_share, y_share = grid.widths(0), grid.widths(1)[:, None]
         self.cells = (grid.cell * x_share * y_share).ravel()
         across_x, across_y = dy / dx * y_share, dx / dy * x_share
         _, east, _, north = sides(grid, FOLDED)
@@ -249,14 +249,9 @@ def _share(part: float, whole: float) -> float:
 
 
 def _boundary_terms(grid: Grid, boundary: Surface) -> Array:
-    """What the values on the boundary add to f: (dy/dx) v west and east, (dx/dy) v south and north.
-
-    Raises
-    ------
-    InputError : the boundary's formula has no finite value at a point next to which a grid point lies.
-    """
+    """What the values on the boundary add to f: (dy/dx) v west and east, (dx/dy) v south and north."""
     dx, dy = grid.spacing
-    b, x_share, y_share = np.zeros(grid.box), column_shares(grid), line_shares(grid)
+    b, x_share, y_share = np.zeros(grid.box), grid.widths(0), grid.widths(1)[:, None]
     for at_side, (ox, oy) in zip(sides(grid), ((-dx, 0.0), (dx, 0.0), (0.0, -dy), (0.0, dy)), strict=True):
         weight = dy / dx * y_share if ox else dx / dy * x_share
         b += np.where(at_side, weight * boundary(grid.x + ox, grid.y + oy), 0.0)

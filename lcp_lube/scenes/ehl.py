@@ -45,12 +45,7 @@ class EhlLineScene(Scene):
         return replace(super().facts(comm), dense=True)
 
     def build(self, comm: PETSc.Comm | None = None) -> EhlProblem:
-        """The discrete problem. Collective.
-
-        Raises
-        ------
-        InputError : more ranks than unknowns.
-        """
+        """The discrete problem. Collective."""
         dx = (self.x[1] - self.x[0]) / self.n
         # The grid's last point is the end of the interval, where p = 0 and the place is k's.
         grid = Grid((self.n,), ((self.n + 1) * dx,), comm, (self.x[0], 0.0))

@@ -101,12 +101,7 @@ class FilmScene(Scene):
         return self.model.facts(self.shape, comm)
 
     def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
-        """The discrete problem on this scene's grid. Collective.
-
-        Raises
-        ------
-        InputError : as `model`; more ranks than the grid can be dealt to, a film that is not positive.
-        """
+        """The discrete problem on this scene's grid. Collective."""
         model = self.model
         try:
             return model.build(self.shape, comm)

@@ -36,12 +36,7 @@ class OneUnknownScene(Scene):
         raise NotImplementedError
 
     def build(self, comm: PETSc.Comm | None = None) -> Any:
-        """The discrete problem on this scene's grid. Collective.
-
-        Raises
-        ------
-        InputError : more ranks than the grid can be dealt to, values that are not finite, obstacles that cross.
-        """
+        """The discrete problem on this scene's grid. Collective."""
         (x0, x1), (y0, y1) = self.rectangle
         return self.problem_on(Grid(self.shape, (x1 - x0, y1 - y0), comm, (x0, y0)))
 

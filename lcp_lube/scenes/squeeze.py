@@ -57,12 +57,7 @@ class SqueezeScene(Scene):
     place: ClassVar[tuple[float, float]] = (0.0, 0.0)
 
     def models(self) -> Models:
-        """The film at the time t: d/dx(h^3 dp/dx) = 2 d(h theta)/dt is that of a viscosity of 1/6.
-
-        Raises
-        ------
-        InputError : data whose coefficients overflow or vanish.
-        """
+        """The film at the time t: d/dx(h^3 dp/dx) = 2 d(h theta)/dt is that of a viscosity of 1/6."""
         p_wall, unit = Side(p=self.p_wall), self.p_wall or 1.0
 
         def at(t: float, journal: object) -> Model:

@@ -208,12 +208,7 @@ class UserProblem(BoxProblem):
 
 
 def _vector(value: Any, label: str) -> Array:
-    """A new vector of floats.
-
-    Raises
-    ------
-    InputError : not a sequence of real numbers.
-    """
+    """A new vector of floats."""
     try:
         if np.iscomplexobj(value):
             raise TypeError

@@ -146,12 +146,7 @@ class _Band:
         self.slack = 4 * rounding + 8 * UNIT * (near - problem.scheme.b_C).ravel()
 
     def width(self, system: str, stages: Stages) -> Array:
-        """e ~ J(z)^-1 (|G(z)| + slack), and a little for the error of the solve itself. Collective.
-
-        Raises
-        ------
-        LinearSolverError : the solve fails.
-        """
+        """e ~ J(z)^-1 (|G(z)| + slack), and a little for the error of the solve itself. Collective."""
         reduce = self.problem.reduce
         w = np.abs(self.G) + self.slack
         w += RESERVE * reduce.norm(w) / np.sqrt(self.problem.size)

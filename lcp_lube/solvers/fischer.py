@@ -130,12 +130,7 @@ class ArmijoNewton(FischerNewton):
     def _decrease(
         self, trial: Callable[[float], Trial], change2: Array, dp: Array, dr: Array, delta: float
     ) -> Callable[[float], bool]:
-        """The test of a trial alpha.
-
-        Raises
-        ------
-        StepLengthError : the inner solver's direction does not reduce the merit function.
-        """
+        """The test; raises StepLengthError where the inner solver's direction does not reduce the merit function."""
         reduce, norm, beta, slope = self.problem.reduce, self.norm, self.options.beta, self._slope(change2, dp, dr)
         if slope >= 0.0 and norm > 0.0:
             raise StepLengthError(f"the inexact direction is not one of descent: slope {slope:.1e}")

@@ -49,12 +49,7 @@ class ModelSystem(ReducedSystem):
         self._s = self._diagonal_A / self._diagonal_B
 
     def solve_model(self, cavity: Mask, full: Mask, rtol: float) -> tuple[Array, int]:
-        """z with (model's Jacobian) z = c for these policies, and the number of linear iterations. Collective.
-
-        Raises
-        ------
-        LinearSolverError : breakdown, a failed factorisation, or a result that is not finite.
-        """
+        """z with (model's Jacobian) z = c for these policies, and the number of linear iterations. Collective."""
         grid = self.problem.grid
         with self.stages("Jacobian"):
             east, others, void = (

@@ -36,12 +36,7 @@ class Pivoting(Pivots, Method):
         return {"p": self.p, "r": self.r}
 
     def advance(self) -> Step:
-        """One set of full cells.
-
-        Raises
-        ------
-        LinearSolverError : a part of the film has no way out.
-        """
+        """One set of full cells."""
         try:
             with self.stages("KSP"):
                 moved = self.step()

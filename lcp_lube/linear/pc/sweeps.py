@@ -40,12 +40,7 @@ class Pipeline:
 
 
 class Jacobi:
-    """F = diag(A). S is lower bidiagonal along every x line; without `lines` its diagonal alone is used.
-
-    Raises
-    ------
-    LinearSolverError : S has a zero on its diagonal (then P = R = 0 at that point), or an entry that is not finite.
-    """
+    """F = diag(A). S is lower bidiagonal along every x line; without `lines` its diagonal alone is used."""
 
     def __init__(self, fields: TwoFields, lines: bool = True):
         self._fields, self._lines = fields, lines
@@ -89,10 +84,6 @@ class GaussSeidel:
         t + (strict lower part of A) p + (west part of B) r = 0,
 
     are a unit lower triangle in t with A's sparsity: one forward sweep.
-
-    Raises
-    ------
-    LinearSolverError : some d is zero or not finite.
     """
 
     def __init__(self, fields: TwoFields):
@@ -159,12 +150,7 @@ class GaussSeidel:
 
 
 def check_pivots(fields: TwoFields, pivots: Array) -> None:
-    """Collective.
-
-    Raises
-    ------
-    LinearSolverError : a pivot is zero or not finite.
-    """
+    """Raise LinearSolverError where a pivot is zero or not finite. Collective."""
     smallest, largest = fields.reduce.min(np.abs(pivots)), fields.reduce.max(np.abs(pivots))
     if not (smallest > 0.0 and np.isfinite(largest)):
         raise LinearSolverError(f"saddle-point preconditioner: pivots between {smallest} and {largest}")

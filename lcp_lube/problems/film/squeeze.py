@@ -48,7 +48,7 @@ class Squeeze:
         self.p_wall, self.front_time = p_wall, front_time
         self.history = History()
         self.step: Any = None  # the last step's problem
-        self.time, self.dt, self._m = 0.0, 0.0, 0
+        self.time, self.dt = 0.0, 0.0
         self._pressures: list[Array] = []  # of the last steps in the full film
         self._fronts: list[tuple[float, float]] = []  # (time, front) since rupture
         self._void: list[float] = []
@@ -68,7 +68,6 @@ class Squeeze:
     def accept(self, step: Any, fields: Fields, time: float, dt: float) -> None:
         """Note what a step shows. Collective."""
         self.step, self.time, self.dt, seen = step, time, dt, self.history
-        self._m += 1
         p, r = fields["p"] * step.p_unit, self._void_of(step, fields)
         p_max = self.reduce.max(p)
         if p_max > seen.p_max:
