@@ -5,21 +5,21 @@ from typing import Annotated, Any
 from pydantic import Field, model_validator
 
 from ..base.quantity import in_si, quantity
+from .scene import Finite
 from .units import Measured, measured, stem
 
 UNITS = {"eccentricity": "", "h_offset": "m"}  # of the keys that are found most; another's number is taken in SI
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 
 
 class BalanceTable(Measured):
     """[balance] of a scene file: the load to carry, and the key whose value is to be found for it."""
 
-    load: Annotated[Number, Field(gt=0)] = measured(
+    load: Annotated[Finite, Field(gt=0)] = measured(
         "N or N/m", ..., "load to carry, in 1D per metre of width: `load` of the results"
     )
     vary: str | None = Field(None, description="key to find; default eccentricity (journals), else h_offset, the film's level")
-    range: tuple[Number, Number] | None = Field(None, description="values allowed for it, in SI or with its unit ('5um')")
-    tol: Annotated[Number, Field(gt=1e-12, lt=1)] = Field(1e-6, description="relative error of the load")
+    range: tuple[Finite, Finite] | None = Field(None, description="values allowed for it, in SI or with its unit ('5um')")
+    tol: Annotated[Finite, Field(gt=1e-12, lt=1)] = Field(1e-6, description="relative error of the load")
 
     @classmethod
     def in_si_units(cls, data: Any) -> Any:

@@ -14,9 +14,9 @@ from ..problems.film.views import Travelling
 from ..registry import SHAPES
 from .film_scene import Extent
 from .formula import Formula
+from .scene import Finite
 from .units import Measured, metres
 
-Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Span = tuple[Finite, Finite]
 Unit = Literal["m", "mm", "um"]
 SLACK = 1e-9  # relative: dimples that touch do not overlap

@@ -9,10 +9,9 @@ from pydantic import Field, model_validator
 
 from ..errors import InputError
 from .formula import TimeText, of_time
+from .scene import Finite, Positive
 from .units import Measured, measured
 
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Positive = Annotated[Number, Field(gt=0)]
 AtTime = Annotated[float | str, TimeText]
 Pair = tuple[AtTime, AtTime]
 Course = Callable[[float], tuple[float, float]]  # [X, Y] of a journal at the time t
@@ -29,7 +28,7 @@ class MotionTable(Measured):
     t_end: Positive = measured("s", ..., "end of the march, which begins at t = 0")
     steps: Annotated[int, Field(strict=True, ge=2, le=10_000_000)] | None = Field(None, description="equal steps up to t_end")
     dt: Positive | None = measured("s", None, "length of the steps, in place of their number")
-    tol: Annotated[Number, Field(gt=1e-9, lt=1)] | None = Field(
+    tol: Annotated[Finite, Field(gt=1e-9, lt=1)] | None = Field(
         None, description="steps as long as this relative error of the film's rates allows; default 1e-3 without steps and dt"
     )
     scheme: Literal["bdf2", "euler"] = Field("bdf2", description="two-step backward difference, or implicit Euler")
@@ -38,11 +37,11 @@ class MotionTable(Measured):
     file: str | None = Field(None, description="where the journal is: a .csv with rows t, X, Y, a cubic spline between them")
     free: bool = Field(False, description="the journal goes where load, film and its mass take it")
     load: Pair | None = measured("N or N/m", None, "on a free journal: [F_X, F_Y], formulas of t")
-    mass: Annotated[Number, Field(ge=0)] | None = measured("kg or kg/m", None, "of a free journal")
-    position: tuple[Number, Number] | None = Field(
+    mass: Annotated[Finite, Field(ge=0)] | None = measured("kg or kg/m", None, "of a free journal")
+    position: tuple[Finite, Finite] | None = Field(
         None, description="of a free journal at t = 0: [X, Y]; default: where the scene has it"
     )
-    velocity: tuple[Number, Number] = Field((0.0, 0.0), description="of a free journal at t = 0, clearances per second")
+    velocity: tuple[Finite, Finite] = Field((0.0, 0.0), description="of a free journal at t = 0, clearances per second")
 
     @model_validator(mode="after")
     def _consistent(self) -> "MotionTable":

@@ -8,10 +8,9 @@ from pydantic import Field, model_validator
 
 from ..problems.film.supplies import Patch, Region, Supply, Where
 from .formula import Formula
+from .scene import Finite, Positive
 from .units import Measured, measured, metres
 
-Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Positive = Annotated[Finite, Field(gt=0)]
 Span = tuple[Finite, Finite]
 SLACK = 1e-6  # of a side: a supply may reach so far beyond it
 

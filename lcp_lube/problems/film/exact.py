@@ -155,7 +155,7 @@ def exact_solution(film: Film, L: float, mu: float, U: float, p_a: float, p_b: f
     lo, hi = _inside(x)
     side = np.sign(U * film(lo) - Q)
     change = side * (U * film(hi) - Q) < 0
-    x = np.union1d(x, _bisect(lambda t: side[change] * (U * film(t) - Q), lo[change], hi[change]))
+    x = np.union1d(x, bisect(lambda t: side[change] * (U * film(t) - Q), lo[change], hi[change]))
 
     p = np.full(len(x), float(p_b))
     solution = ExactSolution(rupture, None, Q, 0, 0, 0, film, mu, U, x, p)
@@ -168,7 +168,7 @@ def exact_solution(film: Film, L: float, mu: float, U: float, p_a: float, p_b: f
         # Ahead of the rupture the film is full, also where p is zero: at the inlet with p_a = 0.
         behind = np.arange(len(x) - 1) >= np.argmin(abs(x - rupture))
         j = np.flatnonzero(behind & (p[:-1] == 0) & (p[1:] > 0))
-        fronts = _bisect(lambda t: _gauss(solution._slope, t, x[j + 1]) - p[j + 1], x[j], x[j + 1])
+        fronts = bisect(lambda t: _gauss(solution._slope, t, x[j + 1]) - p[j + 1], x[j], x[j + 1])
     ends = np.union1d(x, fronts)
     top = np.argmax(p)
     return ExactSolution(
@@ -207,7 +207,7 @@ def _flux(film: Film, x: Array, mu: float, U: float, p_a: float, p_b: float) -> 
     lo, hi = _inside(x)
     every = np.arange(len(lo))
     k = np.flatnonzero((S(lo, every) > 0) & (S(hi, every) <= 0))
-    where = np.append(_bisect(lambda t: S(t, k), lo[k], hi[k]), x[1:])
+    where = np.append(bisect(lambda t: S(t, k), lo[k], hi[k]), x[1:])
     J_w, F_w = J_F_at(where, np.append(k, every + 1))
     M = (p_a + F_w) / J_w
     least = np.argmin(M)
@@ -259,7 +259,7 @@ def _gauss(f: Callable[[Array], Array], a: Array, b: Array) -> Array:
     return half * np.sum(f(points) * _WEIGHT, axis=-1)
 
 
-def _bisect(f: Callable[[Array], Array], a: Array, b: Array) -> Array:
+def bisect(f: Callable[[Array], Array], a: Array, b: Array) -> Array:
     """Return the roots of f, positive at a and not at b, in all brackets at once; rounding cannot make it fail."""
     for _ in range(60 if np.size(a) else 0):
         m = (a + b) / 2

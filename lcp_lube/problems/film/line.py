@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from ...base.parallel import Array
 from ..solution import Fields
 from .cavity import VOID
-from .exact import _bisect
+from .exact import bisect
 from .integrals import SAME, LineIntegrals
 
 if TYPE_CHECKING:
@@ -120,7 +120,7 @@ def solve_line(line: LineIntegrals, mu: float, U: float, p_a: float, p_b: float,
         over = level < U * h
         k, i = np.nonzero(over[:, 1:] != over[:, :-1])
         sign = np.where(over[k, i], 1.0, -1.0)
-        return _bisect(lambda x: sign * (U * line.film_at(x) - level), places[k, i], places[k, i + 1])
+        return bisect(lambda x: sign * (U * line.film_at(x) - level), places[k, i], places[k, i + 1])
 
     J, F = J_F(line.ends)
     Q_full = float((p_a - p_b + F[-1]) / J[-1])
@@ -148,7 +148,7 @@ def solve_line(line: LineIntegrals, mu: float, U: float, p_a: float, p_b: float,
         J_t, F_t = J_F(t)
         return Z[k + 1] - (F_t - Q * J_t) - p[k + 1]
 
-    x_f = _bisect(below, x[k], x[k + 1])
+    x_f = bisect(below, x[k], x[k + 1])
     apart = (x_f - x[k] > SAME * x[-1]) & (x[k + 1] - x_f > SAME * x[-1])
     k, x_f = k[apart], x_f[apart]
     points = np.insert(x, k + 1, x_f)

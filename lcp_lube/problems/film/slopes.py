@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...base.parallel import Array
 from .cavity import cavity_sign
+from .effects import around
 from .flows import friction, line_weights, point_weights, sheared_faces, side_flows
 from .forces import forces
 from .grooves import GroovedProblem
@@ -201,13 +202,8 @@ def _given(problem: LubricationProblem, tangent: Tangent, cells: NDArray[np.bool
     size = 0.5 * s.flow_unit * (grid.spacing[1] if grid.dim == 2 else 1.0)
     rows = np.where(cells.reshape(grid.box), size, 0.0)
     dp = rows * sum(tangent.own)
-    places = (
-        (slice(1, -1), slice(2, None)),
-        (slice(1, -1), slice(0, -2)),
-        (slice(2, None), slice(1, -1)),
-        (slice(0, -2), slice(1, -1)),
-    )
-    for other, place in zip(tangent.other, places, strict=True):  # a row's part by its neighbour's p is that neighbour's
-        dp = dp + np.nan_to_num(grid.ghosted((rows * other).ravel())[place])
+    east, west, north, south = 1, 0, 3, 2  # of `around`: a row's part by its neighbour's p is that neighbour's
+    for other, from_there in zip(tangent.other, (east, west, north, south), strict=True):
+        dp = dp + np.nan_to_num(around(grid.ghosted((rows * other).ravel()))[from_there])
     dr = rows * s.b_C + np.nan_to_num(grid.ghosted((rows * s.b_W).ravel())[1:-1, 2:])
     return Slope(dp.ravel(), dr.ravel())

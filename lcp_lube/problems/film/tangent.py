@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.parallel import Array
-from .effects import Cells, answer, face_means, factors, framed_by
+from .effects import Cells, answer, around, face_means, factors, framed_by
 from .fluid import Law
 from .lubrication import LubricationProblem
 from .reynolds import BoxScheme, sides
@@ -62,22 +62,17 @@ def tangent(problem: LubricationProblem, law: Law | None, constant: LubricationP
     framed = framed_by(grid, p * unit, problem.p_sides)
     q, dq = law.reduced(framed), np.exp(-law.barus * framed)
     rho, drho = face_means(law.density(framed)), law.density_slope(framed)
-    around = (
-        (slice(1, -1), slice(0, -2)),
-        (slice(1, -1), slice(2, None)),
-        (slice(0, -2), slice(1, -1)),
-        (slice(2, None), slice(1, -1)),
-    )
-    here = (slice(1, -1), slice(1, -1))
+    beside = zip(*(map(np.nan_to_num, around(a)) for a in (q, dq, drho)), strict=True)
+    q, dq, drho = (a[1:-1, 1:-1] for a in (q, dq, drho))
     void = grid.ghosted(r, outside=0.0)
     none = np.zeros(grid.box)
     dragged = [-(s.couette_W - s.b_W * void[1:-1, :-2]), s.couette_E + s.b_C * r.reshape(grid.box), none, none]
     own, other = [], []
-    for k, at, mean, drag in zip(conductances, around, rho, dragged, strict=True):
-        leaving = k * (q[here] - np.nan_to_num(q[at])) / unit + drag
-        own.append(mean * k * dq[here] + 0.5 * drho[here] * leaving * unit)
-        other.append(np.nan_to_num(-mean * k * dq[at] + 0.5 * drho[at] * leaving * unit))
-    half = 0.5 * drho[here] * unit
+    for k, (q_there, dq_there, drho_there), mean, drag in zip(conductances, beside, rho, dragged, strict=True):
+        leaving = k * (q - q_there) / unit + drag
+        own.append(mean * k * dq + 0.5 * drho * leaving * unit)
+        other.append(np.nan_to_num(-mean * k * dq_there + 0.5 * drho_there * leaving * unit))
+    half = 0.5 * drho * unit
     mu = np.full(grid.box, 0.5 * law.barus * unit)
     at_wall = sides(grid, ("closed", "mirror"))[1]  # where the point's own pressure stands for the one beyond
     return Tangent(own, other, half * dragged[1], half * dragged[0], (mu * (1.0 + at_wall), mu) if law.barus else None)

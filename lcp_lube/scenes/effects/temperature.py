@@ -10,12 +10,13 @@ from ...base.parallel import Array
 from ...problems.film import oils
 from ...problems.film.effects import Answer, Cells, Effect, Report
 from ...problems.film.energy import carried, fresh_flow, heated
+from ...problems.film.exact import bisect
 from ..scene import Finite, NotNegative, Positive
 from ..units import measured
 from .table import EffectTable
 
 Kelvin = Annotated[Finite, Field(ge=oils.LOWEST, le=oils.HIGHEST)]
-NEWTON, FOUND, NEAR, BISECTIONS = 30, 1e-9, 1e-2, 60  # steps, and K: of T ahead; for derivatives by T
+NEWTON, FOUND, NEAR = 30, 1e-9, 1e-2  # steps, and K: of T ahead; for derivatives by T
 POINTS = {"exponential": 2, "walther": 2, "roelands": 2, "vogel": 3}
 
 
@@ -88,16 +89,6 @@ class Temperature(EffectTable):
         return Heat(self.viscosity(mu), mu, self, wall)
 
 
-def _rising(function: Any, low: float, high: float, like: Array) -> Array:
-    """Where a function that rises is zero, by bisection; the nearer end where it is nowhere."""
-    a, b = np.full(like.shape, low), np.full(like.shape, high)
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (a + b)
-        below = function(middle) < 0.0
-        a, b = np.where(below, middle, a), np.where(below, b, middle)
-    return 0.5 * (a + b)
-
-
 @dataclass(frozen=True)
 class Heat(Effect):
     """Viscosity from the temperatures of an answer. law : mu(T), Pa s. mu : where there is no effect. wall : T_wall - T_in."""
@@ -130,9 +121,9 @@ class Heat(Effect):
             by_heat = lambda T: power + sheared * (law(T) / before - 1.0)  # noqa: E731
             gain = table.share / (rho_c * fresh) if fresh > 0 else np.inf
             with np.errstate(invalid="ignore"):
-                T = _rising(lambda T: T - table.T_in - gain * by_heat(T), coldest, oils.HIGHEST, np.zeros(1))
+                T = bisect(lambda T: table.T_in + gain * by_heat(T) - T, np.array([coldest]), np.array([oils.HIGHEST]))
             return np.full(at.p.size, T[0])
-        T = _rising(lambda T: old - law(T), coldest, oils.HIGHEST, old)
+        T = bisect(lambda T: law(T) - old, np.full(old.shape, coldest), np.full(old.shape, oils.HIGHEST))
         for _ in range(NEWTON):
             ratio, slope = law(T) / old, (law(T + NEAR) - law(T - NEAR)) / (2.0 * NEAR * old)
             falls = np.maximum(-slope, 0.0) * flow.sheared.ravel()
