@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from petsc4py import PETSc
 
 from ..base.owned import Owned
 from ..base.parallel import Array
@@ -46,6 +48,17 @@ class System:
         if self.krylov is not None:
             self.krylov.destroy()
         self._own.free()
+
+
+class OneMatrix(System):
+    """A matrix whose values change, two vectors and its KSP; python preconditioners find `problem` as its attribute."""
+
+    def __init__(self, problem: Any, stages: Stages, mat: PETSc.Mat):
+        super().__init__(problem, stages)
+        self.mat = self._own(mat)
+        self.mat.setAttr("problem", problem)
+        self.x, self.b = map(self._own, mat.createVecs())
+        self.krylov = Krylov(mat)
 
 
 def make_system(name: str, problem: LubricationProblem, stages: Stages) -> System:

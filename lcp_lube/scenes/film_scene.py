@@ -12,12 +12,11 @@ from pydantic import Field, model_validator
 from ..errors import InputError
 from ..problems.facts import Facts
 from ..problems.film.effects import Effect
-from ..problems.film.exact import ExactSolution
+from ..problems.film.exact import ExactSolution, exact_solution
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model, Side
 from ..problems.film.shapes import Block, Shape, Sum
 from ..problems.film.supplies import Supply
-from ..problems.film.turned import exact_either_way
 from .balance import BalanceTable
 from .effects.named import FLUID, named
 from .scene import Count, Finite, Positive, Scene
@@ -194,4 +193,4 @@ class RectangleScene(FilmScene):
         known = self.dimension == 1 and {west.kind, east.kind} == {"open"} and getattr(model.gap, "smooth_between", False)
         if not known or model.law or model.effects or model.supplies or west.r:
             return None
-        return exact_either_way(model.gap, self.L, model.mu, self.U, west.p, east.p)
+        return exact_solution(model.gap, self.L, model.mu, self.U, west.p, east.p)

@@ -17,7 +17,8 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..base.parallel import Array
-from ..linear.krylov import Krylov, LinearSolverError
+from ..linear.krylov import LinearSolverError
+from ..linear.system import OneMatrix
 from ..problems.fold import whole_lengths
 from ..problems.semilinear import SemilinearProblem
 from ..problems.solution import Fields, Step
@@ -63,12 +64,10 @@ class PlainNewton(Method):
         x, y = ((points - o) / side for points, o, side in zip((grid.x, grid.y), grid.origin, whole_lengths(grid), strict=True))
         self._bump = (np.sin(np.pi * x) * np.sin(np.pi * y)).ravel()  # A's first eigenvector
         with stages("assembly"):
-            self.mat = problem.A.duplicate(copy=True)
-            self.mat.setAttr("problem", problem)
+            mat = problem.A.duplicate(copy=True)
             for option in (PETSc.Mat.Option.SYMMETRIC, PETSc.Mat.Option.SYMMETRY_ETERNAL):
-                self.mat.setOption(option, True)
-            self._x, self._b = self.mat.createVecs()
-            self._krylov = Krylov(self.mat)
+                mat.setOption(option, True)
+            self.system = OneMatrix(problem, stages, mat)
         self.f = problem.residual(self.v)
         self.norm = problem.reduce.norm(self.f)
         self.enough = self.options.relative * self.norm  # of ||f||
@@ -76,10 +75,6 @@ class PlainNewton(Method):
     @property
     def fields(self) -> Fields:
         return {"v": self.v}
-
-    @property
-    def krylov(self) -> Krylov:
-        return self._krylov
 
     def direction(self) -> tuple[Array, int]:
         """d and the number of linear iterations. Collective.
@@ -89,37 +84,40 @@ class PlainNewton(Method):
         LinearSolverError : breakdown, a failed factorisation, or a result that is not finite.
         NoSolutionError : climbing, and f' is not positive definite, as d or a direction inside the KSP shows.
         """
+        mat, x, b, krylov = self.system.mat, self.system.x, self.system.b, self.system.krylov
         with self.stages("Jacobian"):
-            self._x.setArray(self.problem.jacobian_diagonal(self.v))
-            self.mat.setDiagonal(self._x)
-            self.mat.assemble()
-            self._b.setArray(-self.f)
+            x.setArray(self.problem.jacobian_diagonal(self.v))
+            mat.setDiagonal(x)
+            mat.assemble()
+            b.setArray(-self.f)
         with self.stages("KSP"):
             try:
-                iterations = self.krylov.solve(self._b, self._x, self.options.eta)
+                iterations = krylov.solve(b, x, self.options.eta)
             except LinearSolverError:
                 indefinite = PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_MAT
-                if self.climbing and self.krylov.ksp.getConvergedReason() == indefinite:
+                if self.climbing and krylov.ksp.getConvergedReason() == indefinite:
                     raise self._no_solution() from None
                 raise
-        d = self._x.array_r.copy()
+        d = x.array_r.copy()
         # A KSP that stopped early gives no d that proves anything, even if it reports success.
-        self.climbing = self.climbing and self.krylov.ksp.getConvergedReason() > 0 and self._solves(d)
+        self.climbing = self.climbing and krylov.ksp.getConvergedReason() > 0 and self._solves(d)
         if self.climbing and min(self._curvature(d), self._curvature(self._bump)) < 0:
             raise self._no_solution()
         return d, iterations
 
     def _solves(self, d: Array) -> bool:
         """Whether f'(v) d + f is small against f: the KSP may have tested another norm, or lie. Collective."""
-        self._x.setArray(d)
-        self.mat.mult(self._x, self._b)
-        return self.problem.reduce.norm(self._b.array_r + self.f) <= LOOSEST * self.norm
+        return self.problem.reduce.norm(self._times(d) + self.f) <= LOOSEST * self.norm
 
     def _curvature(self, d: Array) -> float:
         """d' f'(v) d. Collective."""
-        self._x.setArray(d)
-        self.mat.mult(self._x, self._b)
-        return float(self._b.dot(self._x))
+        return self.problem.reduce.dot(self._times(d), d)
+
+    def _times(self, d: Array) -> Array:
+        """f'(v) d. Collective."""
+        self.system.x.setArray(d)
+        self.system.mat.mult(self.system.x, self.system.b)
+        return self.system.b.array_r
 
     def _no_solution(self) -> NoSolutionError:
         return NoSolutionError(f"{self.problem.source.no_solution}: f' lost its definiteness on Newton's climb from below")
@@ -130,7 +128,7 @@ class PlainNewton(Method):
         d, iterations = self.direction()
         alpha, cuts = 1.0, 0
         if not self.climbing:
-            eta = 0.0 if self.krylov.direct else self.options.eta
+            eta = 0.0 if self.system.direct else self.options.eta
             # f itself is no more accurate than this: below it nothing can be asked to decrease.
             rounding = float(np.finfo(float).eps) * problem.largest_diagonal * reduce.norm(self.v)
 
@@ -145,9 +143,3 @@ class PlainNewton(Method):
         self.norm = reduce.norm(self.f)
         enough = self.options.relative > 0 and self.norm <= self.enough
         return Step(self.norm, alpha * reduce.norm(d), alpha, iterations, 0, cuts, 0.0, self.options.eta, enough)
-
-    def destroy(self) -> None:
-        """Free the PETSc objects; a python PC must not outlive this."""
-        self.krylov.destroy()
-        for obj in (self.mat, self._x, self._b):
-            obj.destroy()

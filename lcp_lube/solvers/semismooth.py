@@ -16,7 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.parallel import Array
-from ..linear.krylov import Krylov, LinearSolverError
+from ..linear.krylov import LinearSolverError
+from ..linear.system import OneMatrix
 from ..problems.box import BoxProblem
 from ..problems.solution import Fields, Step
 from .job import Job
@@ -71,23 +72,16 @@ class Semismooth(Method):
         self.centre, self.rho = self.x, 0.0
         with stages("assembly"):
             jacobian = problem.jacobian(self.x)
-            self.mat = jacobian.duplicate(copy=True)
-            self.mat.setAttr("problem", problem)
-            self._a, self._b = self.mat.createVecs()
-            jacobian.getDiagonal(self._a)
-            size = problem.reduce.sum(np.abs(self._a.array_r)) / problem.unknowns
+            self.system = OneMatrix(problem, stages, jacobian.duplicate(copy=True))
+            jacobian.getDiagonal(self.system.x)
+            size = problem.reduce.sum(np.abs(self.system.x.array_r)) / problem.unknowns
             self._rho0 = size if 0 < size < np.inf else 1.0
-            self._krylov = Krylov(self.mat)
         self._begin()
         self.norm = self._natural()
 
     @property
     def fields(self) -> Fields:
         return {"v": np.clip(self.x, self.problem.lower, self.problem.upper)}
-
-    @property
-    def krylov(self) -> Krylov:
-        return self._krylov
 
     def _natural(self) -> float:
         x = self.fields["v"]
@@ -115,23 +109,23 @@ class Semismooth(Method):
 
     def _direction(self, phi: Array, D_x: Array, D_F: Array) -> tuple[Array, float, int]:
         """d, the slope of ||Phi||^2/2 along it, and the number of linear iterations. Collective."""
-        reduce, mat = self.problem.reduce, self.mat
+        reduce, mat, x, b = self.problem.reduce, self.system.mat, self.system.x, self.system.b
         with self.stages("Jacobian"):
             self.problem.jacobian(self.x).copy(mat, structure=mat.Structure.SAME_NONZERO_PATTERN)
-            self._a.setArray(D_F)
-            mat.diagonalScale(self._a, None)
-            mat.getDiagonal(self._b)
-            self._b.setArray(self._b.array_r + D_x + self.rho * D_F)
-            mat.setDiagonal(self._b)
+            x.setArray(D_F)
+            mat.diagonalScale(x, None)
+            mat.getDiagonal(b)
+            b.setArray(b.array_r + D_x + self.rho * D_F)
+            mat.setDiagonal(b)
             mat.assemble()
-            self._b.setArray(phi)
-            mat.multTranspose(self._b, self._a)
-            gradient = self._a.array_r.copy()
+            b.setArray(phi)
+            mat.multTranspose(b, x)
+            gradient = x.array_r.copy()
         with self.stages("KSP"):
             try:
-                self._b.setArray(-phi)
-                iterations = self.krylov.solve(self._b, self._a, self.options.rtol)
-                d = self._a.array_r.copy()
+                b.setArray(-phi)
+                iterations = self.system.krylov.solve(b, x, self.options.rtol)
+                d = x.array_r.copy()
                 slope = reduce.dot(gradient, d)
                 if slope <= -DESCENT * reduce.norm(d) ** 2.1:
                     return d, slope, iterations
@@ -181,9 +175,3 @@ class Semismooth(Method):
                     f"residual {self.norm:.1e}, and rho has risen by more than {o.rho_max:g} (semismooth.rho_max)"
                 )
             self._begin()
-
-    def destroy(self) -> None:
-        """Free the PETSc objects; a python PC must not outlive this."""
-        self.krylov.destroy()
-        for obj in (self.mat, self._a, self._b):
-            obj.destroy()

@@ -24,27 +24,18 @@ It holds for any number of minima, jumps and cavities, for a cavity that reaches
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...base.parallel import Array
 from ...errors import InputError
+from .views import MirroredFilm
 
 Indices = NDArray[np.intp]
-
-
-class Film(Protocol):
-    """What the exact solution asks of a film."""
-
-    def __call__(self, x: ArrayLike, y: ArrayLike | None = None, /) -> Array:
-        """Return h (m) at x and y (m), with the broadcast shape of both."""
-
-    def breakpoints(self) -> tuple[float, ...]:
-        """Return the x (m) of all jumps, kinks and extrema: in between, h is smooth and monotone."""
 
 
 _XI, _WEIGHT = np.polynomial.legendre.leggauss(16)
@@ -57,16 +48,11 @@ class ExactSolution:
 
     Attributes
     ----------
-    rupture : float or None
-        Where the (first) cavity begins (m); None in a full film.
-    reformation : float or None
-        Where it ends (m); None if there is none, or if it reaches the outlet.
-    Q : float
-        Flux per unit width (m2/s) of U h (1 - r) - alpha p'; half of it flows if one wall moves with U.
-    p_max, x_max : float
-        Greatest pressure (Pa) and the place of it (m).
-    load : float
-        Integral of p over [0, L] (N/m).
+    rupture : where the (first) cavity begins (m); None in a full film.
+    reformation : where it ends (m); None if there is none, or if it reaches the outlet.
+    Q : flux per unit width (m2/s) of U h (1 - r) - alpha p'; half of it flows if one wall moves with U.
+    p_max, x_max : greatest pressure (Pa) and its place (m).
+    load : integral of p over [0, L] (N/m).
     """
 
     rupture: float | None
@@ -75,21 +61,23 @@ class ExactSolution:
     p_max: float
     x_max: float
     load: float
-    _film: Film = field(repr=False, compare=False)
+    _film: Any = field(repr=False, compare=False)
     _mu: float = field(repr=False, compare=False)
     _U: float = field(repr=False, compare=False)
     _x: Array = field(repr=False, compare=False)  # panel ends, shape (n,)
     _p: Array = field(repr=False, compare=False)  # pressure there
+    _moving: "ExactSolution | None" = field(default=None, repr=False, compare=False)  # of the mirror image, where U < 0
 
     def p(self, x: ArrayLike) -> Array:
         """Return the pressure (Pa) at x (m), in the shape of x.
 
         Raises
         ------
-        InputError
-            If a point lies outside [0, L].
+        InputError : a point lies outside [0, L].
         """
         x = np.asarray(x, dtype=float)
+        if self._moving is not None:
+            return self._moving.p(self._x[-1] - x)
         L = self._x[-1]
         if not np.all((x >= -1e-12 * L) & (x <= (1 + 1e-12) * L)):  # grids round; NaN fails too
             raise InputError(f"x = {x.min()} .. {x.max()}: must be within 0 .. {L} (m)")
@@ -100,6 +88,8 @@ class ExactSolution:
     def r(self, x: ArrayLike) -> Array:
         """Return the void fraction (-) at x (m), in the shape of x; it raises what `p` raises."""
         x = np.asarray(x, dtype=float)
+        if self._moving is not None:
+            return self._moving.r(self._x[-1] - x)
         p = self.p(x)
         if self.rupture is None:
             return np.zeros_like(p)
@@ -111,42 +101,35 @@ class ExactSolution:
         return 6 * self._mu * (self._U * h - self.Q) / h**3
 
 
-def exact_solution(film: Film, L: float, mu: float, U: float, p_a: float, p_b: float) -> ExactSolution:
+def exact_solution(film: Any, L: float, mu: float, U: float, p_a: float, p_b: float) -> ExactSolution:
     """Solve the 1D cavitation problem exactly, to quadrature of nearly machine precision.
+
+    Theory in the head of this file. Rounding leaves an error of some 1e-14 of 6 mu U L/h_min^2 in p, so a film ratio of
+    1 + 1e-6 leaves fewer digits than one of 2.
 
     Parameters
     ----------
-    film : Film
-        Thickness (m), piecewise smooth and monotone between its breakpoints; jumps are allowed there.
-    L : float
-        Length (m).
-    mu, U : float
-        Viscosity (Pa s), positive, and speed of the wall (m/s), not negative; at U = 0 nothing ruptures.
-    p_a, p_b : float
-        Pressures at x = 0 and x = L above the cavitation pressure (Pa), not negative.
-
-    Returns
-    -------
-    ExactSolution
+    film : h(x) (m), smooth and monotone between the places (m) that its `breakpoints()` gives; jumps are allowed there.
+    L, mu : length (m) and viscosity (Pa s), positive.
+    U : speed of the wall (m/s); at U = 0 nothing ruptures, and where it is negative the mirror image is solved.
+    p_a, p_b : pressures at x = 0 and x = L above the cavitation pressure (Pa), not negative.
 
     Raises
     ------
-    InputError
-        If a number is out of its range, or the film not positive or not smooth between its breakpoints.
-
-    Notes
-    -----
-    Theory in the head of this file. Rounding leaves an error of some 1e-14 of 6 mu U L/h_min^2 in p, so a film ratio
-    of 1 + 1e-6 leaves fewer digits than one of 2.
+    InputError : a number out of its range, or a film that is not positive or not smooth between its breakpoints.
     """
     for name, value in {"L": L, "mu": mu}.items():
         if not 0 < value < math.inf:
             raise InputError(f"{name} = {value}: must be positive and finite")
-    if not 0 <= U < math.inf:
-        raise InputError(f"U = {U}: must be positive and finite, or 0; `turned.exact_either_way` takes the other sign")
+    if not math.isfinite(U):
+        raise InputError(f"U = {U}: must be finite")
     for name, value in {"p_a": p_a, "p_b": p_b}.items():
         if not 0 <= value < math.inf:
             raise InputError(f"{name} = {value}: must be finite and not negative (Pa above the cavitation pressure)")
+    if U < 0:
+        moving = exact_solution(MirroredFilm(film, L), L, mu, -U, p_b, p_a)
+        rupture, reformation = (None if at is None else L - at for at in (moving.rupture, moving.reformation))
+        return replace(moving, rupture=rupture, reformation=reformation, Q=-moving.Q, x_max=L - moving.x_max, _moving=moving)
 
     x = _panels(film, L)
     Q, rupture = _flux(film, x, mu, U, p_a, p_b)
@@ -186,7 +169,7 @@ def exact_solution(film: Film, L: float, mu: float, U: float, p_a: float, p_b: f
     )
 
 
-def _flux(film: Film, x: Array, mu: float, U: float, p_a: float, p_b: float) -> tuple[float, float | None]:
+def _flux(film: Any, x: Array, mu: float, U: float, p_a: float, p_b: float) -> tuple[float, float | None]:
     """Return Q (m2/s) and the rupture point (m) or None: the minimum of M(x), see the head of this file."""
 
     def J_F(a: Array, b: Array) -> tuple[Array, Array]:
@@ -221,7 +204,7 @@ def _flux(film: Film, x: Array, mu: float, U: float, p_a: float, p_b: float) -> 
     return (Q_full, None) if Q_full <= Q * (1 + _TIE) else (Q, rupture)
 
 
-def _panels(film: Film, L: float) -> Array:
+def _panels(film: Any, L: float) -> Array:
     """Return ends of panels on which 16 Gauss points integrate h^-3 to rounding, shape (n,), from 0 to L."""
     pieces = np.unique([0.0, *(s for s in film.breakpoints() if 0 < s < L), L])
     few = len(pieces) <= 1000  # the pieces of a long profile are short enough by themselves

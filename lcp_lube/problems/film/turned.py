@@ -6,18 +6,17 @@ rupture being where the moving fluid leaves the full film.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ...base.parallel import Array
 from ..certificate import Certificate
 from ..grid import Grid
 from ..solution import Fields
 from ..transfer import Pick
-from .exact import ExactSolution, exact_solution
+from .exact import ExactSolution
 from .lubrication import LubricationProblem
 from .views import MirroredFilm
 
@@ -106,33 +105,3 @@ class TurnedProblem(LubricationProblem):
         self._there.destroy()
         super().destroy()
         self.moving.destroy()
-
-
-@dataclass(frozen=True)
-class TurnedExact(ExactSolution):
-    """The exact solution of a film from that of its mirror image."""
-
-    _moving: Any = None
-
-    @classmethod
-    def of(cls, moving: ExactSolution, L: float) -> "TurnedExact":
-        def place(x: float | None) -> float | None:
-            return None if x is None else L - x
-
-        data = {name: getattr(moving, name) for name in ("p_max", "load", "_mu", "_x", "_p")}
-        fronts = {name: place(getattr(moving, name)) for name in PLACES}
-        more = {"_film": MirroredFilm(moving._film, L), "_U": -moving._U, "_moving": moving}
-        return cls(**data, **fronts, Q=-moving.Q, x_max=L - moving.x_max, **more)  # type: ignore[arg-type]
-
-    def p(self, x: ArrayLike) -> Array:
-        return self._moving.p(self._x[-1] - np.asarray(x, dtype=float))
-
-    def r(self, x: ArrayLike) -> Array:
-        return self._moving.r(self._x[-1] - np.asarray(x, dtype=float))
-
-
-def exact_either_way(film: Any, L: float, mu: float, U: float, p_a: float, p_b: float) -> ExactSolution:
-    """`exact_solution` for any U: where it is negative, by the mirror image."""
-    if not U < 0:
-        return exact_solution(film, L, mu, U, p_a, p_b)
-    return TurnedExact.of(exact_solution(MirroredFilm(film, L), L, mu, -U, p_b, p_a), L)
