@@ -109,8 +109,7 @@ class JournalScene(LubricationScene):
 
     def bearing_numbers(self, values: dict[str, Any]) -> dict[str, Any]:
         """Sommerfeld number W psi^2/(B D mu omega), and in 2D the side leakage as Q/((D/2)^3 psi omega)."""
-        width = self.width if self.dimension == 2 and self.width else 1.0
-        numbers = {"sommerfeld": values["load"] * self.psi**2 / (width * self.D * self.mu_0 * self.omega)}
+        numbers = {"sommerfeld": self.turning.numbers(values["load"], self.mu_0, self.eccentricity)["sommerfeld"]}
         if self.dimension == 2:
             numbers["side_leakage_number"] = values["side_leakage"] / ((0.5 * self.D) ** 3 * self.psi * self.omega)
         return numbers

@@ -1,7 +1,7 @@
 """Thrust bearings: equal sectors side by side, one of which is solved in polar coordinates."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -19,29 +19,19 @@ from .units import measured, metres
 
 
 @dataclass(frozen=True)
-class _Times:
-    """A shape times a number."""
-
-    by: float
-    shape: Shape
-
-    def __call__(self, x: Array, y: Array) -> Array:
-        return self.by * self.shape(x, y)
-
-
-@dataclass(frozen=True)
 class _Tilt:
     """Rise of a sector's point, by its arc x at the mean radius and y beyond the inner one, about the radius at `at`; about the
-    circle of radius `about` if that is given."""
+    circle of radius `about` if that is given. by : the angle, rad."""
 
     inner: float
     mean: float
     at: float
     about: float | None = None
+    by: float = 1.0
 
     def __call__(self, x: Array, y: Array) -> Array:
         radius, angle = self.inner + y, x / self.mean - self.at
-        return -radius * np.sin(angle) if self.about is None else radius * np.cos(angle) - self.about
+        return self.by * (-radius * np.sin(angle) if self.about is None else radius * np.cos(angle) - self.about)
 
 
 class ThrustScene(WithEffects):
@@ -155,11 +145,11 @@ class ThrustScene(WithEffects):
             parts.append(SpiralGrooves(self.taper, self.pads, angle, self.ratio, between, self.radii))
         if self.pivot_part is not None:
             pitch, roll = self.tilt_modes
-            parts += [_Times(self.pitch or 0.0, pitch), _Times(self.roll or 0.0, roll)]
+            parts += [replace(pitch, by=self.pitch or 0.0), replace(roll, by=self.roll or 0.0)]
         return Sum([*parts, *(table.part(self.extent) for table in self.film)])
 
     @property
-    def tilt_modes(self) -> tuple[Shape, Shape]:
+    def tilt_modes(self) -> tuple[Any, Any]:
         """dh of a tilt about the radius through the pivot that opens the inlet, and of one that opens the outer radius."""
         (L, _), (inner, mean) = self.side_lengths, self.radii
         at, radius = (self.pivot_part or 0.0) * L / mean, self.pivot_radius or mean
