@@ -16,7 +16,7 @@ from .fold import folded_axes, part_grid, part_shape, whole_lengths, whole_shape
 from .grid import Grid
 from .semilinear import Bratu, SemilinearProblem, Surface
 from .solution import Fields, Outcome
-from .transfer import Transfer
+from .transfer import Transfer, interpolated
 
 # Largest lambda for which -Lap v = lambda e^v, v = 0 on the boundary of the unit square, has a solution; the five-point
 # formula's is smaller by 1.5 h^2 (6.80674, 6.80777, 6.80803 for n = 32, 64, 128).
@@ -165,9 +165,7 @@ class ObstacleProblem(BoxProblem):
         if self.homogeneous:
             v = self._interpolation(coarse.grid)(fields["v"])
         else:
-            transfer = Transfer(coarse.grid, self.grid)
-            v = transfer(fields["v"])
-            transfer.destroy()
+            v = interpolated(coarse.grid, self.grid, fields["v"])
         return {"v": np.clip(v, self.lower, self.upper)}
 
     def destroy(self) -> None:

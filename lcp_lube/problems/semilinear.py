@@ -16,7 +16,7 @@ from .film.reynolds import sides
 from .fold import FOLDED
 from .grid import Grid
 from .solution import Fields
-from .transfer import Transfer
+from .transfer import interpolated
 
 Surface = Callable[[Array, Array], Array]
 
@@ -228,10 +228,7 @@ class SemilinearProblem:
 
     def prolong(self, coarse: "SemilinearProblem", fields: Fields, interior: bool) -> Fields:
         """v from a coarser grid, interpolated bilinearly. Collective."""
-        transfer = Transfer(coarse.grid, self.grid)
-        v = transfer(fields["v"])
-        transfer.destroy()
-        return {"v": v}
+        return {"v": interpolated(coarse.grid, self.grid, fields["v"])}
 
     def destroy(self) -> None:
         """Free the PETSc objects. Collective."""

@@ -71,6 +71,14 @@ class Transfer:
         self._own.free()
 
 
+def interpolated(coarse: Grid, fine: Grid, field: Array) -> Array:
+    """A field of `coarse` on `fine`. Collective."""
+    transfer = Transfer(coarse, fine)
+    values = transfer(field)
+    transfer.destroy()
+    return values
+
+
 def _weights(points: np.ndarray, coarse: Grid, fine: Grid, side: int, zero_boundary: bool) -> "csr_matrix":
     """Linear interpolation along one side as a matrix, a row for each of the fine points, a column for each coarse one."""
     from scipy.sparse import csr_matrix

@@ -7,11 +7,9 @@ from functools import lru_cache
 import numpy as np
 
 from ..base.parallel import Array
-from ..linear.system import System, make_system
-from ..problems.film.lubrication import LubricationProblem
-from ..problems.solution import Fields, Step
+from ..problems.solution import Step
 from .job import Job
-from .method import Method, constant_or
+from .method import PairMethod
 from .method_options import MethodOptions, one_of, option, part, positive
 from .steplength import Centrality, feasible, halve_until, inexact_decrease, reduction
 
@@ -65,28 +63,17 @@ class DinOptions(MethodOptions):
     inner: str = one_of("relative", ("relative", "residual"))
 
 
-class DIN(Method):
+class DIN(PairMethod):
     """The iterates and steps of DIN; `newton.iterate` runs it."""
 
     Options: type[MethodOptions] = DinOptions
-    problem: LubricationProblem
-    system: System
-
     state: tuple[str, ...] = ("p", "r", "F1", "norm", "central.tau1", "central.tau2")  # what a step starts from
 
     def __init__(self, job: Job):
-        super().__init__(job, tol_min=job.inner_floor)
-        problem, o = self.problem, self.options
-        self.system = make_system(job.system, problem, self.stages)
-        self.p, self.r = constant_or(job.start, problem.grid.local_size, o.p0, o.r0)
-        self.F1 = problem.flow(self.p, self.r)
-        reduce = problem.reduce
-        self.central = Centrality(reduce, self.p * self.r, problem.size, reduce.norm(self.F1), o.gamma)
-        self.norm = reduce.norm(self.F1, self.p * self.r)
-
-    @property
-    def fields(self) -> Fields:
-        return {"p": self.p, "r": self.r}
+        super().__init__(job)
+        reduce, products = self.problem.reduce, self.p * self.r
+        self.central = Centrality(reduce, products, self.problem.size, reduce.norm(self.F1), self.options.gamma)
+        self.norm = reduce.norm(self.F1, products)
 
     def forcing(self, sigma: float) -> float:
         """delta_k of the inner solves, at most 0.1 and small enough for (31), sigma_k > delta_k max(...)."""

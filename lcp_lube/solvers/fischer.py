@@ -10,11 +10,9 @@ from functools import lru_cache
 import numpy as np
 
 from ..base.parallel import Array
-from ..linear.system import System, make_system
-from ..problems.film.lubrication import LubricationProblem
-from ..problems.solution import Fields, Step
+from ..problems.solution import Step
 from .job import Job
-from .method import Method, constant_or
+from .method import PairMethod
 from .method_options import MethodOptions, option, part
 from .steplength import StepLengthError, armijo, halve_until, inexact_decrease
 
@@ -70,28 +68,19 @@ class ArmijoOptions(FischerOptions):
     method = "fbn-a"
 
 
-class FischerNewton(Method):
+class FischerNewton(PairMethod):
     """The iterates and steps of FBN; `newton.iterate` runs it.
 
     A step is halved until a merit function falls enough: ||F~|| as an inexact Newton step must make it (FBN-I).
     """
 
     Options: type[MethodOptions] = InexactOptions
-    problem: LubricationProblem
-    system: System
     state: tuple[str, ...] = ("p", "r", "F1", "F2", "norm")
 
     def __init__(self, job: Job):
-        super().__init__(job, tol_min=job.inner_floor)
-        problem, o = self.problem, self.options
-        self.system = make_system(job.system, problem, self.stages)
-        self.p, self.r = constant_or(job.start, problem.grid.local_size, o.p0, o.r0)
-        self.F1, self.F2 = problem.flow(self.p, self.r), fischer_burmeister(self.p, self.r)
-        self.norm = problem.reduce.norm(self.F1, self.F2)
-
-    @property
-    def fields(self) -> Fields:
-        return {"p": self.p, "r": self.r}
+        super().__init__(job)
+        self.F2 = fischer_burmeister(self.p, self.r)
+        self.norm = self.problem.reduce.norm(self.F1, self.F2)
 
     def advance(self) -> Step:
         """One step: the Newton direction of F~, then alpha = 1 halved until the merit function falls enough."""

@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..base.parallel import Array
 from ..linear.krylov import Krylov
+from ..linear.system import System, make_system
 from ..problems.certificate import Certificate
 from ..problems.solution import Fields, Step
 from .method_options import MethodOptions, make_options
 
 if TYPE_CHECKING:
+    from ..problems.film.lubrication import LubricationProblem
     from .job import Job
 
 
@@ -63,6 +64,20 @@ class Method:
             self.system.destroy()
 
 
-def constant_or(start: Fields | None, n: int, p0: float, r0: float) -> tuple[Array, Array]:
-    """p and r of a start, or p0 and r0 at all n points of this rank."""
-    return (start["p"].copy(), start["r"].copy()) if start else (np.full(n, p0), np.full(n, r0))
+class PairMethod(Method):
+    """A method for films whose iterates are p and r, by a linear system: from a start, or from p0 and r0 at every point."""
+
+    problem: LubricationProblem
+    system: System
+
+    def __init__(self, job: Job):
+        super().__init__(job, tol_min=job.inner_floor)
+        problem, start, n = self.problem, job.start, self.problem.grid.local_size
+        self.system = make_system(job.system, problem, self.stages)
+        self.p = start["p"].copy() if start else np.full(n, self.options.p0)
+        self.r = start["r"].copy() if start else np.full(n, self.options.r0)
+        self.F1 = problem.flow(self.p, self.r)
+
+    @property
+    def fields(self) -> Fields:
+        return {"p": self.p, "r": self.r}

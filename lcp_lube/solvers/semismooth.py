@@ -20,6 +20,7 @@ from ..linear.krylov import LinearSolverError
 from ..linear.system import OneMatrix
 from ..problems.box import BoxProblem
 from ..problems.solution import Fields, Step
+from .fischer import derivatives
 from .job import Job
 from .method import Method
 from .method_options import MethodOptions, least, option, part
@@ -47,13 +48,12 @@ class SemismoothOptions(MethodOptions):
 
 
 def fischer(a: Array, b: Array) -> tuple[Array, Array, Array]:
-    """phi(a, b) without cancellation, and the two derivatives; at a = b = 0 those along a = b."""
+    """phi(a, b) without cancellation, and the two derivatives; the other sign than `fischer.fischer_burmeister`."""
     r = np.hypot(a, b)
     total = a + b
     with np.errstate(invalid="ignore", divide="ignore"):
-        phi = np.where(total > 0, 2.0 * a * (b / (total + r)), total - r)
-        along = np.sqrt(0.5)
-        return phi, 1.0 - np.where(r > 0, a / r, along), 1.0 - np.where(r > 0, b / r, along)
+        by_a, by_b = derivatives(a, b)
+        return np.where(total > 0, 2.0 * a * (b / (total + r)), total - r), -by_a, -by_b
 
 
 class Semismooth(Method):
