@@ -21,7 +21,7 @@ from .assembly import assemble
 from .cavity import cavity_sign
 from .contact import areas
 from .effects import Answer, around, framed_by
-from .flows import line_weights, point_weights, sheared_faces
+from .flows import line_weights, point_weights, sheared_faces, volume_unit
 from .forces import open_pressures
 from .reynolds import sides
 
@@ -61,7 +61,7 @@ def carried(at: Answer) -> Carried:
     problem, grid = at.problem, at.grid
     s, box = problem.scheme, at.grid.box
     dy = grid.spacing[1] if grid.dim == 2 else 1.0
-    unit = 0.5 * dy * s.flow_unit  # the equations have twice the volume flows
+    unit = volume_unit(problem)
     held = holders(at)
     free = ~np.logical_or.reduce(held).reshape(box) if held else np.ones(box, dtype=bool)
     p, r = at.p.reshape(box), at.r.reshape(box)
@@ -134,8 +134,7 @@ def _shear(at: Answer, dy: float, other_free: list[Any]) -> tuple[Array, Array]:
         inner = np.where(is_free, 0.5, 1.0) * (h[0] + share / h[1])
         at_wall = 0.5 * np.where(full, 4.0, 1.0 - r) / s.h
         shear = shear + dx * mu * np.where(wall, at_wall, inner)
-    unit = 0.5 * dy * s.flow_unit
-    return rows * shear, unit * (s.couette_E + s.b_C * r)
+    return rows * shear, volume_unit(problem) * (s.couette_E + s.b_C * r)
 
 
 @dataclass(frozen=True)

@@ -33,6 +33,11 @@ def stream_weights(grid: Grid) -> Array:
     return line_weights(grid) * grid.stretch(grid.y)
 
 
+def volume_unit(problem: LubricationProblem) -> float:
+    """Volume flow, m3/s (1D: m2/s), of one of the scheme's units: its equations have twice the volume's flows."""
+    return 0.5 * problem.scheme.flow_unit * (problem.grid.spacing[1] if problem.grid.dim == 2 else 1.0)
+
+
 def side_flows(problem: LubricationProblem, p: Array, r: Array) -> dict[str, float]:
     """Volume flow out of the film through each side, m3/s (1D: m2/s); their sum is zero. Collective.
 

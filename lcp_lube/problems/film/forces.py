@@ -39,66 +39,81 @@ def forces(problem: LubricationProblem, p_pa: Array, known: Known | None = None)
     integral of (p - p_ambient) (cos phi, sin phi), `load` its magnitude, `attitude_deg` the angle from the load, which is
     its opposite, to the narrowest gap, positive in the sense of rotation, `moment` of the force about the middle of the width:
     its two parts times the distance along the axis (2D), 0 where the shaft lies straight between alike ends. A sector: `load`,
-    `moment` about the axes through the centre, and `pressure_centre` (`_of_sector`).
+    `moment` about the axes through the centre, and `pressure_centre`, the radius and angle at which the load acts.
 
     Parameters
     ----------
     p_pa : owned points, Pa above p_c. known : of a line, from which follows what the grid gets wrong.
     """
-    grid, shaft, reference = problem.grid, problem.shaft, ambient(problem)
-    middle = [start + 0.5 * length for start, length in zip(grid.origin, grid.lengths, strict=False)]
+    grid, shaft, reference, of = problem.grid, problem.shaft, ambient(problem), weights(problem)
 
-    def over(
-        weight: Weight, whole: Callable[[Array], Array] = np.asarray, above: float = reference, touching: Any = problem.contact
-    ) -> float:
-        """Of a weight; on a line `whole` is its antiderivative."""
-        found = integral(problem, p_pa, above, weight)
-        found += touching.total(problem, weight) if touching else 0.0
+    def over(name: str, above: float, touching: Any) -> float:
+        found = integral(problem, p_pa, above, of[name])
+        found += touching.total(problem, of[name]) if touching else 0.0
         if known is None:
             return found
-        return found + (known.line.integral(whole, above) - integral(problem, known.p_pa, above, weight))
+        along = known.line.integral(antiderivative(problem, name), above)
+        return found + (along - integral(problem, known.p_pa, above, of[name]))
 
-    out: dict[str, Any] = {"pressure_integral": over(lambda x, y: np.ones(1), above=0.0, touching=None)}
-    if shaft is None and grid.polar is not None:
-        return out | _of_sector(grid.polar, over)
+    out: dict[str, Any] = {"pressure_integral": over("pressure_integral", 0.0, None)}
+    found = {name: over(name, reference, problem.contact) for name in of if name != "pressure_integral"}
     if shaft is None:
-        out["load"] = over(lambda x, y: np.ones(1))
-        about_y = -over(lambda x, y: x - middle[0], lambda x: 0.5 * (x - middle[0]) ** 2)
-        out["moment"] = [over(lambda x, y: y - middle[1]), about_y] if grid.dim == 2 else about_y
-        return out
-
-    R, phi = shaft.R, shaft.theta
-    force = [
-        -over(lambda x, y: np.cos(phi(x)), lambda x: R * np.sin(phi(x))),
-        -over(lambda x, y: np.sin(phi(x)), lambda x: -R * np.cos(phi(x))),
-    ]
-    out |= {"load": hypot(*force), "force": force, "attitude_deg": None}
-    if shaft.widest is not None and 0 < out["load"] < inf:
-        out["attitude_deg"] = attitude(shaft.widest, force, problem.U)
-    if grid.dim == 2:
-        out["moment"] = [
-            -over(lambda x, y: (y - middle[1]) * np.cos(phi(x))),
-            -over(lambda x, y: (y - middle[1]) * np.sin(phi(x))),
-        ]
+        out["load"] = found["load"]
+    else:
+        force = [found["force_x"], found["force_y"]]
+        out |= {"load": hypot(*force), "force": force, "attitude_deg": None}
+        if shaft.widest is not None and 0 < out["load"] < inf:
+            out["attitude_deg"] = attitude(shaft.widest, force, problem.U)
+    if "moment" in found:
+        out["moment"] = found["moment"]
+    elif "moment_x" in found:
+        out["moment"] = moment = [found["moment_x"], found["moment_y"]]
+        if shaft is None and grid.polar is not None:
+            degrees = float(np.degrees(np.arctan2(moment[0], -moment[1])))
+            out["pressure_centre"] = [hypot(*moment) / out["load"], degrees] if out["load"] > 0 else None
     return out
+
+
+def weights(problem: LubricationProblem) -> dict[str, Weight]:
+    """By what the pressure is multiplied in its integrals, functions of x and y.
+
+    Moments of a sector are about its centre, x along the edge where it begins, y a quarter of a turn ahead.
+    """
+    grid, shaft = problem.grid, problem.shaft
+    middle = [start + 0.5 * length for start, length in zip(grid.origin, grid.lengths, strict=False)]
+    found: dict[str, Weight] = {"pressure_integral": lambda x, y: np.ones(1)}
+    if shaft is not None:
+        phi = shaft.theta
+        found |= {"force_x": lambda x, y: -np.cos(phi(x)), "force_y": lambda x, y: -np.sin(phi(x))}
+        if grid.dim == 2:
+            found["moment_x"] = lambda x, y: -(y - middle[1]) * np.cos(phi(x))
+            found["moment_y"] = lambda x, y: -(y - middle[1]) * np.sin(phi(x))
+        return found
+    found["load"] = found["pressure_integral"]
+    if grid.polar is not None:
+        inner, on = grid.polar
+        found["moment_x"] = lambda x, y: (inner + y) * np.sin(x / on)
+        found["moment_y"] = lambda x, y: -(inner + y) * np.cos(x / on)
+    elif grid.dim == 2:
+        found |= {"moment_x": lambda x, y: y - middle[1], "moment_y": lambda x, y: -(x - middle[0])}
+    else:
+        found["moment"] = lambda x, y: -(x - middle[0])
+    return found
+
+
+def antiderivative(problem: LubricationProblem, name: str) -> Callable[[Array], Array]:
+    """Of a line's weight, by x."""
+    if problem.shaft is not None and name != "pressure_integral":
+        R, phi = problem.shaft.R, problem.shaft.theta
+        return (lambda x: -R * np.sin(phi(x))) if name == "force_x" else lambda x: R * np.cos(phi(x))
+    middle = problem.grid.origin[0] + 0.5 * problem.grid.lengths[0]
+    return (lambda x: -0.5 * (x - middle) ** 2) if name == "moment" else np.asarray
 
 
 def attitude(widest: float, force: Sequence[float], U: float) -> float:
     """Angle from the load to the narrowest gap, degrees, positive in the sense of rotation."""
     behind = np.exp(1j * widest) / complex(*force)  # of the opposites of both
     return float(np.degrees(np.angle(behind if U >= 0 else np.conj(behind))))
-
-
-def _of_sector(polar: tuple[float, float], integral: Callable[..., float]) -> dict[str, Any]:
-    """Load of a sector, its moment about the axes through the centre, x along the edge where it begins, y a quarter of a turn
-    ahead, and the radius and angle at which the load acts."""
-    inner, on = polar
-    load = integral(lambda x, y: np.ones(1))
-    moment = [integral(lambda x, y: (inner + y) * np.sin(x / on)), -integral(lambda x, y: (inner + y) * np.cos(x / on))]
-    centre = None
-    if load > 0:
-        centre = [hypot(*moment) / load, float(np.degrees(np.arctan2(moment[0], -moment[1])))]
-    return {"load": load, "moment": moment, "pressure_centre": centre}
 
 
 def integral(problem: LubricationProblem, p_pa: Array, above: float, weight: Weight) -> float:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ...base.parallel import Array
 from ..certificate import Certificate, certificate_tol
 from ..solution import Fields
+from .flows import volume_unit
 from .lubrication import LubricationProblem
 
 
@@ -63,9 +64,7 @@ class GroovedProblem(LubricationProblem):
 
     def groove_flows(self, p: Array, r: Array) -> list[float]:
         """Volume flow that each groove gives to the film, m3/s (1D: m2/s). Collective."""
-        balance = self.face_flows(p, r)
-        dy = self.grid.spacing[1] if self.grid.dim == 2 else 1.0
-        unit = 0.5 * dy * self.scheme.flow_unit
+        balance, unit = self.face_flows(p, r), volume_unit(self)
         return [unit * self.reduce.sum(np.where(inside, balance, 0.0)) for inside in self.columns]
 
     def certify(self, fields: Fields, eps1: float) -> Certificate:

@@ -4,7 +4,7 @@ Load, force, moments, friction and flows are linear in p and r as long as no cel
 pressure is that of one point. Whatever else is asked for is a function of these numbers (`drivers.gradient`).
 """
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from ...base.parallel import Array
 from .cavity import cavity_sign
 from .effects import around
-from .flows import friction, line_weights, point_weights, sheared_faces, side_flows
-from .forces import forces
+from .flows import friction, line_weights, point_weights, sheared_faces, side_flows, volume_unit
+from .forces import forces, weights
 from .grooves import GroovedProblem
 from .lubrication import LubricationProblem
 from .peak import Window
@@ -99,24 +99,8 @@ def slope(problem: LubricationProblem, tangent: Tangent, p: Array, r: Array, nam
         return _flow(problem, tangent, name.removeprefix("flow_"))
     if name.startswith(("groove_flow_", "supply_flow_")):
         return _given(problem, tangent, giving(problem, name))
-    grid, shaft = problem.grid, problem.shaft
-    middle = [start + 0.5 * length for start, length in zip(grid.origin, grid.lengths, strict=False)]
-    x, y = grid.x, grid.y
-    weights: dict[str, Callable[[], Array]] = {
-        "pressure_integral": lambda: np.ones((1, 1)),
-        "load": lambda: np.ones((1, 1)),
-        "moment": lambda: -(x - middle[0]),
-    }
-    if shaft is not None:
-        angle = shaft.theta(x)
-        weights |= {"force_x": lambda: -np.cos(angle), "force_y": lambda: -np.sin(angle)}
-        weights |= {"moment_x": lambda: -(y - middle[1]) * np.cos(angle), "moment_y": lambda: -(y - middle[1]) * np.sin(angle)}
-    elif grid.polar is not None:
-        inner, on = grid.polar
-        weights |= {"moment_x": lambda: (inner + y) * np.sin(x / on), "moment_y": lambda: -(inner + y) * np.cos(x / on)}
-    else:
-        weights |= {"moment_x": lambda: y - middle[1], "moment_y": lambda: -(x - middle[0])}
-    w = np.broadcast_to(weights[name](), grid.box).ravel() * point_weights(grid)
+    grid = problem.grid
+    w = np.broadcast_to(weights(problem)[name](grid.x, grid.y), grid.box).ravel() * point_weights(grid)
     return Slope(w * grid.cell * problem.p_unit, np.zeros(w.size))
 
 
@@ -192,14 +176,14 @@ def _flow(problem: LubricationProblem, tangent: Tangent, side: str) -> Slope:
             carried, entered = (np.where(at[way] & at[end], strip, 0.0) for way in ("east", "west"))
             dp = dp + leaves * carried * tangent.carried + enters * entered * tangent.entering
             dr = dr + leaves * carried * s.b_C
-    size = 0.5 * s.flow_unit * (grid.spacing[1] if grid.dim == 2 else 1.0)
+    size = volume_unit(problem)
     return Slope((size * dp).ravel(), (size * dr).ravel())
 
 
 def _given(problem: LubricationProblem, tangent: Tangent, cells: NDArray[np.bool_]) -> Slope:
     """Of what some cells give to the film: the sum of their balances, were they not held."""
     grid, s = problem.grid, problem.scheme
-    size = 0.5 * s.flow_unit * (grid.spacing[1] if grid.dim == 2 else 1.0)
+    size = volume_unit(problem)
     rows = np.where(cells.reshape(grid.box), size, 0.0)
     dp = rows * sum(tangent.own)
     east, west, north, south = 1, 0, 3, 2  # of `around`: a row's part by its neighbour's p is that neighbour's
