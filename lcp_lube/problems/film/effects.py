@@ -8,7 +8,7 @@ and with whatever solves the film. `drivers.coupling` finds the fields that repr
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,7 +62,7 @@ class Effect:
     would have to remember of earlier times in a film that moves; empty: its law is local in time.
     """
 
-    channels: tuple[str, ...] = ("viscosity",)
+    channels: ClassVar[tuple[str, ...]] = ("viscosity",)
     even = True
     keeps = ""
 
@@ -257,7 +257,7 @@ class Compressible(Effect):
     """Dowson and Higginson's density, from the pressure."""
 
     law: Law
-    channels: tuple[str, ...] = ("density",)
+    channels: ClassVar[tuple[str, ...]] = ("density",)
 
     def apply(self, at: Answer, out: Cells) -> None:
         out["density"] *= self.law.density(at.p)

@@ -7,14 +7,13 @@ friction times p_a to `friction`. F fits the integral over normally distributed 
 H < 0 too. The film's flow does not know of the contact: that is what [roughness] is for.
 """
 
-from dataclasses import dataclass
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
 
 from ...problems.film.contact import Contact
-from ...problems.film.effects import Answer, Cells, Effect, Report
+from ...problems.film.effects import Answer, Cells, Report
 from ..scene import NotNegative, Positive
 from ..units import measured, metres
 from .table import EffectTable
@@ -31,25 +30,16 @@ class Asperity(EffectTable):
     E_reduced: Positive = measured("Pa", ..., "E' = 1/((1 - nu_1^2)/E_1 + (1 - nu_2^2)/E_2)")
     friction: NotNegative = Field(0.1, description="coefficient of boundary friction")
 
-    def effect(self, scene: Any) -> "Summits":
-        return Summits(self)
-
-
-@dataclass(frozen=True)
-class Summits(Effect):
-    """The pressure of the asperities, by the film."""
-
-    table: Asperity
-    channels: tuple[str, ...] = ("contact",)
+    channels: ClassVar[tuple[str, ...]] = ("contact",)
 
     def apply(self, at: Answer, out: Cells) -> None:
-        H = (at.h - self.table.delta) / self.table.sigma
-        at.problem.contact = Contact(at.cells["contact"], self.table.friction)
-        out["contact"] += self.table.K * self.table.E_reduced * FIT * np.maximum(REACH - H, 0.0) ** POWER
+        H = (at.h - self.delta) / self.sigma
+        at.problem.contact = Contact(at.cells["contact"], self.friction)
+        out["contact"] += self.K * self.E_reduced * FIT * np.maximum(REACH - H, 0.0) ** POWER
 
     def report(self, at: Answer) -> Report:
         p_a, problem = at.cells["contact"], at.problem
-        problem.contact = Contact(p_a, self.table.friction)
+        problem.contact = Contact(p_a, self.friction)
         carried = problem.contact.total(problem, lambda x, y: np.ones(1))
         numbers = {"asperity_load": carried, "asperity_p_max": problem.reduce.max(p_a)}
         return Report(numbers, {}, {"p_a": (p_a, "Pa")})

@@ -4,7 +4,7 @@ A thin soft liner of thickness t on a stiff backing, bonded to it, has the compl
 """
 
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -43,7 +43,7 @@ class Elastic(EffectTable):
 class GivingWay(Effect):
     """Walls that pressure moves apart."""
 
-    channels: tuple[str, ...] = ("lift",)
+    channels: ClassVar[tuple[str, ...]] = ("lift",)
 
     def report(self, at: Answer) -> Report:
         lift = at.cells["lift"]

@@ -7,13 +7,12 @@
 They hold for H above some 1/2; asperities that carry load are not among them.
 """
 
-from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
 
-from ...problems.film.effects import Answer, Cells, Effect
+from ...problems.film.effects import Answer, Cells
 from ..scene import Finite, Positive
 from ..units import metres
 from .table import EffectTable
@@ -27,16 +26,10 @@ class SurfaceRoughness(EffectTable):
     sigma: Positive = metres(..., "standard deviation of both walls together: sqrt(sigma_1^2 + sigma_2^2)")
     moving: Annotated[Finite, Field(ge=0, le=1)] = Field(0.5, description="part of sigma^2 that the moving wall has")
 
-    def effect(self, scene: Any) -> "FlowFactors":
-        return FlowFactors(self.sigma, 2.0 * self.moving - 1.0)
-
-
-@dataclass(frozen=True)
-class FlowFactors(Effect):
-    """sigma : m. excess : of the moving wall's part of sigma^2 over the other's."""
-
-    sigma: float
-    excess: float
+    @property
+    def excess(self) -> float:
+        """Of the moving wall's part of sigma^2 over the other's."""
+        return 2.0 * self.moving - 1.0
 
     @property
     def channels(self) -> tuple[str, ...]:  # type: ignore[override]

@@ -8,13 +8,12 @@ mu_N is the viscosity at that place's pressure and temperature. Reynolds' equati
 usual; profiles across the film are not resolved.
 """
 
-from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from ...problems.film.effects import Answer, Cells, Effect
+from ...problems.film.effects import Answer, Cells
 from ..scene import Finite, Positive
 from ..units import measured
 from .table import EffectTable
@@ -37,23 +36,13 @@ class Shear(EffectTable):
             raise ValueError(f"law = {self.law}: {' and '.join(missing)} is missing")
         return self
 
-    def effect(self, scene: Any) -> "Thinning":
-        return Thinning(self)
-
-
-@dataclass(frozen=True)
-class Thinning(Effect):
-    """Viscosity over mu_N from the shear rate of an answer."""
-
-    table: Shear
-
     def apply(self, at: Answer, out: Cells) -> None:
-        table, U, h = self.table, at.speed, at.h
+        U, h = at.speed, at.h
         along, across = at.gradient
         rate = np.sqrt((U / h) ** 2 + (h**2 * (along**2 + across**2)) / (12.0 * at.mu**2))
-        if table.law == "eyring":
-            x = at.base.mu * out["viscosity"] * at.law.viscosity(at.p) * rate / table.tau_0
+        if self.law == "eyring":
+            x = at.base.mu * out["viscosity"] * at.law.viscosity(at.p) * rate / self.tau_0
             out["viscosity"] *= np.where(x > 1e-4, np.arcsinh(x) / np.maximum(x, 1e-4), 1.0 - x * x / 6.0)
         else:
-            thin = (1.0 + (table.time * rate) ** 2) ** (0.5 * (table.n - 1.0))  # type: ignore[operator]
-            out["viscosity"] *= table.least + (1.0 - table.least) * thin
+            thin = (1.0 + (self.time * rate) ** 2) ** (0.5 * (self.n - 1.0))  # type: ignore[operator]
+            out["viscosity"] *= self.least + (1.0 - self.least) * thin

@@ -15,8 +15,8 @@ from ..units import Measured
 from .named import FLUID
 
 
-class EffectTable(Measured):
-    """Data of one effect. hint : on what else may be meant by its name."""
+class EffectTable(Measured, Effect):
+    """Data of one effect, which it is itself unless `effect` makes one of them. hint : what else may be meant by its name."""
 
     hint: ClassVar[str] = ""
 
@@ -29,7 +29,7 @@ class EffectTable(Measured):
 
     def effect(self, scene: Any) -> Effect:
         """What it does to the film of the scene."""
-        raise NotImplementedError
+        return self
 
 
 if TYPE_CHECKING:

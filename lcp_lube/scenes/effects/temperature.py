@@ -1,7 +1,7 @@
 """[temperature]: viscosity that depends on the temperature, and the heat balance that the temperature follows from."""
 
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -98,7 +98,7 @@ class Heat(Effect):
     table: Temperature
     wall: float
     keeps = "temperature: the heat that the oil stores is not in its equation"
-    channels: tuple[str, ...] = ("viscosity", "warmth")
+    channels: ClassVar[tuple[str, ...]] = ("viscosity", "warmth")
 
     def apply(self, at: Answer, out: Cells) -> None:
         factor = self.law(self._ahead(at)) / self.mu
