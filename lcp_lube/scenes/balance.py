@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from ..base.quantity import in_si, quantity
 from .scene import Finite
@@ -34,8 +34,6 @@ class BalanceTable(Measured):
             data = {**data, "range": [end if read is None else read.value for end, read in zip(ends, found, strict=True)]}
         return super().in_si_units(data)
 
-    @model_validator(mode="after")
-    def _ordered(self) -> "BalanceTable":
+    def check(self) -> None:
         if self.range is not None and not self.range[0] < self.range[1]:
             raise ValueError(f"range = {list(self.range)}: smallest < largest is needed")
-        return self

@@ -54,13 +54,11 @@ class SideTable(Measured):
             return {"p": data}
         return {"kind": data} if isinstance(data, str) else data
 
-    @model_validator(mode="after")
-    def _meant(self) -> "SideTable":
+    def check(self) -> None:
         if self.kind != "pressure":
             for key in ("p", "r"):
                 if getattr(self, key):
                     raise ValueError(f"{key} = {getattr(self, key):g}: the side is {self.kind}")
-        return self
 
 
 class SidesTable(Measured):
@@ -92,8 +90,8 @@ class BearingScene(RectangleScene, WithEffects):
     def _one_shape(cls, film: Any) -> Any:
         return [film] if isinstance(film, dict) else film
 
-    @model_validator(mode="after")
-    def _consistent(self) -> "BearingScene":
+    def check(self) -> None:
+        super().check()
         if self.dimension == 1:
             for name in NAMES[2:]:
                 if name in self.sides.model_fields_set:
@@ -110,7 +108,11 @@ class BearingScene(RectangleScene, WithEffects):
                 raise ValueError(f"sides.{name} is periodic, sides.{OPPOSITE[name]} is not: both of them or none")
         self._supplies()
         self._check_motion()
-        return self
+        own = self.temperature.own_mu if self.temperature is not None else None
+        if self.fluid.mu is None and own is None:
+            raise ValueError("fluid.mu is missing")
+        if self.fluid.mu is not None and own is not None:
+            raise ValueError(f"fluid.mu = {self.fluid.mu:g} and the viscosities of [temperature] are both given: one of them")
 
     def _check_motion(self) -> None:
         """Raise ValueError where shapes and [motion] contradict one another."""
@@ -133,15 +135,6 @@ class BearingScene(RectangleScene, WithEffects):
         radius = self.L / (2.0 * math.pi) if self._journals else None
         place = Place(self.side_lengths, self.sides.west.kind == "periodic", self.fluid.p_c, radius, 0.0, least)
         return supplies_of(self.supply, place)
-
-    @model_validator(mode="after")
-    def _viscosity_once(self) -> "BearingScene":
-        own = self.temperature.own_mu if self.temperature is not None else None
-        if self.fluid.mu is None and own is None:
-            raise ValueError("fluid.mu is missing")
-        if self.fluid.mu is not None and own is not None:
-            raise ValueError(f"fluid.mu = {self.fluid.mu:g} and the viscosities of [temperature] are both given: one of them")
-        return self
 
     @property
     def mu_0(self) -> float:

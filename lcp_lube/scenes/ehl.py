@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
 from petsc4py import PETSc
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from ..problems.ehl import EhlProblem
 from ..problems.facts import Facts
@@ -28,11 +28,9 @@ class EhlLineScene(Scene):
     )
     n: Annotated[int, Field(strict=True, ge=2, le=46_340)] = Field(200, description="unknowns: n - 1 pressures and k")
 
-    @model_validator(mode="after")
-    def _interval(self) -> "EhlLineScene":
+    def check(self) -> None:
         if not self.x[0] < self.x[1]:
             raise ValueError(f"x = {list(self.x)}: start < end is needed")
-        return self
 
     @property
     def shape(self) -> tuple[int, ...]:

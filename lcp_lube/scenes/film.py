@@ -5,7 +5,7 @@ from math import atan2, hypot, inf, pi, radians
 from operator import or_
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from ..errors import InputError
 from ..problems.film.profile import read_profile
@@ -28,13 +28,11 @@ class Part(Measured):
 
     moves: bool = Field(False, description="[motion]: it travels with the wall, going on periodically over the length L")
 
-    @model_validator(mode="after")
-    def _spans(self) -> "Part":
+    def check(self) -> None:
         for name in ("x", "y", "between"):
             span = getattr(self, name, None)
             if span is not None and not span[0] < span[1]:
                 raise ValueError(f"{name} = {list(span)}: start < end is needed")
-        return self
 
     def part(self, extent: Extent) -> Shape:
         """The shape as a function h(x, y)."""
@@ -189,11 +187,10 @@ class HerringbonePart(Part):
     ratio: Annotated[Finite, Field(gt=0, lt=1)] = Field(0.5, description="width of a groove over groove and land")
     land: Annotated[Finite, Field(ge=0, lt=1)] = Field(0.0, description="share of the width in the middle without grooves")
 
-    @model_validator(mode="after")
-    def _inclined(self) -> "HerringbonePart":
+    def check(self) -> None:
+        super().check()
         if not self.angle_deg:
             raise ValueError("angle_deg = 0: grooves along the motion never meet; an angle above or below 0 is needed")
-        return self
 
     def part(self, extent: Extent) -> Shape:
         return Herringbone(self.depth, self.count, radians(self.angle_deg), self.ratio, self.land, extent.both)
@@ -218,10 +215,9 @@ class FormulaPart(Part):
     h: str = Field(..., description="the formula, as text")
     unit: Unit = Field("m", description="unit of its values")
 
-    @model_validator(mode="after")
-    def _readable(self) -> "FormulaPart":
+    def check(self) -> None:
+        super().check()
         Formula(self.h, ("x", "y", "t"))
-        return self
 
     def part(self, extent: Extent) -> Shape:
         return Scaled(Formula(self.h, ("x", "y", "t")), UNITS[self.unit], extent.t)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from petsc4py import PETSc
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from ..errors import InputError
 from ..problems.facts import Facts
@@ -47,13 +47,11 @@ class Extent:
 class FilmScene(Scene):
     """A scene that is a film; a family says which, in `_model`."""
 
-    @model_validator(mode="after")
-    def _one_viscosity(self) -> "FilmScene":
+    def check(self) -> None:
         temperature, field = getattr(self, "temperature", None), type(self).model_fields.get("mu")
         mu = getattr(self, "mu", None)
         if field is not None and temperature is not None and temperature.own_mu and mu != field.default:
             raise ValueError(f"mu = {mu:g} and the viscosities of [temperature] are both given: one of them")
-        return self
 
     @property
     def mu_0(self) -> float:
@@ -128,12 +126,11 @@ class RectangleScene(FilmScene):
     nx: Count | None = Field(None, description="points in x; default n")
     ny: Count | None = Field(None, description="points in y; default n (2D)")
 
-    @model_validator(mode="after")
-    def _one_dimensional(self) -> "RectangleScene":
+    def check(self) -> None:
+        super().check()
         for key in ("ny", "width"):
             if self.dimension == 1 and (value := getattr(self, key)) is not None:
                 raise ValueError(f"{key} = {value}: the scene is one-dimensional (dimension = 2 is not set)")
-        return self
 
     @property
     def shape(self) -> tuple[int, ...]:

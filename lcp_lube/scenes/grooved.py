@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from ..problems.film.bore import Bore, Dam
 from ..problems.film.grooves import Groove
@@ -52,8 +52,8 @@ class GroovedJournalScene(ShaftScene, WithEffects):
     balance: BalanceTable | None = Field(None, description="load to carry; eccentricity and attitude are found for it")
     motion: MotionTable | None = Field(None, description="how the journal moves in time")
 
-    @model_validator(mode="after")
-    def _possible(self) -> "GroovedJournalScene":
+    def check(self) -> None:
+        super().check()
         places = sorted(angle % 360.0 for angle in self.grooves_deg)
         gaps = [(b - a) % 360.0 or 360.0 for a, b in zip(places, [*places[1:], *places[:1]], strict=True)]
         if places and min(gaps) <= self.groove_deg:
@@ -78,7 +78,6 @@ class GroovedJournalScene(ShaftScene, WithEffects):
         if self.dam_deg is not None and not 0 < self.dam_deg[1] - self.dam_deg[0] < 360:
             raise ValueError(f"dam_deg = {list(self.dam_deg)}: start < end < start + 360 is needed")
         self._supplies()
-        return self
 
     def _supplies(self) -> tuple[Supply, ...]:
         """The tables' supplies, and behind them the grooves, where there are both: cells held on the whole ring."""

@@ -61,8 +61,8 @@ class JournalScene(LubricationScene):
             return data  # the fields' own checks say what is wrong
         return {**data, **{key: value for key, value in derived.items() if value > 0 and math.isfinite(value)}}
 
-    @model_validator(mode="after")
-    def _fed(self) -> "JournalScene":
+    def check(self) -> None:
+        super().check()
         if self.round == "periodic":
             if self.dimension == 1 or not (self.p_side > 0 or self.supply):
                 found = "dimension = 1" if self.dimension == 1 else f"p_side = {self.p_side:g}"
@@ -72,7 +72,6 @@ class JournalScene(LubricationScene):
         if self.graded and (self.dimension == 1 or self.round == "periodic"):
             raise ValueError("graded = true: lines are graded in 2D, from the groove at the widest gap (round = groove)")
         self._supplies()
-        return self
 
     def _supplies(self) -> tuple[Supply, ...]:
         """The supplies inside the film, angles counted from the widest gap."""

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from ..errors import InputError
 from .formula import TimeText, of_time
@@ -43,8 +43,7 @@ class MotionTable(Measured):
     )
     velocity: tuple[Finite, Finite] = Field((0.0, 0.0), description="of a free journal at t = 0, clearances per second")
 
-    @model_validator(mode="after")
-    def _consistent(self) -> "MotionTable":
+    def check(self) -> None:
         lengths = [key for key in ("steps", "dt", "tol") if getattr(self, key) is not None]
         if len(lengths) > 1:
             raise ValueError(f"{' and '.join(lengths)} are both given: one of them says how long the steps are")
@@ -60,7 +59,6 @@ class MotionTable(Measured):
             unused = {"load": None, "mass": None, "position": None, "velocity": (0.0, 0.0)}
             if given := [key for key, none in unused.items() if getattr(self, key) != none]:
                 raise ValueError(f"{given[0]}: the journal is not free (free = true is not set)")
-        return self
 
     @property
     def moves_journal(self) -> bool:

@@ -2,7 +2,7 @@
 
 from typing import Annotated, ClassVar
 
-from pydantic import Field, PrivateAttr, model_validator
+from pydantic import Field, PrivateAttr
 
 from ..base.parallel import Array
 from ..problems.grid import Grid
@@ -32,13 +32,11 @@ class ObstacleScene(OneUnknownScene):
     y: tuple[Finite, Finite] = Field((0.0, 1.0), description="the rectangle's sides")
     _coarse: bool = PrivateAttr(False)
 
-    @model_validator(mode="after")
-    def _rectangle(self) -> "ObstacleScene":
+    def check(self) -> None:
         for name in ("x", "y"):
             start, end = getattr(self, name)
             if not start < end:
                 raise ValueError(f"{name} = {[start, end]}: start < end is needed")
-        return self
 
     def with_shape(self, shape: tuple[int, ...]) -> "ObstacleScene":
         """The same scene on a grid that serves this one."""

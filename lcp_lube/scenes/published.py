@@ -22,11 +22,10 @@ class LubricationScene(RectangleScene, WithEffects):
     p_side: NotNegative = measured("Pa", 0.0, "pressure at y = 0 and y = width; above p_c (2D)")
     p_c: Finite = measured("Pa", 0.0, "cavitation pressure")
 
-    @model_validator(mode="after")
-    def _no_ends(self) -> "LubricationScene":
+    def check(self) -> None:
+        super().check()
         if self.dimension == 1 and self.p_side:
             raise ValueError(f"p_side = {self.p_side}: the scene is one-dimensional")
-        return self
 
     @property
     def cavitation_pressure(self) -> float:
@@ -47,13 +46,12 @@ class SliderScene(LubricationScene):
     h_max: Positive = metres(25e-6, "largest film")
     scheme: Literal["nodal", "face", "upwind"] = Field("nodal", description="form of the Couette flux")
 
-    @model_validator(mode="after")
-    def _consistent(self) -> "SliderScene":
+    def check(self) -> None:
+        super().check()
         if self.h_max < self.h_min:
             raise ValueError(f"h_max = {self.h_max:g}: at least h_min = {self.h_min:g} is needed")
         if not self.wave[0] < self.wave[1] <= 1:
             raise ValueError(f"wave = {list(self.wave)}: 0 <= start < end <= 1 is needed")
-        return self
 
     def _parts(self) -> Sequence[Shape]:
         heights = (self.h_min, self.h_max) if self.form == "convergent-divergent" else (self.h_max, self.h_min)

@@ -4,7 +4,7 @@ import math
 from typing import Annotated, ClassVar, Literal
 
 from petsc4py import PETSc
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model, Side
@@ -29,11 +29,9 @@ class SqueezeScene(Scene):
     steps: Annotated[int, Field(strict=True, ge=2, le=10_000_000)] = Field(300, description="time steps")
     n: Count = Field(199, description="interior points")
 
-    @model_validator(mode="after")
-    def _possible(self) -> "SqueezeScene":
+    def check(self) -> None:
         if not self.h_amplitude < self.h_mean:
             raise ValueError(f"h_amplitude = {self.h_amplitude:g}: less than h_mean = {self.h_mean:g} is needed")
-        return self
 
     @property
     def shape(self) -> tuple[int, ...]:

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from ..problems.film.supplies import Patch, Region, Supply, Where
 from .formula import Formula
@@ -54,8 +54,7 @@ class SupplyTable(Measured):
         False, description="whether oil may flow back through a restrictor where the film's pressure is above p_s"
     )
 
-    @model_validator(mode="after")
-    def _one_source(self) -> "SupplyTable":
+    def check(self) -> None:
         given = [name for name in ("p", "flow", "restrictor") if getattr(self, name) is not None]
         if len(given) != 1:
             raise ValueError(f"{' and '.join(given) or 'no source'} given: one of p, flow, restrictor is needed")
@@ -71,7 +70,6 @@ class SupplyTable(Measured):
                 raise ValueError(f"{name} = {list(span)}: start < end is needed")
         if self.where is not None:
             Formula(self.where)
-        return self
 
     def supply(self, place: Place) -> Supply:
         """The supply in its scene.
@@ -87,7 +85,7 @@ class SupplyTable(Measured):
             return Supply(region, p=self.p - place.p_c)
         if self.flow is not None:
             return Supply(region, flow=self.flow)
-        assert self.K is not None and self.p_s is not None  # as `_one_source` found
+        assert self.K is not None and self.p_s is not None  # as `check` found
         if not self.p_s > place.p_least:
             raise ValueError(
                 f"p_s = {self.p_s:g}: more than the film's least pressure at a side, {place.p_least:g} Pa, is needed"

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from ..base.parallel import Array
 from ..problems.film.model import Model, Side
@@ -82,8 +82,8 @@ class ThrustScene(WithEffects):
     nx: Count | None = Field(None, description="points along the angle; default n")
     ny: Count | None = Field(None, description="points along the radius; default half of n")
 
-    @model_validator(mode="after")
-    def _possible(self) -> "ThrustScene":
+    def check(self) -> None:
+        super().check()
         if self.scheme != "face":
             raise ValueError(f"scheme = {self.scheme}: face is allowed")
         if not self.D_inner < self.D_outer:
@@ -103,7 +103,6 @@ class ThrustScene(WithEffects):
         if self.pivot_part is not None and self.balance is not None and self.balance.vary not in (None, "h_min"):
             raise ValueError(f"balance.vary = {self.balance.vary}: the film at the pivot follows from the load: h_min")
         self._supplies()
-        return self
 
     def _supplies(self) -> Any:
         least = min(self.p_inner, self.p_outer, *([] if self.pad_deg is None else [self.p_groove])) + self.p_c

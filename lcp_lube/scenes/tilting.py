@@ -3,7 +3,7 @@
 import math
 from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from ..problems.film.bore import PadBore
 from ..problems.film.grooves import Groove
@@ -37,8 +37,8 @@ class TiltingPadScene(ShaftScene, WithEffects):
     p_groove: NotNegative = measured("Pa", 0.0, "pressure between the pads, above p_c")
     balance: BalanceTable | None = Field(None, description="load to carry; the journal's place is found for it")
 
-    @model_validator(mode="after")
-    def _possible(self) -> "TiltingPadScene":
+    def check(self) -> None:
+        super().check()
         if sorted(self.pivots_deg) != self.pivots_deg or self.pivots_deg[-1] - self.pivots_deg[0] >= 360.0:
             raise ValueError(f"pivots_deg = {self.pivots_deg}: ascending angles within a turn are needed")
         turn = [*self.pivots_deg[1:], self.pivots_deg[0] + 360.0]
@@ -53,7 +53,6 @@ class TiltingPadScene(ShaftScene, WithEffects):
             raise ValueError(f"nx = {self.shape[0]}: pads of {self.pad_deg:g} degrees need {needed} points around")
         if self.balance is not None and self.balance.vary not in (None, "eccentricity"):
             raise ValueError(f"balance.vary = {self.balance.vary}: the journal's place follows from the load: eccentricity")
-        return self
 
     @property
     def start(self) -> float:

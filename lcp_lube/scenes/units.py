@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 from decimal import Decimal
-from typing import Annotated, Any, ClassVar, Literal, get_args, get_origin
+from typing import Annotated, Any, ClassVar, Literal, Self, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -59,6 +59,14 @@ class Measured(BaseModel):
     @classmethod
     def _in_si(cls, data: Any) -> Any:
         return cls.in_si_units(data)
+
+    @model_validator(mode="after")
+    def _checked(self) -> Self:
+        self.check()
+        return self
+
+    def check(self) -> None:
+        """Raise ValueError where keys contradict one another."""
 
     @classmethod
     def in_si_units(cls, data: Any) -> Any:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from ...problems.film.effects import Answer, Cells, Effect, Report
 from ..scene import Finite, Positive
@@ -23,19 +23,17 @@ class Elastic(EffectTable):
     E: Positive | None = measured("Pa", None, "its modulus")
     nu: Annotated[Finite, Field(ge=0, lt=0.5)] = Field(0.3, description="its Poisson's ratio")
 
-    @model_validator(mode="after")
-    def _one(self) -> "Elastic":
+    def check(self) -> None:
         liner = (self.thickness is not None, self.E is not None)
         if (self.compliance is not None) == any(liner) or any(liner) != all(liner):
             raise ValueError("compliance, or thickness and E, are needed")
         if self.E is not None and self.E < 1e4:
             raise ValueError(f"E = {self.E:g}: at least 10 kPa is needed (SI units?)")
-        return self
 
     def effect(self, scene: Any) -> "Foundation":
         given = self.compliance
         if given is None:
-            assert self.thickness is not None and self.E is not None  # as `_one` found
+            assert self.thickness is not None and self.E is not None  # as `check` found
             given = self.thickness * (1.0 + self.nu) * (1.0 - 2.0 * self.nu) / (self.E * (1.0 - self.nu))
         return Foundation(given)
 

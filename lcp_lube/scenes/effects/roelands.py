@@ -11,7 +11,7 @@ from math import exp, log
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from ...errors import InputError
 from ...problems.film.effects import Answer, Cells, Effect
@@ -29,11 +29,9 @@ class RoelandsTable(EffectTable):
     alpha: Annotated[Finite, Field(ge=0, lt=1e-6)] | None = measured("1/Pa", None, "dlog(mu)/dp at p_c")
     z: Annotated[Finite, Field(ge=0, le=2)] | None = Field(None, description="Roelands' exponent")
 
-    @model_validator(mode="after")
-    def _one(self) -> "RoelandsTable":
+    def check(self) -> None:
         if (self.alpha is None) == (self.z is None):
             raise ValueError("alpha or z: one of them is needed")
-        return self
 
     def effect(self, scene: Any) -> "Roelands":
         mu = scene.mu_0

@@ -11,7 +11,7 @@ usual; profiles across the film are not resolved.
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from ...problems.film.effects import Answer, Cells
 from ..scene import Finite, Positive
@@ -28,13 +28,11 @@ class Shear(EffectTable):
     n: Annotated[Finite, Field(gt=0, le=1)] | None = Field(None, description="Carreau's exponent")
     least: Annotated[Finite, Field(ge=0, lt=1)] = Field(0.0, description="Carreau: viscosity at the highest rates, over mu_N")
 
-    @model_validator(mode="after")
-    def _complete(self) -> "Shear":
+    def check(self) -> None:
         needed = ("tau_0",) if self.law == "eyring" else ("time", "n")
         missing = [name for name in needed if getattr(self, name) is None]
         if missing:
             raise ValueError(f"law = {self.law}: {' and '.join(missing)} is missing")
-        return self
 
     def apply(self, at: Answer, out: Cells) -> None:
         U, h = at.speed, at.h

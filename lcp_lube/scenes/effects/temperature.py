@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from ...base.parallel import Array
 from ...problems.film import oils
@@ -47,8 +47,7 @@ class Temperature(EffectTable):
         0.5, description="effective: T_eff = T_in + share (T_out - T_in), 1/2 in ISO 7902"
     )
 
-    @model_validator(mode="after")
-    def _one_law(self) -> "Temperature":
+    def check(self) -> None:
         given = [name for name in ("oil", "law", "beta") if getattr(self, name) is not None]
         if len(given) != 1:
             found = " and ".join(given) or "none"
@@ -64,7 +63,6 @@ class Temperature(EffectTable):
             if sorted(set(self.T)) != self.T or sorted(set(self.mu), reverse=True) != self.mu:
                 raise ValueError(f"T = {self.T}, mu = {self.mu}: T rising and mu falling is needed")
             self.viscosity(0.0)
-        return self
 
     @property
     def own_mu(self) -> float | None:
@@ -77,7 +75,7 @@ class Temperature(EffectTable):
             return oils.named(self.oil, self.rho)
         if self.beta is not None:
             return oils.Exponential(mu, self.T_in, self.beta)
-        assert self.T is not None and self.mu is not None  # as `_one_law` found
+        assert self.T is not None and self.mu is not None  # as `check` found
         if self.law == "walther":
             return oils.Walther.through(self.T, [1e6 * one / self.rho for one in self.mu], self.rho)
         laws: dict[str | None, Any] = {"vogel": oils.Vogel, "roelands": oils.Roelands}

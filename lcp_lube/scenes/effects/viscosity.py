@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from ...errors import InputError
 from ...problems.film.effects import Answer, Cells, Effect
@@ -25,19 +25,17 @@ class ViscosityMap(EffectTable):
     unit_x: Unit = Field("mm", description="the file's unit of x and y (.csv)")
     interpolation: Literal["linear", "cubic", "nearest"] = Field("linear", description="between the file's points")
 
-    @model_validator(mode="after")
-    def _one(self) -> "ViscosityMap":
+    def check(self) -> None:
         if (self.factor is None) == (self.file is None):
             raise ValueError("factor or file: one of them is needed")
         if self.factor is not None:
             Formula(self.factor)
-        return self
 
     def effect(self, scene: Any) -> "Places":
         if self.factor is not None:
             return Places(Formula(self.factor), scene.name)
         lengths = getattr(scene, "side_lengths", None) or (math.pi * scene.D, scene.L_over_D * scene.D)
-        assert self.file is not None  # as `_one` found
+        assert self.file is not None  # as `check` found
         return Places(
             read_profile((scene._folder or Path()) / self.file, lengths, self.interpolation, 1.0, UNITS[self.unit_x]),
             scene.name,
