@@ -20,10 +20,8 @@ step all the same: it is what tells the bounds in contact from the others.
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
-from petsc4py import PETSc
 
 from ..base.parallel import Array
 from ..errors import InputError
@@ -98,7 +96,7 @@ class Interior(Method):
                 "--method interior: nothing drives v, and v = 0 is the answer: ||H|| <= eps1 says nothing about what is left "
                 "of it, nor of s and z where it lies on a bound; active-set, semismooth or fas can"
             )
-        self.system = BoxSystem(self._for_system(), self.stages)
+        self.system = BoxSystem(problem, self.stages)
         margin = o.inside * np.minimum(u - l, 1.0)
         v = np.clip(job.start["v"] if job.start else problem.v0, l + margin, u - margin)
         s1, s2 = (np.where(has, o.s0 or s, 1.0) for has, s in zip(self._has, (v - l, u - v), strict=True))
@@ -109,9 +107,9 @@ class Interior(Method):
         self.norm = problem.reduce.norm(*self.H)
         self._pairs = problem.reduce.sum(self._has[0].astype(float)) + problem.reduce.sum(self._has[1].astype(float))
 
-    def _for_system(self) -> BoxProblem:
-        """The problem as the Newton matrix sees it."""
-        return self.problem
+    def _linearise(self) -> None:
+        """Take f' for the next step. Collective."""
+        self.system.linearise(self.at.v)
 
     def _multipliers(self, v: Array) -> tuple[Array | float, Array | float]:
         """z1 and z2 to start with."""
@@ -144,7 +142,7 @@ class Interior(Method):
         size = reduce.norm(rhs)
         wanted = o.forcing * (mu if self._pairs else size)
         rtol = float(np.clip(wanted / size, *RTOL)) if size > 0 else RTOL[1]
-        self.system.linearise(at.v)
+        self._linearise()
         dv, iterations = self.system.solve(rhs, rtol, shift=at.z1 / at.s1 + at.z2 / at.s2)
         ds1, ds2 = np.where(has1, b4 + dv, 0.0), np.where(has2, b5 - dv, 0.0)
         step = Point(dv, ds1, ds2, (b2 - at.z1 * ds1) / at.s1, (b3 - at.z2 * ds2) / at.s2)
@@ -182,48 +180,21 @@ class MixedInteriorOptions(InteriorOptions):
     keep: int = least(1, 1)
 
 
-class KeptJacobian:
-    """A problem whose Jacobian serves `keep` calls before it is evaluated anew; the rest is the problem's own.
-
-    The first call, before the first step, gives the Newton matrix its layout and does not count.
-    """
-
-    def __init__(self, problem: BoxProblem, keep: int):
-        self._problem, self._keep = problem, keep
-        self._mat: PETSc.Mat | None = None
-        self._age = keep  # calls served by the one at hand
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._problem, name)
-
-    def jacobian(self, v: Array) -> PETSc.Mat:
-        """f' at the v of this call or of an earlier one. Collective."""
-        layout = self._mat is None
-        if self._age >= self._keep:
-            self._mat = self._problem.jacobian(v)
-            self._age = 0
-        self._age = self._keep if layout else self._age + 1
-        return self._mat
-
-    @property
-    def old(self) -> bool:
-        """Whether the last call was served by an earlier one's Jacobian."""
-        return self._age > 1
-
-    def expire(self) -> None:
-        """Evaluate at the next call."""
-        self._age = self._keep
-
-
 class MixedInterior(Interior):
     """The iterates of the interior point method from z = max(+-f(v), z0), with Jacobians that may be kept."""
 
     Options = MixedInteriorOptions
     state = ()  # a Jacobian kept from earlier steps cannot be made anew
 
-    def _for_system(self) -> Any:
-        self.kept = KeptJacobian(self.problem, self.options.keep)
-        return self.kept
+    def __init__(self, job: Job):
+        super().__init__(job)
+        self._age = self.options.keep  # steps that the Jacobian at hand has served
+
+    def _linearise(self) -> None:
+        if self._age >= self.options.keep:
+            super()._linearise()
+            self._age = 0
+        self._age += 1
 
     def _multipliers(self, v: Array) -> tuple[Array, Array]:
         f = self.problem.residual(v)
@@ -239,12 +210,12 @@ class MixedInterior(Interior):
         try:
             step = super().advance()
         except StepLengthError:
-            if not self.kept.old:
+            if self._age <= 1:
                 raise
-            self.kept.expire()
+            self._age = self.options.keep
             step = super().advance()
         if step.backtracking:
-            self.kept.expire()
+            self._age = self.options.keep
         if step.alpha < STUCK:
             raise StepLengthError(f"the bounds leave room for {step.alpha:.1e} of it")
         return step
