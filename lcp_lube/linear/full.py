@@ -1,12 +1,11 @@
 """The 2n-by-2n Newton matrix [A B; D_p D_r] of the papers as one PETSc AIJ Mat, ordered by field inside each rank."""
 
 import numpy as np
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ..base.parallel import Array
 from ..base.stages import Stages
-from ..problems.film.assembly import coo, csr
+from ..problems.film.assembly import assemble
 from ..problems.film.lubrication import LubricationProblem
 from .krylov import Krylov
 from .system import System
@@ -24,40 +23,28 @@ class FullSystem(System):
 
     def __init__(self, problem: LubricationProblem, stages: Stages | None = None):
         super().__init__(problem, stages)
-        grid = problem.grid
-        nl = grid.local_size
-        comm = grid.petsc_comm
+        nl, comm = problem.grid.local_size, problem.grid.petsc_comm
         with self.stages("assembly"):
-            starts = grid.starts
-            own_p = (2 * grid.first + np.arange(nl)).astype(PETSc.IntType)
-            own_r = own_p + nl
+            diagonal = assemble(problem.grid, [(0, 0, np.ones(1))])
+            nest = PETSc.Mat().createNest([[problem.A, problem.B], [diagonal, diagonal]], comm=comm)
+            self.mat = self._own(nest.convert("aij", PETSc.Mat()))
+            nest.destroy()
+            diagonal.destroy()
+            own_p = (2 * problem.grid.first + np.arange(nl)).astype(PETSc.IntType)
+            self._rows = own_p + nl
             # Row k of the complementarity block is (D_p)_k, (D_r)_k: refreshed alone by `solve`.
-            self._rows = own_r
             self._pointers = np.arange(0, 2 * nl + 1, 2, dtype=PETSc.IntType)
-            self._columns = np.stack([own_p, own_r], axis=1).ravel()
+            self._columns = np.stack([own_p, self._rows], axis=1).ravel()
             self._values = np.ones(2 * nl)
-            rows, columns, values = [], [], []
-            for entries, field in ((problem.scheme.pressure_entries(), 0), (problem.scheme.void_entries(), 1)):
-                for i, j, v in coo(grid, entries):
-                    rows.append(_number(i, 0, starts))
-                    columns.append(_number(j, field, starts))
-                    values.append(v)
-            rows.append(np.repeat(own_r, 2))
-            columns.append(self._columns)
-            values.append(self._values)
+            self._x, self._b = map(self._own, self.mat.createVecs())
             self._scale = self._row_scale()
             if self._scale is not None:
-                for k in range(len(rows) - 1):
-                    values[k] = values[k] * self._scale[rows[k] - 2 * grid.first]
-            pointers, sorted_columns, order = csr(np.concatenate(rows), np.concatenate(columns), 2 * grid.first, 2 * nl)
-            size = (2 * nl, 2 * grid.size)
-            csr_arrays = (pointers, sorted_columns, np.concatenate(values)[order])
-            self.mat = self._own(PETSc.Mat().createAIJ((size, size), csr=csr_arrays, comm=comm))
-            parts = {"p": own_p, "r": own_r}
+                self._b.setArray(np.concatenate([self._scale, np.ones(nl)]))
+                self.mat.diagonalScale(self._b, None)
+            parts = {"p": own_p, "r": self._rows}
             self.fields = {name: self._own(PETSc.IS().createGeneral(part, comm=comm)) for name, part in parts.items()}
             self.mat.setAttr("fields", self.fields)
             self.mat.setAttr("problem", problem)
-            self._x, self._b = map(self._own, self.mat.createVecs())
             self.krylov = Krylov(self.mat, self.fields)
 
     def solve(self, D_p: Array, D_r: Array, f1: Array, f2: Array, rtol: float) -> tuple[Array, Array, int]:
@@ -87,9 +74,3 @@ class FullSystem(System):
         if not self.problem.reduce.min(largest) < TINY:
             return None
         return 2.0 ** -np.round(np.log2(largest))
-
-
-def _number(points: NDArray, field: int, starts: NDArray) -> NDArray:
-    """2n numbers of field 0 (p) or 1 (r) at PETSc point numbers: rank k holds points starts[k] to starts[k+1]."""
-    owner = np.searchsorted(starts, points, side="right") - 1
-    return points + (starts[owner + 1] if field else starts[owner])

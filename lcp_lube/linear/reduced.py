@@ -11,13 +11,12 @@ and the derivatives of the Fischer-Burmeister function.
 """
 
 import numpy as np
-from numpy.typing import NDArray
-from petsc4py import PETSc
 
 from ..base.parallel import Array
 from ..base.stages import Stages
-from ..problems.film.assembly import coo, csr
+from ..problems.film.assembly import assemble
 from ..problems.film.lubrication import LubricationProblem
+from ..problems.grid import Grid
 from .krylov import Krylov
 from .system import System
 
@@ -33,31 +32,21 @@ class ReducedSystem(System):
     def __init__(self, problem: LubricationProblem, stages: Stages | None = None):
         super().__init__(problem, stages)
         grid, scheme = problem.grid, problem.scheme
+        ny, nx = grid.box
+        place = np.arange((ny + 2.0) * (nx + 2)).reshape(ny + 2, nx + 2)
+        pressure = scheme.pressure_entries()
+        void = {(dj, di): value for dj, di, value in scheme.void_entries()}
         with self.stages("assembly"):
-            rows, columns, a, b, neighbour = self._stencil()
-            self._pointers, self._columns, order = csr(rows, columns, grid.first, grid.local_size)
-            # In CSR order: the entries of A and B, and where their column stands in an array with ghosts.
-            self._a, self._b_entries, self._neighbour = a[order], b[order], neighbour[order]
-            size = (grid.local_size, grid.size)
-            csr_arrays = (self._pointers, self._columns, self._a)
-            self.mat = self._own(PETSc.Mat().createAIJ((size, size), csr=csr_arrays, comm=grid.petsc_comm))
+            # In CSR order: the entries of A and, in A's sparsity, of B, and where their column stands in an array with ghosts.
+            self.mat = self._own(assemble(grid, pressure))
+            self._pointers, self._columns, self._a = self.mat.getValuesCSR()
+            self._b_entries = _values(grid, [(dj, di, void.get((dj, di), np.zeros(1))) for dj, di, _ in pressure])
+            places = [(dj, di, place[1 + dj : 1 + dj + ny, 1 + di : 1 + di + nx]) for dj, di, _ in pressure]
+            self._neighbour = _values(grid, places).astype(int)
             self._diagonal_A = scheme.diagonal.ravel()
             self._diagonal_B = -scheme.b_C.ravel()
             self._x, self._b = map(self._own, self.mat.createVecs())
             self.krylov = Krylov(self.mat)
-
-    def _stencil(self) -> tuple[NDArray, ...]:
-        """Rows, columns, entries of A and of B, and the column's place in an array with ghosts, for A's sparsity."""
-        grid, scheme = self.problem.grid, self.problem.scheme
-        ny, nx = grid.box
-        place = np.arange((ny + 2) * (nx + 2)).reshape(ny + 2, nx + 2)
-        void = {(dj, di): value for dj, di, value in scheme.void_entries()}
-        pressure = scheme.pressure_entries()
-        columns_of = [(dj, di, place[1 + dj : 1 + dj + ny, 1 + di : 1 + di + nx]) for dj, di, _ in pressure]
-        b_entries = [(dj, di, void.get((dj, di), np.zeros((1, 1)))) for dj, di, _ in pressure]
-        rows, columns, a = (np.concatenate(part) for part in zip(*coo(grid, pressure), strict=True))
-        b = np.concatenate([value for _, _, value in coo(grid, b_entries)])
-        return rows, columns, a, b, np.concatenate([value for _, _, value in coo(grid, columns_of)])
 
     def assemble(self, theta: Array) -> Array:
         """Refresh the matrix for theta; returns the column scaling, y = scaling * (the KSP's solution). Collective."""
@@ -89,3 +78,11 @@ class ReducedSystem(System):
             iterations = self.krylov.solve(self._b, self._x, rtol)
         y = self._scaling * self._x.array_r
         return theta * y + g, -(1.0 - theta) * y + g, iterations
+
+
+def _values(grid: Grid, entries: list[tuple[int, int, Array]]) -> Array:
+    """Stencil entries in CSR order. Collective."""
+    mat = assemble(grid, entries)
+    values = mat.getValuesCSR()[2]
+    mat.destroy()
+    return values

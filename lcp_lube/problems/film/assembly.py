@@ -1,35 +1,10 @@
 """Stencils of the box scheme as PETSc matrices, and their structure."""
 
-from collections.abc import Iterator, Sequence
-
 import numpy as np
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ...base.parallel import Array
 from ..grid import Grid
-
-
-def coo(grid: Grid, entries: Sequence[tuple[int, int, NDArray]]) -> Iterator[tuple[NDArray, NDArray, NDArray]]:
-    """Global rows, columns and values of stencil entries; neighbours outside the domain are left out."""
-    number = grid.neighbours()
-    ny, nx = grid.box
-    rows = number[1:-1, 1:-1]
-    for dj, di, values in entries:
-        columns = number[1 + dj : 1 + dj + ny, 1 + di : 1 + di + nx]
-        inside = columns >= 0
-        yield rows[inside], columns[inside], np.broadcast_to(values, grid.box)[inside]
-
-
-def csr(rows: NDArray, columns: NDArray, first: int, count: int) -> tuple[NDArray, NDArray, NDArray]:
-    """CSR structure of COO entries in `count` owned rows from `first` on.
-
-    Returns row pointers, columns (sorted in each row), and the order that takes COO values to CSR values.
-    """
-    order = np.lexsort((columns, rows))
-    pointers = np.zeros(count + 1, dtype=PETSc.IntType)
-    np.cumsum(np.bincount(rows - first, minlength=count), out=pointers[1:])
-    return pointers, columns[order].astype(PETSc.IntType), order
 
 
 def assemble(grid: Grid, entries: list[tuple[int, int, Array]]) -> PETSc.Mat:
