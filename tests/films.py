@@ -11,7 +11,7 @@ from pydantic import PrivateAttr
 
 from lcp_lube.problems.film.exact import ExactSolution, exact_solution
 from lcp_lube.problems.film.lubrication import LubricationProblem
-from lcp_lube.problems.film.reynolds import SCHEMES, box_scheme
+from lcp_lube.problems.film.reynolds import box_scheme
 from lcp_lube.problems.film.shapes import Along, Sum
 from lcp_lube.problems.grid import Grid
 from lcp_lube.scenes.published import LubricationScene
@@ -114,7 +114,7 @@ def knots(ratio: float = 20.0) -> st.SearchStrategy[Knots]:
 
 
 shapes = st.one_of(st.tuples(st.integers(1, 12)), st.tuples(st.integers(1, 5), st.integers(1, 4)))
-schemes = st.sampled_from(SCHEMES)
+schemes = st.sampled_from(("nodal", "face", "upwind"))
 pressures = st.tuples(*[st.sampled_from([0.0, 1e5, 3e6])] * 4)  # Pa, at the four sides
 
 

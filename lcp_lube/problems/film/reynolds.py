@@ -15,7 +15,6 @@ from .integrals import LineIntegrals, check_film
 from .rims import rims_across_x, rims_across_y
 from .stored import Stored
 
-SCHEMES = ("nodal", "face", "upwind")
 Film = Callable[[Array, Array], Array]
 USUAL = 1e6  # the largest coefficient lies between this and its inverse: absolute tolerances then mean something
 LARGE = 1e100  # coefficients whose squares still have a norm
