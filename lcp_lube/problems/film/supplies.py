@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from mpi4py import MPI
@@ -32,32 +32,13 @@ KNOWN, IDLE, ROUNDINGS = 1e-8, 1e-8, 64  # parts of a pressure and a flow that c
 HALVINGS = 40  # of the interval in which an edge is looked for: derivatives see no steps, both cells of a face find the same
 
 
-class Region(Protocol):
-    """Where a supply lies."""
-
-    def inside(self, x: Array, y: Array) -> NDArray[np.bool_]:
-        """Whether points (m, they broadcast) are in it."""
-
-    @property
-    def middle(self) -> tuple[float, float]:
-        """x and y of its middle, m."""
-
-    def moved(self, start: float) -> Region:
-        """The same place, where x is counted from `start`."""
-
-    def mirrored(self, L: float) -> Region:
-        """Its mirror image in a film of length L."""
-
-    def symmetric(self, y: float) -> bool:
-        """Whether it is its own mirror image in the line at y."""
-
-    def edges(self, axis: str) -> tuple[float, ...]:
-        """x or y of its straight edges, m."""
-
-
 @dataclass(frozen=True)
 class Patch:
-    """A rectangle or an ellipse about (x, y), of extents 2 half_x and 2 half_y, m; `period` in x, where the film closes."""
+    """A rectangle or an ellipse about (x, y), of extents 2 half_x and 2 half_y, m; `period` in x, where the film closes.
+
+    A region says whether points (m, they broadcast) are inside, its middle, the same place with x counted from `start`, its
+    mirror image in a film of length L, whether it is its own in the line at y, and its straight edges along an axis.
+    """
 
     x: float
     y: float
@@ -122,6 +103,9 @@ class Where:
 
     def edges(self, axis: str) -> tuple[float, ...]:
         return ()
+
+
+Region = Patch | Where  # where a supply lies
 
 
 @dataclass(frozen=True)
