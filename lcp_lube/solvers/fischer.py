@@ -51,6 +51,7 @@ class FischerOptions(MethodOptions):
     delta_k = max(tol_min, min(delta_max, delta_factor ||F~||)): quadratic convergence down to tol_min.
     """
 
+    method = "fbn-i"
     p0: float = option(1.0, np.isfinite, "a finite number is needed", "--p0")
     r0: float = option(0.1, np.isfinite, "a finite number is needed", "--r0")
     beta: float = part(1e-4)
@@ -58,10 +59,6 @@ class FischerOptions(MethodOptions):
     delta_max: float = part(0.1)
     delta_factor: float = part(0.01)
     tol_min: float = part(1e-8)
-
-
-class InexactOptions(FischerOptions):
-    method = "fbn-i"
 
 
 class ArmijoOptions(FischerOptions):
@@ -74,7 +71,7 @@ class FischerNewton(PairMethod):
     A step is halved until a merit function falls enough: ||F~|| as an inexact Newton step must make it (FBN-I).
     """
 
-    Options: type[MethodOptions] = InexactOptions
+    Options: type[MethodOptions] = FischerOptions
     state: tuple[str, ...] = ("p", "r", "F1", "F2", "norm")
 
     def __init__(self, job: Job):

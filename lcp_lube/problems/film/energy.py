@@ -80,7 +80,8 @@ def carried(at: Answer) -> Carried:
     shear, drag = _shear(at, dy, other_free)
     sheared = np.where(free, shear, 0.0)
     if problem.contact is not None:
-        shear = shear + abs(problem.U) * problem.contact.friction * contact_areas(at)
+        carrying = problem.contact.p_a.reshape(box) * areas(problem) * grid.stretch(grid.y)
+        shear = shear + abs(problem.U) * problem.contact.friction * carrying
     power_shear = float(problem.reduce.sum(np.where(free, shear, 0.0)))
     pressures = problem.reduce.sum(np.sum(k, axis=0)) * problem.reduce.max(np.abs(at.p)) ** 2  # what they could turn into heat
     if not problem.U and not problem.reduce.sum(np.abs(heat)) > NOTHING * pressures:
@@ -96,13 +97,6 @@ def carried(at: Answer) -> Carried:
         pumped -= float(problem.reduce.sum(np.where(at_edge, flow * (near - least), 0.0)))
     area = grid.cell * point_weights(grid).reshape(box)
     return Carried(q, free, np.where(free, heat + shear, 0.0), power_shear + push + pumped, area, sheared)
-
-
-def contact_areas(at: Answer) -> Array:
-    """p_a of the cells times their areas and the wall's speed over U, N."""
-    problem, grid = at.problem, at.grid
-    assert problem.contact is not None  # as `carried` found
-    return problem.contact.p_a.reshape(grid.box) * areas(problem) * grid.stretch(grid.y)
 
 
 def _shear(at: Answer, dy: float, other_free: list[Any]) -> tuple[Array, Array]:
