@@ -22,7 +22,7 @@ from ..base.stages import Stages
 from ..errors import InputError
 from ..problems.film.lubrication import LubricationProblem
 from .krylov import Krylov
-from .nearnull import COARSEST, NearNull
+from .nearnull import COARSEST, near_null
 from .system import System
 
 CYCLES = 1  # from w = 1 or the last w; more of them gain nothing (benchmarks/README.md)
@@ -125,9 +125,7 @@ class CavitySystem(System):
     def _scale(self, S: PETSc.Mat, full: NDArray[np.bool_], cycles: int) -> None:
         """Improve w and multiply the columns of S by it; a run that is taken up again has it already. Collective."""
         if cycles:
-            hierarchy = NearNull(S, self._column[full], self._line[full])
-            self._w[full] = hierarchy.improve(self._w[full], cycles)
-            hierarchy.destroy()
+            self._w[full] = near_null(S, self._column[full], self._line[full], self._w[full], cycles)
         scaling = S.createVecRight()
         scaling.setArray(self._w[full])
         S.diagonalScale(None, scaling)

@@ -18,70 +18,55 @@ LEAK = 1e-4  # right-hand side, in parts of diag(S): larger ones let the boundar
 SWEEPS = 3  # symmetric Gauss-Seidel sweeps before and after
 
 
-class NearNull:
-    """Aggregation hierarchy for one sparsity of S.
+def near_null(S: PETSc.Mat, i: np.ndarray, j: np.ndarray, w: Array, cycles: int) -> Array:
+    """w after some cycles; every entry stays positive. Collective.
 
     Parameters
     ----------
     S : the matrix, any number of ranks.
     i, j : grid column and line of each of this rank's unknowns; aggregates are 2 x 2 blocks of them.
     """
+    prolongations: list[PETSc.Mat] = []
+    size = S.getSize()[0]
+    while size > COARSEST:
+        i, j = i // 2, j // 2
+        width = int(i.max(initial=0)) + 1
+        blocks, aggregate = np.unique(j * width + i, return_inverse=True)
+        i, j = blocks % width, blocks // width
+        prolongations.append(_aggregation(aggregate, blocks.size, S.comm))
+        size = prolongations[-1].getSize()[1]
+    x, f = S.createVecs()
+    x.setArray(w)
+    S.getDiagonal(f)
+    f.scale(LEAK)
+    for _ in range(cycles):
+        _cycle(S, x, f, prolongations)
+    out = x.array_r.copy()
+    for obj in (x, f, *prolongations):
+        obj.destroy()
+    return out
 
-    def __init__(self, S: PETSc.Mat, i: np.ndarray, j: np.ndarray):
-        self._S = S
-        self._prolongations: list[PETSc.Mat] = []
-        size = S.getSize()[0]
-        while size > COARSEST:
-            i, j = i // 2, j // 2
-            width = int(i.max(initial=0)) + 1
-            block = j * width + i
-            used = np.zeros(int(block.max(initial=0)) + 1, dtype=bool)
-            used[block] = True
-            aggregate = (np.cumsum(used) - 1)[block]
-            blocks = np.flatnonzero(used)
-            i, j = blocks % width, blocks // width
-            P = _aggregation(aggregate, int(used.sum()), S.comm)
-            self._prolongations.append(P)
-            size = P.getSize()[1]
 
-    def improve(self, w: Array, cycles: int) -> Array:
-        """w after some cycles; every entry stays positive. Collective."""
-        S = self._S
-        x, f = S.createVecs()
-        x.setArray(w)
-        S.getDiagonal(f)
-        f.scale(LEAK)
-        for _ in range(cycles):
-            self._cycle(S, x, f, 0)
-        out = x.array_r.copy()
-        x.destroy()
-        f.destroy()
-        return out
-
-    def _cycle(self, S: PETSc.Mat, x: PETSc.Vec, f: PETSc.Vec, level: int) -> None:
-        symmetric = PETSc.Mat.SORType.LOCAL_SYMMETRIC_SWEEP
-        if level == len(self._prolongations):
-            S.SOR(f, x, sortype=symmetric, its=COARSEST_SWEEPS)
-            return
-        S.SOR(f, x, sortype=symmetric, its=SWEEPS)
-        P = self._prolongations[level]
-        scaled = S.duplicate(copy=True)
-        scaled.diagonalScale(None, x)
-        coarse = scaled.ptap(P)
-        e, f_coarse = coarse.createVecs()
-        P.multTranspose(f, f_coarse)
-        e.set(1.0)
-        self._cycle(coarse, e, f_coarse, level + 1)
-        fine = x.duplicate()
-        P.mult(e, fine)
-        x.pointwiseMult(x, fine)
-        for obj in (scaled, coarse, e, f_coarse, fine):
-            obj.destroy()
-        S.SOR(f, x, sortype=symmetric, its=SWEEPS)
-
-    def destroy(self) -> None:
-        for P in self._prolongations:
-            P.destroy()
+def _cycle(S: PETSc.Mat, x: PETSc.Vec, f: PETSc.Vec, prolongations: list[PETSc.Mat]) -> None:
+    symmetric = PETSc.Mat.SORType.LOCAL_SYMMETRIC_SWEEP
+    if not prolongations:
+        S.SOR(f, x, sortype=symmetric, its=COARSEST_SWEEPS)
+        return
+    S.SOR(f, x, sortype=symmetric, its=SWEEPS)
+    P, *coarser = prolongations
+    scaled = S.duplicate(copy=True)
+    scaled.diagonalScale(None, x)
+    coarse = scaled.ptap(P)
+    e, f_coarse = coarse.createVecs()
+    P.multTranspose(f, f_coarse)
+    e.set(1.0)
+    _cycle(coarse, e, f_coarse, coarser)
+    fine = x.duplicate()
+    P.mult(e, fine)
+    x.pointwiseMult(x, fine)
+    for obj in (scaled, coarse, e, f_coarse, fine):
+        obj.destroy()
+    S.SOR(f, x, sortype=symmetric, its=SWEEPS)
 
 
 def _aggregation(aggregate: np.ndarray, count: int, comm: PETSc.Comm) -> PETSc.Mat:
