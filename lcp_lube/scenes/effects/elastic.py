@@ -3,8 +3,7 @@
 A thin soft liner of thickness t on a stiff backing, bonded to it, has the compliance t (1 + nu) (1 - 2 nu)/(E (1 - nu)).
 """
 
-from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -15,7 +14,17 @@ from ..units import measured, metres
 from .table import EffectTable
 
 
-class Elastic(EffectTable):
+class GivingWay(Effect):
+    """Walls that pressure moves apart."""
+
+    channels: ClassVar[tuple[str, ...]] = ("lift",)
+
+    def report(self, at: Answer) -> Report:
+        lift = at.cells["lift"]
+        return Report({"deflection_max": at.problem.reduce.max(np.abs(lift))}, {}, {"lift": (lift, "m")})
+
+
+class Elastic(GivingWay, EffectTable):
     """A local foundation: its compliance, or thickness, modulus and Poisson's ratio of a thin liner."""
 
     compliance: Positive | None = measured("m/Pa", None, "how far the wall gives way under a pressure")
@@ -30,29 +39,9 @@ class Elastic(EffectTable):
         if self.E is not None and self.E < 1e4:
             raise ValueError(f"E = {self.E:g}: at least 10 kPa is needed (SI units?)")
 
-    def effect(self, scene: Any) -> "Foundation":
-        given = self.compliance
-        if given is None:
-            assert self.thickness is not None and self.E is not None  # as `check` found
-            given = self.thickness * (1.0 + self.nu) * (1.0 - 2.0 * self.nu) / (self.E * (1.0 - self.nu))
-        return Foundation(given)
-
-
-class GivingWay(Effect):
-    """Walls that pressure moves apart."""
-
-    channels: ClassVar[tuple[str, ...]] = ("lift",)
-
-    def report(self, at: Answer) -> Report:
-        lift = at.cells["lift"]
-        return Report({"deflection_max": at.problem.reduce.max(np.abs(lift))}, {}, {"lift": (lift, "m")})
-
-
-@dataclass(frozen=True)
-class Foundation(GivingWay):
-    """compliance : m/Pa."""
-
-    compliance: float
-
     def apply(self, at: Answer, out: Cells) -> None:
-        out["lift"] += self.compliance * (at.p + out.get("contact", 0.0))
+        compliance = self.compliance
+        if compliance is None:
+            assert self.thickness is not None and self.E is not None  # as `check` found
+            compliance = self.thickness * (1.0 + self.nu) * (1.0 - 2.0 * self.nu) / (self.E * (1.0 - self.nu))
+        out["lift"] += compliance * (at.p + out.get("contact", 0.0))
