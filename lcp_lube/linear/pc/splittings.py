@@ -82,18 +82,15 @@ class SaddlePC:
             self._fields.destroy()
 
 
-class Whole:
+class Whole(Inner):
     """F = A, through a KSP of its own."""
 
     def __init__(self, fields: TwoFields, prefix: str):
+        super().__init__(fields.A, prefix)
         self._fields = fields
-        self._inner = Inner(fields.A, prefix)
 
     def refresh(self) -> None:
-        self._inner.setUp(self._fields.A)
+        self.setUp(self._fields.A)
 
     def solve_F(self, g: Array) -> Array:
-        return self._inner.solve(g)
-
-    def destroy(self) -> None:
-        self._inner.destroy()
+        return self.solve(g)
