@@ -2,9 +2,8 @@
 
 A cell whose point lies in a supply is full, p = P and r = 0. Its row of A p + B r = c becomes d (p - P) = 0 with A's own
 diagonal d, and void that reaches it is swallowed, b_W = 0. A and -B stay column diagonally dominant M-matrices: rows lose
-off-diagonal entries, no column grows. What the supply gives to the film is the balance that its cells would have had. The edge
-of a supply may lie anywhere between two points: the face between a held point and a free one resists over the length up to the
-edge alone.
+off-diagonal entries, no column grows. What the supply gives to the film is the balance that its cells would have had. The face
+between a held point and a free one resists over the length up to the supply's edge alone, wherever that lies.
 """
 
 from __future__ import annotations
@@ -112,7 +111,7 @@ Region = Patch | Where  # where a supply lies
 class Supply:
     """A region that one source feeds.
 
-    region : where it lies. p : its pressure, Pa above p_c: given, or the last one found. flow : volume flow that it gives, m3/s
+    p : its pressure, Pa above p_c: given, or the last one found. flow : volume flow that it gives, m3/s
     (1D: m2/s). law, K, p_s : or a restrictor before it, 'capillary', flow = K (p_s - p), or 'orifice', flow = K sqrt(p_s - p),
     back again where p > p_s; p_s in Pa above p_c. backflow : whether that may happen.
     """
@@ -143,32 +142,33 @@ class Supply:
             return flow - self.K * (self.p_s - p), self.K, 1.0
         return p - self.p_s + flow * abs(flow) / self.K**2, 1.0, 2.0 * abs(flow) / self.K**2
 
+    def given(self, p: float) -> float:
+        """What an orifice lets through at the pressure p, m3/s."""
+        return math.copysign(self.K * math.sqrt(abs(self.p_s - p)), self.p_s - p)
+
     def sought(self, p: float, flow: float) -> tuple[float, float, float]:
-        """As `misfit`, for the next p by Newton's method: in flows also behind an orifice of which the film asks too much.
-
-        There the square grows beyond bounds, and its steps are halves.
+        """As `misfit`, for the next p by Newton's method: in flows also behind an orifice of which the film asks too much,
+        as the square grows beyond bounds there, and its steps are halves.
         """
-        if self.law != "orifice" or not flow**2 > self.K**2 * (self.p_s - p) > 0.0:
+        if self.law != "orifice" or not flow**2 > self.K**2 * abs(self.p_s - p) > 0.0:
             return self.misfit(p, flow)
-        given = self.K * math.sqrt(self.p_s - p)
-        return flow - given, 0.5 * given / (self.p_s - p), 1.0
+        return flow - self.given(p), 0.5 * self.given(p) / (self.p_s - p), 1.0
 
-    def defect(self, p: float, flow: float, largest: float, rounding: float) -> float:
-        """The misfit beyond rounding in parts of the largest flow; behind an orifice, of its pressures.
+    def defect(self, p: float, flow: float, largest: float, least: float, rounding: float) -> float:
+        """The misfit beyond rounding in parts of the largest flow; behind an orifice, of its pressures or of its own flow.
 
-        rounding : of the flow, m3/s; as much as makes 1e-8 of a restrictor's pressures counts.
+        least : flow that is next to nothing. rounding : of the flow; as much as makes 1e-8 of a restrictor's pressures counts.
         """
-        off, by_p, by_flow = map(abs, self.misfit(p, flow))
+        (off, by_p, by_flow), orifice = map(abs, self.misfit(p, flow)), self.law == "orifice"
         pressure = max(abs(p), abs(self.p_s))
-        off -= min(
-            rounding * (by_flow + rounding / self.K**2 if self.law == "orifice" else 1.0), by_p * KNOWN * pressure or np.inf
-        )
-        return max(off, 0.0) / ((pressure if self.law == "orifice" else largest) or 1.0)
+        off -= min(rounding * (by_flow + rounding / self.K**2 if orifice else 1.0), by_p * KNOWN * pressure or np.inf)
+        part = max(off, 0.0) / ((pressure if orifice else max(largest, least)) or 1.0)
+        return min(part, max(abs(flow - self.given(p)) - rounding, 0.0) / (max(abs(flow), least) or 1.0)) if orifice else part
 
 
 @dataclass(frozen=True)
 class Held:
-    """The supplies of a problem: `owner` has the number of the supply at each owned point, -1 outside, shape (ny, nx)."""
+    """The supplies of a problem, and the number of the supply at each owned point, -1 outside, shape (ny, nx)."""
 
     supplies: tuple[Supply, ...]
     owner: NDArray[np.int64]
@@ -189,8 +189,10 @@ def hold(grid: Grid, scheme: BoxScheme, supplies: Sequence[Supply], p_unit: floa
 
     Raises
     ------
-    InputError : two supplies have a point in common.
+    InputError : two supplies have a point in common, or hold all of a film without a way out, whose matrix has no scale.
     """
+    if not grid.reduce.max(scheme.diagonal) > 0:
+        raise InputError(f"grid {'x'.join(map(str, grid.shape))}: a supply holds the film's only point, between closed sides")
     owner = np.full(grid.box, -1, dtype=np.int64)
     for number, supply in enumerate(supplies):
         mine = np.broadcast_to(supply.region.inside(grid.x, grid.y), grid.box)
@@ -231,8 +233,6 @@ def _share(grid: Grid, held: Held, dj: int, di: int) -> Array:
     framed = grid.ghosted(held.owner.astype(float).ravel(), outside=outside).astype(np.int64)
     beside = framed[1 + dj : 1 + dj + ny, 1 + di : 1 + di + nx]
     j, i = np.nonzero(((held.owner < 0) != (beside < 0)) & ((beside != outside) | (held.owner >= 0)))
-    if not j.size:
-        return share
     numbers = np.maximum(held.owner[j, i], beside[j, i])
     at_x, at_y = grid.with_neighbours(0), grid.with_neighbours(1) if grid.dim == 2 else np.zeros(3)
     x, y = at_x[grid.x_start + i + 1], at_y[grid.y_start + j + 1]
@@ -241,35 +241,36 @@ def _share(grid: Grid, held: Held, dj: int, di: int) -> Array:
     found = np.ones(j.size)
     for number in np.unique(numbers):
         at = numbers == number
-        inside = held.supplies[number].region.inside
+        region = held.supplies[number].region
         free = [np.where(starts_held, b, a)[at] for a, b in ((x, to_x), (y, to_y))]
         full = [np.where(starts_held, a, b)[at] for a, b in ((x, to_x), (y, to_y))]
         low, high = np.zeros(int(at.sum())), np.ones(int(at.sum()))
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
-            there = inside(free[0] + middle * (full[0] - free[0]), free[1] + middle * (full[1] - free[1]))
+            at_x_y = [a + middle * (b - a) for a, b in zip(free, full, strict=True)]
+            for side in np.flatnonzero(grid.periodic):  # both cells of a face there see the same edge
+                at_x_y[side] = grid.origin[side] + np.remainder(at_x_y[side] - grid.origin[side], grid.lengths[side])
+            there = region.inside(*at_x_y)
             low, high = np.where(there, low, middle), np.where(there, middle, high)
         found[at] = np.maximum(high, NEAREST)
-    found[(beside[j, i] == outside) & (found == NEAREST)] = 1.0  # a supply that reaches the side
-    share[j, i] = found
+    share[j, i] = np.where((beside[j, i] == outside) & (found == NEAREST), 1.0, found)  # 1: a supply that reaches the side
     return share
 
 
 def supply_flows(problem: LubricationProblem, p: Array, r: Array) -> list[float]:
     """Volume flow that each supply gives to the film, m3/s (1D: m2/s). Collective."""
-    held, grid = problem.held, problem.grid
-    if held is None:
+    if (held := problem.held) is None:
         return []
+    grid = problem.grid
     given = problem.face_flows(p, r).reshape(grid.box)
     unit = 0.5 * problem.scheme.flow_unit * (grid.spacing[1] if grid.dim == 2 else 1.0)
     return [unit * problem.reduce.sum(np.where(held.owner == k, given, 0.0)) for k in range(len(held.supplies))]
 
 
 def supply_defects(problem: LubricationProblem, flows: Sequence[float]) -> list[float]:
-    """What each source gives and the film takes differ by, in parts of the largest flow; 0 where p is given. Collective.
+    """What each source gives and the film takes differ by, as `Supply.defect` tells; 0 where p is given. Collective.
 
-    flows : of `supply_flows`. A flow that is next to nothing beside what the pressures drive through the supply's own faces
-    counts as that part of it.
+    flows : of `supply_flows`. A part of what the pressures drive through a supply's own faces is next to nothing.
     """
     held, grid, s = problem.held, problem.grid, problem.scheme
     if held is None or not any(one.open for one in held.supplies):
@@ -279,6 +280,6 @@ def supply_defects(problem: LubricationProblem, flows: Sequence[float]) -> list[
     pressed = [problem.reduce.sum(np.where(held.owner == k, moved, 0.0)) for k in range(len(flows))]
     largest = max(map(abs, [*flows, *(one.flow or 0.0 for one in held.supplies)]))
     return [
-        one.defect(one.p, flow, max(largest, IDLE * by), ROUNDINGS * 2.0**-53 * by) if one.open else 0.0
+        one.defect(one.p, flow, largest, IDLE * by, ROUNDINGS * 2.0**-53 * by) if one.open else 0.0
         for one, flow, by in zip(held.supplies, flows, pressed, strict=True)
     ]
