@@ -32,7 +32,8 @@ from .linearised import Feed, Linear
 
 MOST_SOLVES = 40
 TOLERANCE = 1e-10  # of the largest flow: by how much what a source gives may differ from what the film takes
-DIGITS, ENOUGH = 1e-7, 1e-4  # two steps of such parts of the largest pressure are rounding; the misfit that may be left then
+DIGITS, ENOUGH = 1e-7, 1e-4  # steps of such parts of the largest pressure may be rounding; the misfit that may be left then
+PATIENCE, GIVE_UP = 2, 8  # such steps that do not halve the misfit, before one that is left is enough; or given up
 FIRST = 0.5  # part of p_s behind a restrictor, to begin with
 LARGE = 60_000  # points of a film in the plane that is not factored
 
@@ -91,7 +92,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         P = np.array(_first(model))
     last: tuple[Array, Array] | None = None  # pressures and flows
     chain = Chain(ask, inner)
-    rests, enough = False, TOLERANCE
+    resting, least, enough = 0, np.inf, TOLERANCE
     for count in range(1, MOST_SOLVES + 1):
         held = tuple(Supply(one.region, float(p)) for one, p in zip(supplies, P, strict=True))
         solution = chain.solve(Fed(scene, held))
@@ -114,8 +115,9 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
             last, slopes = (P[free], flows[free]), film
         new_P = P[free] + np.linalg.solve(misfit[free, 2:] * slopes + np.diag(misfit[free, 1]), -misfit[free, 0])
         new_P = np.maximum(new_P, 0.0)
-        resting, rests = rests, film is None and bool(np.all(np.abs(new_P - P[free]) <= DIGITS * np.max(P)))
-        if rests and resting:
+        rests = film is None and np.all(np.abs(new_P - P[free]) <= DIGITS * np.max(P)) and np.max(off) > 0.5 * least
+        resting, least = resting + 1 if rests else 0, min(least, np.max(off))
+        if resting >= GIVE_UP or (resting >= PATIENCE and np.max(off) <= ENOUGH):
             enough = ENOUGH
             break
         P = P.copy()

@@ -45,7 +45,7 @@ class DinPc(DIN):
         dp, dr, its = self.system.solve(r, p, -self.F1, -products, rtol)
         alpha = feasible(reduce, (p, dp), (r, dr))
         mu_affine = reduce.dot(p + alpha * dp, r + alpha * dr) / n
-        sigma = float(np.clip(mu_affine / mu, 0.0, 1.0)) ** 3
+        sigma = float(np.clip(mu_affine / mu, 0.0, 1.0)) ** 3 if mu > 0.0 else 0.0  # products below 1e-308 are none
         second_order = dp * dr
 
         def central(alpha: float) -> bool:

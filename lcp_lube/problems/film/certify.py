@@ -38,7 +38,7 @@ def certify(problem: "LubricationProblem", p: Array, r: Array, eps1: float) -> C
     red, s = problem.reduce, problem.scheme
     # The ends' pressure is the scale where a cavity leaves no point full.
     p_max, driven = max(red.max(np.abs(p)), max(problem.p_sides) / problem.p_unit), red.norm(problem.c)
-    if not driven:  # p = 0: what is left of it is measured by its unit
+    if not driven and not any(problem.p_sides):  # p = 0: what is left of it is measured by its unit
         p_max = max(p_max, 1.0)
     pressure, void, residual, diagonal, worst = misfits(problem, p, r, p_max)
     # Of p itself, which in a deep pocket is more than all that flows, and of c as a difference of the wall's flows.
