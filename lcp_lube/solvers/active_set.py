@@ -11,7 +11,8 @@ and after each one put the fronts right to the cell, which saves two to four ste
 
 Plain steps cycle on some rough films, and a line search at every step is worse: it forbids the rise of ||G|| through which the
 method gets out of a poor start. Here, once ||G|| has stalled, sweeps take over for a while, twice as many each time: they
-converge from any start, as G is an M-function, so the method cannot cycle for ever.
+converge from any start, as G is an M-function. Where the film hangs on less than rounding, on a ring that is hardly fed, the
+steps lead back to the same cycle all the same, and the method says so.
 """
 
 from dataclasses import dataclass
@@ -31,6 +32,7 @@ from .relaxation import Relaxation, relaxation
 from .zform import EPS, ZForm
 
 RESCUE_SWEEPS, MOST_SWEEPS = 16, 2**14  # once stalled: at first, and at most
+IN_VAIN = 6  # times that sweeps may take over without ||G|| ever falling below what it was before
 # Inner tolerances: the first steps need signs, not digits; later ones a part of ||G||; the last one brings ||G|| below eps1
 # and no further (benchmarks/constants.py sweeps the three).
 FIRST, FORCING, LAST = 1e-2, 0.1, 0.4
@@ -60,7 +62,7 @@ class ActiveSet(Method):
     Options = ActiveSetOptions
     problem: LubricationProblem
     system: System
-    state = ("z", "G", "norm", "_best", "_stalled", "_rescue", "_taken", "_sweeps")
+    state = ("z", "G", "norm", "_best", "_stalled", "_rescue", "_vain", "_taken", "_sweeps")
 
     def __init__(self, job: Job):
         super().__init__(job)
@@ -72,7 +74,7 @@ class ActiveSet(Method):
         self._relaxation: Relaxation | None = relaxation(problem) if options.sweeps else None
         self._sweeps = options.sweeps if start else 0
         self._relax(self._sweeps)
-        self._best, self._stalled, self._rescue, self._taken = self.norm, 0, RESCUE_SWEEPS, 0
+        self._best, self._stalled, self._rescue, self._vain, self._taken = self.norm, 0, RESCUE_SWEEPS, 0, 0
 
     @property
     def fields(self) -> Fields:
@@ -99,11 +101,11 @@ class ActiveSet(Method):
 
         Raises
         ------
-        StalledError : after give_up steps; the last one leaves pressures uncertain.
+        StalledError : after give_up steps, or sweeps in vain; the last one leaves pressures uncertain.
         """
-        if self._taken == self.options.give_up:
-            steps = f"{self._taken} steps (active-set.give_up)"
-            raise StalledError(f"||G|| is at {self.norm:.1e} of ||c|| after {steps}: they seem to cycle")
+        if self._taken == self.options.give_up or self._vain > IN_VAIN:
+            why = "active-set.give_up" if self._vain <= IN_VAIN else f"{self._vain} times sweeps took over in vain"
+            raise StalledError(f"||G|| is at {self.norm:.1e} of ||c|| after {self._taken} steps ({why}): they seem to cycle")
         self._taken += 1
         full = self._branch()
         cavity = (~full).astype(float)
@@ -126,10 +128,10 @@ class ActiveSet(Method):
         with self.system.stages("relaxation"):
             if self._stalled >= self.options.patience:
                 self._relax(self._rescue, always=True)
-                self._stalled, self._rescue = 0, min(2 * self._rescue, MOST_SWEEPS)
+                self._stalled, self._rescue, self._vain = 0, min(2 * self._rescue, MOST_SWEEPS), self._vain + 1
             else:
                 self._relax(self._sweeps)
-        self._stalled = 0 if self.norm <= 0.9 * self._best else self._stalled + 1
+        self._stalled, self._vain = (0, 0) if self.norm <= 0.9 * self._best else (self._stalled + 1, self._vain)
         self._best = min(self._best, self.norm)
         return Step(self.norm, step_norm, 1.0, linear_iterations, rtol=rtol)
 

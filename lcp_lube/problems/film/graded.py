@@ -17,7 +17,7 @@ WORK = {True: 4e8, False: 2e5}  # multiplications of a factorisation, compiled o
 UNIT = 2.0**-53
 REFINEMENTS = 10
 HALVES = 60  # steps of half the wrong cells that may fail to make fewer of them
-PATIENCE = HALVES + 5  # and of all of them before
+PATIENCE = HALVES + 250  # and of all of them before: what is wrong on a ring may have to go round it many times
 
 
 def within_reach(grid: Grid) -> bool:
@@ -77,7 +77,7 @@ class Pivots:
     """Principal pivoting on the full cells (Judice and Pires; Murty), its systems solved without subtraction.
 
     Every blend of A's and -B's columns is an M-matrix, so exactly one set of full cells has p >= 0 in it and r >= 0 outside.
-    All cells of the wrong sign change sides at once, as long as this makes fewer of them; where it does not, half of them by
+    All cells of the wrong sign change sides at once, until a set of full cells comes twice; then half of the wrong ones by
     chance, and at last the last one alone, and of such steps no set comes twice. On closed and periodic lines, where a blend
     may be singular, that is no proof. Collective.
 
@@ -93,6 +93,7 @@ class Pivots:
         self.p, self.r = np.maximum(p, 0.0), np.maximum(r, 0.0)
         self._driven = problem.reduce.norm(problem.c) > 0  # or else all is zero, and signs are rounding
         self._fewest, self._patience = np.inf, PATIENCE
+        self._seen: set[float] = set()  # a number for every set of full cells
         self._part()
 
     def step(self) -> float:
@@ -124,7 +125,11 @@ class Pivots:
                 self._fewest, self._patience = self.wrong, PATIENCE
             else:
                 self._patience -= 1
-            number = np.where(bad, self.problem.grid.first + np.arange(bad.size), -1)
+            numbers = self.problem.grid.first + np.arange(bad.size)
+            if (this := reduce.sum(np.where(self.full, np.sin(numbers), 0.0))) in self._seen:
+                self._patience = min(self._patience, HALVES)
+            self._seen.add(this)
+            number = np.where(bad, numbers, -1)
             if self._patience <= 0:
                 bad = number == reduce.max(number.astype(float))
             elif self._patience <= HALVES:
