@@ -79,9 +79,8 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     """
     model: Model = scene.model  # type: ignore[attr-defined]
     supplies = model.supplies
-    if all(one.flow is not None for one in supplies) and not any(
-        side.kind == "open" for side in model.sides[: 2 * len(scene.shape)]
-    ):
+    shut = not model.grooves and not any(side.kind == "open" for side in model.sides[: 2 * len(scene.shape)])
+    if shut and all(one.flow is not None for one in supplies):
         raise InputError(f"{scene.name}: supply.1.flow: no side has a pressure, and no supply one or a restrictor: no way out")
     known = ask.start.settings.get("supply_pressures") if ask.start is not None else None
     free = np.array([one.open for one in supplies])
@@ -90,9 +89,12 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         P = np.array(known)
     elif P is None:
         P = np.array(_first(model))
+    known_before = shut and len(supplies) == 1  # nothing flows, through its restrictor neither, whatever rounding says
+    P = np.array([supplies[0].p_s]) if known_before else P
+    other = np.full(2, np.nan)  # of one supply: the last pressure that was too low, and too high
     last: tuple[Array, Array] | None = None  # pressures and flows
     chain = Chain(ask, inner)
-    resting, least, enough = 0, np.inf, TOLERANCE
+    resting, least, enough = 0, np.inf, ENOUGH if known_before else TOLERANCE
     for count in range(1, MOST_SOLVES + 1):
         held = tuple(Supply(one.region, float(p)) for one, p in zip(supplies, P, strict=True))
         solution = chain.solve(Fed(scene, held))
@@ -105,7 +107,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         off = np.array(supply_defects(problem, flows.tolist()), dtype=float)
         misfit = np.array([one.sought(p, flow) if one.open else (0.0, 0.0, 0.0) for one, p, flow in sought])
         starved = (off > TOLERANCE) & (misfit[:, 0] > 0.0) & (P <= 0.0)
-        if np.max(off) <= TOLERANCE or starved.any() or count == MOST_SOLVES:
+        if np.max(off) <= TOLERANCE or starved.any() or count == MOST_SOLVES or known_before:
             break
         if film is None:
             slopes = _slopes(problem, solution.fields, free)
@@ -113,8 +115,14 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
             if last is not None and (moved := P[free] - last[0]).any():
                 film += np.outer(flows[free] - last[1] - film @ moved, moved) / (moved @ moved)
             last, slopes = (P[free], flows[free]), film
-        new_P = P[free] + np.linalg.solve(misfit[free, 2:] * slopes + np.diag(misfit[free, 1]), -misfit[free, 0])
-        new_P = np.maximum(new_P, 0.0)
+        matrix = misfit[free, 2:] * slopes + np.diag(misfit[free, 1])
+        flat = np.diag(np.diag(matrix) == 0.0)  # a film that is nowhere full hears nothing of P: ten times as much
+        matrix += flat * np.abs(misfit[free, 0]) / (9.0 * np.maximum(P[free], model.p_unit * 1e-3))
+        new_P = np.maximum(P[free] + np.linalg.solve(matrix, -misfit[free, 0]), 0.0)
+        if new_P.size == 1:  # the misfit grows with P
+            other[int(misfit[free, 0][0] > 0.0)] = P[free][0]
+            if not np.isnan(other).any() and not other[0] < new_P[0] < other[1]:
+                new_P[:] = np.mean(other)
         rests = film is None and np.all(np.abs(new_P - P[free]) <= DIGITS * np.max(P)) and np.max(off) > 0.5 * least
         resting, least = resting + 1 if rests else 0, min(least, np.max(off))
         if resting >= GIVE_UP or (resting >= PATIENCE and np.max(off) <= ENOUGH):

@@ -5,7 +5,9 @@ import secrets
 
 import numpy as np
 import pytest
-from wild_films import judge
+from wild_films import judge, scene_of
+
+from lcp_lube.api import solve
 
 COUNT = 500
 
@@ -55,6 +57,7 @@ ONCE_FAILED = [
     (6017562, "a ring at 4e8 m/s, rounding's signs as a start"),
     (6004666, "empty all over"),
     (6015374, "empty all over, a ring's misfit of one rounding"),
+    (8013844, "a ring at 6e7 m/s and 5e-3 Pa, whose signs settle after 200 steps"),
     (1032, "a ring, half a cell before x = 0, where sqrt(x) is none"),
     *CERTIFIED_WRONG_ONCE,
 ]
@@ -64,3 +67,10 @@ ONCE_FAILED = [
 def test_films_that_once_failed(seed, why, tmp_path):
     verdict = judge(seed, tmp_path)
     assert verdict.good and verdict.what == "converged", verdict
+
+
+@pytest.mark.parametrize("seed", [665, 30814, 5010571])
+def test_active_set_says_early_that_it_cycles(seed, tmp_path):
+    solution = solve(scene_of(seed, tmp_path), method="active-set", rescue=False)
+    assert solution.outcome == "stalled" and "in vain" in solution.message
+    assert len(solution.steps) < 80
