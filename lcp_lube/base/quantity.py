@@ -46,6 +46,7 @@ PLAIN: dict[str, tuple[Fraction, Dimension]] = {
     "psi": (Fraction("6894.757293168361"), PASCAL),
     "in": (Fraction(254, 10_000), (1, 0, 0, 0, 0)),
 }
+OWN = ("rpm", "deg")  # as the last word of a key: its number is in them
 # What a dimension is called, and what one may write for it.
 NAMES: dict[Dimension, tuple[str, str]] = {
     NUMBER: ("a number without a unit", ""),
@@ -121,6 +122,14 @@ def in_si(text: str, units: str) -> float | None:
     if found.dimension not in wanted if found.unit else (text.strip().endswith("%") and NUMBER not in wanted):
         raise InputError(f"{_named(wanted)} is needed{_article(found)}")
     return found.value
+
+
+def in_own(text: str, key: str) -> float | None:
+    """The number that a text says in the unit that its key's name ends with (speed_rpm = '3000 rpm'); None if it does not."""
+    words, found, own = WORDS.fullmatch(text.strip()), quantity(text), key.rpartition("_")[2]
+    if own not in OWN or words is None or found is None or not found.unit or found.dimension != _unit(own)[1]:
+        return None
+    return float(Fraction(Decimal(words[1])) * _unit(words[2])[0] / _unit(own)[0]) if math.isfinite(found.value) else None
 
 
 def _article(found: Quantity) -> str:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.quantity import Quantity, quantity
+from ..base.quantity import Quantity, in_own, quantity
 from ..errors import InputError
 
 MOST_POINTS = 100_000
@@ -49,6 +49,7 @@ def parse_axis(text: str) -> Axis:
             pass
         case _:
             raise InputError(f"--vary {text}: {forms}")
+    start, end = (_own(key, word) for word in (start, end))
     first, last = quantity(start), quantity(end)
     if first is None or last is None or not re.fullmatch(r"[+-]?\d{1,9}", count):
         raise InputError(f"--vary {text}: {forms}")
@@ -62,6 +63,11 @@ def parse_axis(text: str) -> Axis:
     numbers = np.linspace(a, b, n)
     whole = all(end.lstrip("+-").isdigit() for end in (start, end)) and bool(np.all(numbers == np.rint(numbers)))
     return Axis(key, tuple(int(number) if whole else _rounded(number) for number in numbers), unit)
+
+
+def _own(key: str, word: str) -> str:
+    """speed_rpm = 1000 rpm without the unit, which the key has named."""
+    return word if (number := in_own(word, key)) is None else repr(number)
 
 
 def _common(text: str, found: Sequence[Quantity]) -> str:
@@ -87,7 +93,7 @@ def _listed(text: str, key: str, values: str) -> Axis:
         return Axis(key, tuple(tomllib.loads(f"values = [{values}]")["values"]))
     except (ValueError, RecursionError):
         pass
-    words = [value.strip() for value in values.split(",")]
+    words = [_own(key, value.strip()) for value in values.split(",")]
     found = [one for word in words if (one := quantity(word)) is not None]
     if len(found) < len(words):
         return Axis(key, tuple(words))

@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from ..base.quantity import in_si, quantity
+from ..base.quantity import in_own, in_si, quantity
 from ..errors import InputError
 
 SUFFIXES = {"_um": -6, "_mm": -3}
@@ -126,7 +126,8 @@ def _read(value: Any, unit: str, whole: bool, key: str) -> Any:
     if not isinstance(value, str):
         return value
     try:
-        number = in_si(value, unit)
+        number = in_own(value, key)
+        number = in_si(value, unit) if number is None else number
     except InputError as error:
         raise ValueError(f"{key} = {value}: {error}") from None
     if number is None:

@@ -101,6 +101,11 @@ def test_any_text_is_a_quantity_or_refused(text):
         ("journal", ["D=20cm", "omega=3000 rpm", "eccentricity=75%"], {"D": 0.2, "omega": 100 * math.pi, "eccentricity": 0.75}),
         ("textured_slider", ["K=1e1", "depth=2um"], {"K": 10, "depth": 2e-6}),
         (
+            "two_groove_journal",
+            ["speed_rpm=50 rev/s", "groove_deg=30 deg", "grooves_deg=[90 deg, 270 deg]"],
+            {"speed_rpm": 3000.0, "groove_deg": 30.0, "grooves_deg": [90.0, 270.0]},
+        ),
+        (
             "pocketed_pad",
             ["film.pocket.x=[2.5mm, 5mm]", "sides.west=2 bar", "fluid.mu=10cP", "balance.load=5 kN/m"],
             {"film.pocket.x": [2.5e-3, 5e-3], "sides.west.p": 2e5, "fluid.mu": 0.01, "balance.load": 5000.0},

@@ -38,6 +38,7 @@ def table(text):
         ("n=50,7", "n", (50, 7)),
         ("scheme=face,nodal", "scheme", ("face", "nodal")),
         ("journal.eccentricity=0.1,0.2", "journal.eccentricity", (0.1, 0.2)),
+        ("speed_rpm=1000 rpm:3e3rpm:2", "speed_rpm", (1000.0, 3000.0)),
         ("wave=[0.1, 0.2],[0.3, 0.4]", "wave", ([0.1, 0.2], [0.3, 0.4])),
     ],
 )
