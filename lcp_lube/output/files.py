@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -24,6 +25,7 @@ from .results import as_dict, finite
 
 FIELD_FILES = (".npz", ".nc", ".vts", ".vtr", ".pvd", ".h5")
 PETSC_STRING = 13  # of PETSc's PetscDataType
+MOST_TEXT = 60_000  # of an attribute: HDF5 takes 64 KB
 PICTURES = (".png", ".pdf", ".svg")
 
 
@@ -61,7 +63,8 @@ def save(
     - .pvd: a collection of ParaView's of this one answer, with its .vts beside it; `save_series` writes one of many.
     - .vts, .vtr: ParaView's structured and rectilinear grid by PETSc's viewer; rank 0 writes, one rank's part at a time.
     - .h5: the fields, x and y as datasets by PETSc's viewer, all ranks writing, each with an attribute `units`; `Vec.load`
-      with the field's name reads one back on any number of ranks.
+      with the field's name reads one back on any number of ranks. The file has the attribute
+      `result`, as .npz, where that is less than 60 KB.
 
     Parameters
     ----------
@@ -99,7 +102,8 @@ def save(
             if suffix == ".h5":  # a rank that fails inside HDF5 leaves the others there
                 with on_all_ranks(grid.comm, f"{path}: could not be written"):
                     reserve(temporary, 8 * grid.size * len(fields))
-            _save_by_viewer(points, fields, units, temporary)
+            result = grid.comm.bcast(json.dumps(finite(as_dict(solution))))  # each rank has seconds of its own
+            _save_by_viewer(points, fields, units, temporary, result)
 
 
 def gather(grid: Grid | Frame, values: Array, stride: tuple[int, int] = (1, 1)) -> Array:
@@ -196,7 +200,7 @@ def _save_npz(solution: Solution, grid: Grid | Frame, fields: dict[str, Array], 
                 np.lib.format.write_array(entry, np.asarray(values), allow_pickle=False)
 
 
-def _save_by_viewer(grid: Grid | Frame, fields: dict[str, Array], units: dict[str, str], target: str) -> None:
+def _save_by_viewer(grid: Grid | Frame, fields: dict[str, Array], units: dict[str, str], target: str, result: str) -> None:
     """VTK or HDF5, by the extension. PETSc writes all that was viewed when the viewer is destroyed."""
     dm = grid.dm.duplicate() if isinstance(grid, Grid) else grid.dm()  # a copy: coordinates would stay in the grid's own
     comm = dm.comm
@@ -208,6 +212,8 @@ def _save_by_viewer(grid: Grid | Frame, fields: dict[str, Array], units: dict[st
                 vec = PETSc.Vec().createMPI(x.size, comm=comm)
                 vec.setArray(x[slice(*vec.owner_range)])
                 _view(vec, name, viewer, units[name])
+            if len(result) <= MOST_TEXT:
+                _attribute(viewer, "WriteAttribute", b"/", "result", result)
         else:
             viewer.createVTK(target, "w", comm)
             vec = dm.getCoordinateDM().createGlobalVec()
@@ -240,13 +246,16 @@ def _view(vec: PETSc.Vec, name: str, viewer: PETSc.Viewer, unit: str) -> None:
     vec.setName(name)
     vec.view(viewer)
     if viewer.getType() == PETSc.Viewer.Type.HDF5:
-        # petsc4py has no call for attributes, PETSc has.
-        library = ctypes.CDLL(PETSc.__file__)
-        write = library.PetscViewerHDF5WriteObjectAttribute
-        write.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int, ctypes.c_char_p]
-        if error := write(viewer.handle, vec.handle, b"units", PETSC_STRING, unit.encode()):
-            raise PETSc.Error(error)
+        _attribute(viewer, "WriteObjectAttribute", vec.handle, "units", unit)
     vec.destroy()  # a VTK viewer keeps a reference until it writes
+
+
+def _attribute(viewer: PETSc.Viewer, call: str, where: Any, name: str, text: str) -> None:
+    """A text beside a dataset or a group: petsc4py has no call for attributes, PETSc has."""
+    write = getattr(ctypes.CDLL(PETSc.__file__), f"PetscViewerHDF5{call}")
+    write.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int, ctypes.c_char_p]
+    if error := write(viewer.handle, where, name.encode(), PETSC_STRING, text.encode()):
+        raise PETSc.Error(error)
 
 
 def _wrong_extension(suffix: str, plot: bool) -> str:

@@ -183,7 +183,7 @@ def summary(data: dict[str, Any]) -> str:
     recipe = data["recipe"] or f"{data['ksp_type']} + {data['pc_type']}"
     system = f" on the {data['system']} system, {recipe}" if data["system"] else ""
     scheme = f", scheme {data['scheme']}" if data["scheme"] else ""
-    first = f", from which {data['took_over']} took over," if data["took_over"] else ""
+    first = f", from which {data['took_over']} took over" if data["took_over"] else ""
     measures = ", ".join(
         f"{name.replace('_', ' ')} {data[name]:.1e}{UNITS.get(name, '')}"
         for name in MEASURES

@@ -139,6 +139,8 @@ def test_hdf5_carries_units(film: Solution, tmp_path: Path) -> None:
             name: film.units[name] for name in "prhxy"
         }
         np.testing.assert_array_equal(file["p"], film.field("p", boundary=True))
+        result = json.loads(file.attrs["result"])
+    assert result["load"] == film.load and result["scene_units"]["L"] == "m" and result["scene_data"]["family"] == "slider"
 
 
 def test_as_a_dataset(film: Solution) -> None:
