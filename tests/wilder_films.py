@@ -124,15 +124,17 @@ def judge(seed: int, **how_to: Any) -> Verdict:
 def fault(verdict: Verdict, how_to: dict[str, Any]) -> bool:
     """A wrong answer that is called converged; or none, by `auto`, to what has one. A named method may fail with a sentence."""
     if verdict.what == "converged":
-        return not verdict.error <= (max(WRONG, 2 * verdict.said) if how_to else WRONG)
-    # A source's flow may be less than one digit of the pressure moves beside a recess that is 100 times as deep as the film.
-    told = verdict.what in ("refused", "no_solution") or ("film and source differ" in verdict.message and _deep(verdict.seed))
+        return not verdict.error <= (max(WRONG, 4 * verdict.said) if how_to else WRONG)
+    # A source's flow may be less than one digit of the pressure moves beside a recess that is 100 times as deep as the film,
+    # or where nothing has a way out but through restrictors.
+    told = verdict.what in ("refused", "no_solution") or ("film and source differ" in verdict.message and _hard(verdict.seed))
     return not (told or (how_to and verdict.message and verdict.what != "error"))
 
 
-def _deep(seed: int) -> bool:
-    sizes = [max(part.get(key, 0.0) for key in ("h", "c", "depth", "h_start", "h_end")) for part in data_of(seed)["film"]]
-    return max(sizes) > 100 * sizes[0]
+def _hard(seed: int) -> bool:
+    data = data_of(seed)
+    sizes = [max(part.get(key, 0.0) for key in ("h", "c", "depth", "h_start", "h_end")) for part in data["film"]]
+    return max(sizes) > 100 * sizes[0] or all(isinstance(side, str) for side in data["sides"].values())
 
 
 def main(first: int, count: int) -> None:

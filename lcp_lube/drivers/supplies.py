@@ -137,7 +137,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
             solution.outcome, solution.message = Outcome.NO_SOLUTION, message
         else:
             message = f"supply {worst + 1}: film and source differ by {off[worst]:.1e} of the flow after {count} solves"
-            if enough == ENOUGH:
+            if enough == ENOUGH or np.max(off) <= ENOUGH:
                 message += ": the last digit of the pressure moves the film's flow by more than that"
             solution.outcome, solution.message = Outcome.MAX_ITERATIONS, message
     solution.steps = chain.steps
