@@ -225,3 +225,13 @@ def test_three_ranks_find_the_same_places_and_flows(cli):
     for key in ("rupture", "friction", "side_leakage", "cavitated_area", "power_loss", "min_h"):
         assert three[key] == pytest.approx(one[key], rel=1e-6)
     assert three["flow"] == pytest.approx(one["flow"], rel=1e-6)
+
+
+def test_friction_beside_an_edge_of_any_height():
+    """1e17 times the film beyond an edge: what shears both strips agrees with that of the thin one to all digits."""
+    film = [{"shape": "constant", "h": 1e-12}, {"shape": "step", "along": "y", "height": 1e5, "at": 4.3e-3}]
+    sides = dict.fromkeys(SIDES, 0.0)
+    data = {"family": "bearing", "dimension": 2, "L": 0.01, "width": 0.01, "U": 1.0, "nx": 7, "ny": 8, "film": film}
+    solution = solve(data | {"sides": sides, "fluid": {"mu": MU}})
+    thin = MU * 0.01 * 4.3e-3 / 1e-12
+    assert solution.friction == pytest.approx(thin, rel=0.02)

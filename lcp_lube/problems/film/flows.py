@@ -142,8 +142,9 @@ def sheared_faces(problem: LubricationProblem, x: Array, lifted: complex = 0.0) 
         if rows.size:
             thinnest, uneven = in_strips.min(axis=0) + lifted, np.ptp(in_strips, axis=0) > 1e-9 * in_strips.max(axis=0)
             parts = in_strips + lifted
-            mean, full, layer = (np.sum(shares * part, axis=0) for part in (parts, 1.0 / parts, thinnest / parts**2))
-            slope = np.where(uneven, (full - layer) / np.where(uneven, 1.0 - thinnest / mean, 1.0), full)
+            over = parts - thinnest  # of which the difference of both is made: they may agree in all digits
+            mean, full, more, above = (np.sum(shares * part, axis=0) for part in (parts, 1.0 / parts, over / parts**2, over))
+            slope = np.where(uneven, mean * more / np.where(uneven, above, 1.0), full)
             h, resting, moving = np.array(h), np.array(resting), np.array(h)
             h[rows], resting[rows], moving[rows] = mean, full - slope, 1.0 / slope
     return h, resting, moving
