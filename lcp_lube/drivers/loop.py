@@ -133,7 +133,7 @@ class Loop:
         unit = new.problem.p_unit  # type: ignore[attr-defined]
         q, b = new.fields["p"] * unit, self.law.barus
         self.beyond = bool(b) and not self.base.reduce.max(b * q) < 1.0
-        if self.beyond and "viscosity" in self.names:  # of an iterate: hotter oil may carry what this one cannot
+        if self.beyond and {"viscosity", "lift"} & set(self.names):  # of an iterate: hotter oil, softer walls may carry it
             q = np.minimum(q, STEEPEST / b)
         p = self.law.pressure(q)
         with np.errstate(all="ignore"):

@@ -48,20 +48,31 @@ def test_rigid_cylinder():
         assert s.load == pytest.approx(2.448 * 0.02 * u * 0.02 / h_0, rel=0.01)
 
 
-def test_elastic_cylinder():
-    """The film of Moes' formula within 10 %: M = 1.7, L = 3, deflections as large as the film."""
+@pytest.mark.parametrize(
+    ("law", "L", "n", "off"), [("", 0.0, 300, 0.01), ("roelands", 3.0, 150, 0.05), ("barus", 3.0, 150, 0.04)]
+)
+def test_elastic_cylinder(law, L, n, off):
+    """The film of Moes' formula (1992), deflections above the film: M = 1.3 isoviscous within 1 %, 1.7 with L = 3 within 5 %.
+
+    His E' is twice ours, u_s the sum of both speeds, and his film is the one that the flow has where dp/dx = 0, 2 Q/u_s: for
+    rigid cylinders 3/M, where Martin's least film is 2.448/M. The film over the centre is 8 to 18 % less in such contacts.
+    By Barus' law no pressure carries the flow between rigid walls, with which the loop begins.
+    """
     E_2, alpha, R = 2.0 * E, 2e-8, 0.02
     q = (3.0 / (alpha * E_2)) ** 4
-    unit, b = R * sqrt(q), sqrt(20.0 * E_2 * R * sqrt(q) * R / (pi * E))
-    more = {"half_space": {"E_reduced": E, "reference": b}, "roelands": {"alpha": alpha}, "p_unit": 1e8, "n": 150}
-    with solve(cylinder(unit, q * E_2 * R / 0.02, 9 * b, **more), model="full") as s:
+    unit, b, u_s = R * sqrt(q), sqrt(20.0 * E_2 * R * sqrt(q) * R / (pi * E)), q * E_2 * R / 0.02
+    more = {"half_space": {"E_reduced": E, "reference": b}, "p_unit": 1e8, "n": n}
+    laws = {"roelands": {"roelands": {"alpha": alpha}}, "barus": {"fluid": {"mu": 0.02, "barus": alpha}}}
+    data = cylinder(0.8 * unit if law == "barus" else unit, u_s, 9 * b, **more) | laws.get(law, {})
+    with solve(data, model="full") as s:
         assert s.converged, s.message
-        H, M = np.interp(9 * b, s.x, s.h) / unit, s.load / (E_2 * R * sqrt(q))
+        H, M = 2.0 * abs(s.quantities["flow"]["east"]) / u_s / unit, s.load / (E_2 * R * sqrt(q))
         assert s.deflection_max > 0.8 * H * unit
-    RI, EI, RP, EP = 3 / M, 2.621 * M**-0.2, 1.287 * 3 ** (2 / 3), 1.311 * M**-0.125 * 3**0.75
+    RI, EI, RP, EP = 3 / M, 2.621 * M**-0.2, 1.287 * L ** (2 / 3), 1.311 * M**-0.125 * L**0.75
     k = (7 + 8 * exp(-2 * EI / RI)) / 5
-    moes = ((RI ** (7 / 3) + EI ** (7 / 3)) ** (3 * k / 7) + (RP**-3.5 + EP**-3.5) ** (-2 * k / 7)) ** (1 / k)
-    assert pytest.approx(1.7, abs=0.1) == M and pytest.approx(moes, rel=0.1) == H
+    elastic = (RI ** (7 / 3) + EI ** (7 / 3)) ** (3 * k / 7)
+    moes = (elastic + ((RP**-3.5 + EP**-3.5) ** (-2 * k / 7) if L else 0.0)) ** (1 / k)
+    assert pytest.approx({"": 1.34, "roelands": 1.7, "barus": 1.82}[law], abs=0.05) == M and pytest.approx(moes, rel=off) == H
 
 
 def test_roelands():
