@@ -52,7 +52,8 @@ class Reduce:
 
     def norm(self, *arrays: Array) -> float:
         """Euclidean norm of the arrays laid end to end."""
-        return float(np.sqrt(self.comm.allreduce(sum(float(np.dot(a, a)) for a in arrays))))
+        squares = (float(np.dot(a, a) if a.ndim == 1 else np.einsum("ij,ij->", a, a)) for a in arrays)
+        return float(np.sqrt(self.comm.allreduce(sum(squares))))
 
     def min(self, a: Array) -> float:
         """Smallest entry, inf where there is none; NaN if any entry is NaN (MPI.MIN alone may drop it)."""

@@ -1,5 +1,6 @@
 """What certifies a film's answer: how far it is from balance in every cell, from complementarity, from flow in = flow out."""
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -7,8 +8,9 @@ from numpy.typing import NDArray
 
 from ...base.parallel import Array
 from ..certificate import Certificate, certificate_tol
+from ..strips import ghosted, in_strips
 from .graded import GradedJacobian, Pivots, within_reach
-from .reynolds import side_points
+from .reynolds import BoxScheme, side_points
 from .stored import storing
 from .supplies import supply_defects, supply_flows
 
@@ -18,7 +20,7 @@ if TYPE_CHECKING:
 UNIT = 2.0**-53  # largest relative error of one operation
 IDLE = 1e-8  # share of what the pressures alone would drive through the sides, below which a flow is none
 UNEVEN = 1e-4  # part of the flow that the rounding of pressures inside may make of a mass defect, at most
-BLOCK = 16_384  # cells that are looked at together
+BLOCK = 16_384  # cells of a line that are looked at together
 LEAST = 1e-200  # below any void or pressure
 FINE = 1e-7  # of p_max: rounding that may leave less than this in p needs no closer look
 CHECKS = 30  # sets of full cells that the closer look may try
@@ -37,19 +39,20 @@ def certify(problem: "LubricationProblem", p: Array, r: Array, eps1: float) -> C
     """
     red, s = problem.reduce, problem.scheme
     # The ends' pressure is the scale where a cavity leaves no point full.
-    p_max, driven = max(red.max(np.abs(p)), max(problem.p_sides) / problem.p_unit), red.norm(problem.c)
+    p_max, driven = max(red.largest(p), max(problem.p_sides) / problem.p_unit), red.norm(s.c)
     if not driven and not any(problem.p_sides):  # p = 0: what is left of it is measured by its unit
         p_max = max(p_max, 1.0)
     pressure, void, residual, diagonal, worst = misfits(problem, p, r, p_max)
     # Of p itself, which in a deep pocket is more than all that flows, and of c as a difference of the wall's flows.
-    rounding = 2 * UNIT * (diagonal + red.norm(s.b_C.ravel()))
+    dragged = np.sqrt(red.sum(np.array([np.sum(np.square(part.b_C)) for _, part in parts(problem)])))
+    rounding = 2 * UNIT * (diagonal + dragged)
     scale = pressure + void + driven
     if not driven:
         scale += red.norm(s.diagonal.ravel())
     over_all = np.maximum(residual - rounding, 0.0) / scale if scale != 0 else 0.0  # NaN stays NaN
     measures = {
         "residual": float(np.max([over_all, worst, *supply_defects(problem, supply_flows(problem, p, r))])),
-        "complementarity": red.max(np.abs(np.minimum(p / (p_max or 1.0), r / void_scale(problem, p_max)))),
+        "complementarity": complementarity(problem, p, r, p_max),
         "mass_defect": mass_defect(problem, p, r),
     }
     if within_reach(problem.grid) and rounding_may_dominate(problem, p_max):
@@ -61,13 +64,28 @@ def certify(problem: "LubricationProblem", p: Array, r: Array, eps1: float) -> C
     )
 
 
+def parts(problem: "LubricationProblem") -> Iterator[tuple[slice, BoxScheme]]:
+    """The lines strip by strip, and their coefficients."""
+    return ((rows, problem.scheme.rows(rows)) for rows in in_strips(problem.grid))
+
+
+def complementarity(problem: "LubricationProblem", p: Array, r: Array, p_max: float) -> float:
+    """As `certify` tells. Collective."""
+    p, r = p.reshape(problem.grid.box), r.reshape(problem.grid.box)
+    found = [
+        np.max(np.abs(np.minimum(p[rows] / (p_max or 1.0), r[rows] / scale_of_void(s, p_max)))) for rows, s in parts(problem)
+    ]
+    return problem.reduce.max(np.array(found))
+
+
 def rounding_may_dominate(problem: "LubricationProblem", p_max: float) -> bool:
     """Whether rounding of the largest flows, in every cell, may move pressures behind the weakest film by FINE of p_max."""
     s, reduce, ends = problem.scheme, problem.reduce, problem.grid.ends
     along, across = (s.k_W, s.k_E), (s.k_S, s.k_N)
     ways = along if "open" in ends[0] or not across[0].any() else along + across
     weakest = reduce.min(np.array([np.min(k, where=k > 0, initial=np.inf) for k in ways]))
-    largest = max(reduce.max(k) for k in along + across) * p_max + reduce.max(-s.b_C)
+    wall = np.array([-np.min(part.b_C) for _, part in parts(problem)])
+    largest = max(reduce.max(k) for k in along + across) * p_max + reduce.max(wall)
     return not UNIT * problem.size * largest <= FINE * weakest * p_max
 
 
@@ -105,10 +123,14 @@ def void_scale(problem: "LubricationProblem", p_max: float) -> Array:
     It is 1 unless the pressures are far below what the wall could build up: beside such pressures a void of 1e-10, which is
     nothing to the wall's flow, may be all the flow that they drive.
     """
-    s = problem.scheme
+    return scale_of_void(problem.scheme, p_max).ravel()
+
+
+def scale_of_void(s: BoxScheme, p_max: float) -> Array:
+    """`void_scale` of some lines."""
     with np.errstate(divide="ignore", over="ignore"):
         pushed = s.diagonal * p_max / -s.b_C
-    return np.clip(pushed, LEAST, 1.0).ravel()
+    return np.clip(pushed, LEAST, 1.0)
 
 
 def misfits(problem: "LubricationProblem", p: Array, r: Array, p_max: float) -> tuple[float, float, float, float, float]:
@@ -116,15 +138,14 @@ def misfits(problem: "LubricationProblem", p: Array, r: Array, p_max: float) -> 
 
     Collective.
     """
-    s, reduce, (ny, nx) = problem.scheme, problem.reduce, problem.grid.box
-    framed = [problem.grid.ghosted(field, outside=0.0) for field in (p, r)]
-    held = s.held if s.held is not None else np.zeros((0, 0), dtype=bool)
-    owned = (s.k_W, s.k_E, s.k_S, s.k_N, s.b_C, s.entering, s.c, held)
-    squares, worst, lines = np.zeros(4), 0.0, max(1, BLOCK // nx)
-    for j in range(0, ny, lines):  # so that what lies between is no more than the cache holds
+    reduce, nx, nothing = problem.reduce, problem.grid.box[1], np.zeros((0, 0), dtype=bool)
+    framed = [ghosted(problem.grid, field, 0.0) for field in (p, r)]
+    squares, worst = np.zeros(4), 0.0
+    for rows, s in parts(problem):  # so that what lies between is no more than the cache holds
+        frames = [frame(rows) for frame in framed]
+        owned = (s.k_W, s.k_E, s.k_S, s.k_N, s.b_C, s.entering, s.c, nothing if s.held is None else s.held)
         for i in range(0, nx, BLOCK):
-            around, own = (np.s_[j : j + lines + beyond, i : i + BLOCK + beyond] for beyond in (2, 0))
-            arrays = [*(a[around] for a in framed), *(a[own] for a in owned)]
+            arrays = [*(a[:, i : i + BLOCK + 2] for a in frames), *(a[:, i : i + BLOCK] for a in owned)]
             *sums, off = cell_misfits(*arrays, p_max)  # type: ignore[arg-type, call-arg]
             squares, worst = squares + sums, np.maximum(worst, off)  # NaN stays NaN
     norms = [float(np.sqrt(reduce.sum(np.array([square])))) for square in squares]
@@ -180,21 +201,24 @@ def mass_defect(problem: "LubricationProblem", p: Array, r: Array) -> float:
     supplied = [2.0 * flow / (grid.spacing[1] if grid.dim == 2 else 1.0) for flow in supply_flows(problem, p, r)]
     net = abs(west - east + south - north + sum(supplied) - storing(problem, r))
     inflow = max(west, 0.0) + max(-east, 0.0) + max(south, 0.0) + max(-north, 0.0) + sum(max(q, 0.0) for q in supplied)
-    dragged = s.flow_unit * (reduce.min(-s.b_E) if problem.U else 0.0) * (grid.shape[1] if grid.dim == 2 else 1)
-    at = np.abs(p).reshape(grid.box)
-    driven = reduce.norm(problem.c) > 0  # or else p = 0, and p_unit measures what is left of it
-    at = at if driven else at + 1.0
+    driven = reduce.norm(s.c) > 0  # or else p = 0, and p_unit measures what is left of it
+    own, above = p.reshape(grid.box), 0.0 if driven else 1.0
+    least, inside, in_held = np.inf, 0.0, 0.0
+    for rows, part in parts(problem):
+        least, terms = np.minimum(least, -np.max(part.b_E)), part.diagonal * (np.abs(own[rows]) + above)
+        inside += float(np.sum(terms))
+        in_held += 0.0 if part.held is None else float(np.sum(terms[part.held]))
+    dragged = s.flow_unit * (reduce.min(np.array([least])) if problem.U else 0.0) * (grid.shape[1] if grid.dim == 2 else 1)
     pressed = 0.0
     for k, points, side in zip((s.k_W, s.k_E, s.k_S, s.k_N), side_points(grid), problem.p_sides, strict=True):
-        pressed += s.flow_unit * reduce.sum(k[points] * (at[points] + side / problem.p_unit))
-    if s.held is not None:
-        pressed += s.flow_unit * reduce.sum(np.where(s.held, s.diagonal * at, 0.0))
+        pressed += s.flow_unit * reduce.sum(k[points] * (np.abs(own[points]) + above + side / problem.p_unit))
+    pressed += s.flow_unit * reduce.sum(np.array([in_held]))
     flow = max(inflow, dragged, IDLE * pressed if driven else pressed)
     if s.storage is not None:  # in the middle of a stroke nothing flows: rounding is measured by what is stored
         held = s.flow_unit * reduce.sum(s.storage)
         flow = max(flow, abs(storing(problem, r)), certificate_tol(0.0) * held)
         pressed += held
-    inside = UNIT * s.flow_unit * reduce.sum(s.diagonal * at)
+    inside = UNIT * s.flow_unit * reduce.sum(np.array([inside]))
     rounding = 8 * UNIT * (pressed + sum(map(abs, [*flows, *supplied]))) + min(inside, UNEVEN * flow)
     excess = net - rounding  # NaN stays NaN
     return 0.0 if excess <= 0 else excess / flow if flow != 0 else np.inf

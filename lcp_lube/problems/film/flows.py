@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...base.parallel import Array
 from ..grid import Grid
+from ..strips import in_strips, places_of
 from .cavity import cavitated
 from .edges import Around, strips
 from .reynolds import BoxScheme, sides
@@ -54,12 +56,12 @@ def side_flows(problem: LubricationProblem, p: Array, r: Array) -> dict[str, flo
     if grid.dim == 1:
         return {"west": -0.5 * west, "east": 0.5 * east}
     at_west, at_east, *at_ends = sides(grid)
-    leaving = s.couette_E + s.b_E * r.reshape(grid.box)
+    leaving = problem.leaving(r)
     total = lambda flows: s.flow_unit * problem.reduce.sum(flows)  # noqa: E731
     strips = [  # enters at the west, leaves at the east
         (
-            0.5 * rim * total(np.where(at_west & end, s.couette_W / lines, 0.0)),
-            0.5 * rim * total(np.where(at_east & end, leaving / lines, 0.0)),
+            0.5 * rim * total(np.where(at_west[:, :1] & end, s.couette_W[:, :1] / lines, 0.0)),
+            0.5 * rim * total(np.where(at_east[:, -1:] & end, leaving / lines, 0.0)),
         )
         for end, rim in zip(at_ends, grid.rims(1), strict=True)
     ]
@@ -83,7 +85,17 @@ def friction(problem: LubricationProblem, p_pa: Array, r: Array, lever: Array | 
     ----------
     p_pa : pressure in Pa above the cavitation pressure, r : void fraction; owned points. lever : of each line, for a torque, m.
     """
-    of_film = problem.reduce.sum(sum(drag(problem, problem.scheme, p_pa, r)) * lever)  # type: ignore[arg-type]
+    grid, s, of_film = problem.grid, problem.scheme, 0.0
+    p_pa, r = p_pa.reshape(grid.box), r.reshape(grid.box)
+    # What happens in a line of one rank is its own business, but where walls ask what is cavitated.
+    alone = grid.comm.size == 1 and "closed" not in grid.ends[0]
+    for rows in in_strips(grid) if alone else [slice(0, grid.box[0])]:
+        part = copy(problem)
+        if alone:
+            part.grid, part.scheme = places_of(grid, rows), s.rows(rows)
+        along = lever[rows] if isinstance(lever, np.ndarray) else lever
+        of_film += float(np.sum(sum(drag(part, part.scheme, p_pa[rows], r[rows])) * along))  # type: ignore[arg-type]
+    of_film = problem.reduce.sum(np.array([of_film]))
     return of_film if problem.contact is None else of_film + problem.contact.drag(problem, lever)
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...base.parallel import Array
+from ..strips import in_strips, places_of
 from .flows import line_weights, point_weights
 from .reynolds import sides
 
@@ -120,8 +121,11 @@ def integral(problem: LubricationProblem, p_pa: Array, above: float, weight: Wei
     """Integral of (p - above) weight(x, y): trapezoidal to the open sides, a corner having the mean of its two; cells end at
     the others. Collective."""
     grid = problem.grid
-    inside = (p_pa - above) * np.broadcast_to(weight(grid.x, grid.y), grid.box).ravel()
-    total = problem.reduce.sum(inside * point_weights(grid))
+    inside, p = 0.0, p_pa.reshape(grid.box)
+    for rows in in_strips(grid):
+        part = places_of(grid, rows)
+        inside += float(np.sum((p[rows] - above) * weight(part.x, part.y) * point_weights(part).reshape(part.box)))
+    total = problem.reduce.sum(np.array([inside]))
     pressures = open_pressures(problem)
     coordinates = grid.lines  # of all points, on every rank
     for k, p_side in enumerate(pressures):

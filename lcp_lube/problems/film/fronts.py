@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ...base.parallel import Array
 from ..grid import Grid
+from ..strips import ghosted, in_strips, places_of
 from .cavity import cavitated
 from .flows import line_weights, point_weights, stream_weights
 from .reynolds import Film, sides
@@ -104,28 +105,38 @@ def cavitated_area(problem: LubricationProblem, found: Fronts | None, p: Array, 
     Across the flow a front lies where the pressure beside it, followed by its slope, is zero.
     """
     grid = problem.grid
-    cavity = cavitated(problem.reduce, p, r)
-    area = problem.reduce.sum(cavity * point_weights(grid)) * grid.cell
-    if found is None:
-        return area
-    stretch, dy = grid.stretch(grid.y), grid.spacing[1] if grid.dim == 2 else 1.0
-    more = found.shift[:, None] * line_weights(grid) * stretch * dy
-    if grid.dim == 2:
-        width, steps = grid.widths(0) * grid.spacing[0] * stretch, grid.steps(1)[:, None]
-        for (front, back), step in zip(across(grid, p, cavity), (steps[:-1], steps[1:]), strict=True):
-            more = more + np.sum(np.where(front, (0.5 * step - back) * width, 0.0), axis=1, keepdims=True)
-        for end, rim, p_side in zip(sides(grid)[2:], grid.rims(1), problem.p_sides[2:], strict=True):
-            if p_side == 0.0:  # the cavity reaches up to it
-                at_side = np.where(end, 0.5 * rim * dy * width, 0.0) * cavity.reshape(grid.box)
-                more = more + np.sum(at_side, axis=1, keepdims=True)
-    return max(area + problem.reduce.sum(more), 0.0)  # of a cavity of one point the two fronts may cross
+    cavity = cavitated(problem.reduce, p, r).reshape(grid.box)
+    area, more = 0.0, 0.0
+    frames = [ghosted(grid, field, 0.0) for field in (cavity.astype(float), p)] if found is not None and grid.dim == 2 else []
+    for rows in in_strips(grid):
+        part = places_of(grid, rows)
+        area += float(np.sum(cavity[rows] * point_weights(part).reshape(part.box)))
+        if found is None:
+            continue
+        stretch, dy = part.stretch(part.y), grid.spacing[1] if grid.dim == 2 else 1.0
+        more += float(np.sum(found.shift[rows, None] * line_weights(part) * stretch)) * dy
+        if grid.dim == 2:
+            width, steps = part.widths(0) * grid.spacing[0] * stretch, part.steps(1)[:, None]
+            dry, pressures = (frame(rows) for frame in frames)
+            fronts_across = _across(dry, pressures, steps)
+            for (front, back), step in zip(fronts_across, (steps[:-1], steps[1:]), strict=True):
+                more += float(np.sum(np.where(front, (0.5 * step - back) * width, 0.0)))
+            for end, rim, p_side in zip(sides(part)[2:], grid.rims(1), problem.p_sides[2:], strict=True):
+                if p_side == 0.0:  # the cavity reaches up to it
+                    more += float(np.sum(np.where(end, 0.5 * rim * dy * width, 0.0) * cavity[rows]))
+    area, more = (problem.reduce.sum(np.array([part])) for part in (area * grid.cell, more))
+    return area if found is None else max(area + more, 0.0)  # of a cavity of one point the two fronts may cross
 
 
 def across(grid: Grid, p: Array, cavity: NDArray[np.bool_]) -> list[tuple[NDArray[np.bool_], Array]]:
     """Full points beside a cavity to the south, and to the north, and how far from each its front lies, m. Collective."""
-    dry = grid.ghosted(cavity.astype(float), outside=0.0) > 0.0
-    frame, steps = grid.ghosted(p, outside=0.0), grid.steps(1)[:, None]
-    here, out = frame[1:-1, 1:-1], []
+    dry, pressures = (grid.ghosted(field, outside=0.0) for field in (cavity.astype(float), p))
+    return _across(dry, pressures, grid.steps(1)[:, None])
+
+
+def _across(cavity: Array, frame: Array, steps: Array) -> list[tuple[NDArray[np.bool_], Array]]:
+    """The same of framed lines."""
+    dry, here, out = cavity > 0.0, frame[1:-1, 1:-1], []
     sides_of = ((dry[:-2], frame[2:], steps[:-1], steps[1:]), (dry[2:], frame[:-2], steps[1:], steps[:-1]))
     for beside, beyond, step, far in sides_of:
         rise = (beyond[:, 1:-1] - here) / far

@@ -14,6 +14,7 @@ from ...base.parallel import Array
 from ..certificate import Certificate
 from ..grid import Grid
 from ..solution import Fields
+from ..strips import in_strips
 from ..transfer import Transfer
 from .assembly import assemble
 from .certify import certify
@@ -72,7 +73,7 @@ class LubricationProblem:
         held: Held | None = None,
         integrals: LineIntegrals | None = None,
     ):
-        self.grid, self.scheme, self.film = grid, scheme, film
+        self.grid, self.reduce, self.scheme, self.film = grid, grid.reduce, scheme, film
         self.mu, self.U, self.p_unit, self.p_sides, self.p_c = mu, U, p_unit, p_sides, p_c
         self.exact, self.shaft, self.r_in, self.held, self.integrals = exact, shaft, r_in, held, integrals
         self.coefficients_for: Callable[..., BoxScheme] | None = None  # of a film with rims: by which points are cavitated
@@ -82,7 +83,6 @@ class LubricationProblem:
         self.more_fields: dict[str, tuple[Array, str]] = {}
         self.more_measures: dict[str, float] = {}  # of its equations, for the certificate
         self.cells: dict[str, Array] = {}  # what effects made of its coefficients (`film.effects`)
-        self.reduce, self.c = grid.reduce, scheme.c.ravel()
         self._own = Owned(self, grid.petsc_comm)
 
     @made
@@ -96,17 +96,19 @@ class LubricationProblem:
 
     @made
     def _vectors(self) -> tuple[PETSc.Vec, PETSc.Vec]:
-        """`multiply` lends them its arrays."""
         return self.A.createVecs()
+
+    @property
+    def c(self) -> Array:
+        return self.scheme.c.ravel()
+
+    @property
+    def size(self) -> int:
+        return self.grid.size
 
     @property
     def unknowns(self) -> int:
         return 2 * self.size
-
-    @property
-    def size(self) -> int:
-        """Number n of unknown points; there are 2 n unknowns."""
-        return self.grid.size
 
     def multiply(self, mat: PETSc.Mat, a: Array) -> Array:
         """mat @ a for one of A, B and an array of owned points. Collective."""
@@ -153,12 +155,11 @@ class LubricationProblem:
 
     @cached_property
     def _at_sides(self) -> tuple[Any, ...]:
-        """Masks of the points beside the open sides."""
         return sides(self.grid)
 
     @cached_property
     def _sources(self) -> Array:
-        """What c has beyond the flows of the wall and of the pressures at the sides: nothing in a steady film."""
+        """What c has beyond the flows of the wall and the sides' pressures: nothing in a steady film."""
         s = self.scheme
         c = s.couette_W - s.couette_E
         for k, at_side, p_side in zip((s.k_W, s.k_E, s.k_S, s.k_N), sides(self.grid), self.p_sides, strict=True):
@@ -170,7 +171,6 @@ class LubricationProblem:
         assert self.held is not None  # for the type checker: it has supplies
         self.held = replace(self.held, supplies=tuple(supplies))
         self.scheme = pressed(self.scheme, self.held, self.p_unit)
-        self.c = self.scheme.c.ravel()
 
     def certify(self, fields: Fields, eps1: float) -> Certificate:
         """Certificate of the fields p and r for a run whose tolerance was eps1 (`film.certify`). Collective."""
@@ -187,17 +187,18 @@ class LubricationProblem:
         p, r = p.reshape(box), r.reshape(box)
         p_W, p_E, p_S, p_N = (side / self.p_unit for side in self.p_sides)
         west, east, south, north = side_points(self.grid)
-        unit = s.flow_unit
-
-        def total(flows: Array) -> float:
-            return unit * self.reduce.sum(flows)
-
+        total = lambda flows: s.flow_unit * self.reduce.sum(flows)  # noqa: E731
         return (
             total(s.couette_W[west] + s.k_W[west] * (p_W - p[west])),
-            total(s.couette_E[east] + s.b_E[east] * r[east] + s.k_E[east] * (p[east] - p_E)),
+            total(self.leaving(r)[:, : r[east].shape[1]] + s.k_E[east] * (p[east] - p_E)),
             total(s.k_S[south] * (p_S - p[south])),
             total(s.k_N[north] * (p[north] - p_N)),
         )
+
+    def leaving(self, r: Array) -> Array:
+        """What the wall drags through the east faces of this rank's last column; shape (lines, 1)."""
+        r, rows = r.reshape(self.grid.box), in_strips(self.grid)
+        return np.concatenate([s.couette_E[:, -1:] + s.b_E[:, -1:] * r[at, -1:] for at in rows for s in [self.scheme.rows(at)]])
 
     def quantities(self, fields: Fields) -> dict[str, Any]:
         """Load, friction, flows, largest pressure, cavity, and the scene's own `extras`. Collective."""
@@ -257,7 +258,6 @@ class LubricationProblem:
         for name in ("_at_sides", "_sources"):
             other.__dict__.pop(name, None)
         other.dry, other.scheme = dry, self.coefficients_for(cavity=dry)
-        other.c = other.scheme.c.ravel()
         return other
 
     def with_scheme(
@@ -269,7 +269,7 @@ class LubricationProblem:
     ) -> Self:
         """The problem on the same grid with other coefficients; mu : viscosity at the east faces, Pa s."""
         other = copy(self)
-        other.scheme, other.c, other.mu, other.exact = scheme, scheme.c.ravel(), mu, None  # type: ignore[assignment]
+        other.scheme, other.mu, other.exact = scheme, mu, None  # type: ignore[assignment]
         other.p_sides, other.held = p_sides or self.p_sides, held or self.held
         new: dict[str, Any] = {name: {} for name in ("more", "more_fields", "more_measures", "cells")}
         other.__dict__ |= {"plain": False, "coefficients_for": None, "factors": None, "contact": None, **new}

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,14 +11,31 @@ from numpy.typing import NDArray
 from ...base.parallel import Array
 from ...errors import InputError
 from ..grid import Grid
-from .edges import Around, face_film, jumps_of
+from ..strips import in_strips, places_of
+from .edges import Around
 from .integrals import LineIntegrals, check_film
-from .rims import rims_across_x, rims_across_y
 from .stored import Stored
+from .strip import coefficients_of, dragged, entering, leaving, weights
 
 Film = Callable[[Array, Array], Array]
 USUAL = 1e6  # the largest coefficient lies between this and its inverse: absolute tolerances then mean something
 LARGE = 1e100  # coefficients whose squares still have a norm
+
+
+class Made:
+    """An array, or a function that makes it whenever it is asked for: what is seldom asked for takes no memory."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, scheme: Any, owner: type | None = None) -> Array:
+        if scheme is None:
+            raise AttributeError(self._name)  # so that the dataclass sees no default
+        value = scheme.__dict__[self._name]
+        return value() if callable(value) else value  # type: ignore[no-any-return]
+
+    def __set__(self, scheme: Any, value: Array | Callable[[], Array]) -> None:
+        scheme.__dict__[self._name] = value
 
 
 @dataclass(frozen=True)
@@ -32,22 +50,37 @@ class BoxScheme:
     On uneven lines a row is the whole balance of a cell over the mean dy: what leaves a cell is what enters the next one. In a
     sector (`Grid.polar`) arcs are longer than dx by the stretch m, the wall faster: k_W, k_E over m, k_S, k_N and U times m.
     Dirichlet neighbours are in c; `k_*` keeps their conductance, for A's diagonal and the boundary fluxes.
+
+    As `box_scheme` makes them, k_W and k_E are parts of one array, and so are k_S and k_N, couette_W and couette_E, of which
+    b_C and b_W are made when they are asked for: 40 bytes a point in all.
     """
 
     k_W: Array
     k_E: Array
     k_S: Array
     k_N: Array
-    b_C: Array
-    b_W: Array
     c: Array
     couette_W: Array  # U h at the west and east face of a cell without void: the flux balance that c holds
     couette_E: Array
     h: Array  # film at the points, m
+    b_C: Made = Made()
+    b_W: Made = Made()
     flow_unit: float = 1.0  # of all of them but h, m2/s: a power of 2
     held: NDArray[np.bool_] | None = None  # cells at a given pressure (`supplies`): their rows of A have the diagonal alone
     storage: Array | None = None  # of a time step: what a full cell comes to store is storage - kept; b_C has -storage in it
     kept: Array | None = None
+
+    def rows(self, rows: slice) -> "BoxScheme":
+        """Those of some lines of points."""
+
+        def cut(value: Any) -> Any:
+            if isinstance(value, partial):
+                return partial(value.func, *map(cut, value.args))
+            return value[rows] if isinstance(value, np.ndarray) else value
+
+        part = object.__new__(BoxScheme)
+        part.__dict__.update({name: cut(value) for name, value in vars(self).items()})
+        return part
 
     @property
     def arrays(self) -> list[str]:
@@ -99,12 +132,15 @@ def box_scheme(grid: Grid, film: Film, **data: Any) -> BoxScheme:
     with np.errstate(all="ignore"):
         box = coefficients(grid, film, **data)
     reduce = grid.reduce
-    faces = [box.k_W, box.k_E] + ([box.k_S, box.k_N] if grid.dim == 2 else [])
-    walls = zip(sides(grid, ("closed", "mirror")), faces, strict=False)
+    # Every face once: k_E and k_N are k_W and k_S but for the last ones.
+    faces = [box.k_W, box.k_E[:, -1:]] + ([box.k_S, box.k_N[-1:]] if grid.dim == 2 else [])
+    west, east, south, north = sides(grid, ("closed", "mirror"))
+    conducting = [
+        np.min(k, where=~wall, initial=np.inf) for k, wall in zip(faces, (west, east[:, -1:], south, north[-1:]), strict=False)
+    ]
     stores = [] if box.storage is None else [box.storage]
-    conducting = [np.where(wall, np.inf, k) if wall.any() else k for wall, k in walls]
-    smallest = min(map(reduce.min, [box.h, *conducting, *stores]))
-    largest = max(map(reduce.max, [*faces, np.abs(box.b_C), np.abs(box.c)]))
+    smallest = min(map(reduce.min, [box.h, np.array(conducting), *stores]))
+    largest = max(*map(reduce.max, faces), reduce.largest(box.b_C), reduce.largest(box.c))
     if not (smallest > 1 / LARGE and largest < LARGE):
         with np.errstate(all="ignore"):
             check_film(grid, film)
@@ -116,7 +152,12 @@ def box_scheme(grid: Grid, film: Film, **data: Any) -> BoxScheme:
     if 1 / USUAL < largest < USUAL:
         return box
     unit = 2.0 ** np.round(np.log2(largest))
-    return replace(box, **{name: getattr(box, name) / unit for name in box.arrays if name != "h"}, flow_unit=float(unit))
+    held = [value.args if isinstance(value, partial) else (value,) for value in vars(box).values()]
+    arrays = [a if a.base is None else a.base for a in sum(held, ()) if isinstance(a, np.ndarray)]
+    for a in {id(a): a for a in arrays}.values():
+        if a is not box.h and a is not box.h.base:
+            a /= unit
+    return replace(box, b_C=vars(box)["b_C"], b_W=vars(box)["b_W"], flow_unit=float(unit))
 
 
 def coefficients(
@@ -134,7 +175,7 @@ def coefficients(
     integrals: LineIntegrals | None = None,
     stored: Stored | None = None,
 ) -> BoxScheme:
-    """Coefficients of the box scheme on the owned points; the grid's ends say what its sides are.
+    """Coefficients of the box scheme on the owned points, made strip by strip; the grid's ends say what its sides are.
 
     Parameters
     ----------
@@ -152,93 +193,59 @@ def coefficients(
     stored : what the cells store, in a time step.
     integrals : of a line's film (1D): fluxes between its points are exact for a full film; default: from the film at the faces.
     """
-    dx, (ny, nx) = grid.steps(0), grid.box
-    x_share, y_share = grid.widths(0), grid.widths(1)[:, None] if grid.dim == 2 else np.ones((1, 1))
-    x_nodes, x_faces = grid.nodes_and_faces(0)
-    x, y = x_nodes[None, 1:-1], grid.y
-    film = Around(film, grid)
-    period = [length if around else 0.0 for length, around in zip(grid.lengths, grid.periodic, strict=True)]
-    h_x = np.broadcast_to(film(x_nodes[None, :], y), (ny, nx + 2))
-    h_face = np.broadcast_to(film(x_faces[None, :], y), (ny, nx + 1))
-    h = np.array(h_x[:, 1:-1])
-
-    def cubes(at_faces: Array, at_nodes: Array) -> Array:
-        """h^3 at the faces, which come first to last along axis 0."""
-        if not mean_cubes:
-            return at_faces**3
-        nodal = at_nodes**3
-        return 0.5 * (nodal[:-1] + nodal[1:])
-
-    k = p_unit / (6.0 * mu)
-    x_jumps, y_jumps = ((), ()) if mean_cubes else (jumps_of(film, axis) for axis in "xy")
-    across = grid.steps(1) if grid.dim == 2 else np.ones(2)
-    if integrals is not None:
-        own = slice(grid.x_start, grid.x_end + 1)
-        cubes_x, h_face = dx / integrals.parts[2][None, own], integrals.films[None, own]
-    elif x_jumps or y_jumps:
-        cubes_x, h_face = face_film(film, x_nodes, x_faces, y[:, 0], x_jumps, y_jumps, across, period[0])
-    else:
-        cubes_x = cubes(h_face.T, h_x.T).T
+    (ny, nx), film = grid.box, Around(film, grid)
     rims = [] if mean_cubes or scheme != "face" or grid.dim == 1 else getattr(film, "rims", [])
-    if rims:
-        cubes_x, h_face = rims_across_x(grid, film, rims, cavity, cubes_x, h_face, period[0])
-    m = grid.stretch(y)
-    k_x = k * cubes_x / dx * (y_share / m)
-    k_W, k_E = k_x[:, :-1], k_x[:, 1:]  # a face's conductance is stored once
-    if grid.dim == 2:
-        y_nodes, y_faces = grid.nodes_and_faces(1)
-        h_y = np.broadcast_to(film(x, y_nodes[:, None]), (ny + 2, nx))
-        at_y_faces = np.broadcast_to(film(x, y_faces[:, None]), (ny + 1, nx))
-        if x_jumps or y_jumps:
-            turned = face_film(lambda t, s: film(s, t), y_nodes, y_faces, x[0], y_jumps, x_jumps, dx, period[1])
-            cubes_y = turned[0].T
-        else:
-            cubes_y = cubes(at_y_faces, h_y)
-        if rims:
-            cubes_y = rims_across_y(grid, film, rims, cavity, cubes_y, period[1])
-        arcs = grid.spacing[0] * x_share * grid.stretch(y_faces)[:, None]
-        k_y = k * cubes_y * arcs / (grid.steps(1) * grid.spacing[1])[:, None]
-        k_S, k_N = k_y[:-1], k_y[1:]
-    else:
-        k_S = k_N = np.zeros(grid.box)
-
-    first = (np.arange(grid.x_start, grid.x_end) == 0)[None, :]
-    h_W = h_x[:, :-2]
+    # The void is dragged as the film at the points, or as what the wall drags through the faces, which are stored anyway.
+    nodal, weight = scheme != "face" and U != 0.0, None
+    for rows in [slice(0, ny)] if rims else in_strips(grid):
+        strip = grid if rims else places_of(grid, rows)
+        parts = coefficients_of(strip, film, p_unit / (6.0 * mu), U or 1.0, scheme, mean_cubes, rims, cavity, integrals)
+        if rows.start == 0:
+            # With a frame of neighbours, as sweeps want them (`solvers.fas.levels`).
+            frames = ((ny + 2, nx + 3), (ny + 3, nx + 2), (ny + 2, nx + 2), (ny, nx + 1), (ny, nx + 1))
+            kx, ky, c_frame, wall, films = (np.zeros(shape, dtype=parts[2].dtype) for shape in frames)
+            void = films if nodal else wall if U else np.zeros_like(wall)
+        kx[1:-1, 1:-1][rows], films[rows] = parts[0], parts[2]
+        if grid.dim == 2:
+            ky[1:-1, 1:-1][rows.start : rows.stop + 1] = parts[1]
+        (wall if U else void)[rows] = parts[3 if U else 4]
+    h = films[:, 1:]
+    if nodal:
+        weight = weights(grid) * np.ones((ny, 1))
+    k_W, k_E, k_S, k_N = kx[1:-1, 1 : nx + 1], kx[1:-1, 2 : nx + 2], ky[1 : ny + 1, 1:-1], ky[2 : ny + 2, 1:-1]
     if U == 0.0:
         # No void is carried, and there is none: any speed keeps B regular, as what cells store does.
-        U_r, r_in = 0.0 if stored else grid.reduce.max(np.real(k_x)) / grid.reduce.max(np.real(h)), 0.0
-    else:
-        U_r = U
-    if scheme == "upwind":
-        couette_W, couette_E = U * h_W, U * h
-    else:
-        couette_W, couette_E = U * h_face[:, :-1], U * h_face[:, 1:]
-    if scheme == "face":
-        b_C, b_W = -U_r * h_face[:, 1:], U_r * h_face[:, :-1]
-    else:
-        b_C, b_W = -U_r * h, U_r * h_W
-    couette_W, couette_E, b_C, b_W = (y_share * m * a for a in (couette_W, couette_E, b_C, b_W))
+        void *= 0.0 if stored else grid.reduce.max(np.real(kx)) / grid.reduce.max(np.real(h))
+        r_in = 0.0
     open_west, *_ = sides(grid)
-    if r_in:
-        couette_W = couette_W - np.where(open_west, b_W * r_in, 0.0)
-    if not grid.periodic[0] or U == 0.0:
-        b_W = np.where(first, 0.0, b_W)  # what enters is in c
-    if any(end != "open" for pair in grid.ends for end in pair):
-        # Column sums stay >= 0, those of A and B are 0 in the cells away from open sides. b_C stays at a closed east side: in
-        # every solution with flow r is 0 there, as what arrives must be pressed back.
-        west, east, south, north = sides(grid, ("closed", "mirror"))
-        k_W, k_E = np.where(west, 0.0, k_W), np.where(east, 0.0, k_E)
-        k_S, k_N = np.where(south, 0.0, k_S), np.where(north, 0.0, k_N)
-        couette_W, couette_E = np.where(west, 0.0, couette_W), np.where(east, 0.0, couette_E)
-
-    c = couette_W - couette_E
+    if r_in and open_west.any():
+        wall[:, :1] = wall[:, :1] - dragged(void[:, :1], weight, U) * r_in
+    last = None
+    west, east, south, north = (mask.any() for mask in sides(grid, ("closed", "mirror")))
+    # Column sums stay >= 0, those of A and B are 0 in the cells away from open sides. b_C stays at a closed east side: in
+    # every solution with flow r is 0 there, as what arrives must be pressed back.
+    if west:
+        k_W[:, 0] = wall[:, 0] = 0.0
+    if east:
+        last = None if nodal else void[:, -1].copy()
+        k_E[:, -1] = wall[:, -1] = 0.0
+    if south:
+        k_S[0] = 0.0
+    if north:
+        k_N[-1] = 0.0
+    couette_W, couette_E, c = wall[:, :-1], wall[:, 1:], c_frame[1:-1, 1:-1]
+    np.subtract(couette_W, couette_E, out=c)
     for conductance, points, p_side in zip((k_W, k_E, k_S, k_N), side_points(grid), p_sides, strict=True):
         c[points] += conductance[points] * (p_side / p_unit)
-    box = BoxScheme(k_W, k_E, k_S, k_N, b_C, b_W, c, couette_W, couette_E, h)
+    enters = grid.x_start > 0 or (grid.periodic[0] and U != 0.0)  # or else what does is in c
+    b_C, b_W = partial(leaving, void, last, weight, U), partial(entering, void, enters, weight, U)
+    box = BoxScheme(k_W, k_E, k_S, k_N, c, couette_W, couette_E, h, b_C, b_W)  # type: ignore[arg-type]
     if stored is None:
         return box
     # Twice a cell's area over the mean dy.
-    return replace(box, **stored.terms(grid, film, 2.0 * grid.spacing[0] * x_share * y_share * m, b_C, c))  # type: ignore[arg-type]
+    y_share = grid.widths(1)[:, None] if grid.dim == 2 else np.ones((1, 1))
+    area = 2.0 * grid.spacing[0] * grid.widths(0) * y_share * grid.stretch(grid.y)
+    return replace(box, **{"b_W": b_W} | stored.terms(grid, film, area, box.b_C, c))  # type: ignore[arg-type]
 
 
 def sides(grid: Grid, kinds: Sequence[str] = ("open",)) -> tuple[NDArray[np.bool_], ...]:

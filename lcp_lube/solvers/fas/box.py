@@ -55,9 +55,10 @@ class BoxFas(Cycles):
     def __init__(self, job: Job):
         super().__init__(job)
         problem, start = self.problem, job.start
-        from . import box_kernels, fronts, levels, transfer
+        from . import box_kernels, finest, fronts, levels, transfer
 
         self._kernels, self._fronts, self._transfer, self._tools = box_kernels, fronts, transfer, levels
+        self._finest = finest
         if not isinstance(problem, ObstacleProblem):
             raise InputError("--method fas: for obstacle problems on a rectangle; use active-set")
         self._source = problem.semilinear.source
@@ -72,12 +73,12 @@ class BoxFas(Cycles):
         grid, tools = self.problem.grid, self._tools
         dx, dy = grid.spacing
         faces = (np.broadcast_to(k, grid.box) for k in semilinear.faces)
-        finest = tools.level_of(grid, *faces, semilinear.b.reshape(grid.box))
+        finest = self._finest.level_of(grid, *faces, semilinear.b.reshape(grid.box))  # type: ignore[call-arg]
         levels = tools.hierarchy(finest, False)
         bounds, m = np.zeros((2, *finest.z.shape)), np.zeros_like(finest.z)
         for k, bound in enumerate((self.problem.lower, self.problem.upper)):
-            tools.put(finest, grid, bounds[k], bound)
-        tools.put(finest, grid, m, semilinear.cells)
+            self._finest.put(finest, grid, bounds[k], bound)
+        self._finest.put(finest, grid, m, semilinear.cells)
         rows = slice(None) if finest.comm is None else slice(grid.y_start, grid.y_end)
         x = grid.origin[0] + dx * np.arange(1, grid.shape[0] + 1)
         y = (grid.origin[1] + dy * np.arange(1, grid.shape[1] + 1))[rows]
@@ -98,11 +99,11 @@ class BoxFas(Cycles):
     @property
     def v(self) -> Array:
         """This rank's points."""
-        return self._tools.own(self._grids[0].level, self.problem.grid, self._grids[0].level.z).ravel()
+        return self._finest.own(self._grids[0].level, self.problem.grid, self._grids[0].level.z).ravel()
 
     @v.setter
     def v(self, value: Array) -> None:
-        self._tools.put(self._grids[0].level, self.problem.grid, self._grids[0].level.z, value)
+        self._finest.put(self._grids[0].level, self.problem.grid, self._grids[0].level.z, value)
 
     @property
     def fields(self) -> Fields:
@@ -171,7 +172,7 @@ class BoxFas(Cycles):
     def _full_multigrid(self) -> None:
         for fine, coarse in pairwise(self._grids):  # the start, seen from the coarse grids
             self._inject(fine, coarse, coarse.level.z)
-            coarse.level.c[:] = coarse.level.f
+        self._tools.right_sides(self._levels, False)
         super()._full_multigrid()
 
     def _rise_to(self, k: int) -> None:
@@ -203,6 +204,7 @@ class BoxFas(Cycles):
     def _descend(self, k: int) -> None:
         grid, coarse = self._grids[k], self._grids[k + 1]
         level, lower = grid.level, coarse.level
+        lower.work_on()
         self._relax(grid, self.options.pre, False)
         self._residual(grid)
         for part in range(2):

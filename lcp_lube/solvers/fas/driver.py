@@ -60,14 +60,14 @@ class Fas(Cycles):
         super().__init__(job)
         problem, options, start = self.problem, self.options, job.start
         # numba starts with this import, 0.4 s: only where the method is used.
-        from . import fronts, kernels, levels, transfer
+        from . import finest, fronts, kernels, levels, transfer
 
-        self._kernels, self._fronts, self._transfer, self._tools = kernels, fronts, transfer, levels
+        self._kernels, self._fronts, self._transfer, self._tools, self._finest = kernels, fronts, transfer, levels, finest
         self._harmonic, self._truncation = options.weights == "harmonic", TRUNCATIONS[options.truncation]
         with self.stages("assembly"):
-            self._levels = levels.hierarchy(levels.finest(problem), self._harmonic)
+            self._levels = levels.hierarchy(finest.finest(problem), self._harmonic)
         self._begin(start is not None)
-        self._c_norm = problem.reduce.norm(problem.c) if problem.held is None else self._norms()[0]
+        self._c_norm = problem.reduce.norm(problem.scheme.c) if problem.held is None else self._norms()[0]
         h = problem.scheme.h
         # An edge of a supply may lie as near to a side as one likes: what drives the film there has no scale for the rest.
         self._extreme = problem.held is not None or problem.reduce.max(h) > EXTREME * problem.reduce.min(h)
@@ -88,13 +88,13 @@ class Fas(Cycles):
     @z.setter
     def z(self, value: Array) -> None:
         level = self._levels[0]
-        self._tools.put(level, self.problem.grid, level.z, value)
+        self._finest.put(level, self.problem.grid, level.z, value)
         if level.held is not None:
             level.z[level.held] = level.given
 
     def _own(self) -> Array:
         level = self._levels[0]
-        return self._tools.own(level, self.problem.grid, level.z)  # type: ignore[no-any-return]
+        return self._finest.own(level, self.problem.grid, level.z)  # type: ignore[no-any-return]
 
     @property
     def fields(self) -> Fields:
@@ -124,6 +124,8 @@ class Fas(Cycles):
         self.certificate = None
         if not norm <= self._rest:
             return norm
+        for coarse in self._levels[1:]:
+            coarse.rest()
         self.certificate = seen = self.problem.certify(self.fields, self.eps1)
         lost = seen.measures["mass_defect"] / (self._share if self.problem.held is None else FED)
         return max(norm, self._rest * max(lost, seen.measures["residual"] / self._share) / seen.tol)
@@ -162,6 +164,7 @@ class Fas(Cycles):
             if self._taken == 1 and self._levels[0].carry is not None:
                 self._relax_fronts(self._levels[0])
             if anew:
+                self._tools.right_sides(self._levels[: self._depth], self._harmonic)
                 self._full_multigrid()
             else:
                 self._cycle(0, self.options.cycle)
@@ -200,8 +203,6 @@ class Fas(Cycles):
 
     def _rise_to(self, k: int) -> None:
         level = self._levels[k]
-        if k:
-            level.c[:] = level.f
         if k + 1 < self._depth:
             coarse = self._levels[k + 1]
             where = (level.first, level.by_x, level.by_y, self._harmonic)
@@ -224,6 +225,7 @@ class Fas(Cycles):
 
     def _descend(self, k: int) -> None:
         level, coarse = self._levels[k], self._levels[k + 1]
+        coarse.work_on()
         self._relax(level, self.options.pre, False)
         self._tools.held.settle(level)
         self._tools.restrict(level, coarse, coarse.c, self._harmonic)

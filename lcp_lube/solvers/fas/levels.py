@@ -1,16 +1,15 @@
-"""Grids of the nonlinear multigrid: their points, how these are dealt to the ranks, and their coefficients."""
+"""Grids of the nonlinear multigrid: their points, how these are dealt to the ranks, and the coarse ones' coefficients."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ...base.parallel import Array
-from ...errors import InputError
-from ...problems.film.lubrication import LubricationProblem
-from ...problems.grid import Grid
-from . import exact, held, kernels, transfer
+from . import exact, held, transfer
 
 FEWEST = 3  # points a side of the coarsest grid, at least
 FEWEST_LINES = 16  # of a rank; grids with fewer are held whole by every rank. With 8 a dimpled pad stalls on three
@@ -27,8 +26,8 @@ class Level:
 
     Attributes
     ----------
-    z, c : iterate and right-hand side; old : the finer level's values that z started from; f : right-hand side of the coarse
-        problem proper, for full multigrid.
+    z, c : iterate and right-hand side; old : the finer level's values that z started from. Of a coarse level they are made at
+        their first use (`work_on`), and may be dropped between two cycles (`rest`).
     kx, ky : conductances of the x and y faces.
     comm : the ranks, None where this one holds the whole grid and need not tell anyone.
     whole : every rank holds the whole grid, though comm has several.
@@ -50,7 +49,6 @@ class Level:
     c: Array
     kx: Array
     ky: Array
-    f: Array = field(default_factory=lambda: np.zeros((0, 0)))
     old: Array = field(default_factory=lambda: np.zeros((0, 0)))
     by_x: bool = False
     by_y: bool = False
@@ -64,6 +62,19 @@ class Level:
     visits: int = 0
     seconds: float = 0.0
     work: float = 0.0  # relaxed points
+
+    def work_on(self) -> None:
+        """Make the arrays of a coarse level that a cycle fills, where they are not there."""
+        if not self.z.size:
+            self.z, self.c = (np.zeros((self.kx.shape[0], self.ky.shape[1])) for _ in range(2))
+        if not self.old.size:
+            self.old = np.zeros_like(self.z)
+
+    def rest(self) -> None:
+        """Drop them until the next cycle; of films with supplies or in time they hold more than that."""
+        self.old = np.zeros((0, 0))
+        if self.held is None and self.void is None:
+            self.z = self.c = self.old
 
     @property
     def first(self) -> int:
@@ -129,83 +140,13 @@ class Level:
         return a
 
 
-def finest(problem: LubricationProblem) -> Level:
-    """The problem's own grid. Collective.
-
-    Raises
-    ------
-    InputError : the void that leaves a cell is not what enters the next one, which no scheme of this package does.
-    """
-    grid, s = problem.grid, problem.scheme
-    lost, carried = kernels.lost_void(s.b_E, s.b_W, s.b_C)
-    if grid.reduce.max(np.array([lost])) > 1e-12 * grid.reduce.max(np.array([carried])):
-        raise InputError("--method fas: what leaves a cell of this scheme does not enter the next one; use active-set")
-    level = level_of(grid, s.k_W, s.k_E, s.k_S, s.k_N, s.c)
-    if s.storage is not None:
-        level.void = np.zeros_like(level.z), np.zeros_like(level.z)
-        put(level, grid, level.void[0], -s.b_E)
-        put(level, grid, level.void[1], s.storage)
-        _carry(level)
-    if problem.held is not None:
-        mask, pressures = np.zeros_like(level.z), np.zeros_like(level.z)
-        put(level, grid, mask, problem.held.mask.astype(float))
-        put(level, grid, pressures, problem.held.pressures(problem.p_unit))
-        held.hold(level, mask, pressures)
-    return level
-
-
-def _carry(level: Level) -> None:
+def carried(level: Level) -> None:
     """What part of a cell's void leaves it, from `void`."""
     leaves, stored = level.void  # type: ignore[misc]
     level.carry = leaves / (leaves + stored + LEAST)
 
 
-def level_of(grid: Grid, k_W: Array, k_E: Array, k_S: Array, k_N: Array, c: Array) -> Level:
-    """A level from the conductances of every point's faces and a right-hand side. Collective.
-
-    Its points are dealt to the ranks as the grid's are; where these hold parts of lines, or few lines, each holds the whole.
-    """
-    periodic = (grid.periodic[0], grid.dim == 2 and grid.periodic[1])
-    split = grid.comm.size > 1
-    nx, ny = grid.shape[0], grid.shape[1] if grid.dim == 2 else 1
-    lines = grid.box[0] if grid.box[1] == nx else 0
-    if split and grid.reduce.min(np.array([float(lines)])) < FEWEST_LINES:
-        k_W, k_E, k_S, k_N, c = (whole(grid, a) for a in (k_W, k_E, k_S, k_N, c))
-        y0, y1, comm = 0, ny, None
-    else:
-        y0, y1, comm = grid.y_start, grid.y_end, grid.comm if split else None
-    level = _empty(nx, ny, y0, y1, comm, False, periodic)
-    level.kx[1:-1, 1 : nx + 1], level.kx[1:-1, nx + 1] = k_W, k_E[:, -1]
-    level.ky[1 : y1 - y0 + 1, 1:-1], level.ky[y1 - y0 + 1, 1:-1] = k_S, k_N[-1]
-    level.c[1:-1, 1:-1] = c
-    for a in (level.kx, level.ky):
-        level.share(a)
-    return level
-
-
-def whole(grid: Grid, a: Array) -> Array:
-    """All points of a coefficient, on every rank. Collective."""
-    out = np.empty((grid.shape[1] if grid.dim == 2 else 1, grid.shape[0]))
-    own = (slice(grid.y_start, grid.y_end), slice(grid.x_start, grid.x_end))
-    for where, values in grid.comm.allgather((own, np.ascontiguousarray(np.broadcast_to(a, grid.box)))):
-        out[where] = values
-    return out
-
-
-def own(level: Level, grid: Grid, a: Array) -> Array:
-    """This rank's points of an array of the finest level, without a frame."""
-    columns = slice(grid.x_start + 1, grid.x_end + 1)
-    return a[slice(grid.y_start + 1, grid.y_end + 1) if level.comm is None else slice(1, -1), columns]
-
-
-def put(level: Level, grid: Grid, into: Array, values: Array) -> None:
-    """This rank's values into an array of the finest level, and its frame. Collective."""
-    box = values.reshape(grid.box)
-    into[1:-1, 1:-1] = whole(grid, box) if level.comm is None and grid.comm.size > 1 else box
-    level.share(into)
-
-
-def _empty(nx: int, ny: int, y0: int, y1: int, comm: MPI.Comm | None, whole: bool, periodic: tuple[bool, bool]) -> Level:
+def empty(nx: int, ny: int, y0: int, y1: int, comm: MPI.Comm | None, whole: bool, periodic: tuple[bool, bool]) -> Level:
     n = ny if whole or comm is None else y1 - y0
     z, c, kx, ky = (np.zeros(shape) for shape in ((n + 2, nx + 2), (n + 2, nx + 2), (n + 2, nx + 3), (n + 3, nx + 2)))
     return Level(nx, ny, y0, y1, comm, whole, periodic, z, c, kx, ky)
@@ -238,7 +179,7 @@ def _coarser(fine: Level, harmonic: bool) -> Level | None:
     whole = comm is not None and comm.allreduce(y1 - y0, MPI.MIN) < FEWEST_LINES
     if comm is None:
         y0, y1 = 0, ny
-    coarse = _empty(nx, ny, y0, y1, comm, whole, fine.periodic)
+    coarse = empty(nx, ny, y0, y1, comm, whole, fine.periodic)
     last = fine.comm is None or fine.whole or fine.y1 == fine.ny
     beyond_x = by_x and fine.nx % 2 == 0 and not fine.periodic[0]
     beyond_y = by_y and fine.ny % 2 == 0 and not fine.periodic[1] and last
@@ -248,10 +189,8 @@ def _coarser(fine: Level, harmonic: bool) -> Level | None:
     transfer.coarsen_y_faces(fine.kx, ky, coarse.part(coarse.ky), *flags, beyond_y)
     for a in (coarse.kx, coarse.ky):
         coarse.gather(a)
-    restrict(fine, coarse, coarse.c, harmonic, fine.c)
     if fine.held is not None:
         held.coarser(fine, coarse)
-    coarse.f, coarse.old = coarse.c.copy(), np.zeros_like(coarse.z)
     if fine.void is not None:
         leaves, stored, before = (np.zeros_like(coarse.z) for _ in range(3))
         for values, into in zip(fine.void, (leaves, before), strict=True):
@@ -259,9 +198,20 @@ def _coarser(fine: Level, harmonic: bool) -> Level | None:
             coarse.gather(into)
         restrict(fine, coarse, stored, harmonic, fine.void[1])
         coarse.void = leaves, coarse.share(stored)
-        _carry(coarse)
+        carried(coarse)
         coarse.scale = (leaves + stored + LEAST) / (leaves + before + LEAST)
     return coarse
+
+
+def right_sides(levels: Sequence[Level], harmonic: bool) -> None:
+    """The right-hand sides of the coarse problems proper, for full multigrid. Collective."""
+    for fine, coarse in pairwise(levels):
+        coarse.work_on()
+        if fine.held is not None:
+            fine.c[fine.held] = 0.0
+        restrict(fine, coarse, coarse.c, harmonic, fine.c)
+    if levels[-1].held is not None:
+        levels[-1].c[levels[-1].held] = 0.0
 
 
 def solve(level: Level) -> bool:
@@ -271,7 +221,7 @@ def solve(level: Level) -> bool:
         return False
     if comm is None or not level.split:
         return exact.solve(level.z, level.kx, level.ky, level.c, *level.periodic, level.carry, level.held)
-    whole = _empty(level.nx, n, 0, n, None, False, level.periodic)
+    whole = empty(level.nx, n, 0, n, None, False, level.periodic)
     whole.carry = None if level.carry is None else np.zeros_like(whole.z)
     whole.held = None if level.held is None else np.zeros(whole.z.shape, dtype=bool)
     for name in ("z", "c", "kx", "ky", *(name for name in ("carry", "held") if getattr(whole, name) is not None)):

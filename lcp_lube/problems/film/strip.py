@@ -1,0 +1,96 @@
+"""The box scheme's coefficients on some lines of a grid, and those of the void, which are not stored (`reynolds`)."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ...base.parallel import Array
+from ..grid import Grid
+from .edges import Around, face_film, jumps_of
+from .integrals import LineIntegrals
+from .rims import rims_across_x, rims_across_y
+
+
+def coefficients_of(
+    grid: Grid,
+    film: Around,
+    k: float,
+    U: float,
+    scheme: str,
+    mean_cubes: bool,
+    rims: Sequence[Any],
+    cavity: Array | None,
+    integrals: LineIntegrals | None,
+) -> tuple[Array, Array, Array, Array, Array]:
+    """Of some lines: conductances of x and y faces, h at the points and the one before, and what goes through x faces: what the
+    wall drags, and what if all is void."""
+    dx, (ny, nx) = grid.steps(0), grid.box
+    x_share, y_share = grid.widths(0), grid.widths(1)[:, None] if grid.dim == 2 else np.ones((1, 1))
+    x_nodes, x_faces = grid.nodes_and_faces(0)
+    x, y = x_nodes[None, 1:-1], grid.y
+    period = [length if around else 0.0 for length, around in zip(grid.lengths, grid.periodic, strict=True)]
+    h_x = np.broadcast_to(film(x_nodes[None, :], y), (ny, nx + 2))
+    h_face = np.broadcast_to(film(x_faces[None, :], y), (ny, nx + 1))
+
+    def cubes(at_faces: Array, at_nodes: Array) -> Array:
+        """h^3 at the faces, which come first to last along axis 0."""
+        if not mean_cubes:
+            return at_faces**3
+        nodal = at_nodes**3
+        return 0.5 * (nodal[:-1] + nodal[1:])
+
+    x_jumps, y_jumps = ((), ()) if mean_cubes else (jumps_of(film, axis) for axis in "xy")
+    across = grid.steps(1) if grid.dim == 2 else np.ones(2)
+    if integrals is not None:
+        own = slice(grid.x_start, grid.x_end + 1)
+        cubes_x, h_face = dx / integrals.parts[2][None, own], integrals.films[None, own]
+    elif x_jumps or y_jumps:
+        cubes_x, h_face = face_film(film, x_nodes, x_faces, y[:, 0], x_jumps, y_jumps, across, period[0])
+    else:
+        cubes_x = cubes(h_face.T, h_x.T).T
+    if rims:
+        cubes_x, h_face = rims_across_x(grid, film, rims, cavity, cubes_x, h_face, period[0])
+    m = grid.stretch(y)
+    k_x, k_y = k * cubes_x / dx * (y_share / m), np.zeros((ny + 1, nx))
+    if grid.dim == 2:
+        y_nodes, y_faces = grid.nodes_and_faces(1)
+        if x_jumps or y_jumps:
+            turned = face_film(lambda t, s: film(s, t), y_nodes, y_faces, x[0], y_jumps, x_jumps, dx, period[1])
+            cubes_y = turned[0].T
+        else:
+            h_y = np.broadcast_to(film(x, y_nodes[:, None]), (ny + 2, nx)) if mean_cubes else h_x
+            cubes_y = cubes(np.broadcast_to(film(x, y_faces[:, None]), (ny + 1, nx)), h_y)
+        if rims:
+            cubes_y = rims_across_y(grid, film, rims, cavity, cubes_y, period[1])
+        arcs = grid.spacing[0] * x_share * grid.stretch(y_faces)[:, None]
+        k_y = k * cubes_y * arcs / (grid.steps(1) * grid.spacing[1])[:, None]
+    void = y_share * m * (U * (h_face if scheme == "face" else h_x[:, :-1]))
+    wall = void if scheme != "nodal" else y_share * m * (U * h_face)
+    return k_x, k_y, h_x[:, :-1], wall, void
+
+
+def weights(grid: Grid) -> Array:
+    """What the wall of the owned lines drags, in parts of U h on a mean line."""
+    return (grid.widths(1)[:, None] if grid.dim == 2 else np.ones((1, 1))) * grid.stretch(grid.y)
+
+
+def dragged(void: Array, weight: Array | None, U: float) -> Array:
+    """What goes through x faces if all is void: given as it is, or as films that are dragged."""
+    return void if weight is None else weight * (U * void)
+
+
+def leaving(void: Array, last: Array | None, weight: Array | None, U: float) -> Array:
+    """b_C; last: through the last face, where that is closed."""
+    b_C = -dragged(void[:, 1:], weight, U)
+    if last is not None:
+        b_C[:, -1] = -last
+    return b_C
+
+
+def entering(void: Array, first: bool, weight: Array | None, U: float) -> Array:
+    """b_W; first: whether anything enters the first column."""
+    b_W = dragged(void[:, :-1], weight, U) * 1.0
+    if not first:
+        b_W[:, 0] = 0.0
+    return b_W

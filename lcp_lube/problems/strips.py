@@ -1,0 +1,45 @@
+"""Lines of a grid taken together, a few at a time: what is made of them and not kept fits the cache, and takes no memory."""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from ..base.parallel import Array
+from .grid import Grid
+
+STRIP = 16_384  # points
+
+
+def in_strips(grid: Grid) -> Iterator[slice]:
+    """This rank's lines, a strip at a time."""
+    ny, nx = grid.box
+    lines = max(1, STRIP // nx)
+    return (slice(j, min(j + lines, ny)) for j in range(0, ny, lines))
+
+
+def places_of(grid: Grid, rows: slice) -> Grid:
+    """A strip as a grid that knows its points' places and sides; no ghosts, and no matrix."""
+    part = object.__new__(Grid)
+    part.__dict__ |= grid.__dict__
+    part.y_start, part.y_end = grid.y_start + rows.start, grid.y_start + rows.stop
+    part._owned, part.box = [grid._owned[0], (part.y_start, part.y_end)], (rows.stop - rows.start, grid.box[1])
+    return part
+
+
+def ghosted(grid: Grid, owned: Array, outside: float) -> Callable[[slice], Array]:
+    """`Grid.ghosted` strip by strip: of one rank, without an array of them all. Collective."""
+    if grid.comm.size > 1 or grid.dim == 1:
+        whole = grid.ghosted(owned, outside)
+        return lambda rows: whole[rows.start : rows.stop + 2]
+    (ny, _), a = grid.box, owned.reshape(grid.box)
+
+    def framed(rows: slice) -> Array:
+        first, last = rows.start - 1, rows.stop
+        out = np.empty((last - first + 1, a.shape[1] + 2))
+        out[1:-1, 1:-1] = a[rows]
+        out[:, 0], out[:, -1] = (out[:, -2], out[:, 1]) if grid.periodic[0] else (outside, outside)
+        for line, row in ((first, out[0]), (last, out[-1])):
+            row[1:-1] = a[line % ny] if 0 <= line < ny or grid.periodic[1] else outside
+        return out
+
+    return framed

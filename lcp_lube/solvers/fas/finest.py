@@ -1,0 +1,102 @@
+"""The finest grid of the nonlinear multigrid: a problem's own, whose coefficients are not stored twice."""
+
+import numpy as np
+
+from ...base.parallel import Array
+from ...errors import InputError
+from ...problems.film.lubrication import LubricationProblem
+from ...problems.grid import Grid
+from ...problems.strips import in_strips
+from . import held, kernels
+from .levels import FEWEST_LINES, Level, carried
+
+
+def finest(problem: LubricationProblem) -> Level:
+    """The problem's own grid. Collective.
+
+    Raises
+    ------
+    InputError : the void that leaves a cell is not what enters the next one, which no scheme of this package does.
+    """
+    grid, s = problem.grid, problem.scheme
+    lost = [kernels.lost_void(part.b_E, part.b_W, part.b_C) for part in map(s.rows, in_strips(grid))]
+    if grid.reduce.max(np.array([one for one, _ in lost])) > 1e-12 * grid.reduce.max(np.array([most for _, most in lost])):
+        raise InputError("--method fas: what leaves a cell of this scheme does not enter the next one; use active-set")
+    level = level_of(grid, s.k_W, s.k_E, s.k_S, s.k_N, s.c)
+    if s.storage is not None:
+        level.void = np.zeros_like(level.z), np.zeros_like(level.z)
+        put(level, grid, level.void[0], -s.b_E)
+        put(level, grid, level.void[1], s.storage)
+        carried(level)
+    if problem.held is not None:
+        level.c = level.c.copy()  # of which those of held cells change
+        mask, pressures = np.zeros_like(level.z), np.zeros_like(level.z)
+        put(level, grid, mask, problem.held.mask.astype(float))
+        put(level, grid, pressures, problem.held.pressures(problem.p_unit))
+        held.hold(level, mask, pressures)
+    return level
+
+
+def level_of(grid: Grid, k_W: Array, k_E: Array, k_S: Array, k_N: Array, c: Array) -> Level:
+    """A level from the conductances of every point's faces and a right-hand side. Collective.
+
+    Its points are dealt to the ranks as the grid's are; where these hold parts of lines, or few lines, each holds the whole.
+    """
+    periodic = (grid.periodic[0], grid.dim == 2 and grid.periodic[1])
+    split = grid.comm.size > 1
+    nx, ny = grid.shape[0], grid.shape[1] if grid.dim == 2 else 1
+    lines = grid.box[0] if grid.box[1] == nx else 0
+    if split and grid.reduce.min(np.array([float(lines)])) < FEWEST_LINES:
+        k_W, k_E, k_S, k_N, c = (whole(grid, a) for a in (k_W, k_E, k_S, k_N, c))
+        y0, y1, comm = 0, ny, None
+    else:
+        y0, y1, comm = grid.y_start, grid.y_end, grid.comm if split else None
+    n = y1 - y0
+    kx, ky, c_frame = _frame((n + 2, nx + 3), k_W, k_E), _frame((n + 3, nx + 2), k_S, k_N), _frame((n + 2, nx + 2), c)
+    if kx is None:
+        kx = np.zeros((n + 2, nx + 3))
+        kx[1:-1, 1 : nx + 1], kx[1:-1, nx + 1] = k_W, k_E[:, -1]
+    if ky is None:
+        ky = np.zeros((n + 3, nx + 2))
+        ky[1 : n + 1, 1:-1], ky[n + 1, 1:-1] = k_S, k_N[-1]
+    if c_frame is None:
+        c_frame = np.zeros((n + 2, nx + 2))
+        c_frame[1:-1, 1:-1] = c
+    level = Level(nx, ny, y0, y1, comm, False, periodic, np.zeros((n + 2, nx + 2)), c_frame, kx, ky)
+    for a in (level.kx, level.ky):
+        level.share(a)
+    return level
+
+
+def _frame(shape: tuple[int, int], a: Array, behind: Array | None = None) -> Array | None:
+    """The array with a frame whose inside is a, and b one face further, as `reynolds` makes them; None if there is none."""
+    base = a.base
+    if not isinstance(base, np.ndarray) or base.shape != shape or base.dtype != float or not base.flags.c_contiguous:
+        return None
+    places = [base[1:, 1:], base[1:, 2:] if shape[1] > a.shape[1] + 2 else base[2:, 1:]]
+    for part, place in zip((a, behind), places, strict=True):
+        if part is not None and (part.ctypes.data, part.strides) != (place.ctypes.data, base.strides):
+            return None
+    return base
+
+
+def whole(grid: Grid, a: Array) -> Array:
+    """All points of a coefficient, on every rank. Collective."""
+    out = np.empty((grid.shape[1] if grid.dim == 2 else 1, grid.shape[0]))
+    own = (slice(grid.y_start, grid.y_end), slice(grid.x_start, grid.x_end))
+    for where, values in grid.comm.allgather((own, np.ascontiguousarray(np.broadcast_to(a, grid.box)))):
+        out[where] = values
+    return out
+
+
+def own(level: Level, grid: Grid, a: Array) -> Array:
+    """This rank's points of an array of the finest level, without a frame."""
+    columns = slice(grid.x_start + 1, grid.x_end + 1)
+    return a[slice(grid.y_start + 1, grid.y_end + 1) if level.comm is None else slice(1, -1), columns]
+
+
+def put(level: Level, grid: Grid, into: Array, values: Array) -> None:
+    """This rank's values into an array of the finest level, and its frame. Collective."""
+    box = values.reshape(grid.box)
+    into[1:-1, 1:-1] = whole(grid, box) if level.comm is None and grid.comm.size > 1 else box
+    level.share(into)
