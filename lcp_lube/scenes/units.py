@@ -38,7 +38,8 @@ class Measured(BaseModel):
     numbers : the fields that hold nothing but numbers, and whether these are whole; a dimensionless one has no unit.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    # Schemas are made at first use: of all families a run needs one.
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
     units: ClassVar[dict[str, str]] = {}
     lengths: ClassVar[frozenset[str]] = frozenset()
     numbers: ClassVar[dict[str, bool]] = {}
