@@ -39,7 +39,7 @@ MEASURED: dict[tuple[str, str, str], tuple[float, float]] = {
     ("lubrication 1D", "full", "klu"): (800, 0),
     ("lubrication 1D", "full", "mumps"): (1250, 0),
     ("lubrication 1D", "full", "light"): (750, 0),
-    ("lubrication 2D", "", ""): (220, 0),
+    ("lubrication 2D", "", ""): (100, 0),
     ("lubrication 2D", "cavity", "multigrid"): (780, 0),
     ("lubrication 2D", "reduced", "multigrid"): (1040, 0),
     ("lubrication 2D", "reduced", "umfpack"): (410, 82),
@@ -170,7 +170,7 @@ def bytes_needed(facts: Facts, plan: Plan) -> float | None:
     if not known:
         return None
     fits = [known[solver]] if solver in known else list(known.values())
-    each = max(max(a + b * log2(points), 200.0) for a, b in fits)
+    each = max(max(a + b * log2(points), 100.0) for a, b in fits)
     if solver == "light" and options.get("ksp_type", "gmres") == "gmres":
         unknowns = 2 if plan.system == "full" else 1
         each += 8 * unknowns * min(_restart(options), 200)

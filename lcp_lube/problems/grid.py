@@ -13,7 +13,7 @@ from ..base.owned import Owned, collect, made
 from ..base.parallel import Array, Reduce
 from ..errors import InputError
 
-BYTES_PER_POINT = 250  # of the coefficients, A, B and the fields alone: no run needs less
+BYTES_PER_POINT = 60  # of the coefficients and the fields alone: no run needs less
 
 # Where the first point lies, in spacings from its side. open: the side is a neighbour with a given value; closed: it is the
 # outer face of the first cell, through which nothing flows; mirror: the first point lies on it, in half a cell; periodic: the

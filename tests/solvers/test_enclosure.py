@@ -192,9 +192,12 @@ def test_every_methods_answer(name, changes, method):
 def test_conditions_are_checked():
     from dataclasses import replace
 
-    def broken(**changes):
+    from lcp_lube.problems.film.lubrication import LubricationProblem
+
+    def broken(kind=None, **changes):
         problem = make_problem((5, 4), lambda x, y: 1e-5 + 0 * x + 0 * y)
         problem.scheme = replace(problem.scheme, **changes)
+        problem.__class__ = kind or problem.__class__
         said = conditions(problem)
         problem.destroy()
         return said
@@ -204,7 +207,8 @@ def test_conditions_are_checked():
     assert "signs and dominance" in broken(k_E=-s.k_E)
     assert "signs and dominance" in broken(b_C=0.5 * s.b_C)
     assert "signs and dominance" in broken(k_N=0.9 * s.k_N)
-    assert "does not know" in broken(c=s.c + 1e-6)
+    more = type("More", (LubricationProblem,), {"c": property(lambda self: self.scheme.c.ravel() + 1e-6)})
+    assert "does not know" in broken(more)
 
 
 ENDS = {  # ends in x, in y: what stands in docs/guaranteed_bounds.md

@@ -87,14 +87,14 @@ def friction(problem: LubricationProblem, p_pa: Array, r: Array, lever: Array | 
     """
     grid, s, of_film = problem.grid, problem.scheme, 0.0
     p_pa, r = p_pa.reshape(grid.box), r.reshape(grid.box)
-    # What happens in a line of one rank is its own business, but where walls ask what is cavitated.
-    alone = grid.comm.size == 1 and "closed" not in grid.ends[0]
+    # What happens in a line of one rank is its own business, but where walls ask what is cavitated, or effects have been.
+    alone = grid.comm.size == 1 and "closed" not in grid.ends[0] and problem.plain
     for rows in in_strips(grid) if alone else [slice(0, grid.box[0])]:
         part = copy(problem)
         if alone:
             part.grid, part.scheme = places_of(grid, rows), s.rows(rows)
         along = lever[rows] if isinstance(lever, np.ndarray) else lever
-        of_film += float(np.sum(sum(drag(part, part.scheme, p_pa[rows], r[rows])) * along))  # type: ignore[arg-type]
+        of_film += float(np.sum(sum(drag(part, part.scheme, p_pa[rows].ravel(), r[rows].ravel())) * along))  # type: ignore[arg-type]
     of_film = problem.reduce.sum(np.array([of_film]))
     return of_film if problem.contact is None else of_film + problem.contact.drag(problem, lever)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...base.parallel import Array
 from ..strips import in_strips, places_of
-from .flows import line_weights, point_weights
+from .flows import line_weights, stream_weights
 from .reynolds import sides
 
 if TYPE_CHECKING:
@@ -124,7 +124,11 @@ def integral(problem: LubricationProblem, p_pa: Array, above: float, weight: Wei
     inside, p = 0.0, p_pa.reshape(grid.box)
     for rows in in_strips(grid):
         part = places_of(grid, rows)
-        inside += float(np.sum((p[rows] - above) * weight(part.x, part.y) * point_weights(part).reshape(part.box)))
+        along, lines, w = part.widths(0), stream_weights(part)[:, 0], np.atleast_2d(weight(part.x, part.y))
+        if w.shape[0] == 1:  # of x alone
+            inside += float(lines @ ((p[rows] - above) @ (w[0] * along)))
+        else:
+            inside += float(lines @ (((p[rows] - above) * w) @ along))
     total = problem.reduce.sum(np.array([inside]))
     pressures = open_pressures(problem)
     coordinates = grid.lines  # of all points, on every rank

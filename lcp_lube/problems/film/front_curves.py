@@ -53,9 +53,8 @@ def _crossings(problem: LubricationProblem, p: Array, r: Array) -> Array:
     for (j, i, places), kind in ((found.ruptures, -1.0), (found.reformations, 0.0)):
         rows.append(np.stack([j + grid.y_start, i + grid.x_start - 1, np.full(j.size, kind), places, y[j]], axis=1))
     cavity = cavity_sign(problem.reduce, p, r) < 0
-    for (front, back), lower in zip(across(grid, p, cavity), (1, 0), strict=True):
-        j, i = np.nonzero(front)
-        at = y[j] + (1 - 2 * lower) * back[j, i]
+    for (j, i, back), lower in zip(across(grid, p, cavity), (1, 0), strict=True):
+        at = y[j] + (1 - 2 * lower) * back
         rows.append(np.stack([j + grid.y_start - lower, i + grid.x_start, np.ones(j.size), x[i], at], axis=1))
     steps = grid.steps(1)
     for k, (own, step, p_side) in enumerate(((0, steps[0], problem.p_sides[2]), (-1, steps[-1], problem.p_sides[3]))):

@@ -119,8 +119,8 @@ def cavitated_area(problem: LubricationProblem, found: Fronts | None, p: Array, 
             width, steps = part.widths(0) * grid.spacing[0] * stretch, part.steps(1)[:, None]
             dry, pressures = (frame(rows) for frame in frames)
             fronts_across = _across(dry, pressures, steps)
-            for (front, back), step in zip(fronts_across, (steps[:-1], steps[1:]), strict=True):
-                more += float(np.sum(np.where(front, (0.5 * step - back) * width, 0.0)))
+            for (j, i, back), step in zip(fronts_across, (steps[:-1, 0], steps[1:, 0]), strict=True):
+                more += float(np.sum((0.5 * step[j] - back) * np.broadcast_to(width, part.box)[j, i]))
             for end, rim, p_side in zip(sides(part)[2:], grid.rims(1), problem.p_sides[2:], strict=True):
                 if p_side == 0.0:  # the cavity reaches up to it
                     more += float(np.sum(np.where(end, 0.5 * rim * dy * width, 0.0) * cavity[rows]))
@@ -128,20 +128,26 @@ def cavitated_area(problem: LubricationProblem, found: Fronts | None, p: Array, 
     return area if found is None else max(area + more, 0.0)  # of a cavity of one point the two fronts may cross
 
 
-def across(grid: Grid, p: Array, cavity: NDArray[np.bool_]) -> list[tuple[NDArray[np.bool_], Array]]:
-    """Full points beside a cavity to the south, and to the north, and how far from each its front lies, m. Collective."""
+Across = list[tuple[NDArray[np.int64], NDArray[np.int64], Array]]
+
+
+def across(grid: Grid, p: Array, cavity: NDArray[np.bool_]) -> Across:
+    """Full points beside a cavity to the south, and to the north: j, i, and how far from each its front lies, m. Collective."""
     dry, pressures = (grid.ghosted(field, outside=0.0) for field in (cavity.astype(float), p))
     return _across(dry, pressures, grid.steps(1)[:, None])
 
 
-def _across(cavity: Array, frame: Array, steps: Array) -> list[tuple[NDArray[np.bool_], Array]]:
+def _across(cavity: Array, frame: Array, steps: Array) -> Across:
     """The same of framed lines."""
-    dry, here, out = cavity > 0.0, frame[1:-1, 1:-1], []
-    sides_of = ((dry[:-2], frame[2:], steps[:-1], steps[1:]), (dry[2:], frame[:-2], steps[1:], steps[:-1]))
-    for beside, beyond, step, far in sides_of:
-        rise = (beyond[:, 1:-1] - here) / far
+    dry, out = cavity > 0.0, []
+    full = ~dry[1:-1, 1:-1]
+    for beside, beyond in ((0, 2), (2, 0)):  # rows of the frame, counted from a point's southern neighbour
+        j, i = np.nonzero(dry[beside : beside + full.shape[0], 1:-1] & full)
+        step, far = steps[j + beside // 2, 0], steps[j + beyond // 2, 0]
+        here = frame[j + 1, i + 1]
+        rise = (frame[j + beyond, i + 1] - here) / far
         back = np.where(rise > 0.0, np.minimum(here / np.where(rise > 0.0, rise, 1.0), step), 0.5 * step)
-        out.append((beside[:, 1:-1] & ~dry[1:-1, 1:-1], back))
+        out.append((j, i, back))
     return out
 
 

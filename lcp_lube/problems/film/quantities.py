@@ -80,11 +80,11 @@ def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any
     cavity = cavitated(reduce, p, r)
     min_h, min_h_at = thinnest(problem)
     known = known_of(problem)
-    read = _read(problem, p_pa, r)
+    read = _read(problem, p_pa, r, p)
     if known is not None:
         off = reduce.max(np.abs(p_pa - known.p_pa)), reduce.max(np.abs(r - known.r))
         same = off[0] <= SAME * reduce.max(known.p_pa) + LEAST and off[1] <= SAME
-        read = read.corrected(_read(problem, known.p_pa, known.r), known.line, same)
+        read = read.corrected(_read(problem, known.p_pa, known.r, known.p_pa / problem.p_unit), known.line, same)
     ruptures, reformations, flow = read.ruptures, read.reformations, read.flow
     rupture, reformation = first_cavity(grid, ruptures, reformations)
     out: dict[str, Any] = {
@@ -146,9 +146,8 @@ class _Read:
         )
 
 
-def _read(problem: LubricationProblem, p_pa: Array, r: Array) -> _Read:
-    """Collective."""
-    p = p_pa / problem.p_unit
+def _read(problem: LubricationProblem, p_pa: Array, r: Array, p: Array) -> _Read:
+    """p_pa in Pa, p in units of p_unit. Collective."""
     ends = line_fronts(problem, p, r) if problem.U else None
     return _Read(
         *largest_pressure(problem, p_pa),

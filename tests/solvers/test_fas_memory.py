@@ -1,0 +1,63 @@
+"""Bytes a point of whole multigrid solves: counted, not timed."""
+
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from lcp_lube.api import solve
+from lcp_lube.problems.strips import ghosted, in_strips, places_of
+from lcp_lube.scenes.scene import load_scene
+from lcp_lube.solvers.fas.finest import finest
+
+
+@pytest.mark.parametrize("name, changes", [("problem4", {}), ("problem4", {"scheme": "face"}), ("journal", {})])
+def test_bytes_a_point(name, changes):
+    """Coefficients 40; grids, iterate and fields beside them, and what output takes for a moment: 90 in all, 168 once."""
+    n = 399
+    with solve(load_scene(name, {"nx": 40, "ny": 40, **changes}), method="fas"):
+        pass  # what is loaded once
+    tracemalloc.start()
+    try:
+        with solve(load_scene(name, {"nx": n, "ny": n, **changes}), method="fas", memory_check=False) as solution:
+            held, peak = (count / n**2 for count in tracemalloc.get_traced_memory())
+            assert solution.converged
+    finally:
+        tracemalloc.stop()
+    assert held < 60  # 40, p and r
+    assert peak < 90
+
+
+def test_the_finest_grid_is_the_problems_own():
+    """Its conductances and right-hand side are not stored twice; a scheme that was changed is not mistaken for them."""
+    from dataclasses import replace
+
+    problem = load_scene("problem4", {"n": 30}).build()
+    level, s = finest(problem), problem.scheme
+    for mine, theirs in ((level.kx, s.k_W), (level.kx, s.k_E), (level.ky, s.k_S), (level.ky, s.k_N), (level.c, s.c)):
+        assert np.shares_memory(mine, theirs)
+    for name in ("k_E", "k_N", "c"):
+        other = problem.with_scheme(replace(s, **{name: 2.0 * getattr(s, name)}), problem.mu)
+        changed, whole = finest(other), {"k_E": "kx", "k_N": "ky", "c": "c"}[name]
+        assert not np.shares_memory(getattr(changed, whole), getattr(s, name))
+    problem.destroy()
+
+
+@pytest.mark.parametrize("name", ["problem4", "journal", "misaligned_journal"])
+def test_strips_are_parts_of_the_whole(monkeypatch, name):
+    """Coefficients made and read a few lines at a time are those made at once, and so are the neighbours' values."""
+    scene = load_scene(name, {"nx": 24, "ny": 17})
+    whole = scene.build()
+    monkeypatch.setattr("lcp_lube.problems.strips.STRIP", 60)
+    problem, grid = scene.build(), whole.grid
+    field = np.random.default_rng(0).random(grid.size)
+    frame, framed = grid.ghosted(field, 0.0), ghosted(grid, field, 0.0)
+    for rows in in_strips(grid):
+        part, lines = problem.scheme.rows(rows), slice(rows.start, rows.stop + 2)
+        assert np.array_equal(places_of(grid, rows).y, grid.y[rows])
+        assert np.array_equal(framed(rows)[1:-1], frame[lines][1:-1])
+        assert np.array_equal(framed(rows)[:, 1:-1], frame[lines][:, 1:-1])
+        for coefficient in whole.scheme.arrays:
+            assert np.array_equal(getattr(part, coefficient), getattr(whole.scheme, coefficient)[rows]), coefficient
+    whole.destroy()
+    problem.destroy()
