@@ -29,7 +29,6 @@ def finest(problem: LubricationProblem) -> Level:
         put(level, grid, level.void[1], s.storage)
         carried(level)
     if problem.held is not None:
-        level.c = level.c.copy()  # of which those of held cells change
         mask, pressures = np.zeros_like(level.z), np.zeros_like(level.z)
         put(level, grid, mask, problem.held.mask.astype(float))
         put(level, grid, pressures, problem.held.pressures(problem.p_unit))

@@ -18,7 +18,7 @@ from petsc4py import PETSc
 
 from ...base.parallel import Array
 from ...problems.film.lubrication import LubricationProblem
-from . import frozen_kernels, frozen_transfer, held, levels, transfer
+from . import finest, frozen_kernels, frozen_transfer, held, levels, transfer
 
 SWEEPS = 1  # before and after the coarse grid
 COARSEST = 3  # sweeps of the coarsest grid, in numbers of its points a side
@@ -45,12 +45,12 @@ class Frozen:
         """M : what cavitated cells store of a unit of void, in J's units; None: nothing is asked at a frequency.
         given : points whose rows are those of the identity, as those of supplies are with A's diagonal."""
         self.problem, self.grid, self.cavity, self.work = problem, problem.grid, cavity, 0
-        first, grid = levels.finest(problem), problem.grid
+        first, grid = finest.finest(problem), problem.grid
         scheme = problem.scheme
         self.held = given if scheme.held is None else scheme.held.ravel()
         if given is not None:
             mask = np.zeros_like(first.z)
-            levels.put(first, grid, mask, given.astype(float))
+            finest.put(first, grid, mask, given.astype(float))
             held.hold(first, mask, mask)
         self._over = (
             None if self.held is None else np.where(self.held, 1.0 / scheme.diagonal.ravel() if given is None else 1.0, 0.0)
@@ -60,10 +60,10 @@ class Frozen:
         if M is not None:
             first.void = np.zeros_like(first.z), np.zeros_like(first.z)
             for into, values in zip(first.void, (self.leaves, M), strict=True):
-                levels.put(first, grid, into, values)
+                finest.put(first, grid, into, values)
         self.levels = levels.hierarchy(first, True)
         full = np.zeros_like(first.z)
-        levels.put(first, grid, full, np.where(cavity, 0.0, 1.0))
+        finest.put(first, grid, full, np.where(cavity, 0.0, 1.0))
         self.full = [full > 0.0]
         for fine, coarse in zip(self.levels[:-1], self.levels[1:], strict=True):
             values = np.zeros_like(coarse.z)
@@ -100,10 +100,10 @@ class Frozen:
 
     def _put(self, into: Array, values: Array) -> None:
         for one, part in zip(into, values.reshape(self.several, -1), strict=True):
-            levels.put(self.levels[0], self.grid, one, part)
+            finest.put(self.levels[0], self.grid, one, part)
 
     def _own(self, a: Array) -> Array:
-        return np.concatenate([levels.own(self.levels[0], self.grid, one).ravel() for one in a])
+        return np.concatenate([finest.own(self.levels[0], self.grid, one).ravel() for one in a])
 
     def _rest(self, x: Array, free: NDArray[np.bool_] | None) -> Array:
         """-J x, at free points."""
@@ -231,7 +231,7 @@ class Frozen:
         """Whether x' (J z) = b' z, each."""
         first, dot = self.levels[0], self.grid.reduce.dot
         at, out = np.zeros((1, *first.z.shape)), np.zeros((1, *first.z.shape))
-        levels.put(first, self.grid, at[0], z)
+        finest.put(first, self.grid, at[0], z)
         none = np.zeros_like(at)
         frozen_kernels.residual(at, self.full[0], self.free[0], first.kx, first.ky, none, self.passed[0][0], None, out)
         forced = -self._own(out)

@@ -29,7 +29,7 @@ def hold(level: Level, mask: Array, pressures: Array) -> None:
     level.spans = free_spans(level.held)
     level.given = pressures[level.held]
     level.z[level.held] = level.given
-    level.c[level.held] = 0.0  # what is restricted
+    level.c = np.where(level.held, 0.0, level.c)  # what is restricted; of the finest level a copy of the problem's
 
 
 def settle(level: Level) -> None:
