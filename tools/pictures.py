@@ -101,11 +101,11 @@ GROUPS: dict[str, Group] = {
         [*study("precision_picture"), "lcp_lube/studies/precision_words.py", f"{RESULTS}/precision.csv"],
     ),
     "rungs": Group(chart("rungs"), f"{RESULTS}/rungs.png", [*study("rungs"), f"{RESULTS}/rungs.csv"]),
-    "scaling": Group(chart("scaling"), f"{RESULTS}/scaling.png", [*study("scaling_picture"), f"{RESULTS}/scaling.csv"]),
+    "scaling": Group(chart("scaling"), f"{RESULTS}/scaling.png", [*study("scaling"), f"{RESULTS}/scaling.csv"]),
     "starts": Group(
         chart("stability", "starts"),
         f"{RESULTS}/starts_*.png",
-        [*study("starts_picture"), "lcp_lube/studies/map_picture.py", f"{RESULTS}/starts.csv"],
+        [*study("starts"), "lcp_lube/studies/map_picture.py", f"{RESULTS}/starts.csv"],
     ),
     **{
         name: Group(

@@ -17,14 +17,13 @@ class Alarm:
         self._comm = MPI.COMM_WORLD.Dup()
         self.rank, self.alone = self._comm.rank, self._comm.size == 1
 
-    def all_arrive(self, seconds: float | None = None) -> bool:
+    def all_arrive(self) -> bool:
         """True if every rank calls this within the time. If some do, the lowest of them gives up first, and speaks for all.
 
         The time is 4 s, up to 6 s on a busy machine: ranks that fail together are then further apart, and a job in which one
         rank fails is still to end within 10 s.
         """
-        if seconds is None:
-            seconds = min(6.0, 4.0 * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1)))
+        seconds = min(6.0, 4.0 * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1)))
         return all_come(self._comm, seconds + min(0.25 * self.rank, 2.0))
 
     def end_all(self, status: int) -> None:
@@ -38,10 +37,6 @@ def check_same(comm: MPI.Comm, what: str, value: object) -> None:
     Parameters
     ----------
     value : its `repr` is compared, addresses left out.
-
-    Raises
-    ------
-    InputError : on every rank.
     """
     text = re.sub(r" at 0x[0-9a-f]+", "", repr(value))  # a function's address is each process's own
     digest = hashlib.sha256(text.encode(errors="replace")).digest()

@@ -92,12 +92,7 @@ def unread() -> list[str]:
 
 
 def check_unread() -> None:
-    """Raise InputError if an option was not read by now.
-
-    Raises
-    ------
-    InputError : names the option and the nearest one that exists.
-    """
+    """Raise InputError if an option was not read by now."""
     left = unread()
     if left:
         near = "" if left[0] in known_names() else nearest(left[0], known_names(), "-")

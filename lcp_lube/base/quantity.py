@@ -144,12 +144,7 @@ def _named(wanted: Iterable[Dimension]) -> str:
 
 
 def _unit(text: str) -> tuple[Fraction, Dimension]:
-    """Factor to SI and dimension of a product such as 'N/mm^2' or 'kg m-1 s-1'; what follows a / is divided by, one factor.
-
-    Raises
-    ------
-    InputError : a symbol that is unknown.
-    """
+    """Factor to SI and dimension of a product such as 'N/mm^2' or 'kg m-1 s-1'; what follows a / is divided by, one factor."""
     factor, powers = Fraction(1), [0] * len(BASE)
     for k, part in enumerate(text.split("/")):
         for j, word in enumerate(re.split(r"[\s*\u00b7.]+", part.strip())):

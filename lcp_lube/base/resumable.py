@@ -34,7 +34,7 @@ class ResumableCsv:
 
     Raises
     ------
-    InputError : the file cannot be read, or is no csv with these keys.
+    InputError : the file cannot be read, or is no csv with these keys; by the methods that write, it cannot be written.
     """
 
     def __init__(
@@ -59,6 +59,15 @@ class ResumableCsv:
         wanted = [str(key[name]) for name in self.key]
         return next((row for row in self.rows if [row[name] for name in self.key] == wanted), None)
 
+    def row(self, key: dict[str, Any], make: Callable[[], dict[str, Any]]) -> Row:
+        """The row with this key, made and written now where it is not there; raises InputError as `add` does."""
+        return self.find(**key) or self.add({**make(), **key})
+
+    @property
+    def said(self) -> str:
+        """How many rows were made now."""
+        return f"{len(self._made)} of them new; the others stood in {self.path} (remove it to run them again)."
+
     def current(self, row: Row) -> bool:
         """Whether this very code made the row (of a signed csv), by the command that its key names."""
         return row["digest"] == origin.signature([row[name] for name in self.key])["digest"]
@@ -73,23 +82,13 @@ class ResumableCsv:
         return "; ".join(f"{count} rows {age}" for age, count in counts.items()) or "no rows"
 
     def add(self, values: dict[str, Any]) -> Row:
-        """Write a row, in the place of the one with the same keys if there is one; returns it as text.
-
-        Raises
-        ------
-        InputError : the file cannot be written.
-        """
+        """Write a row, in the place of the one with the same keys if there is one; returns it as text."""
         row = self._take(values)
         self.write()
         return row
 
     def again(self, made: Iterable[dict[str, Any]]) -> None:
-        """Write the file as if it had been filled in this order.
-
-        Raises
-        ------
-        InputError : the file cannot be written.
-        """
+        """Write the file as if it had been filled in this order."""
         self.columns, self.rows, self._made = list(self._read_before[0]), list(self._read_before[1]), []
         for values in made:
             self._take(values)
@@ -111,12 +110,7 @@ class ResumableCsv:
         return row
 
     def write(self) -> None:
-        """Replace the file; to be called before a long run, to hear whether it can be written.
-
-        Raises
-        ------
-        InputError : it cannot.
-        """
+        """Replace the file; to be called before a long run, to hear whether it can be written."""
         self._on_rank_0(self._write)
 
     def _read(self) -> list[Row]:

@@ -34,12 +34,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def parse(own: list[str]) -> argparse.Namespace:
-    """The command and its options; `words`: what they were read from.
-
-    Raises
-    ------
-    InputError : an unknown option or command, a missing or malformed value.
-    """
+    """The command and its options; `words`: what they were read from."""
     return parser_of_all().parse_args(own, argparse.Namespace(words=own))
 
 

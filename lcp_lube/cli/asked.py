@@ -50,12 +50,7 @@ def options_of(args: argparse.Namespace, method: str, among: Sequence[str] = ())
 
 
 def _p0(args: argparse.Namespace, text: str) -> float:
-    """The start of p in the scene's p_unit, which a pressure with a unit is turned into.
-
-    Raises
-    ------
-    InputError : no number, or one whose unit is not a pressure's.
-    """
+    """The start of p in the scene's p_unit, which a pressure with a unit is turned into."""
     try:
         found = quantity(text)
         if found is None:

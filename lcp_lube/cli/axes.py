@@ -33,10 +33,6 @@ def parse_axis(text: str) -> Axis:
     """KEY=FROM:TO:N (N values, both ends among them), KEY=FROM:TO:N:log (at equal ratios) or KEY=A,B,C.
 
     Whole numbers stay whole where FROM, TO and the step are.
-
-    Raises
-    ------
-    InputError : of another form; N < 1; a range without equal ratios.
     """
     key, equals, values = (part.strip() for part in text.partition("="))
     forms = "KEY=FROM:TO:N, KEY=FROM:TO:N:log or KEY=A,B,C is needed"
@@ -71,12 +67,7 @@ def _own(key: str, word: str) -> str:
 
 
 def _common(text: str, found: Sequence[Quantity]) -> str:
-    """The unit of quantities that belong together; empty if they have none.
-
-    Raises
-    ------
-    InputError : they are of different dimensions.
-    """
+    """The unit of quantities that belong together; empty if they have none."""
     if len({one.dimension for one in found if one.unit}) > 1 or len({one.unit for one in found if one.value}) > 1:
         raise InputError(f"--vary {text}: values of one dimension are needed, all with a unit or none")
     return next((one.text.partition(" ")[2] for one in found if one.unit), "")
@@ -113,12 +104,7 @@ def chains(axes: Sequence[Axis], warm: bool) -> list[range]:
 
 
 def checked(axes: Sequence[Axis]) -> list[dict[str, Any]]:
-    """The points of the axes.
-
-    Raises
-    ------
-    InputError : a key twice, too many points.
-    """
+    """The points of the axes."""
     for k, axis in enumerate(axes):
         if axis.key in [other.key for other in axes[:k]]:
             raise InputError(f"--vary {axis.key}: given twice")

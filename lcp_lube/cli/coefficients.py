@@ -16,6 +16,7 @@ from ..errors import InputError, NotFound
 from ..output.console import say
 from ..output.files import check_target, replacing
 from ..output.results import as_dict, finite
+from ..output.style import save_figure
 from ..problems.film.model import Model
 from ..problems.film.turning import Turning
 from ..problems.solution import Outcome, Solution
@@ -29,12 +30,7 @@ KEYS = ("S", "sommerfeld", "eccentricity", "attitude_deg", "load")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Exit status 0 if the film's solution converged, else 1. Collective.
-
-    Raises
-    ------
-    InputError : a scene without a film, a frequency that is none.
-    """
+    """Exit status 0 if the film's solution converged, else 1. Collective."""
     scene = scene_of(args)
     check_film(scene, args.tilt)
     try:
@@ -69,10 +65,6 @@ def table(args: argparse.Namespace, scene: Scene, frequencies: list[float]) -> i
 
     Theirs: x to the right, y upwards, the journal turning from x to y; the load is its weight, along -y. Our x is -y, our y
     is x.
-
-    Raises
-    ------
-    InputError : no journal with a speed_rpm, a file that cannot be written.
     """
     if "speed_rpm" not in type(scene).model_fields or getattr(scene, "turning", None) is None:
         raise InputError(f"--speeds: scene {scene.name} is no journal with a speed_rpm")
@@ -106,9 +98,9 @@ def table(args: argparse.Namespace, scene: Scene, frequencies: list[float]) -> i
             if MPI.COMM_WORLD.rank == 0:
                 Path(name).write_text(lines)
     if args.plot is not None and rows:
-        from ..output.coefficients_picture import draw
+        from ..output.coefficients_picture import figure_of
 
-        draw(np.array(rows)[:, 0] * 30.0 / math.pi, drawn, scene.name, Path(args.plot))
+        save_figure(lambda: figure_of(np.array(rows)[:, 0] * 30.0 / math.pi, drawn, scene.name), args.plot)
     return 1 if failed else 0
 
 
@@ -121,12 +113,7 @@ def _first(scene: Scene, solution: Solution, frequencies: list[float]) -> Coeffi
 
 
 def check_film(scene: Scene, tilt: bool) -> None:
-    """Refuse before the solve what has no coefficients.
-
-    Raises
-    ------
-    InputError : names the scene, and why.
-    """
+    """Refuse before the solve what has no coefficients."""
     if not isinstance(getattr(scene, "model", None), Model):
         raise InputError(f"scene {scene.name}: coefficients are of films; it has no part that could be displaced")
     if motion_of(scene) is not None:

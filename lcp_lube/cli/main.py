@@ -126,7 +126,8 @@ def run_compare(args: argparse.Namespace) -> int:
 def run_table(args: argparse.Namespace) -> int:
     from ..studies.tables import run_published_table
 
-    return run_published_table(args.paper, args.number, args.quick, args.results, fitted=args.fitted, stored=args.stored)
+    how = {"quick": args.quick, "fitted": args.fitted, "stored": args.stored}
+    return run_published_table(args.paper, args.number, results=args.results, **how)
 
 
 def run_chart(args: argparse.Namespace) -> int:

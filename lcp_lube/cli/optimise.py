@@ -22,12 +22,7 @@ from .asked import ask_of, scene_of
 
 
 def run(args: argparse.Namespace) -> int:
-    """Exit status 0 where the optimiser came to rest at a design that keeps the limits, else 1. Collective.
-
-    Raises
-    ------
-    InputError : a goal, a key or a limit that is none; no feasible start; a file that cannot be written.
-    """
+    """Exit status 0 where the optimiser came to rest at a design that keeps the limits, else 1. Collective."""
     scene = scene_of(args)
     check_film(scene)
     if (args.maximise is None) == (args.minimise is None):

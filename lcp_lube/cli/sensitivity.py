@@ -27,12 +27,7 @@ HEAD = ("scene", "nx", "ny", "outcome", "converged", "message")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Exit status 0 if the film's solution converged, else 1. Collective.
-
-    Raises
-    ------
-    InputError : a quantity or a key without a derivative, a file that cannot be written.
-    """
+    """Exit status 0 if the film's solution converged, else 1. Collective."""
     scene = scene_of(args)
     check_film(scene)
     names = [name.strip() for name in args.quantity.split(",")]

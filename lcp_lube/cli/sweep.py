@@ -87,10 +87,6 @@ def sweep(
     Returns
     -------
     list of dict, list of str : the points in their order, and the names of their columns.
-
-    Raises
-    ------
-    InputError : an invalid value; a file that cannot be read or written; every point was refused.
     """
     at, reads = checked(axes), as_read(axes)
     scenes = [scene_at(point) for point in reads]

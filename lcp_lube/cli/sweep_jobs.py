@@ -29,10 +29,6 @@ def jobs_for(asked: int | None, chains: int, sizes: Sequence[int]) -> int:
     Parameters
     ----------
     sizes : grid points of every scene.
-
-    Raises
-    ------
-    InputError : fewer than one; several, where ranks share each solve.
     """
     if asked is not None:
         if asked < 1:

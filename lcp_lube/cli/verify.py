@@ -3,7 +3,7 @@
 import argparse
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from time import perf_counter
 from typing import Any
 
@@ -15,7 +15,7 @@ from ..base.options import check_unread
 from ..output.results import finite
 from ..output.table import table as rows_of
 from ..scenes.scene import load_scene
-from ..studies.verify_cases import CASES, QUICK, Case, Reference
+from ..studies.verify_cases import CASES, DERIVED, QUICK, Case, Reference
 
 ROUNDING = 1e-9  # relative error that no finer grid has to improve on
 
@@ -47,24 +47,9 @@ class Row:
         """Whether all grids give one value: the reference's own digits are what is left."""
         return bool(np.ptp(self.values) <= ROUNDING * abs(self.values[-1]))
 
-    @property
-    def passed(self) -> bool:
-        return not self.fault
-
     def as_dict(self) -> dict[str, Any]:
-        return {
-            "quantity": self.quantity,
-            "ours": self.values[-1],
-            "reference": self.reference.value,
-            "source": self.source,
-            "grids": self.grids,
-            "values": self.values,
-            "errors": self.errors,
-            "tol": self.reference.tol,
-            "order": self.order,
-            "order_needed": self.reference.order,
-            "passed": self.passed,
-        }
+        known = {"reference": self.reference.value, "tol": self.reference.tol, "order_needed": self.reference.order}
+        return {**asdict(self), **known, "ours": self.values[-1], "passed": not self.fault}
 
 
 @dataclass(frozen=True)
@@ -78,18 +63,13 @@ class Verdict:
 
     @property
     def passed(self) -> bool:
-        return not self.failures and all(row.passed for row in self.rows)
+        return not self.failures and not any(row.fault for row in self.rows)
 
     def as_dict(self) -> dict[str, Any]:
         return {
-            "case": self.case.name,
-            "scene": self.case.scene,
-            "data": self.case.data,
-            "passed": self.passed,
-            "failures": self.failures,
-            "note": self.case.note,
+            **{"case": self.case.name, "scene": self.case.scene, "data": self.case.data, "note": self.case.note},
+            **{"passed": self.passed, "failures": self.failures, "time_s": self.seconds},
             "rows": [row.as_dict() for row in self.rows],
-            "time_s": self.seconds,
         }
 
 
@@ -109,29 +89,22 @@ def _run_case(case: Case) -> Verdict:
     for grid in case.grids:
         scene = load_scene(case.scene, {**case.data, **grid})
         grids.append(" x ".join(map(str, scene.shape)))
-        solution = solve(scene, **case.how)
-        try:
+        with solve(scene, **case.how) as solution:
             check_unread()
             values = solution.problem.quantities(solution.fields)
-            found.append({**values, **case.derive(solution, values)} if solution.converged else {})
+            found.append({**values, **DERIVED[case.derive](solution, values)} if solution.converged else {})
             spacings.append(float(np.max(solution.problem.grid.spacing)))
             if not solution.converged:
                 failures.append(f"{grids[-1]}: {solution.outcome}, {solution.message}")
-        finally:
-            solution.destroy()
-    rows = [_row(name, reference, case, grids, found, spacings) for name, reference in case.references.items()]
+    rows = []
+    for name, reference in case.references.items():
+        ours = [float("nan" if (value := values.get(name)) is None else value) for values in found]
+        errors = [abs(value / reference.value - 1.0) for value in ours]
+        order = None
+        if len(errors) > 1 and errors[0] > 0 and errors[-1] > 0:
+            order = float(np.log(errors[0] / errors[-1]) / np.log(spacings[0] / spacings[-1]))
+        rows.append(Row(name, reference, reference.source or case.source, grids, ours, errors, order))
     return Verdict(case, rows, failures, perf_counter() - begin)
-
-
-def _row(
-    name: str, reference: Reference, case: Case, grids: list[str], found: list[dict[str, Any]], spacings: list[float]
-) -> Row:
-    values = [np.nan if (value := values.get(name)) is None else float(value) for values in found]
-    errors = [abs(value / reference.value - 1.0) for value in values]
-    order = None
-    if len(errors) > 1 and errors[0] > 0 and errors[-1] > 0:
-        order = float(np.log(errors[0] / errors[-1]) / np.log(spacings[0] / spacings[-1]))
-    return Row(name, reference, reference.source or case.source, grids, values, errors, order)
 
 
 def table(verdicts: Sequence[Verdict]) -> str:
@@ -141,7 +114,7 @@ def table(verdicts: Sequence[Verdict]) -> str:
         order = "-" if row.order is None or row.errors[-1] <= ROUNDING or row.steady else f"{row.order:.2f}"
         needed = f"({row.reference.order:g})" if row.reference.order else ""
         numbers = (f"{row.values[-1]:.9g}", f"{row.reference.value:.9g}", " ".join(f"{error:8.1e}" for error in row.errors))
-        verdict_word = "ok" if row.passed else f"FAIL: {row.fault}"
+        verdict_word = f"FAIL: {row.fault}" if row.fault else "ok"
         cells.append([f"  {row.quantity}", *numbers, f"{order:>5} {needed}", verdict_word])
     head, *told = rows_of(cells, align="<>><<<", least=[33, 15, 15, 26])
     printed, lines = iter(told), [head]

@@ -13,6 +13,7 @@ from ..base.quantity import in_si
 from ..errors import InputError
 from ..output.files import check_target
 from ..output.frames import Frames, HistoryFile, Series, due
+from ..output.style import save_figure
 from ..problems.solution import Solution
 from ..scenes.moving import motion_of
 from ..scenes.scene import Scene
@@ -24,12 +25,7 @@ GIF, FILES = 40, 10  # frames of an animation, times of a series of files
 
 
 class Watching:
-    """Hears of every time step (`Ask.watch`). Collective.
-
-    Raises
-    ------
-    InputError : an option that wants a march, of a scene that has none; a file that cannot be written; times beyond the end.
-    """
+    """Hears of every time step (`Ask.watch`). Collective."""
 
     def __init__(self, args: argparse.Namespace, scene: Scene):
         self.table: MotionTable | None = motion_of(scene)
@@ -91,9 +87,10 @@ class Watching:
 
             animate(self.frames, solution.history, self.picture)
         else:
-            from ..output.march_picture import draw_march
+            from ..output.march_picture import march_figure
 
-            draw_march(self.frames, solution.history, f"{solution.settings['scene']}, {solution.message}", self.picture)
+            frames, title = self.frames, f"{solution.settings['scene']}, {solution.message}"
+            save_figure(lambda: march_figure(frames, solution.history, title), self.picture)
 
 
 BAR = "{l_bar}{bar}| {n:.4g}/{total:.4g} s [{elapsed}<{remaining}, {postfix}]"

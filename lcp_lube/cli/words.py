@@ -11,10 +11,6 @@ def split(argv: list[str]) -> tuple[list[str], list[str]]:
     """Ours and PETSc's arguments. A PETSc option takes the next word as its value unless that begins with a dash.
 
     `--` options and their values, and words that no PETSc option takes, are ours; so is a scene's name.
-
-    Raises
-    ------
-    InputError : -options_file names a file that PETSc would abort on.
     """
     own: list[str] = []
     petsc: list[str] = []

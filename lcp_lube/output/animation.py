@@ -15,13 +15,9 @@ from .units import prefix
 DOTS, RATE = 80, 10  # an inch; frames a second
 
 
-def animate(frames: Frames, history: list[dict[str, Any]], path: Path, comm: MPI.Comm = MPI.COMM_WORLD) -> None:
-    """Draw the frames into a .gif. Collective; rank 0 draws.
-
-    Raises
-    ------
-    InputError : the file cannot be written.
-    """
+def animate(frames: Frames, history: list[dict[str, Any]], path: Path) -> None:
+    """Draw the frames into a .gif. Collective; rank 0 draws."""
+    comm = MPI.COMM_WORLD
     with replacing(path, comm) as temporary, on_all_ranks(comm, str(path)):
         if comm.rank == 0 and frames.fields:
             import matplotlib as mpl

@@ -1,39 +1,25 @@
 """Stiffness and damping of a journal's film against the Sommerfeld number, and where a rigid rotor on it is stable."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
-from .style import BLUE, GREY, RED, new_figure, save_figure
+from .style import BLUE, GREY, RED, new_figure
 
-DOTS = 130
-LOOKS = ((BLUE, "-"), (RED, "-"), (RED, "--"), (BLUE, "--"))  # xx, xy, yx, yy
+LOOKS = {"xx": (BLUE, "-"), "xy": (RED, "-"), "yx": (RED, "--"), "yy": (BLUE, "--")}
 
 
-def draw(rpm: Any, rows: list[dict[str, Any]], name: str, path: Path, comm: MPI.Comm = MPI.COMM_WORLD) -> None:
-    """Draw the coefficients of several speeds (rpm) to a .png, .pdf or .svg. Collective; rank 0 draws.
-
-    Raises
-    ------
-    InputError : the file cannot be written.
-    """
-    save_figure(lambda: _figure(rpm, rows, name), path, comm, DOTS)
-
-
-def _figure(rpm: Any, rows: list[dict[str, Any]], name: str) -> Any:
+def figure_of(rpm: Any, rows: list[dict[str, Any]], name: str) -> Any:
+    """The coefficients of several speeds (rpm)."""
     figure = new_figure(10.5, 3.9)
     axes = figure.subplots(1, 3)
     S = np.array([row["S"] for row in rows])
     for one, key, title in zip(axes, ("K", "C"), ("stiffness K c/W", "damping C c$\\omega$/W"), strict=False):
         values = np.array([row["coefficients"][0][f"{key}_dimensionless"] for row in rows]).reshape(len(rows), 4)
-        for k, (colour, dashes) in enumerate(LOOKS):
-            one.plot(
-                S, np.abs(values[:, k]), color=colour, ls=dashes, marker="o", ms=3, label=f"{key}{['xx', 'xy', 'yx', 'yy'][k]}"
-            )
-            below = values[:, k] < 0
-            one.plot(S[below], -values[below, k], "o", mfc="white", mec=colour, ms=5, ls="none")
+        for (part, (colour, dashes)), value in zip(LOOKS.items(), values.T, strict=True):
+            one.plot(S, np.abs(value), color=colour, ls=dashes, marker="o", ms=3, label=f"{key}{part}")
+            below = value < 0
+            one.plot(S[below], -value[below], "o", mfc="white", mec=colour, ms=5, ls="none")
         one.set(xscale="log", yscale="log", xlabel="Sommerfeld number S", title=title)
         one.legend(ncols=2, title="hollow: negative", title_fontsize=8)
     ws = np.array([np.nan if row["threshold"] is None else row["threshold"] for row in rows])

@@ -29,10 +29,6 @@ class HistoryFile:
     Parameters
     ----------
     resumed : the march was taken up again: rows up to there stay.
-
-    Raises
-    ------
-    InputError : the file cannot be written.
     """
 
     def __init__(self, path: Path, comm: Any, resumed: bool):
@@ -78,12 +74,7 @@ def _told(value: Any) -> str:
 
 
 class Series:
-    """Fields at chosen times: a .pvd, which lists a .vts for each. Collective.
-
-    Raises
-    ------
-    InputError : the files cannot be written.
-    """
+    """Fields at chosen times: a .pvd, which lists a .vts for each. Collective."""
 
     def __init__(self, path: Path, boundary: bool):
         check_target(path.with_suffix(".vts"))

@@ -101,19 +101,15 @@ def _bar(figure: Figure | SubFigure, axes: Axes, image: Any, label: str, ratio: 
         wide = LONG if ratio < FLAT else HIGH / ratio
         place, upright = (1.0 + BAR / wide, 0.0, BAR / wide, 1.0), True
     bar = figure.colorbar(image, cax=axes.inset_axes(place), orientation="vertical" if upright else "horizontal")
-    bar.locator = _few_ticks()
+    from matplotlib.ticker import MaxNLocator
+
+    bar.locator = MaxNLocator(nbins=5, min_n_ticks=2)
     if upright:
         axes.set_title(label, fontsize="medium")
     else:
         bar.ax.xaxis.set_ticks_position("top")
         bar.ax.xaxis.set_label_position("top")
         bar.set_label(label)
-
-
-def _few_ticks() -> Any:
-    from matplotlib.ticker import MaxNLocator
-
-    return MaxNLocator(nbins=5, min_n_ticks=2)
 
 
 def _cell_edges(at: Array) -> Array:

@@ -1,29 +1,16 @@
 """A march in time in one picture: pressure and void of the middle line over x and t, the load, a journal's orbit."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
 from .frames import Frames
-from .style import BLUE, GREY, MAPS, NAMES, RED, new_figure, save_figure
+from .style import BLUE, GREY, MAPS, NAMES, RED, new_figure
 from .units import prefix
 
-DOTS = 130
 
-
-def draw_march(frames: Frames, history: list[dict[str, Any]], title: str, path: Path, comm: MPI.Comm = MPI.COMM_WORLD) -> None:
-    """Draw to a .png, .pdf or .svg. Collective; rank 0 draws.
-
-    Raises
-    ------
-    InputError : the file cannot be written.
-    """
-    save_figure(lambda: _figure(frames, history, title), path, comm, DOTS)
-
-
-def _figure(frames: Frames, history: list[dict[str, Any]], title: str) -> Any:
+def march_figure(frames: Frames, history: list[dict[str, Any]], title: str) -> Any:
+    """Middle lines and load in time; with a journal that moves its orbit too."""
     orbit = "journal_x" in history[0]
     figure = new_figure(12.0 if orbit else 9.0, 5.4)
     grid = figure.add_gridspec(2, 3 if orbit else 2, height_ratios=[2.0, 1.0], width_ratios=[1, 1, 1.05][: 3 if orbit else 2])

@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mpi4py import MPI
-
 from ..errors import InputError
 from ..registry import RUNGS
 from .style import BLUE, GREY, RED, new_figure, save_figure
@@ -18,7 +16,7 @@ DOTS = 160  # an inch
 LEAST = 1e-3  # of the part of the tolerance from which effects count: what is smaller is drawn as that
 
 
-def plot_model(model: dict[str, Any], path: str | Path, comm: MPI.Comm = MPI.COMM_WORLD) -> None:
+def plot_model(model: dict[str, Any], path: str | Path) -> None:
     """Draw settings['model'] of a solution to a .png, .pdf or .svg. Collective.
 
     Raises
@@ -27,7 +25,7 @@ def plot_model(model: dict[str, Any], path: str | Path, comm: MPI.Comm = MPI.COM
     """
     if "quantity" not in model:
         raise InputError(f"--plot-model {path}: no decision was taken: {model['reason']}")
-    save_figure(lambda: _draw(model), Path(path), comm, DOTS)
+    save_figure(lambda: _draw(model), path, dpi=DOTS)
 
 
 def _draw(model: dict[str, Any]) -> Figure:

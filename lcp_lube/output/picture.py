@@ -14,6 +14,7 @@ from ..problems.film.exact import ExactSolution
 from ..problems.film.front_curves import front_curves
 from ..problems.film.fronts import middle_row
 from ..problems.film.lubrication import LubricationProblem
+from ..problems.grid import Grid
 from ..problems.solution import Solution
 from .files import coordinates, gather, taken
 from .liquid import NOISE, ahead, void_at_faces
@@ -125,8 +126,7 @@ def collect(solution: Solution) -> Picture | None:
     """What there is to draw, on rank 0; None elsewhere. Collective."""
     problem: Any = solution.problem
     grid = problem.grid
-    nx, ny = (math.ceil(n / MOST_POINTS[grid.dim]) for n in (*grid.shape, 1)[:2])
-    stride = (nx, ny)
+    stride = nx, ny = thinning(grid)
     fields = {name: (gather(grid, values, stride), unit) for name, (values, unit) in problem.physical(solution.fields).items()}
     quantities = problem.quantities(solution.fields)
     scales = {
@@ -155,6 +155,12 @@ def collect(solution: Solution) -> Picture | None:
         return None
     x, *y = coordinates(grid, stride)
     return Picture(solution, x, y[0] if y else np.empty(0), fields, quantities, scales, sign, void, **more)
+
+
+def thinning(grid: Grid) -> tuple[int, int]:
+    """Every so manieth point in x and in y that a picture takes."""
+    nx, ny = (math.ceil(n / MOST_POINTS[grid.dim]) for n in (*grid.shape, 1)[:2])
+    return nx, ny
 
 
 def trace(solution: Solution) -> float:

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-DOTS = 130  # an inch, in a .png
 WIDE = 9.6  # inches: pictures with several maps
 
 
@@ -38,7 +37,7 @@ def plot(solution: Solution, path: str | Path) -> None:
     if find_spec("matplotlib") is None:
         raise InputError(f"--plot {path}: pictures need matplotlib: pip install lcp-lube[plot]")
     picture = collect(solution)
-    save_figure(lambda: draw(picture), Path(path), solution.problem.grid.comm, DOTS, few_colours=True)  # type: ignore[arg-type]
+    save_figure(lambda: draw(picture), path, solution.problem.grid.comm, few_colours=True)  # type: ignore[arg-type]
 
 
 def draw(picture: Picture) -> Figure:

@@ -13,7 +13,7 @@ from ..drivers.gradient import Gradient
 from ..problems.solution import Solution
 from .files import gather
 from .maps import outline
-from .picture import Picture, collect
+from .picture import Picture, collect, thinning
 from .style import BLUE, RED, new_figure, save_figure
 from .table import table
 from .units import quantity
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 MOST_BARS = 20
-DOTS = 130
 
 
 def unit_of(solution: Solution, name: str) -> str:
@@ -104,7 +103,6 @@ def plot(gradient: Gradient, solution: Solution, field: Array, path: str | Path)
     ------
     InputError : the file cannot be written; then nothing is left behind.
     """
-    grid = solution.problem.grid
     picture, values = _gathered(solution, field)
 
     def figure() -> Any:
@@ -118,16 +116,11 @@ def plot(gradient: Gradient, solution: Solution, field: Array, path: str | Path)
         figure.suptitle(title, fontsize=10, x=0.01, ha="left")
         return figure
 
-    save_figure(figure, Path(path), grid.comm, DOTS)
+    save_figure(figure, path, solution.problem.grid.comm)
 
 
 def plot_error(error: GoalError, solution: Solution, path: str | Path) -> None:
-    """Where the error of a number comes from. Collective; rank 0 draws.
-
-    Raises
-    ------
-    InputError : the file cannot be written; then nothing is left behind.
-    """
+    """Where the error of a number comes from. Collective; rank 0 draws."""
     picture, values = _gathered(solution, error.field)
     unit = unit_of(solution, error.quantity)
 
@@ -142,19 +135,13 @@ def plot_error(error: GoalError, solution: Solution, path: str | Path) -> None:
         axes.set_title(f"{head}\n{shares}", fontsize=9, loc="left")
         return figure
 
-    save_figure(figure, Path(path), solution.problem.grid.comm, DOTS)
+    save_figure(figure, path, solution.problem.grid.comm)
 
 
 def _gathered(solution: Solution, field: Array) -> tuple[Picture | None, Array]:
     """A field on the picture's points, on rank 0. Collective."""
     grid = solution.problem.grid
-    picture = collect(solution)
-    stride = (1, 1) if picture is None else tuple(max(1, -(-n // m.size)) for n, m in _pairs(picture, grid))
-    return picture, gather(grid, field, grid.comm.bcast(stride))  # type: ignore[return-value]
-
-
-def _pairs(picture: Picture, grid: Any) -> list[tuple[int, Array]]:
-    return [(grid.shape[0], picture.x), *([(grid.shape[1], picture.y)] if grid.dim == 2 else [(1, np.zeros(1))])]
+    return collect(solution), gather(grid, field, thinning(grid))
 
 
 def _bars(axes: Axes, gradient: Gradient, keys: list[str]) -> None:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 # Okabe and Ito's colours, told apart by all eyes; lines differ in their dashes too, for print.
 BLUE, RED, GREY = "#0072B2", "#D55E00", "#555555"
+DOTS = 130  # an inch, in a .png
 LIQUID, WALL, CAVITY = "#A6CCE3", "0.78", "0.91"
 MAPS = {"p": "viridis", "r": "cividis", "h": "Blues"}
 NAMES = {"p": "pressure p", "r": "void fraction r", "h": "film h"}
@@ -39,7 +40,12 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def save_figure(
-    build: Callable[[], Figure], path: Path, comm: MPI.Comm, dpi: int, style: Any = STYLE, few_colours: bool = False
+    build: Callable[[], Figure],
+    path: str | Path,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    dpi: int = DOTS,
+    style: Any = STYLE,
+    few_colours: bool = False,
 ) -> None:
     """Write a figure to a .png, .pdf or .svg; what is drawn alike gives the same file. Collective.
 
@@ -47,11 +53,8 @@ def save_figure(
     ----------
     build : makes it, under `style`; called on rank 0 alone.
     few_colours : for a .png, see `fewer_colours`.
-
-    Raises
-    ------
-    InputError : the file cannot be written; then nothing is left behind.
     """
+    path = Path(path)
     kind = path.suffix.lower()
     with replacing(path, comm) as temporary, on_all_ranks(comm, str(path)):
         if comm.rank == 0:

@@ -1,6 +1,7 @@
 """Several methods and recipes on one scene, side by side."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import product
 from typing import Any
 
 from ..api import solve
@@ -42,20 +43,18 @@ def compare(
     nested: bool | None = None,
     rescue: bool = True,
 ) -> list[dict[str, Any]]:
-    """Solve a scene by every method with every recipe; a combination that fails is a row as well. Collective.
+    """Solve a scene by every method ('auto' is one) with every recipe (None: the default one). Collective.
 
     Parameters
     ----------
-    methods : names in the registry, or 'auto'.
-    recipes : names of files in options/; None is the default one.
     system, stopping, nested, rescue : as `api.solve` takes them.
     options : a method's own parameters, by its name.
 
     Returns
     -------
-    list of dict : a run each. The keys of the command line's JSON, and where an exact solution is known `load_error`
-    (relative) and `rupture_error` (relative to L). A combination that was refused (a recipe for one rank on several, a
-    method that lacks the system) has the outcome 'refused'.
+    list of dict : a run each, also one that failed. The keys of the command line's JSON, and where an exact solution is known
+    `load_error` (relative) and `rupture_error` (relative to L). A combination that was refused (a recipe for one rank on
+    several, a method that lacks the system) has the outcome 'refused'.
 
     Raises
     ------
@@ -68,22 +67,15 @@ def compare(
         if recipe is not None:
             read_recipe(recipe)
     rows = []
-    for method in methods:
-        for recipe in recipes:
-            try:
-                rows.append(_run(scene, method, recipe, system, stopping, options(method), nested, rescue))
-            except InputError as error:
-                rows.append(
-                    {
-                        "scene": scene.name,
-                        "method": method,
-                        "system": system,
-                        "recipe": recipe,
-                        "outcome": "refused",
-                        "converged": False,
-                        "message": str(error),
-                    }
-                )
+    how: dict[str, Any] = {"system": system, "stopping": stopping, "nested": nested, "rescue": rescue}
+    for method, recipe in product(methods, recipes):
+        try:
+            with solve(scene, method=method, recipe=recipe, options=options(method), **how) as solution:
+                data = as_dict(solution)
+                rows.append({**data, **exact_errors(solution.problem, data)})
+        except InputError as error:
+            asked = {"scene": scene.name, "method": method, "system": system, "recipe": recipe}
+            rows.append({**asked, "outcome": "refused", "converged": False, "message": str(error)})
     if all(row["outcome"] == "refused" for row in rows):
         raise InputError(rows[0]["message"])
     return rows
@@ -94,27 +86,13 @@ def _check(option: str, name: str, known: Iterable[str]) -> None:
         raise InputError(f"{option} {name}: allowed are auto, {', '.join(known)}{nearest(name, known)}")
 
 
-def _run(
-    scene: Scene, method: str, recipe: str | None, system: str, stopping: Any, options: Any, nested: Any, rescue: bool
-) -> dict[str, Any]:
-    """One row. Collective."""
-    how: dict[str, Any] = {"stopping": stopping, "options": options, "nested": nested, "rescue": rescue}
-    solution = solve(scene, method=method, system=system, recipe=recipe, **how)
-    try:
-        data = as_dict(solution)
-        return {**data, **exact_errors(solution.problem, data)}
-    finally:
-        solution.destroy()
-
-
 def read_off(problem: Problem, data: dict[str, Any]) -> dict[str, float | None]:
     """What errors are told of: `load`, integral of p - p_c (N or N/m), p_max above p_c (Pa), rupture (m; 2D: middle line)."""
     if "load" not in data:
         return {}
-    p_c = getattr(problem, "p_c", 0.0)
     return {
         "load": data["pressure_integral"],
-        "p_max": data["p_max"] - p_c,
+        "p_max": data["p_max"] - getattr(problem, "p_c", 0.0),
         "rupture": data["rupture"],
     }
 
@@ -132,8 +110,7 @@ def errors(found: Mapping[str, float | None], known: Mapping[str, float | None],
 
 def exact_errors(problem: Problem, data: dict[str, Any]) -> dict[str, float]:
     """`errors` against the exact solution, where the problem has one."""
-    known = getattr(problem, "exact", None)
-    exact = known() if known else None
+    exact = known() if (known := getattr(problem, "exact", None)) else None
     if exact is None:
         return {}
     reference = {"load": exact.load, "p_max": exact.p_max, "rupture": exact.rupture}

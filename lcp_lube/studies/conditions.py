@@ -4,7 +4,8 @@ from collections.abc import Iterator, Sequence
 from itertools import combinations
 
 from ..base.resumable import Row
-from .outcome_map import Axis, Case, OutcomeMap, Panels, chosen, converged, groups, tally, unique
+from .map_picture import Axis, Panels, chosen, converged, groups, unique
+from .outcome_map import Case, OutcomeMap, tally
 
 SUBSETS = tuple("".join(subset) for size in range(5) for subset in combinations("FRCB", size))
 SCENES = {

@@ -38,12 +38,7 @@ def look(number: int) -> dict[str, Any]:
 
 
 def save(build: Callable[[], Figure], path: Path, comm: MPI.Comm) -> None:
-    """Draw on rank 0 with the charts' style and replace the picture. Collective.
-
-    Raises
-    ------
-    InputError : the file cannot be written.
-    """
+    """Draw on rank 0 with the charts' style and replace the picture. Collective."""
     save_figure(build, path, comm, DOTS, STYLE)
 
 

@@ -42,9 +42,7 @@ class Samples:
 def deviations(scene: Scene, tolerances: Mapping[str, Any]) -> dict[str, float]:
     """Standard deviations in SI by key, from texts such as '1um', '5%' (of the value) or numbers in SI.
 
-    Raises
-    ------
-    InputError : a key that is no number of the scene, a text that is none, a deviation that is not positive.
+    Raises InputError for a key that is no number of the scene, a text that is none, a deviation that is not positive.
     """
     values, units, out = values_of(scene), scene.data_units(), {}
     for text, given in _flat(tolerances).items():
@@ -93,9 +91,7 @@ def _numbered(scene: Scene, key: str) -> str:
 def first_order(gradient: Gradient, deviation: Mapping[str, float]) -> tuple[float, dict[str, float]]:
     """Standard deviation of a quantity whose numbers vary independently: root of the sum of (dQ/da u_a)^2, and these terms.
 
-    Raises
-    ------
-    InputError : a number without a derivative.
+    Raises InputError for a number without a derivative.
     """
     for key in deviation:
         if key not in gradient.gradient:
@@ -109,9 +105,7 @@ def monte_carlo(
 ) -> Samples:
     """Solve for normally distributed numbers, each sample started from the answer in the middle. Collective.
 
-    Raises
-    ------
-    InputError : fewer than two samples, or none that could be solved.
+    Raises InputError for fewer than two samples, asked for or solved.
     """
     if count < 2:
         raise InputError(f"--monte-carlo {count}: at least 2 samples are needed")

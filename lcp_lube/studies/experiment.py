@@ -28,16 +28,18 @@ RECORD = """outcome iterations linear_iterations centrality backtracking c1 c2 k
 def open_store(path: Path, key: Sequence[str], columns: Sequence[str]) -> ResumableCsv:
     """The csv of a chart, with the columns `key`, `columns` and RECORD. Collective.
 
-    Raises
-    ------
-    InputError : matplotlib is missing, PETSc options are set that would change every run, or the csv cannot be read.
+    Raises InputError where matplotlib is missing, PETSc options are set that would change every run, or the csv cannot be read.
     """
     if find_spec("matplotlib") is None:
         raise InputError("chart: pictures need matplotlib: pip install lcp-lube[plot]")
-    foreign = sorted(set_names() - LATE)
-    if foreign:
-        raise InputError(f"-{foreign[0]}: the runs of a chart bring their own inner solvers")
+    refuse_options("the runs of a chart")
     return ResumableCsv(path, [*key, *columns, *RECORD], key)
+
+
+def refuse_options(runs: str) -> None:
+    """Raise InputError where PETSc options are set that would change every run."""
+    if foreign := sorted(set_names() - LATE):
+        raise InputError(f"-{foreign[0]}: {runs} bring their own inner solvers")
 
 
 def scene_key(scene: Scene) -> tuple[str, str]:
@@ -66,19 +68,14 @@ def run(
     """One run, however it ends: RECORD, `wall_s`, `cpu_s` (this rank's), errors and the rest of the JSON's keys. Collective.
 
     Further keys: `read_off` (`compare.read_off`), `points`, `krylov`: Krylov iterations on all grids. `iterations` are those of
-    all grids too.
+    all grids too. A run that is refused raises InputError.
 
     Parameters
     ----------
-    scene, choices : as the solver takes them.
-    reference : gives `distance` and `reference`; a certified answer that is as far from it as WRONG is a wrong one.
-    steps : filled with the record of every step.
     krylov_limit : the run is left after the step in which its Krylov iterations pass this number; of its answer nothing is
         then known. Counted in iterations, not in seconds: a limit that falls on the same step on every machine.
-
-    Raises
-    ------
-    InputError : the run was refused.
+    reference : gives `distance` and `reference`; a certified answer that is as far from it as WRONG is a wrong one.
+    steps : filled with the record of every step.
     """
     steps = [] if steps is None else steps
 
@@ -91,25 +88,19 @@ def run(
     try:
         solution = solve(scene, monitor=monitor, **choices)
     except _Enough:
+        counts = {name: sum(getattr(s, name) for s in steps) for name in ("linear_iterations", "centrality", "backtracking")}
         return {
-            **environment(),
-            "outcome": KRYLOV_LIMIT,
+            **{**environment(), **counts, "iterations": len(steps), "krylov": counts["linear_iterations"]},
+            **{"wall_s": perf_counter() - begin, "cpu_s": process_time() - cpu_begin},
+            **{"outcome": KRYLOV_LIMIT, "c1": steps[-1].norm, "c2": steps[-1].step_norm},
             "message": f"left after {krylov_limit:,.0f} Krylov iterations with ||F|| = {steps[-1].norm:.2e}",
-            "wall_s": perf_counter() - begin,
-            "cpu_s": process_time() - cpu_begin,
-            "iterations": len(steps),
-            **{name: sum(getattr(s, name) for s in steps) for name in ("linear_iterations", "centrality", "backtracking")},
-            "krylov": sum(step.linear_iterations for step in steps),
-            "c1": steps[-1].norm,
-            "c2": steps[-1].step_norm,
         }
     clocks = {"wall_s": solution.times["total"], "cpu_s": process_time() - cpu_begin}
-    try:
+    with solution:
         data = as_dict(solution)
         # 'auto' is all that it does; of a method that was asked for by name a rescue by another one is a failure.
-        outcome: dict[str, Any] = (
-            {"outcome": FELL_BACK} if solution.settings["took_over"] and choices.get("method", "auto") != "auto" else {}
-        )
+        rescued = solution.settings["took_over"] and choices.get("method", "auto") != "auto"
+        outcome: dict[str, Any] = {"outcome": FELL_BACK} if rescued else {}
         if reference is not None:
             far = reference.distance(solution.problem, solution.fields)
             outcome |= {"distance": None if far is None else f"{far:.3e}", "reference": reference.how}
@@ -123,5 +114,3 @@ def run(
             "krylov": sum(step.linear_iterations for step in steps),
         }
         return {**environment(), **data, **exact_errors(solution.problem, data), **more, **clocks, **outcome}
-    finally:
-        solution.destroy()

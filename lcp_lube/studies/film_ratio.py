@@ -3,7 +3,8 @@
 from collections.abc import Iterator, Sequence
 
 from ..base.resumable import Row
-from .outcome_map import Axis, Case, OutcomeMap, Panels, methods, tallies
+from .map_picture import Axis, Panels
+from .outcome_map import Case, OutcomeMap, methods, tallies
 
 RATIOS = (1.1, 2, 5, 10, 30, 100, 1000, 10_000)
 H_MIN = {"problem1": 15e-6, "textured_slider": 15e-6}  # m; the textured slider's depth is what the ratio leaves

@@ -13,7 +13,8 @@ from ..base.resumable import Row
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Step
 from ..solvers.steplength import Centrality
-from .outcome_map import Axis, Case, OutcomeMap, Panels, chosen, converged, groups, tally
+from .map_picture import Axis, Panels, chosen, converged, groups
+from .outcome_map import Case, OutcomeMap, tally
 
 TOLERANCES = (1e-12, 1e-10, 1e-8, 1e-6, 1e-4, 1e-3, 1e-2, 0.1, 0.5)
 SCENES = {"problem1": {"n": 100}, "problem4": {"n": 24}}

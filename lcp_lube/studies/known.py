@@ -44,7 +44,7 @@ def known_answer(scene: RectangleScene, path: Path, quick: bool = False) -> Know
     store = ResumableCsv(path, [*KEY, *COLUMNS], KEY)
     name, data = scene_key(scene)
     key = {"scene": name, "data": data, "sides": " ".join(map(str, sides))}
-    row = store.find(**key) or store.add({**fine(scene, sides), "machine": machine(), **key})
+    row = store.row(key, lambda: {**fine(scene, sides), "machine": machine()})
     return Known(
         {name: float(row[name]) if row[name] else None for name in QUANTITIES},
         {name: float(row[f"{name}_unsure"]) for name in QUANTITIES if row[f"{name}_unsure"]},
@@ -79,8 +79,5 @@ def fine(scene: RectangleScene, sides: tuple[int, ...]) -> dict[str, object]:
 
 def on_grid(scene: Scene) -> dict[str, float | None]:
     """The three numbers of this grid's own solution, to rounding. Collective."""
-    solution = solve(scene, method="active-set", stopping={"eps1": 1e-11})
-    try:
+    with solve(scene, method="active-set", stopping={"eps1": 1e-11}) as solution:
         return read_off(solution.problem, as_dict(solution)) if solution.converged else dict.fromkeys(QUANTITIES)
-    finally:
-        solution.destroy()

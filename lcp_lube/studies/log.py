@@ -16,12 +16,7 @@ HEAD = "# Charts: what the last full runs say\n\nWritten by `lcp-lube chart`; ev
 
 
 def write_log(results: Path, name: str, rows: Sequence[Row], text: str, pictures: Sequence[Path]) -> None:
-    """Put a chart's section in the place of its old one. Collective.
-
-    Raises
-    ------
-    InputError : the file cannot be read or written.
-    """
+    """Put a chart's section in the place of its old one. Collective."""
     path = results / NAME
     with replacing(path, MPI.COMM_WORLD) as temporary:
         if MPI.COMM_WORLD.rank == 0:

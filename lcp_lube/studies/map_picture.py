@@ -6,15 +6,13 @@ import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from mpi4py import MPI
 
 from ..base.resumable import Row
 from ..problems.solution import Outcome
-from .drawing import WIDTH, new_figure, save
+from .drawing import WIDTH, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -85,20 +83,6 @@ def tick(value: str) -> str:
     if number and exponent == round(exponent) and not -1 <= exponent <= 2:
         return f"${'-' * (number < 0)}10^{{{round(exponent)}}}$"
     return f"{number:g}"
-
-
-def draw(
-    rows: Sequence[Row],
-    panels: Panels,
-    x: Axis,
-    y: Axis,
-    sentence: str,
-    path: Path,
-    comm: MPI.Comm,
-    right: Callable[[Row], bool] = converged,
-) -> None:
-    """Draw the map. Collective."""
-    save(lambda: picture(rows, panels, x, y, sentence, right), path, comm)
 
 
 def values_of(rows: Sequence[Row], axis: Axis) -> list[str]:

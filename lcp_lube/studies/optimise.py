@@ -28,6 +28,7 @@ from ..scenes.values import key_of, values_of, with_values
 
 WORSE = 1e3  # of the start's value: what stands for a design that has no solution
 STUCK, NEAR = 5, 1e-3  # so many designs so near each other, in parts of the ranges and of the goal: a kink
+REST = 1e-9  # relative change of the goal that ends it
 INSIDE = 1e-6  # relative to a limit: a design that keeps it so nearly keeps it
 
 
@@ -79,12 +80,7 @@ class Result:
 
 
 def parse_range(scene: Scene, text: str) -> Range:
-    """KEY=FROM:TO with units or in SI.
-
-    Raises
-    ------
-    InputError : of another form, a key without a derivative, a range that is none.
-    """
+    """KEY=FROM:TO with units or in SI; InputError for another form, a key without a derivative, a range that is none."""
     key, equals, rest = (part.strip() for part in text.partition("="))
     ends = [read(part) for part in rest.split(":")]
     if not (key and equals) or len(ends) != 2 or None in ends:
@@ -99,12 +95,7 @@ def parse_range(scene: Scene, text: str) -> Range:
 
 
 def parse_limit(text: str) -> Limit:
-    """QUANTITY<=BOUND or QUANTITY>=BOUND, the bound in SI or with a unit.
-
-    Raises
-    ------
-    InputError : of another form.
-    """
+    """QUANTITY<=BOUND or QUANTITY>=BOUND, the bound in SI or with a unit; InputError for another form."""
     match = re.fullmatch(r"\s*(\w+)\s*(<=|>=)\s*(.+?)\s*", text)
     bound = read(match[3]) if match else None
     if match is None or bound is None:
@@ -117,25 +108,21 @@ class Designs:
 
     def __init__(self, scene: Scene, ranges: Sequence[Range], quantities: Sequence[str], ask: Ask, path: Path | None):
         self.scene, self.ranges, self.quantities, self.ask = scene, list(ranges), list(dict.fromkeys(quantities)), ask
-        self._known: dict[bytes, Design] = {}
+        self.known: dict[bytes, Design] = {}
         self._near: Solution | None = None
         self._digest = sha256(f"{scene.model_dump_json()} {self.quantities} {ask.choices}".encode()).hexdigest()[:12]
         self._store = ResumableCsv(path, ["design"], ["design"], ask.mpi, growing=True) if path else None
         if self._store:
             self._store.write()
 
-    def __len__(self) -> int:
-        return len(self._known)
-
-    def values(self, x: Array) -> dict[str, float]:
-        """Of numbers between 0 and 1."""
-        return {one.key: one.low + float(t) * (one.high - one.low) for one, t in zip(self.ranges, x, strict=True)}
-
     def at(self, x: Array) -> Design:
+        """Of numbers between 0 and 1, the ends of the ranges."""
+        x = np.clip(x, 0.0, 1.0)
         name = np.asarray(x, dtype=float).tobytes()
-        if name not in self._known:
-            self._known[name] = self._made(self.values(x))
-        return self._known[name]
+        if name not in self.known:
+            values = {one.key: one.low + float(t) * (one.high - one.low) for one, t in zip(self.ranges, x, strict=True)}
+            self.known[name] = self._made(values)
+        return self.known[name]
 
     def slopes(self, design: Design, quantity: str) -> Array:
         """By the numbers between 0 and 1."""
@@ -143,7 +130,7 @@ class Designs:
 
     def stuck(self, best: Design, goal: str, size: float) -> bool:
         """Whether the last designs lie about the best one, and are hardly worse."""
-        last = [one for one in self._known.values() if not one.message][-STUCK:]
+        last = [one for one in self.known.values() if not one.message][-STUCK:]
         far = max(abs(one.values[r.key] - best.values[r.key]) / (r.high - r.low) for one in last for r in self.ranges)
         worse = max(abs(one.results[goal] - best.results[goal]) for one in last)
         return len(last) == STUCK and far < NEAR and worse < NEAR * size
@@ -196,13 +183,12 @@ def optimise(
     ask: Ask | None = None,
     history: Path | None = None,
     most: int = 100,
-    tol: float = 1e-9,
 ) -> Result:
     """The design with the largest (sign 1) or smallest (-1) value of a quantity. Collective.
 
     Parameters
     ----------
-    history : csv of all designs. most : steps of the optimiser at most. tol : relative change of the goal that ends it.
+    history : csv of all designs. most : steps of the optimiser at most.
 
     Raises
     ------
@@ -242,40 +228,38 @@ def optimise(
 
         if worst(start) > INSIDE:  # first into the limits
             x = np.clip(minimize(excess, x, jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": most}).x, 0.0, 1.0)
-            if designs.at(x).message or worst(designs.at(x)) > 1e-3:
-                design = designs.at(x)
+            design = designs.at(x)
+            if design.message or worst(design) > 1e-3:
                 off = [f"{one} ({design.results.get(one.quantity, np.nan):.6g})" for one in limits]
                 raise InputError(f"no feasible start: no design within the ranges was found that keeps {', '.join(off)}")
 
         def cost(t: Array) -> tuple[float, Array]:
-            design = designs.at(np.clip(t, 0.0, 1.0))
+            design = designs.at(t)
             if design.message:
                 return WORSE, np.zeros(t.size)
             return -sign * design.results[goal] / size, -sign * designs.slopes(design, goal) / size
 
         def kept(t: Array, one: Limit) -> float:
-            design = designs.at(np.clip(t, 0.0, 1.0))
+            design = designs.at(t)
             return -WORSE if design.message else -one.excess(design.results[one.quantity])
 
         def kept_slope(t: Array, one: Limit) -> Array:
-            design = designs.at(np.clip(t, 0.0, 1.0))
+            design = designs.at(t)
             if design.message:
                 return np.zeros(t.size)
             return -one.sign * designs.slopes(design, one.quantity) / (abs(one.bound) or 1.0)
 
         rules = [{"type": "ineq", "fun": kept, "jac": kept_slope, "args": (one,)} for one in limits]
         how: dict[str, Any] = {"method": "SLSQP", "constraints": rules} if rules else {"method": "L-BFGS-B"}
-        options = {"maxiter": most, "ftol": tol}
+        options = {"maxiter": most, "ftol": REST}
         done = minimize(cost, x, jac=True, bounds=bounds, options=options, **how)
-        feasible = [one for one in designs._known.values() if not one.message and worst(one) <= INSIDE]
+        feasible = [one for one in designs.known.values() if not one.message and worst(one) <= INSIDE]
         if not feasible:
-            return Result(
-                start, designs.at(np.clip(done.x, 0, 1)), int(done.nit), len(designs), False, "the limits are not kept"
-            )
+            return Result(start, designs.at(done.x), int(done.nit), len(designs.known), False, "the limits are not kept")
         best = max(feasible, key=lambda one: sign * one.results[goal])
         converged, message = bool(done.success), str(done.message)
         if not converged and designs.stuck(best, goal, size):
             converged, message = True, "at a kink: no step improves it"
-        return Result(start, best, int(done.nit), len(designs), converged, message)
+        return Result(start, best, int(done.nit), len(designs.known), converged, message)
     finally:
         designs.destroy()

@@ -17,9 +17,10 @@ from ..problems.solution import Step
 from ..registry import METHODS
 from ..scenes.scene import Scene, load_scene
 from ..solvers.newton import Stopping
+from .drawing import save
 from .experiment import FELL_BACK, KRYLOV_LIMIT, open_store, run
 from .log import write_log
-from .map_picture import Axis, Panels, chosen, converged, draw, groups, unique
+from .map_picture import Axis, Panels, converged, groups, picture
 from .reference import WRONG, Reference, References
 
 COLUMNS = ("distance", "reference", "system", "cpu_s", "command")
@@ -74,18 +75,12 @@ class Case:
 
 @dataclass(frozen=True)
 class OutcomeMap:
-    """What tells one map from another.
+    """What tells one map from another. Its files are stability_{stem}.csv and .png (stability_{stem}_quick...).
 
-    Attributes
-    ----------
-    stem : its files are stability_{stem}.csv and .png.
-    cases : quick -> the runs.
     panels, x, y : which key columns make panels, and which the cells within them; rows that share a cell are counted together.
-    sentence : rows -> what the map shows.
-    reference : scene -> what its runs are judged by; default the discrete solution.
-    more : case, steps -> further columns of a run, from the record of its steps.
-    columns : their names.
-    right : whether a run is as it must be; default: it converged.
+    reference : what runs are judged by; default the discrete solution.
+    more : further columns of a run, from the record of its steps; columns : their names.
+    right : whether a run is as it must be.
     """
 
     stem: str
@@ -99,43 +94,25 @@ class OutcomeMap:
     columns: tuple[str, ...] = ()
     right: Callable[[Row], bool] = converged
 
-    def chart(self, quick: bool = False, results: Path = Path("lcp_lube_results")) -> int:
-        """Make the runs that are not in the csv yet, then draw. Collective.
-
-        Parameters
-        ----------
-        quick : a map of few cells, kept apart from the full one.
-        results : folder of stability_{stem}.csv and .png (stability_{stem}_quick...).
-
-        Returns
-        -------
-        int : exit status 0; a run that fails is a cell of the map.
-
-        Raises
-        ------
-        InputError : see `open_store`.
-        """
+    def chart(self, quick: bool, results: Path) -> int:
+        """Make the runs that are not in the csv yet, then draw; a run that fails is a cell of the map. Collective."""
         stem = f"stability_{self.stem}" + "_quick" * quick
         cases = list(self.cases(quick))
         key = (*cases[0].key, "ranks")
         store = open_store(results / f"{stem}.csv", key, (*COLUMNS, *self.columns))
-        known, references = len(store.rows), References()
-        find = self.reference or references.of
+        find = self.reference or References().of
         rows = [row for case in cases if (row := self.row(store, case, find)) is not None]
         sentence = f"Numbers: steps. {self.sentence(rows)} {judged(rows)}"
         say(sentence)
-        for row in rows:
-            if row.get("method") == "auto" and not self.right(row):
-                say(f"auto failed: {row['command']}: {row['message']}")
-        draw(rows, self.panels, self.x, self.y, sentence, results / f"{stem}.png", store.comm, self.right)
+        failed = [row for row in rows if row.get("method") == "auto" and not self.right(row)]
+        for row in failed:
+            say(f"auto failed: {row['command']}: {row['message']}")
+        path = results / f"{stem}.png"
+        save(lambda: picture(rows, self.panels, self.x, self.y, sentence, self.right), path, store.comm)
         if not quick:
-            failed = [f"- `{row['command']}`" for row in rows if row.get("method") == "auto" and not self.right(row)]
-            text = "\n".join([sentence, *(["", "What `auto` fails at:", "", *failed] if failed else [])])
-            write_log(results, f"stability: {self.stem}", rows, text, [results / f"{stem}.png"])
-        say(
-            f"{results / stem}.png: {len(rows)} runs, {len(store.rows) - known} of them new; the others stood in {store.path} "
-            "(remove it to run them again)."
-        )
+            lines = ["", "What `auto` fails at:", "", *(f"- `{row['command']}`" for row in failed)] if failed else []
+            write_log(results, f"stability: {self.stem}", rows, "\n".join([sentence, *lines]), [path])
+        say(f"{path}: {len(rows)} runs, {store.said}")
         return 0
 
     def row(self, store: ResumableCsv, case: Case, reference: Callable[[Scene], Reference]) -> Row | None:
@@ -154,9 +131,9 @@ class OutcomeMap:
         return row
 
 
-def methods(kind: str = "lubrication") -> list[str]:
-    """'auto', and every method of the registry for this kind of problem."""
-    return ["auto", *(name for name, entry in METHODS.items() if kind in entry.kinds)]
+def methods() -> list[str]:
+    """'auto', and every method of the registry for films."""
+    return ["auto", *(name for name, entry in METHODS.items() if "lubrication" in entry.kinds)]
 
 
 def tally(rows: Sequence[Row], axes: Sequence[Axis], right: Callable[[Row], bool] = converged) -> str:
@@ -205,6 +182,3 @@ def judged(rows: Sequence[Row]) -> str:
         text += f"; it refused {alarms} that are as near as {WRONG:g}" * bool(alarms)
     without = len(rows) - len(known)
     return f"{text}{f'; {without} runs had no reference' * bool(without)}." if text else ""
-
-
-__all__ = ["Axis", "Case", "OutcomeMap", "Panels", "chosen", "converged", "groups", "methods", "tallies", "tally", "unique"]

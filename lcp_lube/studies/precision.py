@@ -6,7 +6,7 @@ which the iteration leaves (against the same grid solved to rounding).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -82,20 +82,6 @@ class Configuration:
     eps: float
     most: int = ALL
 
-    @property
-    def key(self) -> dict[str, Any]:
-        return {
-            "method": self.method,
-            "nested": self.nested,
-            "system": self.system,
-            "recipe": self.recipe or "default",
-            "eps": self.eps,
-        }
-
-    def __str__(self) -> str:
-        nested = " nested" * self.nested
-        return f"{self.method}{nested}, {self.system} system, recipe {self.recipe or 'default'}, eps {self.eps:g}"
-
 
 def configurations(dimension: int, quick: bool = False) -> Iterator[Configuration]:
     """All that make sense; nested iteration with a method's first recipe of each system. quick: one recipe a system."""
@@ -113,27 +99,15 @@ def configurations(dimension: int, quick: bool = False) -> Iterator[Configuratio
                         yield Configuration(method, nested, system, recipe, eps, min(most, SLOW.get(method, ALL)))
 
 
-def chart(sources: Sequence[str], quick: bool = False, results: Path = Path("lcp_lube_results")) -> int:
-    """Make the runs that are not in the csv yet, then draw the pictures from it. Collective.
+def chart(sources: Sequence[str], quick: bool, results: Path) -> int:
+    """Make the runs that are not in the csv yet, then draw; a run that fails is a point of the chart. Collective.
 
-    Parameters
-    ----------
     sources : scenes of films, by name or file, or of VARIANTS; none: SCENES.
     quick : two small grids, one recipe a system, each run made once; kept apart from the full chart.
-    results : folder of precision.csv, precision_references.csv and the pictures (precision_quick...).
-
-    Returns
-    -------
-    int : exit status 0; a run that fails is a point of the chart.
-
-    Raises
-    ------
-    InputError : a scene that is no film; see also `open_store`.
     """
     scenes = [film(source) for source in sources or SCENES]
     stem = "precision_quick" if quick else "precision"
     store = open_store(results / f"{stem}.csv", KEY, COLUMNS)
-    before = len(store.rows)
     for scene in scenes:
         bench = Bench(scene, known_answer(scene, results / f"{stem}_references.csv", quick), 1 if quick else REPEATS)
         dimension = len(scene.shape)
@@ -149,10 +123,7 @@ def chart(sources: Sequence[str], quick: bool = False, results: Path = Path("lcp
     if not quick:
         text = "\n".join([sentence(rows, "load"), "", *which(rows), "", MARKS, "", "```text", table, "```"])
         write_log(results, "precision", rows, text, pictures)
-    say(
-        f"{', '.join(map(str, pictures))}: {len(rows)} runs, {len(store.rows) - before} of them new; the others stood in "
-        f"{store.path} (remove it to run them again)."
-    )
+    say(f"{', '.join(map(str, pictures))}: {len(rows)} runs, {store.said}")
     return 0
 
 
@@ -165,12 +136,7 @@ def grids(scene: Scene, quick: bool) -> tuple[int, ...]:
 
 
 def film(source: str) -> RectangleScene:
-    """The scene of a name or file, or of VARIANTS, if its load can be told.
-
-    Raises
-    ------
-    InputError : it is no film with cavitation.
-    """
+    """The scene of a name or file, or of VARIANTS, if its load can be told; else InputError."""
     name, changes = VARIANTS.get(source, (source, {}))
     scene = load_scene(name, **changes, **({"name": source} if changes else {}))
     if not isinstance(scene, RectangleScene):
@@ -188,18 +154,14 @@ class Bench:
 
     def fill(self, store: ResumableCsv, configuration: Configuration, sizes: Sequence[int]) -> None:
         """Make a configuration's runs on all its grids, from small to large, until one reaches a limit. Collective."""
-        choices: dict[str, Any] = {
-            "method": configuration.method,
-            "system": configuration.system,
-            "recipe": configuration.recipe,
-            "nested": configuration.nested,
-            "stopping": Stopping(configuration.eps, configuration.eps),
-        }
+        choices = asdict(configuration)
+        eps, most = choices.pop("eps"), choices.pop("most")
         for n in sizes:
-            if n > configuration.most:
+            if n > most:
                 return
             scene = self.scene.with_shape((n,) * len(self.scene.shape))
-            row = self.row(store, {**configuration.key, "n": n}, scene, **choices)
+            key = {**choices, "recipe": configuration.recipe or "default", "eps": eps, "n": n}
+            row = self.row(store, key, scene, **choices, stopping=Stopping(eps, eps))
             limits = (KRYLOV_LIMIT, Outcome.MAX_ITERATIONS)
             if row is None or row["outcome"] in limits or float(row["cpu_s"]) > ENOUGH:
                 return

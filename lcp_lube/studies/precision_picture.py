@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,19 +32,14 @@ GRID = "error of the grid"
 
 
 def draw_all(rows: Sequence[Row], stem: Path, comm: MPI.Comm) -> list[Path]:
-    """All pictures: an error against seconds for each of AXES, the load's against Krylov iterations, and its parts. Collective.
-
-    Returns
-    -------
-    list of Path : the files, stem_load.png and so on.
-    """
-    pictures: dict[str, Callable[[], Figure]] = {name: lambda name=name: against_seconds(rows, name) for name in AXES}  # type: ignore[misc]
-    pictures |= {"krylov": lambda: against_krylov(rows), "parts": lambda: parts(rows)}
-    paths = []
+    """An error against seconds for each of AXES, the load's against Krylov iterations, and its parts: stem_load.png and so on.
+    Collective."""
+    pictures: dict[str, Callable[[], Figure]] = {name: partial(against_seconds, rows, name) for name in AXES}
+    pictures |= {"krylov": partial(against_krylov, rows), "parts": partial(parts, rows)}
+    paths = {name: stem.with_name(f"{stem.name}_{name}.png") for name in pictures}
     for name, build in pictures.items():
-        paths.append(stem.with_name(f"{stem.name}_{name}.png"))
-        save(build, paths[-1], comm)
-    return paths
+        save(build, paths[name], comm)
+    return [*paths.values()]
 
 
 def against_seconds(rows: Sequence[Row], quantity: str) -> Figure:

@@ -99,18 +99,18 @@ def cheapest(rows: Sequence[Row]) -> list[str]:
     return lines
 
 
-def which(rows: Sequence[Row], quantity: str = "load") -> list[str]:
+def which(rows: Sequence[Row]) -> list[str]:
     """Which method when, as a table in Markdown: the fastest run for each of ASKED, and how much longer others take."""
     lines = ["| scene | error of the load | fastest | s | paper's DIN | other codes |", "|---|---|---|---|---|---|"]
     for scene, mine in by_scene(timed(rows)).items():
         for level in ASKED:
-            best = fastest(mine, level, quantity)
+            best = fastest(mine, level)
             if best is None:
                 lines.append(f"| {scene} | {percent(level)} | no run gets there | | | |")
                 continue
             rivals = []
             for theirs in (list(filter(published, mine)), [row for row in mine if row["system"] == PEER]):
-                rival = fastest(theirs, level, quantity)
+                rival = fastest(theirs, level)
                 label = f"{rival['method']}, " * (rival["system"] == PEER) if rival else ""
                 rivals.append(f"{label}{seconds(rival) / seconds(best):.2g} times" if rival else unreached(theirs, mine))
             name = describe(best).rpartition(": ")[0]

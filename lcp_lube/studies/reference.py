@@ -1,6 +1,5 @@
 """The answer that runs are judged by: the discrete solution on the same grid, found and proved apart from them."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,8 +50,8 @@ def _size(problem: Problem, values: Array) -> float:
 class References:
     """Made at first use, one for each scene and grid."""
 
-    def __init__(self, known: Mapping[str, Reference] | None = None):
-        self._known = dict(known or {})
+    def __init__(self) -> None:
+        self._known: dict[str, Reference] = {}
 
     def of(self, scene: Scene) -> Reference:
         """The reference of a film with cavitation; for other scenes one without answers. Collective."""
@@ -70,9 +69,8 @@ def discrete(scene: LubricationScene) -> Reference:
     """
     found: list[Fields] = []
     for method in ("active-set", "monotone"):
-        solution = solve(scene, method=method, system="reduced", stopping=TIGHT, certify=True)
-        band, problem = solution.enclosure, solution.problem
-        try:
+        with solve(scene, method=method, system="reduced", stopping=TIGHT, certify=True) as solution:
+            band, problem = solution.enclosure, solution.problem
             if band is not None and band.certified:
                 p_max = problem.reduce.max(solution.fields["p"]) * getattr(problem, "p_unit", 1.0)
                 width = max(band.bounds["band_p"] / (p_max or 1.0), band.bounds["band_r"])
@@ -83,6 +81,4 @@ def discrete(scene: LubricationScene) -> Reference:
                 apart = Reference((found[0],)).distance(problem, found[1])
                 if apart is not None and apart < 0.01 * WRONG:
                     return Reference((found[0],), f"active-set and monotone agree to {apart:.0e}")
-        finally:
-            solution.destroy()
     return Reference()

@@ -3,7 +3,8 @@
 from collections.abc import Iterator, Sequence
 
 from ..base.resumable import Row
-from .outcome_map import Axis, Case, OutcomeMap, Panels, methods, tallies
+from .map_picture import Axis, Panels
+from .outcome_map import Case, OutcomeMap, methods, tallies
 
 AMPLITUDES = (
     0,

@@ -62,10 +62,10 @@ def chart(quick: bool, results: Path) -> int:
 
 def _of_scene(store: ResumableCsv, name: str, source: Any, n: int) -> Iterator[Row]:
     """Rows from the least model to the full one, then the decision's."""
-    size = {"n": n} if not isinstance(source, dict) and "2d" not in source else {"nx": n, "ny": max(3, n // 2)}
-    if isinstance(source, dict) and source.get("dimension", 1) == 1:
-        size = {"n": n}
-    scene = load_scene({**source, **size, "name": name}) if isinstance(source, dict) else load_scene(source, size)
+    own = isinstance(source, dict)
+    plane = source.get("dimension") == 2 if own else "2d" in source
+    size = {"nx": n, "ny": max(3, n // 2)} if plane else {"n": n}
+    scene = load_scene({**source, **size, "name": name}) if own else load_scene(source, size)
     full = _run(store, scene, name, n, "full")
     names = named(scene)
     alone = {one: _run(store, scene, name, n, one) for one in names}
@@ -78,19 +78,19 @@ def _of_scene(store: ResumableCsv, name: str, source: Any, n: int) -> Iterator[R
 
 
 def _run(store: ResumableCsv, scene: Scene, name: str, n: int, model: str) -> Row:
-    key = {"scene": name, "n": n, "model": model}
-    if (row := store.find(**key)) is not None:
-        return row
+    return store.row({"scene": name, "n": n, "model": model}, lambda: _made(scene, model))
+
+
+def _made(scene: Scene, model: str) -> dict[str, Any]:
     with solve(scene, model=model) as s:
         found = s.settings.get("balance")
         value = found["value"] if found else s.numbers["load"]
         share = s.settings["model"].get("share_of_work", 0.0)
-        made: dict[str, Any] = {
-            **{**key, "outcome": str(s.outcome), "quantity": found["vary"] if found else "load", "value": f"{value:.12g}"},
-            **{"error": "", "work": f"{total_work(s) * (1.0 + share):.6g}", "share_of_work": f"{share:.4g}"},
+        return {
+            **{"outcome": str(s.outcome), "quantity": found["vary"] if found else "load", "value": f"{value:.12g}"},
+            **{"work": f"{total_work(s) * (1.0 + share):.6g}", "share_of_work": f"{share:.4g}"},
             "seconds": f"{s.times['total']:.3g}",
         }
-    return store.add(made)
 
 
 def _draw(rows: Sequence[Row]) -> Figure:

@@ -6,19 +6,25 @@ fills one csv; the picture is drawn anew from all of it. On more ranks than core
 but the iteration counts do: they are those of a cluster.
 """
 
+from __future__ import annotations
+
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from math import isqrt
 from pathlib import Path
 from statistics import median
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..base.resumable import ResumableCsv, Row
 from ..output.console import say
 from ..output.table import table as lines_of
 from ..scenes.scene import load_scene
+from .drawing import look, new_figure, save
 from .experiment import open_store, run
-from .scaling_picture import draw
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 SCENES = ("problem4", "rough")
 STRONG = (250, 500, 1000)  # points a side, whatever the ranks
@@ -31,23 +37,12 @@ KEY = ("kind", "scene", "n", "ranks")
 COLUMNS = ("wall_s", "cpu_s", "runs", "levels", "finest_linear", "memory_mb")
 
 
-def chart(quick: bool = False, results: Path = Path("lcp_lube_results")) -> int:
+def chart(quick: bool, results: Path) -> int:
     """Make the runs of this number of ranks that are not in the csv yet, then draw. Collective.
 
-    Parameters
-    ----------
     quick : small grids, each run made once; kept apart from the full chart.
-    results : folder of scaling.csv and scaling.png (scaling_quick...).
-
-    Returns
-    -------
-    int : exit status 0; a run that fails is a point of the chart.
-
-    Raises
-    ------
-    InputError : see `open_store`.
     """
-    stem = "scaling_quick" if quick else "scaling"
+    stem = "scaling" + "_quick" * quick
     store = open_store(results / f"{stem}.csv", KEY, COLUMNS)
     wanted = [
         (kind, scene, n)
@@ -60,7 +55,7 @@ def chart(quick: bool = False, results: Path = Path("lcp_lube_results")) -> int:
         counts_only = quick or store.comm.size > (os.cpu_count() or 1)
         fill(store, kind, scene, n, 1 if counts_only else REPEATS)
     say("\n".join(table(store.rows)))
-    draw(store.rows, results / f"{stem}.png", store.comm)
+    save(lambda: picture(store.rows), results / f"{stem}.png", store.comm)
     say(f"{results / stem}.png, from {store.path} (remove it to run them again)")
     return 0
 
@@ -111,3 +106,51 @@ def reference(rows: list[Row], row: Row) -> Row | None:
 def can_time(row: Row) -> bool:
     """Whether this machine has a core for every rank."""
     return int(row["ranks"]) <= (os.cpu_count() or 1)
+
+
+def picture(rows: Sequence[Row]) -> Figure:
+    """Seconds a point by grid, and Krylov iterations a Newton step by ranks."""
+    cores = os.cpu_count() or 1
+    figure = new_figure(
+        3.0,
+        "Nested active set on the cavity system, BiCGStab with BoomerAMG, medians. Left: a whole solve's seconds, up to "
+        f"the {cores} ranks that have a core of their own. Right: Krylov iterations a Newton step on the finest grid, "
+        "also on ranks that share cores.",
+    )
+    good = [row for row in rows if row["outcome"] == "converged"]
+    left, right = figure.subplots(1, 2)
+    _seconds(left, list(filter(can_time, good)))
+    _counts(right, good)
+    return figure
+
+
+def _seconds(axes: Axes, rows: Sequence[Row]) -> None:
+    """Microseconds a point against points, a line for each scene and number of ranks."""
+    series = sorted({(row["scene"], int(row["ranks"])) for row in rows})
+    for k, (scene, ranks) in enumerate(series):
+        mine = [row for row in rows if (row["scene"], int(row["ranks"])) == (scene, ranks)]
+        points = sorted({int(row["n"]) ** 2: float(row["wall_s"]) for row in mine}.items())
+        label = f"{scene}, {ranks} rank{'s' * (ranks > 1)}"
+        axes.plot([n for n, _ in points], [1e6 * s / n for n, s in points], label=label, **look(k))
+    axes.set(xscale="log", xlabel="points", ylabel="microseconds a point", ylim=(0, None), title="whole solve")
+    if series:
+        axes.legend(loc="lower right")
+
+
+def _counts(axes: Axes, rows: Sequence[Row]) -> None:
+    """Krylov iterations a step against ranks, a line for each scene and kind: the largest grid of each."""
+    series = sorted({(row["kind"], row["scene"]) for row in rows})
+    for k, (kind, scene) in enumerate(series):
+        mine = [row for row in rows if (row["kind"], row["scene"]) == (kind, scene)]
+        if kind == "strong":
+            largest = max(int(row["n"]) for row in mine)
+            mine = [row for row in mine if int(row["n"]) == largest]
+        points = sorted((int(row["ranks"]), int(row["finest_linear"]) / max(int(row["iterations"]), 1)) for row in mine)
+        label = f"{scene}, {kind}"
+        axes.plot([ranks for ranks, _ in points], [count for _, count in points], label=label, **look(k))
+    axes.set(xscale="log", xlabel="ranks", ylabel="iterations a step", ylim=(0, None), title="Krylov iterations")
+    ticks = sorted({int(row["ranks"]) for row in rows})
+    axes.set_xticks(ticks, [str(tick) for tick in ticks])
+    axes.minorticks_off()
+    if series:
+        axes.legend()

@@ -3,7 +3,8 @@
 from collections.abc import Iterator, Sequence
 
 from ..base.resumable import Row
-from .outcome_map import Axis, Case, OutcomeMap, Panels, methods, tallies
+from .map_picture import Axis, Panels
+from .outcome_map import Case, OutcomeMap, methods, tallies
 
 SPEEDS = (1e-3, 1e-2, 0.1, 1, 10, 100, 1000)  # m/s
 PRESSURES = (0, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7)  # Pa, on all sides

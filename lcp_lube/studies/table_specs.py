@@ -1,10 +1,12 @@
-"""What is in the published tables: how each printed row is run, as data."""
+"""What is in the published tables: how each printed row is run (tables.toml), and which runs a printed row stands for."""
 
 import math
+import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
-import numpy as np
 from mpi4py import MPI
 
 from ..base.resumable import Row
@@ -13,26 +15,13 @@ from ..errors import InputError
 
 @dataclass(frozen=True)
 class Spec:
-    """How a printed table is run.
-
-    Attributes
-    ----------
-    title : what the table shows.
-    command : a row's arguments of `lcp-lube`, with the printed columns that fill it in braces.
-    rows : makes one row a run of the printed csv.
-    points : numbers i of the points x_i = i dx (1D) whose pressure, in the problem's unit, is printed as p_i.
-    quick : --quick leaves rows with a larger n out.
-    system : the matrix that the inner solver sees.
-    printed, fitted : arguments for settings that the paper prints, and for others, fitted to its counts; None: it prints none
-        that we depart from.
-    note : said under the table.
-    """
+    """How a printed table is run: the keys of tables.toml, which says what they are."""
 
     title: str
     command: str
     rows: Callable[[list[Row]], list[Row]] = list
     points: tuple[int, ...] = ()
-    quick: float = np.inf
+    quick: float = math.inf
     system: str = "full"
     printed: str = ""
     fitted: str | None = None
@@ -46,45 +35,6 @@ def _row_a_method(printed: list[Row]) -> list[Row]:
         {"method": column.removeprefix("p_").replace("_", "-"), **{f"p_{row['i']}": row[column] for row in printed}}
         for column in columns
     ]
-
-
-_LOOSE = "--method din --eps1 1e-4 --eps2 1e-4"
-
-MEZZADRI = {
-    2: Spec("DIN, direct solver, n = 100", "solve problem{problem} --film {film} --method din --recipe lu"),
-    3: Spec(
-        "DIN with GMRES: no preconditioner, no restart (problem 1)",
-        "solve problem1 --n {n} --method din --recipe gmres --set din.tol_min=1e-12",
-        quick=100,
-    ),
-    4: Spec(
-        "the conditions on the step length taken apart, n = 100",
-        "solve problem{problem} --method din --conditions {conditions} --recipe lu",
-    ),
-    5: Spec(
-        "starting vectors and mu, n = 100", "solve problem{problem} --method din --p0 {p0} --r0 {r0} --mu {mu} --recipe lu"
-    ),
-    6: Spec("DIN and Fischer-Burmeister Newton, n = 100", "solve problem{problem} --method {method} --recipe lu"),
-    7: Spec(
-        "p in MPa at points of the cavity (problem 1, n = 100)",
-        "solve problem1 --method {method} --recipe lu",
-        rows=_row_a_method,
-        points=(70, 71, 72, 73, 74, 75),
-    ),
-    8: Spec("DIN with LAPACK's dense LU (problem 1)", f"solve problem1 --n {{n}} --recipe lu {_LOOSE}", quick=500),
-    9: Spec(
-        "DIN with sparse direct solvers (problem 1)",
-        f"solve problem1 --n {{n}} --recipe {{solver}} {_LOOSE}",
-        quick=100,
-    ),
-    10: Spec("DIN with ILU(0) (problem 1)", f"solve problem1 --n {{n}} --recipe {{solver}} {_LOOSE}", quick=1000),
-    11: Spec(
-        "DIN on the square, n x n (problem 4)",
-        f"solve problem4 --n {{n}} --recipe {{solver}} {_LOOSE}",
-        quick=50,
-        note="The paper's text does not determine problem 4, and no reading of it gives both counts: benchmarks/README.md.",
-    ),
-}
 
 
 def _these_ranks(printed: list[Row]) -> list[Row]:
@@ -155,52 +105,22 @@ def _line_contact(printed: list[Row]) -> list[Row]:
     return [a | b for a, b in zip(rows + own, measured + len(own) * [{"it": "", "time_s": ""}], strict=True)]
 
 
-_ONES = "--set interior.s0=1"  # the printed start, v = s = z = 1; s2 = u - v = 3 fits the counts better
-
-BERGAMASCHI = {
-    1: Spec(
-        "inexact interior point, BiCGStab with Jacobi (obstacle Bratu)",
-        "solve obstacle_bratu --n {side} --set lambda={lambda} --set v0={v0} --method interior --recipe bcgs_jacobi",
-        rows=_obstacle,
-        quick=4096,
-        system="jacobian",
-        printed=_ONES,
-        fitted="",
-    ),
-    2: Spec(
-        "inexact interior point with LAPACK's LU of the dense Jacobian (elastohydrodynamic line contact)",
-        "solve ehl_line --n {n} --method interior --set rows={rows} --set interior.keep={keep} --eps1 {eps1} --eps2 0.99",
-        rows=_line_contact,
-        system="jacobian",
-    ),
-    3: Spec(
-        "Newton with block Cimmino, five orthogonal blocks of rows or more (4096 points)",
-        "solve {problem} --n {side} --set {set} --method newton --recipe cimmino --set newton.eta=1e-5",
-        rows=_cimmino,
-        system="jacobian",
-        printed="--set newton.relative=1e-4",
-        fitted="--eps1 1e-9 --eps2 0.1",
-    ),
-    4: Spec(
-        "inexact Newton with AINV and with Jacobi (Bratu, lambda = 1)",
-        "solve bratu --n {side} --set lambda=1 --method newton --recipe {recipe} --set newton.eta=1e-3 --eps1 1e-9 --eps2 0.1",
-        rows=_row_a_preconditioner,
-        quick=4096,
-        system="jacobian",
-    ),
-    5: Spec(
-        "inexact interior point with AINV and with Jacobi (obstacle Bratu, lambda = 1)",
-        "solve obstacle_bratu --n {side} --set lambda=1 --set v0=1 --method interior --recipe {recipe}",
-        rows=_row_a_preconditioner,
-        quick=4096,
-        system="jacobian",
-        printed=_ONES,
-        fitted="",
-    ),
+ROWS = {
+    "row_a_method": _row_a_method,
+    "row_a_preconditioner": _row_a_preconditioner,
+    "cimmino": _cimmino,
+    "obstacle": _obstacle,
+    "line_contact": _line_contact,
 }
 
+
+def _spec(keys: dict[str, Any]) -> Spec:
+    return Spec(**{**keys, "rows": ROWS[keys["rows"]] if "rows" in keys else list, "points": tuple(keys.get("points", ()))})
+
+
+_TABLES = tomllib.loads(Path(__file__).with_name("tables.toml").read_text(encoding="utf-8"))
 # The papers by the name that --paper takes: folder of the printed figures, and tables by number.
 PAPERS: dict[str, tuple[str, dict[int, Spec]]] = {
-    "mezzadri": ("mezzadri_galligani_2018", MEZZADRI),
-    "bergamaschi": ("bergamaschi_zilli", BERGAMASCHI),
+    paper: (tables.pop("folder"), {int(number): _spec(keys) for number, keys in tables.items()})
+    for paper, tables in _TABLES.items()
 }

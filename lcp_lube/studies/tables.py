@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from ..base.options import LATE, set_names
 from ..base.resumable import ResumableCsv, Row
 from ..cli.arguments import parse
 from ..cli.asked import solution_of
@@ -19,6 +18,7 @@ from ..output.results import as_dict, machine
 from ..output.table import line
 from ..problems.solution import Solution
 from ..registry import PACKAGE
+from .experiment import refuse_options
 from .table_specs import PAPERS, Spec
 
 # A wheel carries the printed tables inside the package; in a checkout they stand with the benchmarks.
@@ -44,12 +44,7 @@ MEASURED = {
 
 
 def find_table(paper: str, number: int) -> tuple[Spec, list[Row]]:
-    """A table's spec and its printed rows.
-
-    Raises
-    ------
-    InputError : no such table, or its printed figures cannot be read.
-    """
+    """A table's spec and its printed rows; InputError where there is no such table, or its figures cannot be read."""
     folder, tables = PAPERS[paper]
     if number not in tables:
         known = ", ".join(map(str, tables)) or "none"
@@ -73,12 +68,7 @@ def row_command(spec: Spec, printed: Row, fitted: bool = False) -> str:
 
 
 def run_published_table(
-    paper: str,
-    number: int,
-    quick: bool = False,
-    results: Path = Path("lcp_lube_results"),
-    fitted: bool = False,
-    stored: bool = False,
+    paper: str, number: int, *, results: Path, quick: bool = False, fitted: bool = False, stored: bool = False
 ) -> int:
     """Run a table and print each row beside the printed one; `=` marks a match, `!=` a difference. Collective.
 
@@ -95,24 +85,14 @@ def run_published_table(
     -------
     int : exit status, 0 if every row ran; a failed run is a row, a run that its recipe or method refuses is not. With
     `stored`, 0 if every row was there.
-
-    Raises
-    ------
-    InputError : no such table; a csv that cannot be read or written; PETSc options that would change the runs.
     """
     spec, rows = find_table(paper, number)
     if fitted and spec.fitted is None:
         raise InputError(f"--fitted: table {number} of --paper {paper} is run with one set of settings only")
-    foreign = sorted(set_names() - LATE)
-    if foreign:
-        raise InputError(f"-{foreign[0]}: the rows of a published table bring their own inner solvers")
+    refuse_options("the rows of a published table")
     runs = [row for row in rows if not (quick and float(row.get("n", 0)) > spec.quick)]
-    store = ResumableCsv(
-        results / f"{paper}_table{number}.csv",
-        [*KEY, *(f"p_{i}" for i in spec.points), *RECORD],
-        KEY,
-        signed=True,
-    )
+    columns = [*KEY, *(f"p_{i}" for i in spec.points), *RECORD]
+    store = ResumableCsv(results / f"{paper}_table{number}.csv", columns, KEY, signed=True)
     layout = _Layout(rows)
     seconds = "; seconds of the processor (printed ones in brackets)" if "time_s" in layout.measured else ""
     settings = f" Settings {'fitted, not printed' if fitted else 'as printed'}." if spec.fitted is not None else ""
@@ -150,20 +130,15 @@ def run_published_table(
 
 
 def run_command(command: str, points: tuple[int, ...] = ()) -> dict[str, Any]:
-    """Run a `lcp-lube solve` command line and record it, however it ends. Collective.
-
-    Returns
-    -------
-    dict : the columns RECORD, and p_i in the problem's unit for the points asked for; outcome 'refused' and a message
-    alone where the run could not start.
-    """
+    """Run a `lcp-lube solve` command line: the columns RECORD, and p_i in the problem's unit for the points asked for; outcome
+    'refused' and a message alone where the run could not start. Collective."""
     begin = process_time()
     try:
         solution = solution_of(parse(shlex.split(command)[1:]))
     except InputError as error:
         return {"outcome": "refused", "message": str(error)}
     cpu_s = process_time() - begin
-    try:
+    with solution:
         data = as_dict(solution)
         times = data.pop("time_s")
         return {
@@ -176,8 +151,6 @@ def run_command(command: str, points: tuple[int, ...] = ()) -> dict[str, Any]:
             "petsc": data["versions"]["petsc"],
             **{f"p_{i}": _pressure(solution, i) for i in points},
         }
-    finally:
-        solution.destroy()
 
 
 def _pressure(solution: Solution, i: int) -> float:

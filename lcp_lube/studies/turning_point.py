@@ -18,7 +18,8 @@ from ..base.resumable import Row
 from ..problems.solution import Outcome
 from ..scenes.scene import Scene
 from ..scenes.semilinear import BratuScene
-from .outcome_map import Axis, Case, OutcomeMap, Panels, tallies
+from .map_picture import Axis, Panels
+from .outcome_map import Case, OutcomeMap, tallies
 from .reference import Reference
 
 PARTS = (0.1, 0.01, 1e-3, 1e-4, 1e-6, 1e-8)  # of the turning point, below it and beyond it

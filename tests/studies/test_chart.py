@@ -21,13 +21,13 @@ from lcp_lube.scenes.scene import load_scene
 from lcp_lube.studies import experiment, known, precision, turning_point
 from lcp_lube.studies.drawing import STYLE
 from lcp_lube.studies.log import NAME, load, write_log
-from lcp_lube.studies.map_picture import Axis, Panels, tick
+from lcp_lube.studies.map_picture import Axis, Panels, chosen, converged, tick
 from lcp_lube.studies.map_picture import picture as map_picture
 from lcp_lube.studies.outcome_map import tallies, tally
 from lcp_lube.studies.precision_picture import against_krylov, against_seconds, parts
 from lcp_lube.studies.precision_words import cheapest, error, fastest, front, loose, seconds, sentence, timed, which
 from lcp_lube.studies.reference import WRONG, References
-from lcp_lube.studies.starts_picture import apart, chosen, converged, equal_starts, lines_sentence, map_sentence
+from lcp_lube.studies.starts import apart, equal_starts, lines_sentence, map_sentence, with_rules
 
 Row = dict[str, str]
 
@@ -399,7 +399,7 @@ def test_log_has_one_section_a_chart(tmp_path: Path) -> None:
 
 @pytest.mark.rounding
 def test_mu1_stalls_at_tiny_starts_and_mu2_does_not(quick: Path) -> None:
-    rows = read(quick / "starts_quick.csv")
+    rows = with_rules(read(quick / "starts_quick.csv"))
     equal = equal_starts(rows)
     failed = [row for row in chosen(equal, mu="mu1") if not converged(row)]
     assert {row["p0"] for row in failed} == {"1e-15"}

@@ -15,12 +15,7 @@ from .server import Server
 
 
 def run(args: argparse.Namespace) -> int:
-    """Serve the page until Ctrl-C; exit status 0.
-
-    Raises
-    ------
-    InputError : several ranks; a scene that cannot be solved as asked; a port that is taken.
-    """
+    """Serve the page until Ctrl-C; exit status 0."""
     if MPI.COMM_WORLD.size > 1:
         raise InputError("explore: a page is served by one rank; leave mpiexec out")
     if not 0 <= args.port < 65536:

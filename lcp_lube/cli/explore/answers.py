@@ -42,12 +42,7 @@ class Answers:
         self._points = COARSE[len(base.shape)]
 
     def reply(self, what: str, request: dict[str, Any]) -> tuple[bytes, str]:
-        """The answer's bytes and their kind.
-
-        Raises
-        ------
-        InputError : no such question, a value that the scene refuses.
-        """
+        """The answer's bytes and their kind."""
         changes, level = self._read(request)
         if what == "scene":
             return _json(self.scene()), "application/json"
