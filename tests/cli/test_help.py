@@ -8,11 +8,11 @@ import sys
 import pytest
 from conftest import ENVIRONMENT
 
-from lcp_lube.cli.arguments import parser_of_all
-from lcp_lube.cli.examples import EXAMPLES
+from lcp_lube.cli.arguments import GRAMMAR, parser_of_all
 from lcp_lube.cli.main import COMMANDS
 from lcp_lube.registry import METHODS, scene_names
 
+EXAMPLES = {name: command["example"] for name, command in GRAMMAR["command"].items()}
 ENDLESS = ("explore",)  # run by a test of its own
 
 
