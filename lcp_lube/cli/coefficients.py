@@ -3,18 +3,16 @@
 import argparse
 import json
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
 from ..api import solve
 from ..base.options import check_unread
 from ..drivers.coefficients import Coefficients, coefficients, placed, stability
 from ..errors import InputError, NotFound
 from ..output.console import say
-from ..output.files import check_target, replacing
+from ..output.files import check_target, write_text
 from ..output.results import as_dict, finite
 from ..output.style import save_figure
 from ..problems.film.model import Model
@@ -39,12 +37,10 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"--frequency {args.frequency}: numbers in rad/s are needed, with commas between them") from None
     if args.speeds is not None:
         return table(args, scene, frequencies)
-    if args.output is not None:
-        raise InputError(f"--output {args.output}: --speeds FROM:TO:N is needed too")
-    if args.plot is not None:
-        raise InputError(f"--plot {args.plot}: --speeds FROM:TO:N is needed too")
-    solution = solve(scene, ask_of(args))
-    try:
+    for option, file in (("--output", args.output), ("--plot", args.plot)):
+        if file is not None:
+            raise InputError(f"{option} {file}: --speeds FROM:TO:N is needed too")
+    with solve(scene, ask_of(args)) as solution:
         data = as_dict(solution)
         record = {key: data.get(key) for key in ("scene", "nx", "ny", "outcome", "converged", "message", *KEYS)}
         if record["converged"]:
@@ -55,8 +51,6 @@ def run(args: argparse.Namespace) -> int:
                 record |= {"outcome": str(Outcome.LINEAR_SOLVER), "converged": False, "message": str(error)}
         check_unread()  # the linearised film has options of its own
         say(json.dumps(finite(record)) if args.json else text(record))
-    finally:
-        solution.destroy()
     return 0 if record["converged"] else 1
 
 
@@ -90,13 +84,11 @@ def table(args: argparse.Namespace, scene: Scene, frequencies: list[float]) -> i
     if near is not None:
         near.destroy()
     told = [",".join(f"{value:.9g}" for value in row) for row in rows]
-    lines = "\n".join([",".join(("frequency", *ROTOR)), *told]) + "\n"
+    lines = "\n".join([",".join(("frequency", *ROTOR)), *told])
     if args.output is None:
-        say(lines.rstrip("\n"))
+        say(lines)
     else:
-        with replacing(args.output, MPI.COMM_WORLD) as name:
-            if MPI.COMM_WORLD.rank == 0:
-                Path(name).write_text(lines)
+        write_text(args.output, lines + "\n")
     if args.plot is not None and rows:
         from ..output.coefficients_picture import figure_of
 
@@ -182,7 +174,6 @@ def text(record: dict[str, Any]) -> str:
     else:
         lines.append(
             f"rigid rotor: whirl ratio {record['whirl_ratio']:.4g}, unstable beyond omega sqrt(c/g) = "
-            f"{record['threshold']:.4g}, "
-            f"at this speed with more than {record['threshold_mass']:.5g} kg{per} on the bearing"
+            f"{record['threshold']:.4g}, at this speed with more than {record['threshold_mass']:.5g} kg{per} on the bearing"
         )
     return "\n".join(lines)

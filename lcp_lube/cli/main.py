@@ -4,6 +4,7 @@ import argparse
 import json
 import sys
 from collections.abc import Callable
+from functools import partial
 from importlib import import_module
 from typing import Any
 
@@ -22,12 +23,7 @@ from .asked import options_of, scene_of, solution_of, stopping_of
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the command; exit status 0 or 1. Collective.
-
-    Raises
-    ------
-    InputError : bad input, for exit status 2.
-    """
+    """Run the command; exit status 0 or 1. Collective. As all commands it raises InputError for bad input, exit status 2."""
     return COMMANDS[args.command](args)
 
 
@@ -70,24 +66,18 @@ def run_solve(args: argparse.Namespace) -> int:
             for doubt in data["warnings"]:
                 print(f"lcp-lube: warning: {doubt}", file=sys.stderr, flush=True)
         say(json.dumps(finite(data)) if args.json else coloured(summary(data), data["outcome"], data["converged"]))
-        failed = []  # a file that cannot be written costs neither the result nor the other files
-        for path in outputs:
-            try:
-                files.save(solution, path, args.boundary)
-            except InputError as error:
-                failed.append(str(error))
+        writers: list[Callable[[], None]] = [partial(files.save, solution, path, args.boundary) for path in outputs]
         if args.plot:
-            from ..output.plot import plot
-
-            try:
-                watching.draw(solution) if moves else plot(solution, args.plot)
-            except InputError as error:
-                failed.append(str(error))
+            writers.append(partial(watching.draw, solution) if moves else partial(solution.plot, args.plot))
         if args.plot_model:
             from ..output.model_picture import plot_model
 
+            model = solution.settings.get("model", {"reason": "the scene names no effects"})
+            writers.append(partial(plot_model, model, args.plot_model))
+        failed = []  # a file that cannot be written costs neither the result nor the other files
+        for write in writers:
             try:
-                plot_model(solution.settings.get("model", {"reason": "the scene names no effects"}), args.plot_model)
+                write()
             except InputError as error:
                 failed.append(str(error))
     finally:
@@ -149,16 +139,17 @@ def run_new(args: argparse.Namespace) -> int:
 
 
 def run_list(args: argparse.Namespace) -> int:
-    groups = {
+    groups: dict[str, Any] = {
         "scenes": {name: scene_line(name) for name in scene_names()},
-        "methods": {name: entry.line for name, entry in METHODS.items()},
-        "systems": {name: entry.line for name, entry in SYSTEMS.items()},
+        "methods": METHODS,
+        "systems": SYSTEMS,
         "recipes": {name: recipe_line(name) for name in recipe_names()},
-        "film shapes": {name: entry.line for name, entry in SHAPES.items()},
-        "effects": {name: entry.line for name, entry in RUNGS.items()},
-        "maps of chart stability": {name: entry.line for name, entry in STABILITY.items()},
+        "film shapes": SHAPES,
+        "effects": RUNGS,
+        "maps of chart stability": STABILITY,
     }
-    for title, lines in groups.items():
+    for title, group in groups.items():
+        lines = {name: getattr(one, "line", one) for name, one in group.items()}
         say(f"{title}:")
         say("\n".join(text_table([*lines.items()], align="<<", least=[16], gap=" ", indent="  ")))
     return 0

@@ -2,16 +2,13 @@
 
 import argparse
 import json
-from pathlib import Path
 from typing import Any
-
-from mpi4py import MPI
 
 from ..base.options import check_unread
 from ..drivers.equations import check_film
 from ..errors import InputError
 from ..output.console import say
-from ..output.files import replacing
+from ..output.files import write_text
 from ..output.results import finite
 from ..output.table import table
 from ..scenes.scene import Scene
@@ -37,10 +34,7 @@ def run(args: argparse.Namespace) -> int:
     found = optimise(scene, goal, sign, ranges, limits, ask=ask, history=history, most=args.steps)
     check_unread()
     if args.output is not None:
-        text = toml_of(with_values(scene, found.best.values))
-        with replacing(args.output, MPI.COMM_WORLD) as name:
-            if MPI.COMM_WORLD.rank == 0:
-                Path(name).write_text(text, encoding="utf-8")
+        write_text(args.output, toml_of(with_values(scene, found.best.values)))
     record = as_dict(scene, goal, sign, limits, found)
     say(json.dumps(finite(record)) if args.json else text_of(record, scene, ranges))
     return 0 if found.converged else 1

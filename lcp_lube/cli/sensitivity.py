@@ -35,19 +35,15 @@ def run(args: argparse.Namespace) -> int:
     for key in keys or []:
         if key != "balance.load":
             key_of(scene, key)
-    if args.plot:
-        files.check_target(args.plot, plot=True)
-    if args.output:
-        files.check_target(args.output)
-    if args.errors:
-        files.check_target(args.errors, plot=True)
+    for path, plot in ((args.plot, True), (args.output, False), (args.errors, True)):
+        if path:
+            files.check_target(path, plot)
     deviation = deviations(scene, {**(scene.tolerance or {}), **dict(map(_assignment, args.tolerance))})
     if args.monte_carlo is not None and not deviation:
         raise InputError(f"--monte-carlo {args.monte_carlo}: --tolerance KEY=U is needed too")
     keys = [*keys, *(key for key in deviation if key not in map(partial(key_of, scene), keys))] if keys else keys
     ask = ask_of(args)
-    solution = solve(scene, ask)
-    try:
+    with solve(scene, ask) as solution:
         check_unread()
         data = as_dict(solution)
         record: dict[str, Any] = {key: data.get(key) for key in HEAD}
@@ -73,8 +69,6 @@ def run(args: argparse.Namespace) -> int:
             if told := record.get("grid_error"):
                 shares = f"{told['cells']:.2g} of it from the cells, half of their sizes from {told['worst']:.1%} of them"
                 say(f"grid: {told['finer']:.6g} at half the spacing, error near {told['error']:.2g}; {shares}")
-    finally:
-        solution.destroy()
     return 0 if solution.converged else 1
 
 
@@ -86,34 +80,18 @@ def _assignment(text: str) -> tuple[str, str]:
 
 
 def error_bars(
-    args: argparse.Namespace,
-    scene: Scene,
-    solution: Solution,
-    found: list[Gradient],
-    deviation: dict[str, float],
-    ask: Ask,
+    args: argparse.Namespace, scene: Scene, solution: Solution, found: list[Gradient], deviation: dict[str, float], ask: Ask
 ) -> dict[str, dict[str, Any]]:
     """By quantity: standard deviation to first order, its parts, and what samples gave. Collective."""
-    if not deviation:
-        return {}
     bars: dict[str, dict[str, Any]] = {}
-    for one in found:
+    for one in found if deviation else ():
         size, parts = first_order(one, deviation)
         bars[one.quantity] = {"value": one.value, "deviation": size, "parts": parts}
-    if args.monte_carlo is not None:
-        names = [one.quantity for one in found]
-        samples = monte_carlo(scene, solution, names, deviation, args.monte_carlo, args.seed, ask)
-        for name in names:
-            bars[name] |= {
-                "monte_carlo": {
-                    "mean": samples.mean[name],
-                    "deviation": samples.deviation[name],
-                    "relative_error": samples.error,
-                    "samples": samples.solved,
-                    "failed": samples.failed,
-                    "seed": args.seed,
-                }
-            }
+    if bars and args.monte_carlo is not None:
+        samples = monte_carlo(scene, solution, [*bars], deviation, args.monte_carlo, args.seed, ask)
+        counts = {"relative_error": samples.error, "samples": samples.solved, "failed": samples.failed, "seed": args.seed}
+        for name, bar in bars.items():
+            bar["monte_carlo"] = {"mean": samples.mean[name], "deviation": samples.deviation[name], **counts}
     return bars
 
 

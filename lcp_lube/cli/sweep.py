@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, KeysView, Sequence
 from contextlib import closing
 from dataclasses import replace
+from functools import partial
 from hashlib import sha256
 from math import prod
 from pathlib import Path
@@ -132,15 +133,13 @@ def _same_layout(store: ResumableCsv, data: list[KeysView[str]]) -> None:
     needed = ["settings", *(name for name in data[0] if all(name in one for one in data))]
     known = {name for one in data for name in one}
     there = store.columns
+    what = ""
     if lacks := next((name for name in needed if name not in there), None):
-        raise InputError(
-            f"{store.path}: rows of another layout, without the column '{lacks}'; move it away or name another file"
-        )
-    if strange := next((name for name in there if name.startswith("scene.") and name not in known), None):
-        raise InputError(
-            f"{store.path}: rows of another layout, with a column '{strange}' that this scene has not; "
-            "move it away or name another file"
-        )
+        what = f"without the column '{lacks}'"
+    elif strange := next((name for name in there if name.startswith("scene.") and name not in known), None):
+        what = f"with a column '{strange}' that this scene has not"
+    if what:
+        raise InputError(f"{store.path}: rows of another layout, {what}; move it away or name another file")
 
 
 def _data(scene: Scene) -> dict[str, Any]:
@@ -172,9 +171,7 @@ def run(args: argparse.Namespace) -> int:
     def solve_at(point: dict[str, Any], near: Solution | None) -> Solution:
         return solve(scene_of(args, point), ask, start=near)
 
-    def scene_at(point: dict[str, Any]) -> Scene:
-        return scene_of(args, point)
-
+    scene_at = partial(scene_of, args)
     axes = [parse_axis(text) for text in args.vary]
     if args.worker:
         at = as_read(axes)

@@ -103,10 +103,9 @@ def _times(text: str | None, end: float, count: int) -> list[float]:
     words = text.split(",")
     try:
         if len(words) == 1 and words[0].strip().isdigit():
-            count = int(words[0])
-            if count < 1:
+            if int(text) < 1:
                 raise InputError("at least 1 is needed")
-            return [end * (k + 1) / count for k in range(count)]
+            return _times(None, end, int(text))
         times = [in_si(word, "s") for word in words]
     except InputError as error:
         raise InputError(f"--times {text}: {error}") from None

@@ -183,6 +183,13 @@ def replacing(path: Path, comm: MPI.Comm) -> Iterator[str]:
         raise
 
 
+def write_text(path: Path, text: str, comm: MPI.Comm = MPI.COMM_WORLD) -> None:
+    """Write a file of text, rank 0's. Collective; raises as `replacing` does."""
+    with replacing(path, comm) as temporary:
+        if comm.rank == 0:
+            Path(temporary).write_text(text, encoding="utf-8")
+
+
 def _save_npz(solution: Solution, grid: Grid | Frame, fields: dict[str, Array], units: dict[str, str], target: str) -> None:
     arrays = {name: gather(grid, values) for name, values in fields.items()}
     arrays |= dict(zip("xy", coordinates(grid), strict=False))

@@ -140,11 +140,8 @@ class Frames:
             line = np.zeros(grid.shape[0])
             line[grid.x_start : grid.x_end] = values[0] if len(values) else 0.0
             kept[name] = grid.comm.allreduce(line)[taken(grid.shape[0], step)].astype(np.float32)
-        self.line_x, self.lengths, self.journal = (
-            grid.lines[0][taken(grid.shape[0], step)],
-            grid.lengths,
-            problem.shaft is not None,
-        )
+        self.line_x, self.lengths = grid.lines[0][taken(grid.shape[0], step)], grid.lengths
+        self.journal = problem.shaft is not None
         self.line_times.append(moment.t)
         self.lines.append(kept)
         if len(self.lines) > LINES:

@@ -71,9 +71,8 @@ def journal(axes: Axes, picture: Picture, row: int | None = None) -> None:
     axes.plot(*np.transpose([0.5 * unit(angle) for angle in turn]), color="black", lw=1.0)
     axes.annotate("", 0.5 * unit(turn[-1]), 0.5 * unit(turn[-3]), arrowprops={**load, "lw": 1.0})
     axes.text(0.0, 0.55, "$\\omega$", ha="center", va="bottom")
-    axes.set_title(
-        "gap not to scale" if attitude is None else f"attitude angle {attitude:.1f}°; gap not to scale", loc="center"
-    )
+    angle = "" if attitude is None else f"attitude angle {attitude:.1f}°; "
+    axes.set_title(f"{angle}gap not to scale", loc="center")
     axes.set_aspect("equal")
     axes.axis("off")
 

@@ -75,17 +75,13 @@ def colour_map(figure: Figure | SubFigure, axes: Axes, picture: Picture, name: s
     else:
         image = axes.pcolormesh(edges_x, edges_y, cells, rasterized=True, **look)
     axes.set_aspect(ratio * width_over_height)
-    x_limits, y_limits = (
-        (scale * start, scale * (start + length))
-        for scale, start, length in zip((scale_x, scale_y), grid.origin, grid.lengths, strict=True)
+    (x0, y0), (L, width) = grid.origin, grid.lengths
+    axes.set(
+        xlabel=label_x, ylabel=label_y, xlim=(scale_x * x0, scale_x * (x0 + L)), ylim=(scale_y * y0, scale_y * (y0 + width))
     )
-    axes.set(xlabel=label_x, ylabel=label_y, xlim=x_limits, ylim=y_limits)
     if not picture.is_journal and not np.isclose(stretch := ratio * grid.lengths[0] / grid.lengths[1], 1.0):
-        axes.set_xlabel(
-            f"{label_x}; y drawn {stretch:.2g} times too long"
-            if stretch > 1
-            else f"{label_x}, {1 / stretch:.2g} times too long"
-        )
+        times = f"; y drawn {stretch:.2g} times" if stretch > 1 else f", {1 / stretch:.2g} times"
+        axes.set_xlabel(f"{label_x}{times} too long")
     if picture.is_journal:
         axes.set_xticks(ANGLES[::2])
     axes.spines[:].set_visible(True)

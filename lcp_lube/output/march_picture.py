@@ -21,9 +21,8 @@ def march_figure(frames: Frames, history: list[dict[str, Any]], title: str) -> A
         axes = figure.add_subplot(grid[0, k])
         values = np.array([line[name] for line in frames.lines])
         factor, unit = prefix(float(values.max()), "Pa") if name == "p" else (1.0, "")
-        mesh = axes.pcolormesh(
-            scale * frames.line_x, times, factor * values, cmap=MAPS[name], shading="nearest", rasterized=True
-        )
+        look: dict[str, Any] = {"cmap": MAPS[name], "shading": "nearest", "rasterized": True}
+        mesh = axes.pcolormesh(scale * frames.line_x, times, factor * values, **look)
         axes.set(xlabel=label, ylabel=f"t ({unit_t})" if k == 0 else "")
         figure.colorbar(mesh, ax=axes, location="top", label=f"{NAMES[name]}{f' ({unit})' if unit else ''}, middle line")
     t = to_t * np.array([row["t"] for row in history])
@@ -33,11 +32,8 @@ def march_figure(frames: Frames, history: list[dict[str, Any]], title: str) -> A
         values = np.array([row.get(key, np.nan) for row in history])
         factor, unit = prefix(float(np.nanmax(np.abs(values))), unit) if unit else (1.0, "")
         axes.plot(t, factor * values, color=colour, lw=1.3)
-        axes.set(
-            xlabel=f"t ({unit_t})",
-            ylabel=f"{key.replace('_', ' ')}{f' ({unit})' if unit else ''}",
-            ylim=(min(0.0, *(factor * values)), None),
-        )
+        ylabel = f"{key.replace('_', ' ')}{f' ({unit})' if unit else ''}"
+        axes.set(xlabel=f"t ({unit_t})", ylabel=ylabel, ylim=(min(0.0, *(factor * values)), None))
     if orbit:
         draw_orbit(figure.add_subplot(grid[:, 2]), history)
     figure.suptitle(title, fontsize=10, x=0.01, ha="left")

@@ -108,10 +108,8 @@ def _lines(picture: Picture) -> Figure:
         factor, unit = prefix(max(abs(low), abs(high)), unit)
         axes.plot(scale * picture.x, factor * values, color=BLUE, lw=1.8)
         margin = 0.05 * (high - low)
-        axes.set(
-            ylabel=NAMES.get(name, name) + (f" ({unit})" if unit else ""),
-            ylim=(factor * (low - margin), factor * (high + margin)),
-        )
+        label = NAMES.get(name, name) + (f" ({unit})" if unit else "")
+        axes.set(ylabel=label, ylim=(factor * (low - margin), factor * (high + margin)))
     panels[-1].set_xlabel(label_x)
     return figure
 

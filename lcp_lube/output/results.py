@@ -16,14 +16,7 @@ from ..scenes.doubts import too_high
 from ..scenes.effects.named import sentence
 from .units import place, quantity
 
-ACCURACY = (
-    "accuracy",
-    "accuracy_quantity",
-    "accuracy_estimate",
-    "accuracy_extrapolated",
-    "accuracy_grid_value",
-    "estimates",
-)
+ACCURACY = ("accuracy", *(f"accuracy_{name}" for name in ("quantity", "estimate", "extrapolated", "grid_value")), "estimates")
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -43,12 +36,8 @@ def as_dict(solution: Solution) -> dict[str, Any]:
         "took_over": solution.took_over,
         **{key: settings.get(key) for key in ("system", "scheme", "recipe", "ksp_type", "pc_type")},
         "outcome": str(solution.outcome),
-        "converged": solution.converged,
-        "message": solution.message,
-        "iterations": solution.iterations,
-        "backtracking": solution.total("backtracking"),
-        "centrality": solution.total("centrality"),
-        "linear_iterations": solution.total("linear_iterations"),
+        **{key: getattr(solution, key) for key in ("converged", "message", "iterations")},
+        **{key: solution.total(key) for key in ("backtracking", "centrality", "linear_iterations")},
         "c1": last.norm if last else None,
         "c2": last.step_norm if last else None,
         **quantities,
@@ -208,10 +197,10 @@ def summary(data: dict[str, Any]) -> str:
     if "model" in data:
         lines.append(f"model: {sentence(data['model'])}")
     if "accuracy_estimate" in data:
+        own = f"; extrapolated, this grid's own is {data['accuracy_grid_value']:.9g}" if data["accuracy_extrapolated"] else ""
         lines.append(
             f"{data['accuracy_quantity']}: estimated relative error {data['accuracy_estimate']:.1e} "
-            f"({data['accuracy']:g} was asked for), {len(data['levels'])} grid{'s' * (len(data['levels']) > 1)}"
-            + (f"; extrapolated, this grid's own is {data['accuracy_grid_value']:.9g}" if data["accuracy_extrapolated"] else "")
+            f"({data['accuracy']:g} was asked for), {len(data['levels'])} grid{'s' * (len(data['levels']) > 1)}{own}"
         )
     if data.get("certified"):
         lines.append(

@@ -11,6 +11,7 @@ from ..base.parallel import Array
 from ..drivers.goal_error import GoalError
 from ..drivers.gradient import Gradient
 from ..problems.solution import Solution
+from ..scenes.values import unit_of as key_unit
 from .files import gather
 from .maps import outline
 from .picture import Picture, collect, thinning
@@ -29,22 +30,7 @@ def unit_of(solution: Solution, name: str) -> str:
     units = solution.units
     words = [name, name.rpartition("_")[0], name.rpartition("_")[0].rpartition("_")[0]]
     found = next((units[word] for word in words if word in units), None)
-    return scene_units(solution).get(name, "") if found is None else found
-
-
-def scene_units(solution: Solution) -> dict[str, str]:
-    """Of the scene's numbers by key, as `values_of` has them."""
-    by_number: dict[str, str] = solution.settings["scene_units"]
-    data, out = solution.settings["scene_data"], dict(by_number)
-    for key, unit in by_number.items():
-        words = key.split(".")
-        if len(words) > 1 and words[1].isdigit() and isinstance(data.get(words[0]), list):
-            out[".".join([words[0], data[words[0]][int(words[1]) - 1].get("shape", words[1]), *words[2:]])] = unit
-    return out
-
-
-def unit_of_key(units: dict[str, str], key: str) -> str:
-    return units.get(key, units.get(key.rpartition(".")[0], ""))
+    return key_unit(solution.solved_scene, name) if found is None else found
 
 
 def field_unit(unit: str, dim: int) -> str:
@@ -54,14 +40,13 @@ def field_unit(unit: str, dim: int) -> str:
 
 def as_dict(gradient: Gradient, solution: Solution) -> dict[str, Any]:
     """The keys of the command line's --json that are a gradient's own, docs/gradients.md."""
-    units = scene_units(solution)
     return {
         "quantity": gradient.quantity,
         "value": gradient.value,
         "unit": unit_of(solution, gradient.quantity),
         "gradient": {key: gradient.gradient[key] for key in gradient.ranked},
         "elasticity": {key: gradient.elasticity[key] for key in gradient.ranked},
-        "units": {key: unit_of_key(units, key) for key in gradient.ranked},
+        "units": {key: key_unit(solution.solved_scene, key) for key in gradient.ranked},
         "held": gradient.held,
         "one_sided": gradient.one_sided,
         "switching": {"points": gradient.switching, "gap": gradient.switching_gap},
@@ -70,23 +55,19 @@ def as_dict(gradient: Gradient, solution: Solution) -> dict[str, Any]:
 
 def text(gradient: Gradient, solution: Solution, values: dict[str, float]) -> str:
     """A table of all numbers, those that matter most first; then what has no derivative, or one to each side."""
-    units, own = scene_units(solution), unit_of(solution, gradient.quantity)
+    own = unit_of(solution, gradient.quantity)
     lines = [f"{gradient.quantity} = {gradient.value:.9g} {own}".rstrip()]
     rows = [("number", "value", "dQ/da", "elasticity")]
     for key in gradient.ranked:
-        unit = unit_of_key(units, key)
+        unit = key_unit(solution.solved_scene, key)
         per = f"{own or '1'} per {unit}" if unit else own
         size = gradient.elasticity[key]
         shown = quantity(values[key], unit, 6).rstrip() if unit else f"{values[key]:.6g}"
         rows.append((key, shown, f"{gradient.gradient[key]:.6g} {per}".rstrip(), "-" if size is None else f"{size:+.4f}"))
     lines += table(rows, align="<>>>", gap="  ")
     for key, gap in gradient.one_sided.items():
-        jumps = (
-            "changes by steps: the slope over 1 % to both sides"
-            if np.isinf(gap)
-            else f"its derivatives to both sides differ by {gap:.3g}; their mean"
-        )
-        lines.append(f"{key}: {jumps}")
+        differ = f"its derivatives to both sides differ by {gap:.3g}; their mean"
+        lines.append(f"{key}: {'changes by steps: the slope over 1 % to both sides' if np.isinf(gap) else differ}")
     if gradient.switching:
         lines.append(
             f"{gradient.switching} points are about to change between full and cavitated, or tie for the largest pressure: "
@@ -174,10 +155,8 @@ def _film(figure: Any, axes: Axes, picture: Picture, gradient: Gradient, values:
             axes.set_title("grey: cavitated", loc="left")
         return
     _map(figure, axes, picture, values, name)
-    axes.set_title(
-        f"red: a thinner film gives more {gradient.quantity}" + (" (dotted: cavitated)" * bool((picture.sign < 0).any())),
-        loc="left",
-    )
+    dotted = " (dotted: cavitated)" * bool((picture.sign < 0).any())
+    axes.set_title(f"red: a thinner film gives more {gradient.quantity}{dotted}", loc="left")
 
 
 def _map(figure: Any, axes: Axes, picture: Picture, values: Array, name: str) -> None:
@@ -185,15 +164,8 @@ def _map(figure: Any, axes: Axes, picture: Picture, values: Array, name: str) ->
     finite = values[np.isfinite(values)]
     largest = float(np.quantile(np.abs(finite), 0.995)) if finite.size else 0.0
     scale_y, label_y = picture.across
-    image = axes.pcolormesh(
-        picture.along[0] * picture.x,
-        scale_y * picture.y,
-        values,
-        cmap="RdBu",
-        vmin=-largest or -1.0,
-        vmax=largest or 1.0,
-        shading="nearest",
-    )
+    look: dict[str, Any] = {"cmap": "RdBu", "vmin": -largest or -1.0, "vmax": largest or 1.0, "shading": "nearest"}
+    image = axes.pcolormesh(picture.along[0] * picture.x, scale_y * picture.y, values, **look)
     axes.set_ylabel(label_y)
     outline(axes, picture, hatch="0.5")
     if not picture.is_journal:

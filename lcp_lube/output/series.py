@@ -6,7 +6,6 @@ from xml.sax.saxutils import quoteattr
 
 from mpi4py import MPI
 
-from ..base.together import on_all_ranks
 from ..errors import InputError
 from ..problems.solution import Solution
 from . import files
@@ -39,6 +38,4 @@ def write_collection(path: Path, entries: Sequence[tuple[float, str]], comm: MPI
     """Write a .pvd of times and names of files beside it. Collective."""
     listed = "".join(f'    <DataSet timestep="{time!r}" part="0" file={quoteattr(name)}/>\n' for time, name in entries)
     head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n  <Collection>\n'
-    with files.replacing(path, comm) as temporary, on_all_ranks(comm, str(path)):
-        if comm.rank == 0:
-            Path(temporary).write_text(f"{head}{listed}  </Collection>\n</VTKFile>\n", encoding="utf-8")
+    files.write_text(path, f"{head}{listed}  </Collection>\n</VTKFile>\n", comm)

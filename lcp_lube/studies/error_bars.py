@@ -17,7 +17,7 @@ from ..drivers.gradient import Gradient
 from ..errors import InputError
 from ..problems.solution import Solution
 from ..scenes.scene import Scene
-from ..scenes.values import key_of, values_of, with_values
+from ..scenes.values import key_of, unit_of, values_of, with_values
 
 LEVEL = "h"  # stands for the level of the whole film
 
@@ -44,7 +44,7 @@ def deviations(scene: Scene, tolerances: Mapping[str, Any]) -> dict[str, float]:
 
     Raises InputError for a key that is no number of the scene, a text that is none, a deviation that is not positive.
     """
-    values, units, out = values_of(scene), scene.data_units(), {}
+    values, out = values_of(scene), {}
     for text, given in _flat(tolerances).items():
         if text == LEVEL and "h" not in values:
             if "h_offset" not in values:
@@ -54,10 +54,9 @@ def deviations(scene: Scene, tolerances: Mapping[str, Any]) -> dict[str, float]:
             key = "h_offset"
         else:
             key = key_of(scene, text)
-        unit = next((units[name] for name in (key, _numbered(scene, key), key.rpartition(".")[0]) if name in units), "")
         try:
             relative = str(given).strip().endswith("%")
-            size = in_si(str(given), "" if relative else unit)
+            size = in_si(str(given), "" if relative else unit_of(scene, key))
         except InputError as error:
             raise InputError(f"--tolerance {text}={given}: {error}") from None
         if size is None:
@@ -76,16 +75,6 @@ def _flat(table: Mapping[str, Any], path: str = "") -> dict[str, Any]:
     for key, value in table.items():
         out |= _flat(value, f"{path}{key}.") if isinstance(value, Mapping) else {f"{path}{key}": value}
     return out
-
-
-def _numbered(scene: Scene, key: str) -> str:
-    """film.2.depth for film.pocket.depth: as units go by."""
-    words = key.split(".")
-    tables = getattr(scene, words[0], None)
-    if len(words) < 3 or not isinstance(tables, list):
-        return key
-    found = (k for k, one in enumerate(tables, 1) if getattr(one, "shape", None) == words[1])
-    return ".".join([words[0], str(next(found, words[1])), *words[2:]])
 
 
 def first_order(gradient: Gradient, deviation: Mapping[str, float]) -> tuple[float, dict[str, float]]:

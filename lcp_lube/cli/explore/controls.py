@@ -14,16 +14,8 @@ HIDDEN = ("family", "name", "n", "nx", "ny", "p_unit", "shape")  # the page's ow
 REACH = 10.0  # a positive number is varied by as much, up and down
 EDGE = 0.02  # of a range, left out at a limit that is not allowed itself
 SMALL = 0.05  # of a range: its width says nothing of the value
-USUAL = {
-    "m": 1e-5,
-    "Pa": 1e5,
-    "rad": 1e-3,
-    "m/s": 1.0,
-    "N": 1e3,
-    "deg": 90.0,
-    "Pa s": 0.05,
-    "rad/s": pi * 100,
-}  # where a zero says nothing
+# Where a zero says nothing.
+USUAL = {"m": 1e-5, "Pa": 1e5, "rad": 1e-3, "m/s": 1.0, "N": 1e3, "deg": 90.0, "Pa s": 0.05, "rad/s": pi * 100}
 
 
 @dataclass(frozen=True)
@@ -107,24 +99,21 @@ def slider(value: float, unit: str, whole: bool, schema: dict[str, Any]) -> dict
     high = min(
         (limits[name] for name in ("maximum", "exclusiveMaximum") if name in limits and limits[name] < 2**31 - 2), default=None
     )
+
+    def around(least: float, most: float) -> dict[str, Any]:
+        return {"low": least if low is None else low, "high": most if high is None else high, "log": False}
+
     if whole:
-        return {
-            "low": low if low is not None else min(0, value),
-            "high": high if high is not None else max(4 * value, 10),
-            "log": False,
-        }
+        return around(min(0, value), max(4 * value, 10))
     small = low is not None and high is not None and 0 <= low < value < SMALL * high  # a clearance ratio, of those below 1
     if low is not None and high is not None and not small:
         step = EDGE * (high - low)
-        return {
-            "low": low + step * ("exclusiveMinimum" in limits),
-            "high": max(high - step * ("exclusiveMaximum" in limits), value),
-            "log": False,
-        }
+        least, most = low + step * ("exclusiveMinimum" in limits), high - step * ("exclusiveMaximum" in limits)
+        return {"low": least, "high": max(most, value), "log": False}
     if low is not None and low >= 0 and value > low:
         return {"low": max(value / REACH, low), "high": value * REACH, "log": True}
     size = 2.0 * abs(value) or USUAL.get(unit, 1.0)
-    return {"low": -size if low is None else low, "high": size if high is None else high, "log": False}
+    return around(-size, size)
 
 
 def _literal(annotation: Any) -> tuple[str, ...]:
