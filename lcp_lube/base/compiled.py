@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from functools import cache
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 Kernel = TypeVar("Kernel", bound=Callable)
 
@@ -14,14 +14,7 @@ def compiled(kernel: Kernel) -> Kernel:
     numba is imported at the first call, not with the package. Machine code is kept between runs beside the kernel's file
     or in the user's cache directory; where neither can be written it is made anew in each run.
     """
-    try:
-        from numba import njit
-    except ImportError:
-        return kernel
-    try:
-        return cast(Kernel, njit(cache=True)(kernel))
-    except RuntimeError:  # numba found no directory for its cache
-        return cast(Kernel, njit(kernel))
+    return _machine_code(kernel)
 
 
 def kernel(function: Kernel) -> Kernel:
@@ -30,12 +23,15 @@ def kernel(function: Kernel) -> Kernel:
     Division by zero gives inf or NaN, as in NumPy, and products may be added without rounding in between: loops like these
     are only then turned into vector instructions.
     """
+    return _machine_code(function, error_model="numpy", fastmath={"contract", "nsz"})
+
+
+def _machine_code(function: Kernel, **how: Any) -> Kernel:
     try:
         from numba import njit
     except ImportError:
         return function
-    relaxed = {"contract", "nsz"}
     try:
-        return cast(Kernel, njit(cache=True, error_model="numpy", fastmath=relaxed)(function))
-    except RuntimeError:
-        return cast(Kernel, njit(error_model="numpy", fastmath=relaxed)(function))
+        return cast(Kernel, njit(cache=True, **how)(function))
+    except RuntimeError:  # numba found no directory for its cache
+        return cast(Kernel, njit(**how)(function))

@@ -6,6 +6,7 @@ No PETSc here.
 import argparse
 import re
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -69,9 +70,14 @@ class Parser(argparse.ArgumentParser):
 
     def option_names(self) -> list[str]:
         """Of this parser and of its commands: the error of an unknown option is raised at the top."""
-        own = [option for action in self._actions for option in action.option_strings]
-        below = [parser for action in self._actions if isinstance(action.choices, dict) for parser in action.choices.values()]
-        return [*own, *(name for parser in below for name in parser.option_names())]
+        return [option for parser in self.parsers() for action in parser._actions for option in action.option_strings]
+
+    def parsers(self) -> Iterator["Parser"]:
+        """This one and those of its commands."""
+        yield self
+        for action in self._actions:
+            for below in action.choices.values() if isinstance(action.choices, dict) else ():
+                yield from below.parsers()
 
 
 def parse(own: list[str]) -> argparse.Namespace:

@@ -17,11 +17,8 @@ from ..solvers.newton import Monitor
 
 def scene_of(args: argparse.Namespace, more: dict[str, Any] | None = None) -> Scene:
     """The scene with the command line's changes, and more of them."""
-    changes = parse_changes(scene_changes(args)[0])
-    for key in ("n", "nx", "ny", "film"):
-        if getattr(args, key) is not None:
-            changes[key] = getattr(args, key)
-    return load_scene(args.scene, {**changes, **(more or {})})
+    own = {key: value for key in ("n", "nx", "ny", "film") if (value := getattr(args, key)) is not None}
+    return load_scene(args.scene, {**parse_changes(scene_changes(args)[0]), **own, **(more or {})})
 
 
 def stopping_of(args: argparse.Namespace) -> dict[str, Any]:
@@ -37,7 +34,7 @@ def stopping_of(args: argparse.Namespace) -> dict[str, Any]:
 
 def options_of(args: argparse.Namespace, method: str, among: Sequence[str] = ()) -> dict[str, Any]:
     """The method's options from flags and from --set METHOD.OPTION=VALUE; such options of others `among` are theirs."""
-    options = method_options(args)
+    options = {name: value for name in ("p0", "r0", "mu", "conditions") if (value := getattr(args, name)) is not None}
     if "p0" in options:
         options["p0"] = _p0(args, options["p0"])
     for key, value in parse_changes(scene_changes(args)[1]).items():
@@ -121,9 +118,3 @@ def scene_changes(args: argparse.Namespace) -> tuple[list[str], list[str]]:
     words = {text: text.partition("=")[0].partition(".") for text in args.set}
     method = [text for text, (owner, dot, _) in words.items() if dot and owner.strip() in METHODS]
     return [text for text in args.set if text not in method], method
-
-
-def method_options(args: argparse.Namespace) -> dict[str, Any]:
-    """The method's options that have a flag of their own, where given."""
-    named = {"p0": args.p0, "r0": args.r0, "mu": args.mu, "conditions": args.conditions}
-    return {name: value for name, value in named.items() if value is not None}

@@ -1,9 +1,9 @@
 """Completion of words in a shell, by argcomplete: eval "$(register-python-argcomplete lcp-lube)"."""
 
-import argparse
 from collections.abc import Callable
 
 from ..registry import METHODS, STABILITY, SYSTEMS, recipe_names, scene_names
+from .arguments import Parser
 
 # What an argument may be, by its name in the namespace.
 NAMES: dict[str, Callable[[], list[str]]] = {
@@ -19,7 +19,7 @@ NAMES: dict[str, Callable[[], list[str]]] = {
 }
 
 
-def complete(parser: argparse.ArgumentParser) -> None:
+def complete(parser: Parser) -> None:
     """Answer the shell and end the process; return at once where argcomplete is missing."""
     try:
         import argcomplete
@@ -36,14 +36,8 @@ def complete(parser: argparse.ArgumentParser) -> None:
 
         return words
 
-    for inner in _parsers(parser):
+    for inner in parser.parsers():
         for action in inner._actions:
             if action.dest in NAMES:
                 action.completer = named(action.dest)  # type: ignore[attr-defined]
     argcomplete.autocomplete(parser, always_complete_options="long")
-
-
-def _parsers(parser: argparse.ArgumentParser) -> list[argparse.ArgumentParser]:
-    """A parser and those of its commands."""
-    below = [one for action in parser._actions if isinstance(action.choices, dict) for one in action.choices.values()]
-    return [parser, *(inner for one in below for inner in _parsers(one))]

@@ -158,7 +158,7 @@ def collect(solution: Solution) -> Picture | None:
 
 
 def thinning(grid: Grid) -> tuple[int, int]:
-    """Every so manieth point in x and in y that a picture takes."""
+    """Steps in x and in y between the points that a picture takes."""
     nx, ny = (math.ceil(n / MOST_POINTS[grid.dim]) for n in (*grid.shape, 1)[:2])
     return nx, ny
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from ..base.resumable import Row
 from ..output.table import table
+from .map_picture import groups
 
 LEVELS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 PEER = "peer"  # what stands in the column `system` for other codes
@@ -74,10 +75,7 @@ def fastest(rows: Sequence[Row], level: float, quantity: str = "load") -> Row | 
 
 
 def by_scene(rows: Sequence[Row]) -> dict[str, list[Row]]:
-    found: dict[str, list[Row]] = {}
-    for row in rows:
-        found.setdefault(row["scene"], []).append(row)
-    return found
+    return {scene: mine for (scene,), mine in groups(rows, ("scene",)).items()}
 
 
 def cheapest(rows: Sequence[Row]) -> list[str]:

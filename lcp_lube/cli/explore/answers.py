@@ -44,10 +44,9 @@ class Answers:
     def reply(self, what: str, request: dict[str, Any]) -> tuple[bytes, str]:
         """The answer's bytes and their kind."""
         changes, level = self._read(request)
-        if what == "scene":
-            return _json(self.scene()), "application/json"
-        if what == "solve":
-            return _json(self.solve(changes, level)), "application/json"
+        if what in ("scene", "solve"):
+            answer = self.scene() if what == "scene" else self.solve(changes, level)
+            return json.dumps(finite(answer)).encode(), "application/json"
         if what == "toml":
             return toml_of(load_scene(self.base, changes)).encode(), "application/toml"  # type: ignore[arg-type]
         if what == "picture":
@@ -124,10 +123,6 @@ class Answers:
             self._points = min(2 * self._points, COARSE[len(shape)])
 
 
-def _json(data: dict[str, Any]) -> bytes:
-    return json.dumps(finite(data)).encode()
-
-
 def _numbers(solution: Solution) -> list[dict[str, Any]]:
     """Every number of the answer with its unit; a table's entries by themselves, a vector's parts as a list."""
     found = []
@@ -143,7 +138,7 @@ def _numbers(solution: Solution) -> list[dict[str, Any]]:
 
 
 def _fields(solution: Solution) -> dict[str, Any]:
-    """Coordinates, and fields as 32-bit numbers in base64; every so manieth point of a fine grid."""
+    """Coordinates, and fields as 32-bit numbers in base64; a fine grid thinned."""
     grid = solution.problem.grid
     steps = tuple(max(1, -(-n // SHOWN[grid.dim])) for n in grid.shape)
     stride = (steps[0], steps[1] if grid.dim == 2 else 1)
