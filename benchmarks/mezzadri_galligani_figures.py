@@ -23,9 +23,10 @@ from mpi4py import MPI  # noqa: E402
 from lcp_lube.api import solve  # noqa: E402
 from lcp_lube.output.files import replacing  # noqa: E402
 from lcp_lube.output.panels import section  # noqa: E402
-from lcp_lube.output.picture import Picture, collect, scaled, title  # noqa: E402
+from lcp_lube.output.picture import Picture, collect, largest, title  # noqa: E402
 from lcp_lube.output.plot import plot  # noqa: E402
 from lcp_lube.output.style import BLUE, MAPS, NAMES, RED, STYLE, new_figure  # noqa: E402
+from lcp_lube.output.units import prefix  # noqa: E402
 from lcp_lube.problems.solution import Solution  # noqa: E402
 from lcp_lube.scenes.scene import load_scene  # noqa: E402
 
@@ -42,6 +43,12 @@ def picture_of(solution: Solution) -> Picture:
     picture = collect(solution)
     assert picture is not None, "the figures are drawn on one rank"
     return picture
+
+
+def scaled(values: Any, unit: str) -> tuple[Any, str]:
+    """Values in a unit that suits them, and ' (unit)' for a label."""
+    factor, unit = prefix(largest(values), unit)
+    return values * factor, f" ({unit})" if unit else ""
 
 
 def profiles(pictures: list[Picture]) -> Figure:

@@ -91,9 +91,9 @@ def _listed(text: str, key: str, values: str) -> Axis:
     return Axis(key, tuple(one.value for one in found), _common(text, found))
 
 
-def points(axes: Sequence[Axis]) -> list[dict[str, Any]]:
-    """Each point of the product, the last axis moving fastest."""
-    values = product(*(axis.values for axis in axes))
+def points(axes: Sequence[Axis], read: bool = False) -> list[dict[str, Any]]:
+    """Each point of the product, the last axis moving fastest; read: as scenes read them, units with their values."""
+    values = product(*([axis.given(value) if read else value for value in axis.values] for axis in axes))
     return [dict(zip((axis.key for axis in axes), point, strict=True)) for point in values]
 
 
@@ -103,17 +103,10 @@ def chains(axes: Sequence[Axis], warm: bool) -> list[range]:
     return [range(first, first + length) for first in range(0, prod(len(axis.values) for axis in axes), length)]
 
 
-def checked(axes: Sequence[Axis]) -> list[dict[str, Any]]:
-    """The points of the axes."""
+def check(axes: Sequence[Axis]) -> None:
+    """Refuse a key that is given twice, and too many points."""
     for k, axis in enumerate(axes):
         if axis.key in [other.key for other in axes[:k]]:
             raise InputError(f"--vary {axis.key}: given twice")
-    if prod(len(axis.values) for axis in axes) > MOST_POINTS:
-        raise InputError(f"--vary: {prod(len(axis.values) for axis in axes)} points; at most {MOST_POINTS} are allowed")
-    return points(axes)
-
-
-def as_read(axes: Sequence[Axis]) -> list[dict[str, Any]]:
-    """The points as scenes read them, units with their values."""
-    reads = {axis.key: axis.given for axis in axes}
-    return [{key: reads[key](value) for key, value in point.items()} for point in points(axes)]
+    if (count := prod(len(axis.values) for axis in axes)) > MOST_POINTS:
+        raise InputError(f"--vary: {count} points; at most {MOST_POINTS} are allowed")

@@ -26,7 +26,7 @@ from ..output.rows import flat
 from ..problems.solution import Outcome, Solution, Step
 from ..scenes.scene import Scene
 from .asked import ask_of, scene_of
-from .axes import Axis, as_read, chains, checked, parse_axis
+from .axes import Axis, chains, check, parse_axis, points
 from .sweep_jobs import jobs_for, serve, side_by_side
 
 REFUSED = "refused"  # an outcome beside those of `Outcome`: bad input that only the solve could notice
@@ -89,7 +89,8 @@ def sweep(
     -------
     list of dict, list of str : the points in their order, and the names of their columns.
     """
-    at, reads = checked(axes), as_read(axes)
+    check(axes)
+    at, reads = points(axes), points(axes, read=True)
     scenes = [scene_at(point) for point in reads]
     digests = [sha256(f"{scene.model_dump_json()} {settings}".encode()).hexdigest()[:12] for scene in scenes]
     keys, comm = [axis.key for axis in axes], MPI.COMM_WORLD
@@ -174,7 +175,7 @@ def run(args: argparse.Namespace) -> int:
     scene_at = partial(scene_of, args)
     axes = [parse_axis(text) for text in args.vary]
     if args.worker:
-        at = as_read(axes)
+        at = points(axes, read=True)
         serve(lambda chain: solved(chain, at, scene_at, solve_at, args.warm))
         return 0
     settings = repr(replace(ask, monitor=None))

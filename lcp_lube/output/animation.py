@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from ..base.parallel import Array
 from ..base.together import on_all_ranks
 from .files import replacing
 from .frames import Frames
@@ -25,17 +26,19 @@ def animate(frames: Frames, history: list[dict[str, Any]], path: Path) -> None:
             from matplotlib.backends.backend_agg import FigureCanvasAgg
 
             with mpl.rc_context(STYLE):
-                figure, update = _maps(frames, history) if frames.y.size else _lines(frames, history)
+                figure, titled, mark, update = _maps(frames, history) if frames.y.size else _lines(frames, history)
                 FigureCanvasAgg(figure)
                 writer = PillowWriter(fps=RATE)
                 with writer.saving(figure, temporary, dpi=DOTS):
-                    for k in range(len(frames.fields)):
-                        update(k)
+                    for t, fields in zip(frames.times, frames.fields, strict=True):
+                        update(fields)
+                        titled.set_title(f"t = {t:.4g} s", loc="left")
+                        mark.set_xdata([t] * 2)
                         writer.grab_frame()
 
 
 def _lines(frames: Frames, history: list[dict[str, Any]]) -> Any:
-    """p and r along x, the film, and the load in time."""
+    """p and r along x, the film, and the load in time: figure, axes to be titled, mark of the time, and what draws a frame."""
     figure = new_figure(7.0, 5.6)
     upper, middle, lower = figure.subplots(3, 1, height_ratios=[2.2, 1.0, 0.8])
     scale, label = frames.along
@@ -49,21 +52,17 @@ def _lines(frames: Frames, history: list[dict[str, Any]]) -> Any:
     upper.set(ylabel=f"{NAMES['p']} ({unit_p})", ylim=(low, 1.05 * to_p * _most(frames, "p") or 1.0))
     right.set(ylabel=NAMES["r"], ylim=(0, 1.05))
     middle.set(ylabel=f"{NAMES['h']} ({unit_h})", xlabel=label, ylim=(0, 1.05 * to_h * _most(frames, "h")))
-    at = _history(lower, history)
 
-    def update(k: int) -> None:
-        one = frames.fields[k]
-        p_line.set_ydata(to_p * one["p"])
-        r_line.set_ydata(one["r"])
-        h_line.set_ydata(to_h * one["h"])
-        upper.set_title(f"t = {frames.times[k]:.4g} s", loc="left")
-        at.set_xdata([frames.times[k]] * 2)
+    def update(fields: dict[str, Array]) -> None:
+        p_line.set_ydata(to_p * fields["p"])
+        r_line.set_ydata(fields["r"])
+        h_line.set_ydata(to_h * fields["h"])
 
-    return figure, update
+    return figure, upper, _history(lower, history), update
 
 
 def _maps(frames: Frames, history: list[dict[str, Any]]) -> Any:
-    """p and r as maps, and the load in time."""
+    """p and r as maps, and the load in time: as `_lines`."""
     figure = new_figure(8.0, 4.6)
     grid = figure.add_gridspec(2, 2, height_ratios=[2.6, 0.8])
     images: dict[str, Any] = {}
@@ -78,15 +77,12 @@ def _maps(frames: Frames, history: list[dict[str, Any]]) -> Any:
         axes.set(xlabel=label, ylabel=f"y ({unit_y})" if k == 0 else "")
         figure.colorbar(images[name][0], ax=axes, location="top", label=NAMES[name] + (f" ({unit})" if unit else ""))
     lower = figure.add_subplot(grid[1, :])
-    at = _history(lower, history)
 
-    def update(k: int) -> None:
+    def update(fields: dict[str, Array]) -> None:
         for name, (image, factor) in images.items():
-            image.set_data(factor * frames.fields[k][name])
-        lower.set_title(f"t = {frames.times[k]:.4g} s", loc="left")
-        at.set_xdata([frames.times[k]] * 2)
+            image.set_data(factor * fields[name])
 
-    return figure, update
+    return figure, lower, _history(lower, history), update
 
 
 def _history(axes: Any, history: list[dict[str, Any]]) -> Any:

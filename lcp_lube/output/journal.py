@@ -1,19 +1,14 @@
 """A journal in its bush: the pressure around it, the liquid in the gap, the load and the attitude angle."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from .liquid import liquid_line
 from .panels import pressure_line
 from .picture import Picture, largest
-from .style import BLUE, GREY, LIQUID, RED, WALL
+from .style import BLUE, GREY, LIQUID, RED, WALL, Axes
 from .units import quantity
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 CLEARANCE, HIGH, BUSH = 0.22, 0.55, 0.10  # mean gap, largest pressure and wall of the bush in its radii, as drawn
 

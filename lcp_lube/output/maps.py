@@ -1,21 +1,15 @@
 """Maps of fields in their true shape, with colour bars and the cavity's outline."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..base.parallel import Array
 from .panels import ANGLES
 from .picture import Picture
-from .style import MAPS, NAMES
+from .style import MAPS, NAMES, Axes, Figure, SubFigure
 from .units import prefix
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure, SubFigure
 
 SLENDER = 12.0  # longer rectangles are drawn as if they were as slender as that, and say so
 FLAT, TALL = 0.4, 2.5  # height over width below which maps stand one above the other, and above which their bars are upright

@@ -1,16 +1,11 @@
 """The decision as a picture: what each effect changes in the quantity asked for, beside the tolerance."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..errors import InputError
 from ..registry import RUNGS
-from .style import BLUE, GREY, RED, new_figure, save_figure
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .style import BLUE, GREY, RED, Figure, new_figure, save_figure
 
 DOTS = 160  # an inch
 LEAST = 1e-3  # of the part of the tolerance from which effects count: what is smaller is drawn as that

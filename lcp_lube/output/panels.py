@@ -1,8 +1,6 @@
 """The panels of a section: p and r along a line, and the film with the liquid in it."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -10,11 +8,8 @@ from ..base.parallel import Array
 from ..problems.film.quantities import open_pressures
 from .liquid import NOISE, liquid_line
 from .picture import Picture, largest
-from .style import BLUE, CAVITY, GREY, LIQUID, NAMES, RED, WALL
+from .style import BLUE, CAVITY, GREY, LIQUID, NAMES, RED, WALL, Axes
 from .units import prefix
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 ANGLES = range(0, 361, 60)
 

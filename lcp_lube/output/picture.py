@@ -198,12 +198,6 @@ def title(picture: Picture) -> str:
     return ",  ".join(parts)
 
 
-def scaled(values: Array, unit: str) -> tuple[Array, str]:
-    """Values in a unit that suits them, and ' (unit)' for a label."""
-    factor, unit = prefix(largest(values), unit)
-    return values * factor, f" ({unit})" if unit else ""
-
-
 def largest(values: Array) -> float:
     """Largest magnitude among the finite values (a run that overflowed is drawn too); 0 where there is none."""
     return float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))

@@ -1,10 +1,8 @@
 """Pictures of a Solution: lines in 1D, maps and a section in 2D, a journal in its bush."""
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,12 +12,8 @@ from .journal import journal
 from .maps import FLAT, height, outline, panels, shape
 from .panels import section
 from .picture import Picture, collect, title
-from .style import BLUE, NAMES, RED, new_figure, save_figure
+from .style import BLUE, NAMES, RED, Axes, Figure, new_figure, save_figure
 from .units import prefix, quantity
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 WIDE = 9.6  # inches: pictures with several maps
 

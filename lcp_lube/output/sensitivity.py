@@ -1,9 +1,7 @@
 """Derivatives as the JSON object, as a table to read, and as a picture: bars, and the film's own derivative at every point."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,12 +13,9 @@ from ..scenes.values import unit_of as key_unit
 from .files import gather
 from .maps import outline
 from .picture import Picture, collect, thinning
-from .style import BLUE, RED, new_figure, save_figure
+from .style import BLUE, RED, Axes, new_figure, save_figure
 from .table import table
 from .units import quantity
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 MOST_BARS = 20
 

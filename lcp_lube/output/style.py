@@ -13,7 +13,10 @@ from ..base.together import on_all_ranks
 from .files import replacing
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+else:  # names for annotations everywhere
+    Axes = Figure = SubFigure = Any
 
 # Okabe and Ito's colours, told apart by all eyes; lines differ in their dashes too, for print.
 BLUE, RED, GREY = "#0072B2", "#D55E00", "#555555"

@@ -1,18 +1,13 @@
 """What the pictures of the charts share: print size, colours and markers that all eyes tell apart, a sentence underneath."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mpi4py import MPI
 
-from ..output.style import save_figure
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from ..output.style import Figure, save_figure
 
 DOTS = 200  # an inch, in a .png
 WIDTH = 7.2  # inches: a page's text width, so that the type is read at the size it is set

@@ -1,22 +1,17 @@
 """The picture of a map of outcomes: panels of cells, a number where runs converge, a mark that says how they fail."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..base.resumable import Row
+from ..output.style import Axes, Figure
 from ..problems.solution import Outcome
 from .drawing import WIDTH, new_figure
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 # A marker for each way to fail.
 FAILURES: dict[str, tuple[str, str]] = {

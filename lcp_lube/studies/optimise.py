@@ -214,17 +214,20 @@ def optimise(
         def worst(design: Design) -> float:
             return max((one.excess(design.results[one.quantity]) for one in limits), default=0.0)
 
-        def excess(t: Array) -> tuple[float, Array]:
-            """Sum of the squares of what exceeds the limits."""
+        def over(t: Array, limit: Limit) -> tuple[float, Array]:
+            """By how much a limit is exceeded."""
             design = designs.at(t)
             if design.message:
                 return WORSE, np.zeros(t.size)
-            total, slope = 0.0, np.zeros(t.size)
-            for one in limits:
-                over = max(one.excess(design.results[one.quantity]), 0.0)
-                total += over**2
-                slope += 2.0 * over * one.sign * designs.slopes(design, one.quantity) / (abs(one.bound) or 1.0)
-            return total, slope
+            slope = limit.sign * designs.slopes(design, limit.quantity) / (abs(limit.bound) or 1.0)
+            return limit.excess(design.results[limit.quantity]), slope
+
+        def excess(t: Array) -> tuple[float, Array]:
+            """Sum of the squares of what exceeds the limits."""
+            if designs.at(t).message:
+                return WORSE, np.zeros(t.size)
+            found = [(max(far, 0.0), slope) for far, slope in (over(t, one) for one in limits)]
+            return sum(far**2 for far, _ in found), sum((2.0 * far * slope for far, slope in found), np.zeros(t.size))
 
         if worst(start) > INSIDE:  # first into the limits
             x = np.clip(minimize(excess, x, jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": most}).x, 0.0, 1.0)
@@ -239,17 +242,10 @@ def optimise(
                 return WORSE, np.zeros(t.size)
             return -sign * design.results[goal] / size, -sign * designs.slopes(design, goal) / size
 
-        def kept(t: Array, one: Limit) -> float:
-            design = designs.at(t)
-            return -WORSE if design.message else -one.excess(design.results[one.quantity])
+        def kept(limit: Limit) -> dict[str, Any]:
+            return {"type": "ineq", "fun": lambda t: -over(t, limit)[0], "jac": lambda t: -over(t, limit)[1]}
 
-        def kept_slope(t: Array, one: Limit) -> Array:
-            design = designs.at(t)
-            if design.message:
-                return np.zeros(t.size)
-            return -one.sign * designs.slopes(design, one.quantity) / (abs(one.bound) or 1.0)
-
-        rules = [{"type": "ineq", "fun": kept, "jac": kept_slope, "args": (one,)} for one in limits]
+        rules = [kept(one) for one in limits]
         how: dict[str, Any] = {"method": "SLSQP", "constraints": rules} if rules else {"method": "L-BFGS-B"}
         options = {"maxiter": most, "ftol": REST}
         done = minimize(cost, x, jac=True, bounds=bounds, options=options, **how)

@@ -1,23 +1,18 @@
 """The pictures of speed against accuracy, from the rows of the csv alone."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mpi4py import MPI
 
 from ..base.resumable import Row
+from ..output.style import Axes, Figure
 from ..registry import METHODS
 from .drawing import look, new_figure, save
 from .precision_words import ASKED, PEER, by_scene, error, fastest, front, loose, percent, seconds, sentence, time, timed
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 AXES = {
     "load": "relative error of the load",

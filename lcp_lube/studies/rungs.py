@@ -5,11 +5,9 @@ of the quantity from that of the model with all of them, on the same grid. Work 
 depend on the machine.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mpi4py import MPI
 
@@ -17,13 +15,11 @@ from ..api import solve
 from ..base.resumable import ResumableCsv, Row
 from ..drivers.decision import total_work
 from ..output.console import say
+from ..output.style import Figure
 from ..registry import RUNGS
 from ..scenes.effects.named import named
 from ..scenes.scene import Scene, load_scene
 from .drawing import look, new_figure, save
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _WEDGE = [{"shape": "linear", "h_start": 4e-5, "h_end": 2e-5}]
 _LAWS = {"mu": 0.02, "p_supply": 1e5, "barus": 2e-8, "density": "dowson-higginson"}

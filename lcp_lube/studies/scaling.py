@@ -6,25 +6,20 @@ fills one csv; the picture is drawn anew from all of it. On more ranks than core
 but the iteration counts do: they are those of a cluster.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator, Sequence
 from math import isqrt
 from pathlib import Path
 from statistics import median
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..base.resumable import ResumableCsv, Row
 from ..output.console import say
+from ..output.style import Axes, Figure
 from ..output.table import table as lines_of
 from ..scenes.scene import load_scene
 from .drawing import look, new_figure, save
 from .experiment import open_store, run
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 SCENES = ("problem4", "rough")
 STRONG = (250, 500, 1000)  # points a side, whatever the ranks

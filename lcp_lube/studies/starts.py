@@ -1,24 +1,19 @@
 """Stability of DIN against its starting vector: p0, r0 from 1e-15 to 1e3 by each rule for mu (the paper's table 5 as a map)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..base.resumable import Row
 from ..output.console import say
+from ..output.style import Axes, Figure
 from ..scenes.scene import load_scene
 from .drawing import look, new_figure, save
 from .experiment import open_store, run
 from .log import write_log
 from .map_picture import FAILURES, Axis, Panels, chosen, converged, groups, legend, picture, unique
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 SCENES = ("problem1", "problem2", "problem3")
 DECADES = range(-15, 4)  # p0 = r0 = 10^k; p0 in the problem's unit, MPa
