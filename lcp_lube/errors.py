@@ -23,7 +23,7 @@ class NotFound(RuntimeError):
 
 def nearest(word: str, legal: Iterable[str], dash: str = "") -> str:
     """'; nearest is X', or nothing when nothing is near; a difference in capitals alone is the least."""
-    import difflib  # a run without a mistake needs it not
+    import difflib  # only where there is a mistake to explain
 
     names = list(legal)
     close = [name for name in names if name.lower() == word.lower()] or difflib.get_close_matches(word, names, 1, 0.5)

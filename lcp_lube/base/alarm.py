@@ -18,7 +18,7 @@ class Alarm:
         self.rank, self.alone = self._comm.rank, self._comm.size == 1
 
     def all_arrive(self) -> bool:
-        """True if every rank calls this within the time. If some do, the lowest of them gives up first, and speaks for all.
+        """True if every rank calls this within the time. If some do, the lowest of them gives up first, and reports for all.
 
         The time is 4 s, up to 6 s on a busy machine: ranks that fail together are then further apart, and a job in which one
         rank fails is still to end within 10 s.

@@ -19,7 +19,7 @@ Row = dict[str, str]
 class ResumableCsv:
     """Rows that are in the file already need not be run again.
 
-    Rank 0 reads and writes, the other ranks hear of it. The file is replaced whole after each row, so that it is
+    Rank 0 reads and writes, the other ranks receive the rows. The file is replaced whole after each row, so that it is
     never half-written.
 
     Parameters

@@ -91,7 +91,7 @@ def solution_of(
 
     Parameters
     ----------
-    watching : hears of time steps (`watching.Watching`).
+    watching : called with every time step (`watching.Watching`).
     scene : `scene_of` the arguments, where that is at hand.
     """
     scene = scene or scene_of(args)

@@ -42,7 +42,7 @@ def jobs_for(asked: int | None, chains: int, sizes: Sequence[int]) -> int:
 
 
 def serve(rows_of: Callable[[Sequence[int]], Iterable[tuple[int, Row]]]) -> None:
-    """A worker's life: a line with a chain's numbers comes in, a line with each point's row goes out, until no more come in."""
+    """A worker: reads lines with the numbers of a chain, and writes a line with each point's row, until its input ends."""
     signal.signal(signal.SIGTERM, signal.SIG_DFL)  # the way to end it; PETSc would report a crash
     for line in sys.stdin:
         for _, row in rows_of(json.loads(line)):

@@ -25,7 +25,7 @@ GIF, FILES = 40, 10  # frames of an animation, times of a series of files
 
 
 class Watching:
-    """Hears of every time step (`Ask.watch`). Collective."""
+    """Called with every time step (`Ask.watch`). Collective."""
 
     def __init__(self, args: argparse.Namespace, scene: Scene):
         self.table: MotionTable | None = motion_of(scene)

@@ -287,7 +287,7 @@ def _fault(path: Path, plot: bool) -> str:
         if path.is_dir():
             return "is a folder"
         if path.exists() and not path.is_file():
-            return "is no ordinary file"  # opening a pipe waits for ever, and a device would be replaced
+            return "is no ordinary file"  # opening a pipe would block, and a device would be replaced
         if not folder.is_dir():
             return f"folder {folder} does not exist"
         with tempfile.TemporaryFile(dir=folder):  # by trying: permission bits say little about root and network disks

@@ -94,7 +94,7 @@ def machine() -> str:
 
 
 def finite(value: Any) -> Any:
-    """NaN and infinities as None: JSON has no word for them."""
+    """NaN and infinities as None: JSON has no numbers for them."""
     if isinstance(value, dict):
         return {key: finite(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):

@@ -21,7 +21,7 @@ def run(args: argparse.Namespace) -> int:
     if not 0 <= args.port < 65536:
         raise InputError(f"--port {args.port}: allowed are 0 (any free port) to 65535")
     answers = Answers(scene_of(args), ask_of(args), args.accuracy)
-    level = 0  # what cannot be solved at all is refused here, and loops are compiled before the hand moves
+    level = 0  # what cannot be solved at all is refused here, and loops are compiled before the first slider moves
     while not answers.solve({}, level)["last"]:
         level += 1
     check_unread()

@@ -23,7 +23,7 @@ from ...scenes.written import toml_of
 from .controls import controls
 
 COARSE = {1: 400, 2: 3000}  # points of the first grid at most
-FOLLOWS = 0.12  # seconds that it may take: half of what the hand notices, the rest is the browser's
+FOLLOWS = 0.12  # seconds that it may take: half of the delay that one notices, the rest is the browser's
 PATIENCE = 2.0  # seconds that a finer grid may take
 SHOWN = {1: 1200, 2: 160}  # points a side that are sent
 TOO_FAR = 30  # levels that anyone could ask for
@@ -116,7 +116,7 @@ class Answers:
         return api.solve(scene, replace(self.ask, accuracy=self.accuracy, finest=shape)), shape
 
     def _adapt(self, seconds: float, shape: tuple[int, ...]) -> None:
-        """Fewer points on the first grid where the machine cannot follow the hand, more again where it can."""
+        """Fewer points on the first grid where the machine cannot keep up with the sliders, more again where it can."""
         if seconds > FOLLOWS:
             self._points = max(min(self._points, prod(shape)) // 2, 50)
         elif seconds < FOLLOWS / 6:
