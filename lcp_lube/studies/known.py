@@ -24,7 +24,7 @@ COLUMNS = (*QUANTITIES, *(f"{name}_unsure" for name in QUANTITIES), "how", "cpu_
 
 @dataclass(frozen=True)
 class Known:
-    """The three numbers of `compare.read_off`, how far each may be off (load, p_max: relative; rupture: of L), and how they are known."""
+    """The three numbers of `compare.read_off`, their doubts (load, p_max: relative; rupture: of L), and how they are known."""
 
     values: Mapping[str, float | None]
     unsure: Mapping[str, float]
