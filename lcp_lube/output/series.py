@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
 
 from mpi4py import MPI
 
@@ -36,6 +35,8 @@ def save_series(solutions: Mapping[float, Solution], path: str | Path, boundary:
 
 def write_collection(path: Path, entries: Sequence[tuple[float, str]], comm: MPI.Comm) -> None:
     """Write a .pvd of times and names of files beside it. Collective."""
+    from xml.sax.saxutils import quoteattr  # here: it brings urllib along
+
     listed = "".join(f'    <DataSet timestep="{time!r}" part="0" file={quoteattr(name)}/>\n' for time, name in entries)
     head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n  <Collection>\n'
     files.write_text(path, f"{head}{listed}  </Collection>\n</VTKFile>\n", comm)
