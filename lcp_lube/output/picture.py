@@ -18,7 +18,7 @@ from ..problems.grid import Grid
 from ..problems.solution import Solution
 from .files import coordinates, gather, taken
 from .liquid import NOISE, ahead, void_at_faces
-from .units import prefix, quantity
+from .units import prefix, with_unit
 
 FINE = 1201  # points of a line that is drawn from a formula
 MOST_POINTS = {1: 4000, 2: 500}  # a direction; larger fields are thinned before rank 0 gathers them
@@ -114,7 +114,7 @@ class Picture:
 
     def place(self, x: float) -> str:
         """x with its unit."""
-        return f"{self.along[0] * x:.4g}°" if self.is_journal else quantity(x, "m")
+        return f"{self.along[0] * x:.4g}°" if self.is_journal else with_unit(x, "m")
 
     @property
     def load(self) -> float | None:
@@ -186,11 +186,11 @@ def title(picture: Picture) -> str:
     if (now := values.get("t_end")) is not None:
         parts.append(f"at the end, $t$ = {now:.4g}")
     if values.get("p_max") is not None:
-        largest_p = quantity(values["p_max"], picture.fields["p"][1]).rstrip()
+        largest_p = with_unit(values["p_max"], picture.fields["p"][1]).rstrip()
         when = "" if now is None else f" at $t$ = {values['p_max_time']:.4g}"
         parts.append(f"$p_{{max}}$ {'was ' * bool(when)}{largest_p}{when}")
     if picture.load is not None:
-        parts.append(f"load {quantity(picture.load, 'N/m' if picture.y.size == 0 else 'N')}")
+        parts.append(f"load {with_unit(picture.load, 'N/m' if picture.y.size == 0 else 'N')}")
     if values.get("sommerfeld") is not None:
         parts.append(f"So {values['sommerfeld']:.4g}")
     if values.get("cavitated_fraction") is not None:

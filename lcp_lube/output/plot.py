@@ -13,7 +13,7 @@ from .maps import FLAT, height, outline, panels, shape
 from .panels import section
 from .picture import Picture, collect, title
 from .style import BLUE, NAMES, RED, Axes, Figure, new_figure, save_figure
-from .units import prefix, quantity
+from .units import prefix, with_unit
 
 WIDE = 9.6  # inches: pictures with several maps
 
@@ -74,7 +74,7 @@ def _film_maps(picture: Picture) -> Figure:
     upper, lower, side = _section_axes(below, picture)
     handles = section(upper, lower, picture, row, named=False)
     fronts = [f"{name} {picture.place(at)}" for name, at in picture.fronts.items()] if row == picture.middle else []
-    there = ", ".join([f"section at y = {quantity(picture.y[row], picture.length_unit)} (dashed)", *fronts])
+    there = ", ".join([f"section at y = {with_unit(picture.y[row], picture.length_unit)} (dashed)", *fronts])
     upper.set_title(there, loc="left", pad=22)
     upper.legend(handles=handles, ncols=3, loc="lower left", bbox_to_anchor=(-0.01, 0.97))
     if side is not None:

@@ -14,7 +14,7 @@ from .. import __version__
 from ..problems.solution import Solution
 from ..scenes.doubts import too_high
 from ..scenes.effects.named import sentence
-from .units import place, quantity
+from .units import place, with_unit
 
 ACCURACY = ("accuracy", *(f"accuracy_{name}" for name in ("quantity", "estimate", "extrapolated", "grid_value")), "estimates")
 
@@ -122,7 +122,7 @@ def _bearing_lines(data: dict[str, Any], one_d: bool) -> list[str]:
     per, flow_unit = ("/m", "m2/s") if one_d else ("", "m3/s")
     lines = []
     if data.get("force"):
-        told = [f"force on the shaft ({', '.join(quantity(part, 'N' + per, 6) for part in data['force'])})"]
+        told = [f"force on the shaft ({', '.join(with_unit(part, 'N' + per, 6) for part in data['force'])})"]
         if data["attitude_deg"] is not None:
             told.append(f"attitude angle {data['attitude_deg']:.5g} deg")
         if data.get("sommerfeld") is not None:
@@ -130,23 +130,23 @@ def _bearing_lines(data: dict[str, Any], one_d: bool) -> list[str]:
         lines.append(", ".join(told))
     if data.get("balance"):
         found = data["balance"]
-        carried = quantity(found["carried"], "N" + per, 6)
+        carried = with_unit(found["carried"], "N" + per, 6)
         lines.append(f"balance: {found['vary']} = {found['value']:.8g} carries {carried}, found in {found['solves']} solves")
     if places := ", ".join(filter(None, (_fronts(name, data) for name in ("rupture", "reformation")))):
         lines.append(places + ("" if one_d else " (on the middle line)"))
-    thinnest = f"thinnest film {quantity(data['min_h'], 'm')} at {place(data['min_h_at']) or '-'}"
+    thinnest = f"thinnest film {with_unit(data['min_h'], 'm')} at {place(data['min_h_at']) or '-'}"
     lines.append(f"p_max at {place(data['p_max_at']) or '-'}; {thinnest}")
     coefficient = data["friction_coefficient"]
     losses = "" if coefficient is None else f"friction coefficient {coefficient:.4g}, "
     flows = ", ".join(f"{side} {value:.4g}" for side, value in data["flow"].items())
-    lines.append(f"{losses}power loss {quantity(data['power_loss'], 'W' + per)}; flow out: {flows} {flow_unit}")
+    lines.append(f"{losses}power loss {with_unit(data['power_loss'], 'W' + per)}; flow out: {flows} {flow_unit}")
     if data.get("supply_p"):
         pairs = zip(data["supply_p"], data["supply_flow"], strict=True)
-        supplied = ", ".join(f"{quantity(p, 'Pa', 6)} {flow:.4g}" for p, flow in pairs)
+        supplied = ", ".join(f"{with_unit(p, 'Pa', 6)} {flow:.4g}" for p, flow in pairs)
         lines.append(f"supplies, pressure and flow into the film: {supplied} {flow_unit}")
     if data.get("temperature_max") is not None:
         hot = ", ".join(f"{name} {data[f'temperature_{name}']:.5g}" for name in ("max", "effective", "out"))
-        into, out = (quantity(data[key], "W" + per) for key in ("heat_power", "heat_out"))
+        into, out = (with_unit(data[key], "W" + per) for key in ("heat_power", "heat_out"))
         lines.append(f"temperature {hot} K; heat in {into}, out {out}")
     if data.get("flow_growth"):
         growth = ", ".join(f"{side} {value:+.2g}" for side, value in data["flow_growth"].items() if value)

@@ -15,7 +15,7 @@ from .maps import outline
 from .picture import Picture, collect, thinning
 from .style import BLUE, RED, Axes, new_figure, save_figure
 from .table import table
-from .units import quantity
+from .units import with_unit
 
 MOST_BARS = 20
 
@@ -57,7 +57,7 @@ def text(gradient: Gradient, solution: Solution, values: dict[str, float]) -> st
         unit = key_unit(solution.solved_scene, key)
         per = f"{own or '1'} per {unit}" if unit else own
         size = gradient.elasticity[key]
-        shown = quantity(values[key], unit, 6).rstrip() if unit else f"{values[key]:.6g}"
+        shown = with_unit(values[key], unit, 6).rstrip() if unit else f"{values[key]:.6g}"
         rows.append((key, shown, f"{gradient.gradient[key]:.6g} {per}".rstrip(), "-" if size is None else f"{size:+.4f}"))
     lines += table(rows, align="<>>>", gap="  ")
     for key, gap in gradient.one_sided.items():
@@ -88,7 +88,7 @@ def plot(gradient: Gradient, solution: Solution, field: Array, path: str | Path)
         _bars(bars, gradient, keys)
         own = unit_of(solution, gradient.quantity)
         _film(figure, film, picture, gradient, values, own)  # type: ignore[arg-type]
-        title = f"{solution.settings.get('scene', '')}: {gradient.quantity} {quantity(gradient.value, own)}".rstrip()
+        title = f"{solution.settings.get('scene', '')}: {gradient.quantity} {with_unit(gradient.value, own)}".rstrip()
         figure.suptitle(title, fontsize=10, x=0.01, ha="left")
         return figure
 
@@ -106,8 +106,8 @@ def plot_error(error: GoalError, solution: Solution, path: str | Path) -> None:
         axes.set_xlabel(picture.along[1])  # type: ignore[union-attr]
         name = f"error of {error.quantity} ({unit or '1'} per mm²)"
         _map(figure, axes, picture, 1e-6 * values, name)  # type: ignore[arg-type, operator]
-        head = f"{solution.settings.get('scene', '')}: {error.quantity} {quantity(error.value, unit)}".rstrip()
-        shares = f"error near {quantity(error.error, unit)}; half of what cells add lies in {error.worst:.1%} of them"
+        head = f"{solution.settings.get('scene', '')}: {error.quantity} {with_unit(error.value, unit)}".rstrip()
+        shares = f"error near {with_unit(error.error, unit)}; half of what cells add lies in {error.worst:.1%} of them"
         axes.set_title(f"{head}\n{shares}", fontsize=9, loc="left")
         return figure
 

@@ -14,7 +14,7 @@ def prefix(size: float, unit: str) -> tuple[float, str]:
     return 10.0**-power, {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}[power] + unit
 
 
-def quantity(value: float, unit: str, digits: int = 4) -> str:
+def with_unit(value: float, unit: str, digits: int = 4) -> str:
     """'6.624 MPa' from 6.624e6 and 'Pa'."""
     factor, unit = prefix(abs(value), unit)
     return f"{value * factor:.{digits}g} {unit}"
@@ -22,4 +22,4 @@ def quantity(value: float, unit: str, digits: int = 4) -> str:
 
 def place(at: list[float] | None, unit: str = "m") -> str:
     """'x = 43.5 mm, y = 50 mm' from [0.0435, 0.05]; empty for None."""
-    return ", ".join(f"{name} = {quantity(value, unit)}" for name, value in zip("xy", at or [], strict=False))
+    return ", ".join(f"{name} = {with_unit(value, unit)}" for name, value in zip("xy", at or [], strict=False))
