@@ -4,6 +4,7 @@ import os
 import shlex
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from conftest import ENVIRONMENT
@@ -13,7 +14,10 @@ from lcp_lube.cli.main import COMMANDS
 from lcp_lube.registry import METHODS, scene_names
 
 EXAMPLES = {name: command["example"] for name, command in GRAMMAR["command"].items()}
-ENDLESS = ("explore",)  # run by a test of its own
+PAGES = [page.read_text(encoding="utf-8") for page in (Path(__file__).parents[2] / "docs" / "guide").glob("*.md")]
+GUIDE = {line.partition("  #")[0].strip() for page in PAGES for line in page.splitlines()}
+# Run by tests of their own, or by the guide's, where the same command stands.
+ELSEWHERE = {"explore", "doctor", "optimise", *(name for name, example in EXAMPLES.items() if example in GUIDE)}
 
 
 def test_every_command_has_an_example_in_its_help() -> None:
@@ -23,7 +27,7 @@ def test_every_command_has_an_example_in_its_help() -> None:
         assert f"example: {EXAMPLES[name]}" in " ".join(parser.format_help().split())
 
 
-@pytest.mark.parametrize("name", [name for name in EXAMPLES if name not in ENDLESS])
+@pytest.mark.parametrize("name", [name for name in EXAMPLES if name not in ELSEWHERE])
 def test_examples_run(cli, name) -> None:
     if name == "solve":
         pytest.importorskip("matplotlib")

@@ -26,6 +26,7 @@ def blocks(kind):
 
 
 SHELL = blocks("sh")
+DONE: set[str] = set()
 PROGRAMS = blocks("python")
 SCENES = blocks("toml")
 
@@ -63,9 +64,13 @@ def test_links_lead_somewhere(page):
 
 @pytest.mark.parametrize("page, block", SHELL)
 def test_commands(page, block, tmp_path, environment):
-    """The lines of a block one after the other, in one folder."""
+    """The lines of a block one after the other, in one folder; what several pages say and leaves no file runs once."""
     for line in block.splitlines():
         assert re.match(r"(mpiexec -n \d |)lcp-lube ", line), line
+        command = line.partition("  #")[0].strip()
+        if command in DONE and not re.search(r"--(plot|output|checkpoint)| new ", command):
+            continue
+        DONE.add(command)
         done = run(["sh", "-c", line], tmp_path, environment)
         assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
         for name in re.findall(r"(?:--plot|--output|--checkpoint) (\S+)", line):

@@ -5,6 +5,7 @@ import csv
 import pytest
 
 from lcp_lube import InputError, load_scene
+from lcp_lube.cli.arguments import GRAMMAR
 from lcp_lube.studies.optimise import Limit, Range, optimise, parse_limit, parse_range
 
 H, L, MU, U = 20e-6, 0.1, 0.02, 1.0
@@ -62,14 +63,15 @@ def test_a_run_goes_on(tmp_path):
 
 
 def test_the_command(cli, tmp_path):
-    words = ("pocketed_pad", "--n", 40, "--maximise", "load", "--vary", "film.pocket.depth=0.3um:3um", "--output", "best.toml")
-    done = cli("optimise", *words, "--json")
+    """The example of its --help, on a coarser grid."""
+    words = (*GRAMMAR["command"]["optimise"]["example"].split()[1:], "--n", "40")
+    done = cli(*words, "--json")
     assert done.status == 0, done.err
     data = done.json
     assert data["best"]["results"]["load"] >= data["start"]["results"]["load"]
     again = cli("solve", "best.toml", "--json").json
     assert again["load"] == pytest.approx(data["best"]["results"]["load"], rel=1e-8)
-    assert (tmp_path / "best.csv").is_file() and "load" in cli("optimise", *words).out
+    assert (tmp_path / "best.csv").is_file() and "load" in cli(*words).out
 
 
 def test_ranges_and_limits():
