@@ -17,7 +17,7 @@ petsc4py.init(sys.argv[:1])
 from mpi4py import MPI  # noqa: E402
 
 from lcp_lube.api import solve  # noqa: E402
-from lcp_lube.output.files import replacing  # noqa: E402
+from lcp_lube.base.files import replacing  # noqa: E402
 from lcp_lube.output.style import BLUE, GREY, RED, STYLE, new_figure  # noqa: E402
 from lcp_lube.problems.solution import Solution  # noqa: E402
 from lcp_lube.scenes.scene import load_scene  # noqa: E402

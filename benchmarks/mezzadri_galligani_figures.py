@@ -21,7 +21,7 @@ petsc4py.init(sys.argv[:1])
 from mpi4py import MPI  # noqa: E402
 
 from lcp_lube.api import solve  # noqa: E402
-from lcp_lube.output.files import replacing  # noqa: E402
+from lcp_lube.base.files import replacing  # noqa: E402
 from lcp_lube.output.panels import section  # noqa: E402
 from lcp_lube.output.picture import Picture, collect, largest, title  # noqa: E402
 from lcp_lube.output.plot import plot  # noqa: E402

@@ -16,7 +16,7 @@ _PUBLIC = {
     "load_scene": "lcp_lube.scenes.scene",
     "solve": "lcp_lube.api",
     "Solution": "lcp_lube.problems.solution",
-    "save_series": "lcp_lube.output.series",
+    "save_series": "lcp_lube.output.files",
     "to_pandas": "lcp_lube.output.rows",
 }
 __all__ = [*_PUBLIC, "__version__"]

@@ -15,10 +15,10 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from lcp_lube import Complementarity, solve
+from lcp_lube.base.files import replacing
 from lcp_lube.base.resumable import ResumableCsv
 from lcp_lube.base.together import on_all_ranks
 from lcp_lube.errors import InputError
-from lcp_lube.output.files import replacing
 from lcp_lube.studies.drawing import save
 
 WORLD = MPI.COMM_WORLD

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from ..api import solve
+from ..base.files import write_text
 from ..base.options import check_unread
 from ..drivers.coefficients import Coefficients, coefficients, placed, stability
 from ..errors import InputError, NotFound
 from ..output.console import say
-from ..output.files import check_target, write_text
+from ..output.files import check_target
 from ..output.results import as_dict, finite
 from ..output.style import save_figure
 from ..problems.film.model import Model

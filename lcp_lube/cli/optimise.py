@@ -4,11 +4,11 @@ import argparse
 import json
 from typing import Any
 
+from ..base.files import write_text
 from ..base.options import check_unread
 from ..drivers.equations import check_film
 from ..errors import InputError
 from ..output.console import say
-from ..output.files import write_text
 from ..output.results import finite
 from ..output.table import table
 from ..scenes.scene import Scene

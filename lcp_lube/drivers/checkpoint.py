@@ -18,6 +18,7 @@ import numpy as np
 from mpi4py import MPI
 
 from .. import __version__
+from ..base.files import not_writable
 from ..errors import InputError
 from ..problems.grid import Grid
 from ..problems.solution import Fields, Outcome, Step
@@ -93,7 +94,7 @@ class Checkpointer:
         self.active, self.path, self.every, self.comm = path is not None, Path(path or ""), every, comm
         if every < 1:
             raise InputError(f"--every {every}: at least 1 is needed")
-        if self.active and (reason := comm.bcast(checkpoint_file.not_writable(self.path) if comm.rank == 0 else None)):
+        if self.active and (reason := comm.bcast(not_writable(self.path) if comm.rank == 0 else None)):
             raise InputError(f"--checkpoint {path}: {reason}")
         self.record: dict[str, Any] = {}
         self.steps: list[Step] = []

@@ -99,25 +99,6 @@ def read_arrays(path: Path, grid: Grid, header: dict[str, Any], start: int) -> d
     return {name: values for (name, _), values in zip(header["arrays"], arrays, strict=True)}
 
 
-def not_writable(path: Path) -> str:
-    """Why no checkpoint can be written there; empty if it can."""
-    try:
-        if path.is_dir():
-            return "is a folder"
-        if path.exists() and not path.is_file():
-            return "is no ordinary file"  # a device would be replaced
-        if not path.parent.is_dir():
-            return f"folder {path.parent} does not exist"
-        probe = path.with_name(f".{path.name}.new")
-        probe.touch()
-        probe.unlink()
-    except OSError as error:
-        return f"cannot be written in {path.parent}: {error.strerror}"
-    except ValueError as error:
-        return str(error)  # a name that no file can have
-    return ""
-
-
 def _header_of(path: Path) -> tuple[dict[str, Any], int]:
     if path.exists() and not (path.is_file() or path.is_dir()):
         raise InputError("is no ordinary file")  # a pipe would be waited for

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from ..base.files import replacing
 from ..base.parallel import Array
 from ..base.together import on_all_ranks
-from .files import replacing
 from .frames import Frames
 from .style import BLUE, GREY, MAPS, NAMES, RED, STYLE, new_figure
 from .units import prefix

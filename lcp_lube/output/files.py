@@ -2,11 +2,8 @@
 
 import ctypes
 import json
-import os
-import tempfile
 import zipfile
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -15,8 +12,9 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from ..base.files import not_writable, replacing, write_text
 from ..base.parallel import Array
-from ..base.together import FOREVER, PATIENCE, all_come, on_all_ranks, reserve
+from ..base.together import on_all_ranks, reserve
 from ..errors import InputError, nearest
 from ..problems.frame import Frame
 from ..problems.grid import Grid
@@ -85,8 +83,6 @@ def save(
     fields = {name: solution.field(name, boundary) for name in solution.problem.physical(solution.fields)}
     fields |= {name: values for name, (values, _) in more.items()}
     if suffix == ".pvd":
-        from .series import save_series
-
         save_series({0.0: solution}, path, boundary)
         return
     with replacing(path, grid.comm) as temporary:
@@ -104,6 +100,38 @@ def save(
                     reserve(temporary, 8 * grid.size * len(fields))
             result = grid.comm.bcast(json.dumps(finite(as_dict(solution))))  # each rank has seconds of its own
             _save_by_viewer(points, fields, units, temporary, result)
+
+
+def save_series(solutions: Mapping[float, Solution], path: str | Path, boundary: bool = False) -> None:
+    """Write `path`, a .pvd, and beside it path_0000.vts, path_0001.vts ... Collective.
+
+    Parameters
+    ----------
+    solutions : answers by what ParaView calls the time: seconds, or the value that was varied.
+    boundary : with the points of the sides.
+
+    Raises
+    ------
+    InputError : another extension, no solutions, a file that cannot be written.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".pvd" or not solutions:
+        raise InputError(f"{path}: a name that ends in .pvd, and one solution at least, are needed")
+    entries = []
+    for k, (time, solution) in enumerate(solutions.items()):
+        name = f"{path.stem}_{k:04d}.vts"
+        save(solution, path.with_name(name), boundary)
+        entries.append((float(time), name))
+    write_collection(path, entries, next(iter(solutions.values())).problem.grid.comm)
+
+
+def write_collection(path: Path, entries: Sequence[tuple[float, str]], comm: MPI.Comm) -> None:
+    """Write a .pvd of times and names of files beside it. Collective."""
+    from xml.sax.saxutils import quoteattr  # here: it brings urllib along
+
+    listed = "".join(f'    <DataSet timestep="{time!r}" part="0" file={quoteattr(name)}/>\n' for time, name in entries)
+    head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n  <Collection>\n'
+    write_text(path, f"{head}{listed}  </Collection>\n</VTKFile>\n", comm)
 
 
 def gather(grid: Grid | Frame, values: Array, stride: tuple[int, int] = (1, 1)) -> Array:
@@ -142,52 +170,6 @@ def taken(n: int, step: int) -> np.ndarray:
 def coordinates(grid: Grid | Frame, stride: tuple[int, int] = (1, 1)) -> tuple[Array, ...]:
     """Coordinates x, and y in 2D, of the points that `gather` returns, in metres; on every rank."""
     return tuple(line[taken(line.size, step)] for line, step in zip(grid.lines, stride, strict=False))
-
-
-@contextmanager
-def replacing(path: Path, comm: MPI.Comm) -> Iterator[str]:
-    """A temporary name beside `path`, which becomes `path` when the block ends well, and vanishes when not. Collective.
-
-    Raises
-    ------
-    InputError : a rank could not write, rank 0 could not rename; on every rank, but for those that still wait inside HDF5 for
-        one that failed there.
-    """
-    temporary = Path(comm.bcast(str(path.with_name(f".{path.stem}.{os.getpid()}{path.suffix.lower()}"))))
-    reason, failed = "", None
-    with on_all_ranks(comm, f"{path}: could not be written"):  # PETSc's viewers would fail on rank 0 alone
-        if comm.rank == 0:
-            temporary.touch()
-    try:
-        yield str(temporary)
-    except OSError as error:
-        reason = error.strerror or str(error)
-    except PETSc.Error as error:
-        reason = f"PETSc's error code {error.ierr}; is the disk full?"
-        failed = error
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
-    if not all_come(comm, PATIENCE if failed else FOREVER):
-        temporary.unlink(missing_ok=True)
-        raise InputError(f"{path}: could not be written: {reason}") from failed
-    try:
-        with on_all_ranks(comm, f"{path}: could not be written"):
-            if reason:
-                raise InputError(reason)
-        with on_all_ranks(comm, f"{path}: could not be written"):
-            if comm.rank == 0:
-                os.replace(temporary, path)
-    except InputError:
-        temporary.unlink(missing_ok=True)
-        raise
-
-
-def write_text(path: Path, text: str, comm: MPI.Comm = MPI.COMM_WORLD) -> None:
-    """Write a file of text, rank 0's. Collective; raises as `replacing` does."""
-    with replacing(path, comm) as temporary:
-        if comm.rank == 0:
-            Path(temporary).write_text(text, encoding="utf-8")
 
 
 def _save_npz(solution: Solution, grid: Grid | Frame, fields: dict[str, Array], units: dict[str, str], target: str) -> None:
@@ -276,29 +258,11 @@ def _wrong_extension(suffix: str, plot: bool) -> str:
 
 def _fault(path: Path, plot: bool) -> str:
     """What is wrong with a target; empty if nothing is."""
-    suffix, folder = path.suffix.lower(), path.parent
+    suffix = path.suffix.lower()
     if wrong := _wrong_extension(suffix, plot):
         return wrong
     if plot and find_spec("matplotlib") is None:
         return "pictures need matplotlib: pip install lcp-lube[plot]"
     if suffix == ".h5" and not PETSc.Sys.hasExternalPackage("hdf5"):
         return "this PETSc was built without HDF5; use .npz, .vts or .vtr"
-    try:
-        if path.is_dir():
-            return "is a folder"
-        if path.exists() and not path.is_file():
-            return "is no ordinary file"  # opening a pipe would block, and a device would be replaced
-        if not folder.is_dir():
-            return f"folder {folder} does not exist"
-        with tempfile.TemporaryFile(dir=folder):  # by trying: permission bits say little about root and network disks
-            pass
-        if path.exists():
-            with path.open("ab"):
-                pass
-        with suppress(FileNotFoundError):
-            os.stat(path.with_name(f".{path.stem}.0000000{suffix}"))  # as `replacing` names it; Path.exists() hides errors
-    except OSError as error:
-        return f"cannot be written in {folder}: {error.strerror}"
-    except ValueError as error:  # a name that no file can have
-        return str(error)
-    return ""
+    return not_writable(path)

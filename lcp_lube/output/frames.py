@@ -15,8 +15,7 @@ from ..base.together import on_all_ranks
 from ..errors import InputError
 from ..problems.film.fronts import middle_row
 from ..problems.solution import Outcome, Solution
-from .files import check_target, coordinates, gather, save, taken
-from .series import write_collection
+from .files import check_target, coordinates, gather, save, taken, write_collection
 from .units import prefix
 
 MOST = {1: 1000, 2: 160}  # points a direction of a frame

@@ -4,8 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from .liquid import liquid_line
-from .panels import pressure_line
+from .panels import liquid_line, pressure_line
 from .picture import Picture, largest
 from .style import BLUE, GREY, LIQUID, RED, WALL, Axes
 from .units import with_unit

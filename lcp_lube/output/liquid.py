@@ -1,17 +1,10 @@
 """How much of the gap is filled, where a picture shows it: at the faces, from what passes there, and between them."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
-
 import numpy as np
 
 from ..base.parallel import Array
 from ..problems.film.flows import stream_weights
 from ..problems.film.lubrication import LubricationProblem
-
-if TYPE_CHECKING:
-    from .picture import Picture
 
 NOISE = 1e-9  # of a field's scale: less is rounding and is not drawn
 
@@ -54,24 +47,3 @@ def void_at_faces(problem: LubricationProblem, r: Array, sign: Array) -> Array:
     beyond = (framed[:, 2:] if downstream else framed[:, :-2]) if way.any() else sign
     inside = moves & (sign < 0.0) & (beyond < 0.0)
     return np.where(inside, 1.0 - np.minimum(layer, 1.0), void).ravel()
-
-
-def liquid_line(picture: Picture, row: int | None, x: Array) -> tuple[Array, Array, Array]:
-    """Places of the faces of a row (m), from end to end, the void fraction there, and the liquid's thickness (m) at x.
-
-    Around a point of the full film the share of the gap that is filled is taken to vary linearly from face to face, so that
-    a full film stays full across an edge; around a point of the cavity the thickness is, and the void takes what is left.
-    """
-    problem: Any = picture.solution.problem
-    grid = problem.grid
-    start, end = grid.origin[0], grid.origin[0] + grid.lengths[0]
-    r, sign = (field if row is None else field[row] for field in (picture.void, picture.sign))
-    entering = {"open": 0.0, "periodic": r[-1]}.get(grid.ends[0][0], r[0])
-    faces = np.concatenate([[start], picture.x + picture.ahead, [end]])
-    fed = grid.ends[0][1] == "open" and problem.p_sides[1] > 0.0  # the side itself is full
-    r = np.concatenate([[entering], r, 0.0 * r[-1:] if fed else r[-1:]])
-    h = picture.film(row, x)
-    share = (1.0 - np.interp(x, faces, r)) * h
-    layer = np.interp(x, faces, (1.0 - r) * picture.film(row, faces))
-    nearest = np.searchsorted(0.5 * (picture.x[1:] + picture.x[:-1]), x)
-    return faces, r, np.where(sign[nearest] < 0.0, np.minimum(layer, h), share)

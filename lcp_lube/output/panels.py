@@ -6,7 +6,7 @@ import numpy as np
 
 from ..base.parallel import Array
 from ..problems.film.quantities import open_pressures
-from .liquid import NOISE, liquid_line
+from .liquid import NOISE
 from .picture import Picture, largest
 from .style import BLUE, CAVITY, GREY, LIQUID, NAMES, RED, WALL, Axes
 from .units import prefix
@@ -79,6 +79,27 @@ def section(upper: Axes, lower: Axes, picture: Picture, row: int | None = None, 
         lower.set_xticks(ANGLES)
     lower.set(ylim=(0.0, top), ylabel=f"{NAMES['h']} ({unit_h})", xlabel=label_x)
     return [*handles, *spans[:1]]
+
+
+def liquid_line(picture: Picture, row: int | None, x: Array) -> tuple[Array, Array, Array]:
+    """Places of the faces of a row (m), from end to end, the void fraction there, and the liquid's thickness (m) at x.
+
+    Around a point of the full film the share of the gap that is filled is taken to vary linearly from face to face, so that
+    a full film stays full across an edge; around a point of the cavity the thickness is, and the void takes what is left.
+    """
+    problem: Any = picture.solution.problem
+    grid = problem.grid
+    start, end = grid.origin[0], grid.origin[0] + grid.lengths[0]
+    r, sign = (field if row is None else field[row] for field in (picture.void, picture.sign))
+    entering = {"open": 0.0, "periodic": r[-1]}.get(grid.ends[0][0], r[0])
+    faces = np.concatenate([[start], picture.x + picture.ahead, [end]])
+    fed = grid.ends[0][1] == "open" and problem.p_sides[1] > 0.0  # the side itself is full
+    r = np.concatenate([[entering], r, 0.0 * r[-1:] if fed else r[-1:]])
+    h = picture.film(row, x)
+    share = (1.0 - np.interp(x, faces, r)) * h
+    layer = np.interp(x, faces, (1.0 - r) * picture.film(row, faces))
+    nearest = np.searchsorted(0.5 * (picture.x[1:] + picture.x[:-1]), x)
+    return faces, r, np.where(sign[nearest] < 0.0, np.minimum(layer, h), share)
 
 
 def pressure_line(picture: Picture, row: int | None) -> tuple[Array, Array]:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from mpi4py import MPI
 
+from ..base.files import replacing
 from ..base.together import on_all_ranks
-from .files import replacing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,9 +7,10 @@ from pathlib import Path
 
 from mpi4py import MPI
 
+from ..base.files import write_text
 from ..base.resumable import Row
+from ..base.together import on_all_ranks
 from ..errors import InputError
-from ..output.files import replacing
 
 NAME = "CHARTS.md"
 HEAD = "# Charts: what the last full runs say\n\nWritten by `lcp-lube chart`; every number comes from the csv beside it.\n"
@@ -18,9 +19,9 @@ HEAD = "# Charts: what the last full runs say\n\nWritten by `lcp-lube chart`; ev
 def write_log(results: Path, name: str, rows: Sequence[Row], text: str, pictures: Sequence[Path]) -> None:
     """Put a chart's section in the place of its old one. Collective."""
     path = results / NAME
-    with replacing(path, MPI.COMM_WORLD) as temporary:
-        if MPI.COMM_WORLD.rank == 0:
-            Path(temporary).write_text(HEAD + "".join(_sections(path, name, rows, text, pictures)), encoding="utf-8")
+    with on_all_ranks(MPI.COMM_WORLD):
+        written = HEAD + "".join(_sections(path, name, rows, text, pictures)) if MPI.COMM_WORLD.rank == 0 else ""
+    write_text(path, written)
 
 
 def _sections(path: Path, name: str, rows: Sequence[Row], text: str, pictures: Sequence[Path]) -> list[str]:

@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.text import Text
 
 from lcp_lube.api import solve
-from lcp_lube.output import liquid, maps, picture
+from lcp_lube.output import maps, panels, picture
 from lcp_lube.output.picture import Picture, title
 from lcp_lube.output.plot import draw
 from lcp_lube.registry import scene_names
@@ -81,7 +81,7 @@ def test_a_full_film_is_drawn_full_wherever_its_edges_lie(
     with shown(str(path)) as found:
         assert found.quantities["cavitated_fraction"] == 0.0
         fine = found.fine()
-        _, r, thickness = liquid.liquid_line(found, None, fine)
+        _, r, thickness = panels.liquid_line(found, None, fine)
         assert np.abs(r).max() < 1e-9
         np.testing.assert_allclose(thickness, found.film(None, fine), rtol=1e-9)
         upper, _, right = draw(found).axes
@@ -108,7 +108,7 @@ def test_the_liquid_in_a_cavity_is_as_thick_as_what_passes(bearing: Any) -> None
         problem: Any = found.solution.problem
         Q = problem.boundary_flows(found.solution.fields["p"], found.solution.fields["r"])[0]
         x = found.fine()[100:-100]
-        _, _, thickness = liquid.liquid_line(found, None, x)
+        _, _, thickness = panels.liquid_line(found, None, x)
         np.testing.assert_allclose(thickness, Q / problem.U, rtol=1e-6)
 
 
@@ -210,7 +210,7 @@ def test_what_is_drawn_lies_in_the_gap_and_in_the_picture(head: str, bearing: An
     with shown(bearing(f"L_mm = 30\nU = 3\n{head}", 'shape = "parabola"\nh_min_um = 10\nh_max_um = 20')) as found:
         x = found.fine()
         row = None if found.y.size == 0 else found.middle
-        _, r, thickness = liquid.liquid_line(found, row, x)
+        _, r, thickness = panels.liquid_line(found, row, x)
         assert ((r > -1e-6) & (r < 1.0 + 1e-6)).all()
         assert (thickness <= found.film(row, x) * (1.0 + 1e-6)).all()
         assert (thickness >= -1e-12).all()
