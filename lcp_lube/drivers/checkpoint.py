@@ -45,10 +45,7 @@ def _leaves(owner: Any, names: tuple[str, ...]) -> list[Entry]:
         else:
             yield name, value
 
-    found: list[Entry] = []
-    for name in names:
-        found += walk(name, attrgetter(name)(owner))
-    return found
+    return [leaf for name in names for leaf in walk(name, attrgetter(name)(owner))]
 
 
 def _rebuilt(name: str, old: Any, values: dict[str, Any]) -> Any:
