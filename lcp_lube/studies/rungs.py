@@ -101,10 +101,10 @@ def _draw(rows: Sequence[Row]) -> Figure:
         *steps, auto = [row for row in rows if row["scene"] == name]
         x, y = zip(*(_place(row) for row in steps), strict=True)
         ax.plot(x, y, **look(number))
-        before: set[str] = set()
+        before: list[str] = []
         for k, row in enumerate(steps):
-            models = set() if row["model"] == "least" else set(row["model"].split(","))
-            new = [RUNGS[one].line for one in models - before] if row["model"] != "full" else ["all"]
+            models = [] if row["model"] == "least" else row["model"].split(",")
+            new = ["all"] if row["model"] == "full" else [RUNGS[one].line for one in models if one not in before]
             left = k % 2 == 1
             place = {"xytext": (-5 if left else 5, 3), "ha": "right" if left else "left", "textcoords": "offset points"}
             ax.annotate(", ".join(new) or "none", _place(row), **place, fontsize=6.5)
