@@ -87,13 +87,7 @@ def solution_of(
     watching: Any = None,
     scene: Scene | None = None,
 ) -> Solution:
-    """What `solve` with these arguments finds. Collective.
-
-    Parameters
-    ----------
-    watching : called with every time step (`watching.Watching`).
-    scene : `scene_of` the arguments, where that is at hand.
-    """
+    """What `solve` with these arguments, and its scene where that is at hand, finds; watching: `Watching`. Collective."""
     scene = scene or scene_of(args)
     return solve(
         scene,

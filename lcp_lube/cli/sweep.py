@@ -74,20 +74,15 @@ def sweep(
 ) -> tuple[list[dict[str, Any]], list[str]]:
     """Solve a scene at every point of the product of the axes; a point that fails is a row as well. Collective.
 
+    Returns the points in their order, and the names of their columns. Every point was refused: InputError.
+
     Parameters
     ----------
     scene_at : the scene at a point; all are built, and so validated, before the first is solved.
     solve_at : solve_at(point, near) -> Solution, near being a neighbour's to start from.
     path : a csv that is filled row by row; points that stand there, with the same data and settings, are not solved again.
-    warm : start each point from its neighbour's answer, along the last axis.
     settings : what the answers depend on beside the scene; part of what tells one row from another.
-    progress : a bar on stderr, if that is a terminal.
-    jobs, words : processes that solve side by side (`sweep_jobs`), and the command line that each is started with; None: where
-        that pays. The rows do not depend on it.
-
-    Returns
-    -------
-    list of dict, list of str : the points in their order, and the names of their columns.
+    jobs, words : processes that solve side by side (`sweep_jobs`; None: where that pays), and the command line of each.
     """
     check(axes)
     at, reads = points(axes), points(axes, read=True)

@@ -26,8 +26,6 @@ HEAVY = 250_000  # grid points of one scene, above which several at once may be 
 def jobs_for(asked: int | None, chains: int, sizes: Sequence[int]) -> int:
     """How many processes: as many as were asked for; else one a core where that pays, and one under mpiexec.
 
-    Parameters
-    ----------
     sizes : grid points of every scene.
     """
     if asked is not None:
@@ -52,8 +50,6 @@ def serve(rows_of: Callable[[Sequence[int]], Iterable[tuple[int, Row]]]) -> None
 def side_by_side(words: Sequence[str], jobs: int, chains: Chains) -> Iterator[tuple[int, Row]]:
     """Rows by their points' numbers, as they come. A process that ends before its time is a row, and another one goes on.
 
-    Parameters
-    ----------
     words : the command line of the sweep, which every worker reads too.
     """
     waiting: SimpleQueue[list[int] | None] = SimpleQueue()

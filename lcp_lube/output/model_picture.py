@@ -12,12 +12,7 @@ LEAST = 1e-3  # of the part of the tolerance from which effects count: what is s
 
 
 def plot_model(model: dict[str, Any], path: str | Path) -> None:
-    """Draw settings['model'] of a solution to a .png, .pdf or .svg. Collective.
-
-    Raises
-    ------
-    InputError : no decision was taken, or the file cannot be written.
-    """
+    """Draw settings['model'] of a solution to a .png, .pdf or .svg; InputError where no decision was taken. Collective."""
     if "quantity" not in model:
         raise InputError(f"--plot-model {path}: no decision was taken: {model['reason']}")
     save_figure(lambda: _draw(model), path, dpi=DOTS)

@@ -73,12 +73,7 @@ def text(gradient: Gradient, solution: Solution, values: dict[str, float]) -> st
 
 
 def plot(gradient: Gradient, solution: Solution, field: Array, path: str | Path) -> None:
-    """Bars of the elasticities, and dQ/dh over the film. Collective; rank 0 draws.
-
-    Raises
-    ------
-    InputError : the file cannot be written; then nothing is left behind.
-    """
+    """Bars of the elasticities, and dQ/dh over the film. Collective; rank 0 draws."""
     picture, values = _gathered(solution, field)
 
     def figure() -> Any:

@@ -45,10 +45,7 @@ def compare(
 ) -> list[dict[str, Any]]:
     """Solve a scene by every method ('auto' is one) with every recipe (None: the default one). Collective.
 
-    Parameters
-    ----------
-    system, stopping, nested, rescue : as `api.solve` takes them.
-    options : a method's own parameters, by its name.
+    options : a method's own parameters, by its name; the others are as `api.solve` takes them.
 
     Returns
     -------

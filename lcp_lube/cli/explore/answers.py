@@ -32,8 +32,6 @@ TOO_FAR = 30  # levels that anyone could ask for
 class Answers:
     """One scene, any number of pages: nothing is kept of a page, which says with every request what it has changed.
 
-    Attributes
-    ----------
     base : the scene before any change.
     """
 

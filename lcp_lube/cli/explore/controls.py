@@ -22,8 +22,6 @@ USUAL = {"m": 1e-5, "Pa": 1e5, "rad": 1e-3, "m/s": 1.0, "N": 1e3, "deg": 90.0, "
 class Control:
     """One key of a scene as a page shows it.
 
-    Attributes
-    ----------
     key : as --set has it.
     kind : 'number' (a slider and a field), 'choice', 'switch', or 'text' (anything else, as TOML).
     value : now, in SI; None where the key is not set.

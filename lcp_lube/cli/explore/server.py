@@ -29,12 +29,7 @@ POLICY = (
 
 
 class Server:
-    """Handlers in threads, answers in the thread that calls `serve`.
-
-    Attributes
-    ----------
-    address : of the page, with its token.
-    """
+    """Handlers in threads, answers in the thread that calls `serve`; address: of the page, with its token."""
 
     def __init__(self, answers: Answers, port: int = 0):
         self.answers = answers
