@@ -16,6 +16,7 @@ import numpy as np
 from ..base.differences import differences
 from ..base.parallel import Array
 from ..errors import InputError
+from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Solution
 from ..registry import SMALL
 from ..scenes.effects.named import without
@@ -57,7 +58,7 @@ class Adjoint:
         if self.equations.grid.shape != solution.problem.grid.shape:
             raise InputError(f"{scene.name}: the solution is on another grid than the scene")
         self._reduction = solution.settings.get("details", {}).get("reduction")
-        self.found, self.conditions = _found(scene, solution)
+        self.found, self.conditions = conditions_of(scene, solution)
         supplies = self.equations.constant.held.supplies if self.equations.constant.held else ()
         free = [k for k, one in enumerate(supplies, start=1) if one.open]
         self.found = [*self.found, *(SUPPLY.format(k) for k in free)]
@@ -72,7 +73,7 @@ class Adjoint:
             self.cavity = self.cavity ^ switching
         self.switching = int(eq.grid.reduce.sum(switching.astype(float)))
         needed = list(dict.fromkeys(part for weights in parts.values() for part in weights))
-        slopes = {part: eq.slope(p, r, part) for part in needed}
+        slopes = {part: eq.slope(p, r, part, last=flip) for part in needed}
         self.ties = {name: sum(slopes[part].ties for part in weights) for name, weights in parts.items()}
         rows = [
             sum((w * np.where(self.cavity, -slopes[part].r, slopes[part].p) for part, w in weights.items()), np.zeros(p.size))
@@ -162,7 +163,7 @@ class Adjoint:
 
             slope, jump = differences(at, value, max(abs(value), 1e-3 * unit), sizes)
         else:
-            scale = abs(value) or self._scale(key)
+            scale = abs(value) or self.scale(key)
             quick = self.equations.grid.size > SMALL
 
             def near(a: float) -> Array:
@@ -180,19 +181,29 @@ class Adjoint:
         known = values_of(self.scene)
         return known[key] if key in known else self.pressures[self._supplies.index(key)]
 
-    def _scale(self, key: str) -> float:
-        """What a change of a number that is zero is small against."""
-        problem, units = self.equations.constant, self.scene.data_units()
-        unit = units.get(key, units.get(key.rpartition(".")[0], ""))
-        p_max = max(problem.reduce.max(self.p), *map(abs, problem.p_sides)) or problem.p_unit
-        thinnest = problem.reduce.min(problem.scheme.h)
-        return {"Pa": p_max, "1/Pa": 1.0 / p_max, "m": thinnest, "rad": thinnest / max(problem.grid.lengths)}.get(unit, 1e-2)
+    def scale(self, key: str) -> float:
+        problem = self.equations.constant
+        return scale_of(self.scene, key, problem, self.p / problem.p_unit)
+
+    @property
+    def report(self) -> dict[str, float]:
+        """All that is told of the film."""
+        return self.equations.report(self.numbers)
 
     def destroy(self) -> None:
         self.equations.destroy()
 
 
-def _found(scene: Scene, solution: Solution) -> tuple[list[str], dict[str, float]]:
+def scale_of(scene: Scene, key: str, problem: LubricationProblem, p: Array) -> float:
+    """What a change of a number that is zero is small against; p : the film's, p_unit. Collective."""
+    units = scene.data_units()
+    unit = units.get(key, units.get(key.rpartition(".")[0], ""))
+    p_max = max(problem.reduce.max(p) * problem.p_unit, *map(abs, problem.p_sides)) or problem.p_unit
+    thinnest = problem.reduce.min(problem.scheme.h)
+    return {"Pa": p_max, "1/Pa": 1.0 / p_max, "m": thinnest, "rad": thinnest / max(problem.grid.lengths)}.get(unit, 1e-2)
+
+
+def conditions_of(scene: Scene, solution: Solution) -> tuple[list[str], dict[str, float]]:
     """The keys whose values were found, and the conditions that they meet: a number and the value that it has."""
     if isinstance(scene, GroovedJournalScene):
         if scene.balance is not None:
@@ -213,7 +224,7 @@ class Implicit:
     by_found: dict[str, Array]  # L_v
 
     @classmethod
-    def of(cls, adjoint: Adjoint, balance: dict[str, Any] | None) -> "Implicit":
+    def of(cls, adjoint: Any) -> "Implicit":
         """Raises InputError where the conditions do not depend on what was found."""
         slopes = [adjoint.slopes(key)[0] for key in adjoint.found]
         conditions = list(adjoint.conditions)

@@ -141,11 +141,11 @@ class Equations:
         out = {FLIPPED.get(name, name): value for name, value in found.items()}
         return {**out, **{name: -out[name] for name in DRAGS if name in out}}
 
-    def slope(self, p: Array, r: Array, name: str) -> slopes.Slope:
-        """dQ/dp (p in p_unit) and dQ/dr of one of `numbers`. Collective."""
+    def slope(self, p: Array, r: Array, name: str, last: bool = False) -> slopes.Slope:
+        """dQ/dp (p in p_unit) and dQ/dr of one of `numbers` (`slopes.slope`). Collective."""
         problem = self.problem(p)
         name = FLIPPED.get(name, name) if self.turned else name
-        found = slopes.slope(problem, self.tangent(p, r), p / problem.p_unit, r, name)
+        found = slopes.slope(problem, self.tangent(p, r), p / problem.p_unit, r, name, last)
         return slopes.Slope(-found.p, -found.r) if self.turned and name in DRAGS else found
 
     def report(self, numbers: dict[str, float]) -> dict[str, float]:

@@ -55,7 +55,7 @@ class FilmGradient:
         self.slopes: BoxScheme = slopes
         self.at_faces = model.scheme == "face", model.scheme != "upwind"  # whether void and Couette flow are those of faces
         self.mean_cubes = model.mean_cubes
-        self.implicit = Implicit.of(adjoint, balance)
+        self.implicit = Implicit.of(adjoint)
 
     def field(self, quantity: str) -> Array:
         """dQ/dh at the owned points of the solution's grid, unit of Q per m and m2 (1D: per m and m).

@@ -79,7 +79,7 @@ def goal_error(scene: Scene, solution: Solution, finer: Solution, quantity: str)
         transfer.destroy()
         if (held := adjoint.equations.held) is not None:  # points in a groove have its pressure on any grid
             G = np.where(held, 0.0, G)
-        implicit = Implicit.of(adjoint, solution.settings.get("balance"))
+        implicit = Implicit.of(adjoint)
         row = -implicit.by_found[quantity] @ implicit.inverse
         lam = adjoint.lambdas[quantity] + sum(w * adjoint.lambdas[c] for c, w in zip(implicit.conditions, row, strict=True))
         parts = -SECOND * lam * G

@@ -11,6 +11,7 @@ the scene its conditions have adjoints of their own (`adjoint.Implicit`).
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from ..errors import InputError
 from ..problems.solution import Solution
@@ -19,6 +20,7 @@ from ..scenes.scene import Scene
 from ..scenes.values import key_of, values_of
 from .adjoint import Adjoint, Implicit
 from .coefficients import placed
+from .coupled_gradient import CoupledGradient
 
 STEPWISE = "the edges of grooves lie on points of the grid: the answer changes by steps"
 FOUND = "it was found for the load"
@@ -92,7 +94,7 @@ def gradients(scene: Scene, solution: Solution, quantities: Sequence[str], keys:
     InputError : a quantity without a derivative, a key that is no number, a solution that is none, a scene without a film.
     """
     first = _gradients(scene, solution, quantities, keys)
-    if first[0].switching == 0:
+    if _coupled(scene) or not any(one.switching for one in first):
         return first
     other = _gradients(scene, solution, quantities, keys, flip=True)
     out = []
@@ -103,10 +105,17 @@ def gradients(scene: Scene, solution: Solution, quantities: Sequence[str], keys:
     return out
 
 
+def _coupled(scene: Any) -> bool:
+    return bool(getattr(getattr(scene, "model", None), "effects", ()))
+
+
 def _gradients(
     scene: Scene, solution: Solution, quantities: Sequence[str], keys: Sequence[str] | None, flip: bool = False
 ) -> list[Gradient]:
-    adjoint = Adjoint(scene, solution, quantities, flip)
+    if _coupled(scene):
+        adjoint: Any = CoupledGradient(scene, solution, quantities)
+    else:
+        adjoint = Adjoint(scene, solution, quantities, flip)
     try:
         values = values_of(adjoint.scene)
         balance = solution.settings.get("balance")
@@ -129,9 +138,9 @@ def _gradients(
                     slopes[key], jumps[key] = adjoint.slopes(key)
                 except InputError as error:
                     held[key] = str(error)
-        implicit = Implicit.of(adjoint, balance)
+        implicit = Implicit.of(adjoint)
         out = []
-        report = adjoint.equations.report(adjoint.numbers)
+        report = adjoint.report
         for name in quantities:
             value = adjoint.value(name) if name in adjoint.found else report[name]
             found = {key: implicit.total(name, key, slope) for key, slope in slopes.items()}

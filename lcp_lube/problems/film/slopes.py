@@ -81,18 +81,19 @@ def giving(problem: LubricationProblem, name: str) -> NDArray[np.bool_]:
     return (problem.held.owner == which - 1).ravel()
 
 
-def slope(problem: LubricationProblem, tangent: Tangent, p: Array, r: Array, name: str) -> Slope:
+def slope(problem: LubricationProblem, tangent: Tangent, p: Array, r: Array, name: str, last: bool = False) -> Slope:
     """dQ/dp and dQ/dr of one of `numbers`. Collective.
 
     Parameters
     ----------
     tangent : the film's equations linearised in p, which know how a fluid's coefficients change with it.
+    last : of points that tie for the largest pressure the last one has it, not the first.
     """
     if name in ("friction", "friction_torque"):
         lever = problem.grid.polar[0] + problem.grid.y if name == "friction_torque" and problem.grid.polar else 1.0
         return _friction(problem, tangent, p, r, lever)
     if name == "p_max":
-        return _largest(problem, p)
+        return _largest(problem, p, last)
     if name == "min_h":
         return Slope(np.zeros(p.size), np.zeros(p.size))
     if name.startswith("flow_"):
@@ -140,20 +141,23 @@ def _friction(problem: LubricationProblem, tangent: Tangent, p: Array, r: Array,
     return Slope(dp.ravel(), (problem.mu * per_row * sheared).ravel())
 
 
-def _largest(problem: LubricationProblem, p: Array) -> Slope:
-    """The point with the largest pressure, the first of equals, or those around the top; nothing where a side has it."""
+def _largest(problem: LubricationProblem, p: Array, last: bool) -> Slope:
+    """The point with the largest pressure, the first or last of equals, or those around the top; none where a side has it."""
     grid, reduce = problem.grid, problem.reduce
-    largest = reduce.max(p)
-    at_side = max((q for q in problem.p_sides if q), default=0.0) / problem.p_unit > largest
+    largest, p_sides = reduce.max(p), [q / problem.p_unit for q in problem.p_sides]
     near = p >= largest - TIE * abs(largest)
     index = grid.first + np.arange(p.size)
-    chosen = -reduce.max(np.where(near, -index.astype(float), -np.inf))
+    way = 1.0 if last else -1.0
+    chosen = way * reduce.max(np.where(near, way * index.astype(float), -np.inf))
     ties = int(reduce.sum(near.astype(float))) - 1
     by_p = np.where(index == chosen, 1.0, 0.0)
-    if problem.tops and not at_side:
-        place = largest_of(problem, p.reshape(grid.box), grid.x[0], grid.y[:, 0])[1]
+    if problem.tops:
+        seen = np.where(near & (index != chosen), 0.0, p)
+        place = largest_of(problem, seen.reshape(grid.box), grid.x[0], grid.y[:, 0])[1]
         assert place is not None  # a solution's pressures are numbers
-        by_p = Window(grid, p, place, [q / problem.p_unit for q in problem.p_sides]).slopes(p.size)
+        window = Window(grid, p, place, p_sides)
+        by_p, largest = window.slopes(p.size), window.top()[0]
+    at_side = max((q for q in p_sides if q), default=0.0) > largest
     return Slope(by_p * (0.0 if at_side else problem.p_unit), np.zeros(p.size), 0 if at_side else ties)
 
 
