@@ -9,12 +9,16 @@ from films import FilmScene, L, Pieces, random_films
 
 from lcp_lube.api import solve
 from lcp_lube.drivers.accuracy import first_shape
-from lcp_lube.drivers.estimate import estimate as estimated
-from lcp_lube.drivers.estimate import misplaced_film
+from lcp_lube.drivers.estimate import estimate, misplaced_film
 from lcp_lube.errors import InputError
 from lcp_lube.problems.solution import Outcome
 from lcp_lube.registry import scene_names
 from lcp_lube.scenes.scene import load_scene
+
+
+def estimated(values, misplaced):
+    """From grids whose spacing halves."""
+    return estimate(values, misplaced, [2.0**k for k in range(len(values))])
 
 
 def exact_scenes():

@@ -28,33 +28,42 @@ def on_edges(n: int, length: float, ends: Sequence[str], edges: Sequence[float])
         nothing.
     """
     periodic = "periodic" in ends
-    places, slack = np.asarray(edges, dtype=float), SAME * length
-    inside = places[(places > slack) & (places < length - slack)]
-    at_ends = (np.abs(places) <= slack) | (np.abs(places - length) <= slack)
-    places = np.unique(np.concatenate([[0.0] if periodic and at_ends.any() else [], inside]))
-    if not places.size:
+    knots, lengths = stretches(length, ends, edges)
+    if not lengths.size:
         return None
-    places = places[np.concatenate([[True], np.diff(places) > slack])]
-    knots = np.concatenate([places, [places[0] + length]]) if periodic else np.concatenate([[0.0], places, [length]])
-    stretches = np.diff(knots)
     # Half a mesh of a closed end lies before its first point.
-    cut = np.zeros(stretches.size)
+    cut = np.zeros(lengths.size)
     if not periodic:
         cut[0] += 0.5 * (ends[0] == "closed")
         cut[-1] += 0.5 * (ends[1] == "closed")
     meshes = n if periodic else n + OFFSET[ends[0]] + OFFSET[ends[1]] - 1.0
-    counts = _counts(stretches, cut, round(meshes + cut.sum()))
+    counts = _counts(lengths, cut, round(meshes + cut.sum()))
     if counts is None:
         return None
     at = np.concatenate([[0.0], np.cumsum(counts - cut)])  # of the knots, in meshes
     if periodic:
-        first = int(np.floor(places[0] * counts[-1] / stretches[-1] + SAME))  # points between 0 and the first edge
+        first = int(np.floor(knots[0] * counts[-1] / lengths[-1] + SAME))  # points between 0 and the first edge
         steps = np.arange(n) - first
         line = np.interp(steps % n, at, knots) + length * (steps // n)
     else:
         line = np.interp(np.arange(n) + OFFSET[ends[0]], at, knots)
     even = (np.arange(n) + OFFSET[ends[0]]) * (length / meshes)
-    return None if np.allclose(line, even, rtol=0.0, atol=slack) else line
+    return None if np.allclose(line, even, rtol=0.0, atol=SAME * length) else line
+
+
+def stretches(length: float, ends: Sequence[str], edges: Sequence[float]) -> tuple[Array, Array]:
+    """The ends of the stretches between edges (round a ring the first one again at the end), and their lengths, m; none
+    where there are no edges."""
+    periodic = "periodic" in ends
+    places, slack = np.asarray(edges, dtype=float), SAME * length
+    inside = places[(places > slack) & (places < length - slack)]
+    at_ends = (np.abs(places) <= slack) | (np.abs(places - length) <= slack)
+    places = np.unique(np.concatenate([[0.0] if periodic and at_ends.any() else [], inside]))
+    if not places.size:
+        return places, places
+    places = places[np.concatenate([[True], np.diff(places) > slack])]
+    knots = np.concatenate([places, [places[0] + length]]) if periodic else np.concatenate([[0.0], places, [length]])
+    return knots, np.diff(knots)
 
 
 def _counts(stretches: Array, cut: Array, total: int) -> NDArray[np.int64] | None:

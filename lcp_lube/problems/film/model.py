@@ -17,7 +17,7 @@ from .exact import ExactSolution
 from .fluid import Law
 from .grooves import Groove, GroovedProblem, Pad, pads_between
 from .integrals import line_integrals
-from .lines import on_edges
+from .lines import on_edges, stretches
 from .lubrication import LubricationProblem
 from .reynolds import BoxScheme, Film, box_scheme, coefficients
 from .stored import Stored
@@ -126,14 +126,23 @@ class Model:
         """Where the lines of points of a grid lie (`Grid.places`): on edges, where scheme 'face' can make use of it in 2D."""
         if self.places is not None:
             return self.places
-        if self.scheme != "face" or self.mean_cubes or len(shape) == 1:
-            return EVEN
-        edges = [[*jumps_of(self.gap, axis), *(t for one in self.supplies for t in one.region.edges(axis))] for axis in "xy"]
-        x, y = (
-            on_edges(n, length, [side.kind for side in self.sides[2 * k : 2 * k + 2]], edges[k])
-            for k, (n, length) in enumerate(zip(shape, self.lengths, strict=True))
-        )
+        x, y = (on_edges(n, *edges) for n, edges in zip(shape, self._edges, strict=True)) if self._edges else EVEN
         return (None if self.grooves else x), y  # grooves are columns of an even grid
+
+    @property
+    def _edges(self) -> list[tuple[float, list[str], list[float]]]:
+        """Length, kinds of the ends and edges of each side of a film whose lines of points lie on edges."""
+        if self.scheme != "face" or self.mean_cubes or len(self.lengths) == 1:
+            return []
+        edges = [[*jumps_of(self.gap, axis), *(t for one in self.supplies for t in one.region.edges(axis))] for axis in "xy"]
+        kinds = [[side.kind for side in self.sides[2 * k : 2 * k + 2]] for k in (0, 1)]
+        return list(zip(self.lengths, kinds, edges, strict=True))
+
+    def fewest_meshes(self) -> tuple[int, ...]:
+        """Meshes a side from which a line of points lies on each straight edge."""
+        if self.grooves or self.places is not None:
+            return ()
+        return tuple(max(1, stretches(*edges)[1].size) for edges in self._edges)
 
     def build(self, shape: Sequence[int], comm: PETSc.Comm | None = None, grid: Grid | None = None) -> LubricationProblem:
         """The discrete problem on (nx,) or (nx, ny) points, or on a grid that others use too. Collective.
