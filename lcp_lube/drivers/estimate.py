@@ -4,16 +4,15 @@ With spacings d_k the value w_k = v_k + c_k, c_k = (v_k - v_(k-1)) d_k^2/(d_(k-1
 order (Richardson). What moves w from grid to grid is what does not fall like that: fronts that stand anywhere in their cells,
 edges, an order that is not two. So
 
-    n = f max(|D|, |D'| (d_k/d_(k-1))^2, |D| q/(1 - q), |c_j| (d_k/d_j)^2/4 of the two before),  D = w_k - w_(k-1),
-    answer v_k + (3/4) c_k, error 1.4 n + |c_k|/4;    v_k itself: error |c_k| + 1.4 n,
+    n = f max(|w_k - w_j| of the grids down to half as fine, |c_j| (d_k/d_j)^2/3 of the two before),
+    answer v_k + (3/4) c_k, error 1.1 n + |c_k|/4;    v_k itself: error |c_k| + 1.1 n,
 
-D' the move before D, q = D/D': what is left of moves that shrink so, if they have one sign, but no more than both together;
 f = 12 over the square of how many times finer the finest grid is than the coarsest, at least 1: the little that grids of
 nearly one spacing tell can be chance. Three quarters of the correction instead of the whole are a little worse as a value and
 far better known: the whole one is right to a part of n that no few values tell. Where the moves of w leave less than a
 hundredth of c_k second order is beyond doubt, and the whole correction is taken, with what they leave for its error. The
 answer is the one of the two with the lesser error. The constants were taken from the loads, largest pressures and frictions of
-100 random plane films, for 95 of 100 estimates to hold, and nearly as many of those that end a run because they are the first
+100 random plane films, for 95 of 100 estimates to hold, and of those that end a run because they are the first
 below its tolerance; `benchmarks/estimates.py` draws others and tells how often the truth was within, and how far below.
 
 Values from grids so coarse that the scheme did not see the film's edges tell nothing of those that do, and are left out. Values
@@ -37,9 +36,10 @@ from ..problems.film.model import Model
 from ..problems.solution import Problem
 from ..scenes.scene import Solvable
 
-MOVED, PART = 1.4, 0.75  # factor of n, and what is added of a correction
-EXPECTED = 0.25  # of what corrections before lead one to expect of the last one, which can be small by chance
+MOVED, PART = 1.1, 0.75  # factor of n, and what is added of a correction
+EXPECTED = 1.0 / 3.0  # of what corrections before lead one to expect of the last one, which can be small by chance
 SPAN = 12.0  # over the square of finest over coarsest grid: factor of n
+HALF = 0.2  # square of coarser over finest grid, a little less than that of half as fine
 ENOUGH = 3.9  # finest over coarsest of grids that are enough without those before
 CLEAN = 0.01  # what moves of w leave over the last correction
 QUADRATURE = 1e-9  # relative: what a line's quadrature may leave
@@ -91,7 +91,7 @@ def estimate(values: Sequence[float], misplaced: Sequence[float], finer: Sequenc
     shrink = (m[1:-1] / m[-1]) ** 2
     expected = EXPECTED * (np.abs(corrections[:-1]) * shrink)[-2:]
     few = max(1.0, SPAN * (m[0] / m[-1]) ** 2)
-    left = few * _left(*np.diff(w)[:-3:-1], shrink=shrink[-1])
+    left = few * float(np.max(np.abs(w[-1] - w[:-1])[shrink > HALF], initial=0.0))
     noise = max(left, *(few * expected))
     correction = float(corrections[-1])
     whole, film = abs(correction), _of_film(np.abs(steps), misplaced, last)
@@ -100,13 +100,6 @@ def estimate(values: Sequence[float], misplaced: Sequence[float], finer: Sequenc
     if of_limit < of_grid:
         return Estimate(last + (1.0 if clean else PART) * correction, max(of_limit, film), True)
     return Estimate(last, max(of_grid, film))
-
-
-def _left(move: float, before: float = 0.0, *, shrink: float) -> float:
-    """How far w may still move, from its last move and the one before."""
-    q = move / before if before else 0.0
-    left = abs(move) * q / (1.0 - q) if 0.0 < q < 1.0 else inf if q >= 1.0 else 0.0
-    return float(max(abs(move), shrink * abs(before), min(left, abs(move) + abs(before))))
 
 
 def _of_film(steps: np.ndarray, misplaced: Sequence[float], value: float) -> float:
