@@ -72,7 +72,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     assert tol is not None
     begin = perf_counter()
     fewest = model.fewest_meshes() if isinstance(model := getattr(scene, "model", None), Model) else ()
-    shape = first_shape(scene.shape, ask.mpi.size, fewest)
+    shape = first_shape(scene.shape, ask.mpi.size, fewest, finest)
     grids: list[tuple[tuple[int, ...], tuple[float, ...]]] = []  # shapes and meshes a side
     solution: Solution | None = None
     history: list[dict[str, float]] = []
@@ -142,11 +142,15 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     return solution
 
 
-def first_shape(shape: tuple[int, ...], ranks: int = 1, fewest: Sequence[int] = ()) -> tuple[int, ...]:
+def first_shape(
+    shape: tuple[int, ...], ranks: int = 1, fewest: Sequence[int] = (), finest: tuple[int, ...] | None = None
+) -> tuple[int, ...]:
     """The coarsest grid, of the scene's own proportions; every rank gets two lines at least.
 
-    fewest : meshes a side, without which a film's straight edges find no lines: coarser grids would tell nothing of it.
+    fewest : meshes a side, without which a film's straight edges find no lines: coarser grids would tell nothing of it. Heeded
+        where that is no finer than the scene's own grid, or `finest`.
     """
+    most = finest or shape
 
     def enough(n: tuple[int, ...]) -> bool:
         return min(n) >= COARSEST[len(n)] and (ranks == 1 or n[-1] >= 2 * ranks)
@@ -154,7 +158,8 @@ def first_shape(shape: tuple[int, ...], ranks: int = 1, fewest: Sequence[int] = 
     while enough(half := tuple((n - 1) // 2 for n in shape)):
         shape = half
     short = max((meshes / (n + 1) for n, meshes in zip(shape, fewest, strict=False)), default=0.0)
-    return tuple(ceil(short * (n + 1)) - 1 for n in shape) if short > 1.0 else shape
+    first = tuple(ceil(short * (n + 1)) - 1 for n in shape)
+    return first if short > 1.0 and all(n <= m for n, m in zip(first, most, strict=True)) else shape
 
 
 def next_shape(grids: Sequence[tuple[tuple[int, ...], tuple[float, ...]]]) -> tuple[int, ...]:

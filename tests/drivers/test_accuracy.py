@@ -8,7 +8,7 @@ import pytest
 from films import FilmScene, L, Pieces, random_films
 
 from lcp_lube.api import solve
-from lcp_lube.drivers.accuracy import first_shape
+from lcp_lube.drivers.accuracy import first_shape, next_shape
 from lcp_lube.drivers.estimate import estimate, misplaced_film
 from lcp_lube.errors import InputError
 from lcp_lube.problems.solution import Outcome
@@ -204,6 +204,27 @@ def test_first_shape_keeps_two_lines_for_every_rank():
     assert first_shape((360, 79)) == (21, 4)
     assert first_shape((360, 79), ranks=3)[1] >= 6
     assert first_shape((3, 3)) == (3, 3)
+
+
+def test_grids_begin_where_lines_lie_on_all_edges():
+    """Twice the points from grid to grid; every other one has half the spacing."""
+    assert first_shape((600, 600), fewest=(81, 81)) == (80, 80)
+    assert first_shape((60, 60), fewest=(81, 81)) == first_shape((60, 60))
+    assert first_shape((600, 600), fewest=(81, 81), finest=(60, 60)) == first_shape((600, 600))
+    grids = [((80, 80), (81.0, 81.0))]
+    for _ in range(4):
+        n, _ = next_shape(grids)
+        grids.append(((n, n), (n + 1.0, n + 1.0)))
+    assert [shape[0] for shape, _ in grids] == [80, 114, 161, 229, 323]
+    assert next_shape([((12,), (13.0,))]) == (25,)
+
+
+def test_textured_slider_of_narrow_rims():
+    """Twenty cells a side, rims a mesh of 601 wide: 1 % of the load, -264.85 N, on at most 480 points a side."""
+    solution = solve(load_scene("textured_slider", {"K": 20, "scheme": "face"}), accuracy=1e-2)
+    solution.destroy()
+    assert solution.converged and solution.problem.grid.shape[0] <= 480
+    assert abs(solution.numbers["load"] / -264.85 - 1) <= solution.settings["accuracy_estimate"] <= 1e-2
 
 
 @pytest.mark.parametrize(
