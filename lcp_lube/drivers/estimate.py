@@ -34,6 +34,7 @@ from ..problems.film.line import known_fields
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.solution import Problem
+from ..scenes.moving import motion_of
 from ..scenes.scene import Solvable
 
 MOVED, PART = 1.1, 0.75  # factor of n, and what is added of a correction
@@ -122,11 +123,14 @@ def scalars(found: Mapping[str, Any]) -> dict[str, float]:
 
 
 def known_numbers(scene: Solvable, comm: PETSc.Comm | None) -> dict[str, float] | None:
-    """The numbers of a film in 1D by quadrature; None for other films: 2D, ends that are not open, supplies. Collective."""
-    if getattr(scene, "balance", None) is not None:
-        return None  # its film is not known yet
+    """The numbers of a film in 1D by quadrature; None for other films: 2D, ends that are not open, supplies, in time, effects.
+
+    Collective.
+    """
+    if getattr(scene, "balance", None) is not None or motion_of(scene) is not None:
+        return None  # its film, or what it has come from, is not known yet
     model = getattr(scene, "model", None)
-    if not isinstance(model, Model) or len(scene.shape) != 1 or model.law or model.supplies or model.grooves:
+    if not isinstance(model, Model) or len(scene.shape) != 1 or model.law or model.effects or model.supplies or model.grooves:
         return None
     problem = replace(model, scheme="face", mean_cubes=False, integrals=True).build(scene.shape, comm)
     try:

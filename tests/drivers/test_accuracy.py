@@ -9,7 +9,7 @@ from films import FilmScene, L, Pieces, random_films
 
 from lcp_lube.api import solve
 from lcp_lube.drivers.accuracy import first_shape, next_shape
-from lcp_lube.drivers.estimate import estimate, misplaced_film
+from lcp_lube.drivers.estimate import estimate, known_numbers, misplaced_film
 from lcp_lube.errors import InputError
 from lcp_lube.problems.solution import Outcome
 from lcp_lube.registry import scene_names
@@ -217,6 +217,13 @@ def test_grids_begin_where_lines_lie_on_all_edges():
         grids.append(((n, n), (n + 1.0, n + 1.0)))
     assert [shape[0] for shape, _ in grids] == [80, 114, 161, 229, 323]
     assert next_shape([((12,), (13.0,))]) == (25,)
+
+
+def test_what_a_line_is_known_by():
+    """Quadrature knows a steady line; not one in time, nor one that effects act on."""
+    assert known_numbers(load_scene("pocketed_pad"), None)["load"] == pytest.approx(34165.70098, rel=1e-9)
+    assert known_numbers(load_scene("moving_texture"), None) is None
+    assert known_numbers(load_scene("lined_pad"), None) is None
 
 
 def test_textured_slider_of_narrow_rims():
