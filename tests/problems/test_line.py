@@ -165,11 +165,26 @@ def test_film_that_touches_between_points_is_refused():
 
 
 def test_where_nothing_is_known():
-    """Other schemes, and lines with an end that is not open, are read as before."""
+    """Other schemes are read as before."""
     assert known_of(load_scene("problem1").build()) is None
-    closed = load_scene({"family": "bearing", "L": 0.1, "U": 1.0, "fluid": {"mu": 0.01}, "sides": {"east": "closed"},
-                         "film": [{"shape": "constant", "h": 1e-5}]})  # fmt: skip
-    assert known_of(closed.build()) is None
+
+
+@pytest.mark.parametrize("U", [1.0, -1.0])
+@pytest.mark.parametrize("sides", [{"west": "closed", "east": 1e5}, {"west": 1e5, "east": "closed"}])
+def test_closed_ends(sides, U):
+    """Nothing flows: what a wall brings is pressed back, p = p_a + Int 6 mu U/h^2; the other wall runs dry up to that."""
+    film = [{"shape": "linear", "h_start": 2e-5, "h_end": 1e-5}, {"shape": "pocket", "depth": 1e-5, "x": [4e-3, 9e-3]}]
+    data = {"family": "bearing", "L": 0.02, "U": U, "fluid": {"mu": 0.02}, "film": film, "scheme": "face", "sides": sides}
+    found = []
+    for n in (3, 12, 300):
+        values, _ = answer(load_scene({**data, "n": n}))
+        found.append([values[name] for name in ("load", "p_max", "friction", "cavitated_area")])
+        assert abs(values["flow"]["east"]) < 1e-15 and abs(values["flow"]["west"]) < 1e-15
+    assert found[0] == pytest.approx(found[2], rel=1e-9, abs=1e-9) and found[1] == pytest.approx(found[2], rel=1e-9, abs=1e-9)
+    if (sides["west"] == "closed") == (U < 0):
+        x = (np.arange(200_000) + 0.5) * 1e-7
+        h = 2e-5 - 5e-4 * x + np.where((x > 4e-3) & (x < 9e-3), 1e-5, 0.0)
+        assert values["p_max"] == pytest.approx(1e5 + np.sum(6 * 0.02 / h**2) * 1e-7, rel=1e-8)
 
 
 @pytest.mark.parametrize("ranks", [2, 3])

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 Flags = NDArray[np.bool_]
 ROUNDING = 4e-15  # of the largest |Z|: a pressure below it is zero
 SETTLED = 1e-15  # relative change of Q
+KINDS = {"open", "closed"}  # ends of a line that is known
 MOST = 200  # looks for the least M: they converge by second order, from far away by halves
 
 
@@ -98,13 +99,16 @@ class Line:
         return x[before & ~self.full].tolist(), x[~before & self.full].tolist()
 
 
-def solve_line(line: LineIntegrals, mu: float, U: float, p_a: float, p_b: float, r_in: float = 0.0) -> Line:
-    """The steady film of a line whose ends are open.
+def solve_line(
+    line: LineIntegrals, mu: float, U: float, p_a: float, p_b: float, r_in: float = 0.0, closed: bool = False
+) -> Line:
+    """The steady film of a line.
 
     Parameters
     ----------
     mu : Pa s. U : m/s, not negative. p_a, p_b : pressures at the first and the last point, Pa above p_c, not negative.
-    r_in : void fraction that enters at the first point; 0 unless p_a is.
+    r_in : void fraction that enters at the first point; 0 unless p_a is. closed : nothing flows, as an end is; p_b is the
+    pressure at the last point all the same.
     """
     places = np.concatenate(
         [np.nextafter(line.ends[:-1], np.inf)[:, None], line.at_gauss, np.nextafter(line.ends[1:], -np.inf)[:, None]], axis=1
@@ -127,7 +131,9 @@ def solve_line(line: LineIntegrals, mu: float, U: float, p_a: float, p_b: float,
     Q = float(np.min((p_a + F[1:]) / J[1:]))
     if p_a == 0.0:
         Q = min(Q, U * float(h[0, 0]) * (1.0 - r_in))
-    for _ in range(MOST if U else 0):
+    if closed:
+        Q_full = Q = 0.0
+    for _ in range(MOST if U and Q else 0):
         J_x, F_x = J_F(crossings(Q))
         least = float(np.min((p_a + F_x) / J_x, initial=Q))
         if not least < Q * (1.0 - SETTLED):
@@ -156,11 +162,13 @@ def solve_line(line: LineIntegrals, mu: float, U: float, p_a: float, p_b: float,
     return Line(LineIntegrals(line.film, points), np.insert(p, k + 1, 0.0), whole, mu, U, Q, r_in > 0.0)
 
 
-def solve_points(line: LineIntegrals, mu: float, U: float, p_a: float, p_b: float, r_in: float = 0.0) -> tuple[Array, Array]:
+def solve_points(
+    line: LineIntegrals, mu: float, U: float, p_a: float, p_b: float, r_in: float = 0.0, closed: bool = False
+) -> tuple[Array, Array]:
     """p (Pa) and r of the discrete equations at all points but the first and the last; arguments as in `solve_line`."""
     _, two, three = 6.0 * mu * line.parts
     J, F = np.cumsum(three), U * np.cumsum(two) - r_in * U * two[0]
-    Q = min(float(np.min((p_a + F[:-1]) / J[:-1])), float((p_a - p_b + F[-1]) / J[-1]))
+    Q = 0.0 if closed else min(float(np.min((p_a + F[:-1]) / J[:-1])), float((p_a - p_b + F[-1]) / J[-1]))
     p = _followed(F - Q * J, p_b)
     with np.errstate(divide="ignore", invalid="ignore"):
         r = 1.0 - (Q + p[1:] / three[1:]) / (U * line.films[1:])  # beside a full point its pressure drives flow back
@@ -184,11 +192,14 @@ class Known:
 
 
 def known_of(problem: LubricationProblem) -> Known | None:
-    """None for 2D, a film without `integrals`, an end that is not open, supplies inside, other equations than the film's."""
+    """None for 2D, a film without `integrals`, ends without a pressure or a wall, supplies inside, other equations."""
     grid, line = problem.grid, problem.integrals
-    if line is None or not problem.plain or problem.U < 0 or grid.ends[0] != ("open", "open") or problem.held is not None:
+    if line is None or not problem.plain or problem.U < 0 or problem.held is not None or not {*grid.ends[0]} <= KINDS:
         return None
-    data: Any = (problem.mu, problem.U, *problem.p_sides[:2], problem.r_in)
+    p_a, p_b, closed = *problem.p_sides[:2], "closed" in grid.ends[0]
+    if grid.ends[0][1] == "closed":  # what the wall brings is pressed back: full, with the slope 6 mu U/h^2 all the way
+        p_b = p_a + 6.0 * problem.mu * problem.U * float(np.sum(line.parts[1]))
+    data: Any = (problem.mu, problem.U, p_a, p_b, problem.r_in, closed)
     if data not in line.known:
         with np.errstate(all="ignore"):
             line.known[data] = solve_line(line, *data), *solve_points(line, *data)
