@@ -28,7 +28,8 @@ COARSEST = {1: 12, 2: 4}  # points a side at least on the first grid
 ALGEBRAIC = 1e-3  # ||F|| relative to the tolerance: with many small cavities it leaves up to 60 times itself in a load
 ALLOWED = (1e-10, 0.5)  # tolerances
 HOPELESS = 1_000_000  # points on which an estimate that has not come down is taken to stay up
-PATIENCE = 4  # grids without a better estimate: rounding dominates
+PATIENCE = 6  # grids without a better estimate: rounding dominates
+BLANK = 3  # grids without a value: a finer one is not expected to have it
 ASYMPTOTIC = 0.1  # an estimate below it falls by second order at best
 BYTES, BYTES_FAS = {1: 900, 2: 1200}, 300  # memory of a point (`memory.MEASURED`)
 SMALL_CHANGE = 1e8  # bytes that every machine has
@@ -200,8 +201,8 @@ def _end(estimates: Sequence[float], values: Sequence[float], tol: float, points
     """Why this grid is the last one; empty if it is not."""
     if estimates[-1] <= tol:
         return "reached"
-    if len(values) > 1 and np.isnan(values[-2:]).all():
-        return "no value on the last two grids"
+    if len(values) >= BLANK and np.isnan(values[-BLANK:]).all():
+        return f"no value on the last {BLANK} grids"
     best = int(np.argmin(estimates))
     # A film with a layer thinner than these grids stays far off for long, and then converges.
     settled = estimates[best] < ASYMPTOTIC or points > HOPELESS

@@ -4,7 +4,7 @@ With spacings d_k the value w_k = v_k + c_k, c_k = (v_k - v_(k-1)) d_k^2/(d_(k-1
 order (Richardson). What moves w from grid to grid is what does not fall like that: fronts that stand anywhere in their cells,
 edges, an order that is not two. So
 
-    n = f max(|w_k - w_j| of the grids down to half as fine, |c_j| (d_k/d_j)^2/3 of the two before),
+    n = f max(|w_k - w_j| min(1, (2 d_k/d_j)^2), |c_j| (d_k/d_j)^2/3), j = k-1 and k-2,
     answer v_k + (3/4) c_k, error 1.1 n + |c_k|/4;    v_k itself: error |c_k| + 1.1 n,
 
 f = 12 over the square of how many times finer the finest grid is than the coarsest, at least 1: the little that grids of
@@ -40,7 +40,6 @@ from ..scenes.scene import Solvable
 MOVED, PART = 1.1, 0.75  # factor of n, and what is added of a correction
 EXPECTED = 1.0 / 3.0  # of what corrections before lead one to expect of the last one, which can be small by chance
 SPAN = 12.0  # over the square of finest over coarsest grid: factor of n
-HALF = 0.2  # square of coarser over finest grid, a little less than that of half as fine
 ENOUGH = 3.9  # finest over coarsest of grids that are enough without those before
 CLEAN = 0.01  # what moves of w leave over the last correction
 QUADRATURE = 1e-9  # relative: what a line's quadrature may leave
@@ -89,11 +88,10 @@ def estimate(values: Sequence[float], misplaced: Sequence[float], finer: Sequenc
     steps = np.diff(v)
     corrections = steps / ((m[1:] / m[:-1]) ** 2 - 1.0)
     w = v[1:] + corrections
-    shrink = (m[1:-1] / m[-1]) ** 2
-    expected = EXPECTED * (np.abs(corrections[:-1]) * shrink)[-2:]
+    shrink = ((m[1:-1] / m[-1]) ** 2)[-2:]  # of the two grids before the last
     few = max(1.0, SPAN * (m[0] / m[-1]) ** 2)
-    left = few * float(np.max(np.abs(w[-1] - w[:-1])[shrink > HALF], initial=0.0))
-    noise = max(left, *(few * expected))
+    left = few * float(np.max(np.abs(w[-1] - w[:-1][-2:]) * np.minimum(1.0, 4.0 * shrink)))
+    noise = max(left, few * EXPECTED * float(np.max(np.abs(corrections[:-1][-2:]) * shrink)))
     correction = float(corrections[-1])
     whole, film = abs(correction), _of_film(np.abs(steps), misplaced, last)
     clean = left < CLEAN * whole
