@@ -69,7 +69,9 @@ class Equations:
     ):
         model = check_film(scene)
         if model.effects:
-            raise InputError(f"{scene.name}: derivatives are of films whose fluid depends on the pressure alone; see --model")
+            raise InputError(
+                f"{scene.name}: derivatives by the film itself, and errors of cells, are of films without effects; see --model"
+            )
         self.scene, self.turned = scene, model.U < 0
         film: Any = Mirrored(scene) if self.turned else scene
         model = film.model

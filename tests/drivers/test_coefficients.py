@@ -270,6 +270,15 @@ def test_multigrid_has_the_coefficients_of_the_matrix(monkeypatch, name, changes
     solution.destroy()
 
 
+def test_multigrid_on_ranks(cli):
+    scene = load_scene("dimpled_pad", nx=191, ny=221)
+    found = cli("coefficients", "dimpled_pad", "--nx", 191, "--ny", 221, "--frequency", "0,200", "--json", ranks=2).json
+    with solve(scene) as solution:
+        for here, there in zip(coefficients(scene, solution, [0.0, 200.0]), found["coefficients"], strict=True):
+            assert there["K"][0][0] == pytest.approx(here.K[0, 0], rel=1e-6)
+            assert there["C"][0][0] == pytest.approx(here.C[0, 0], rel=1e-6)
+
+
 def test_coefficients_cost_some_cycles(monkeypatch):
     """Two pairs of right-hand sides, some ten cycles each, and no matrix."""
     scene = load_scene("problem4", n=255)
