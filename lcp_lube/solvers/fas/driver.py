@@ -15,10 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from ...base.parallel import Array
+from ...base.parallel import Array, trim
 from ...problems.film.lubrication import LubricationProblem
 from ...problems.film.stored import storing
 from ...problems.solution import Fields, Step
+from ...problems.strips import in_strips
 from ..job import Job
 from ..method_options import one_of, option
 from ..newton import StalledError
@@ -32,6 +33,7 @@ SETTLED = 1e-8  # of the largest pressure: what they may then be in the mean
 SCALED = 1e-3  # the most by which all pressures and voids are scaled (`Fas._balance`)
 CLOSE = 1e-6  # ||G|| below which a ring that is hardly fed is not what has stalled
 FED = 3e-5  # of the certificate's tolerance: the flow that a film with supplies may lose, 3e-12 in parts of what flows
+LARGE = 1_000_000  # points from which memory counts
 BORDER = 4  # lines on either side of the border between two ranks
 
 
@@ -65,6 +67,8 @@ class Fas(Cycles):
         self._kernels, self._fronts, self._transfer, self._tools, self._finest = kernels, fronts, transfer, levels, finest
         self._harmonic, self._truncation = options.weights == "harmonic", TRUNCATIONS[options.truncation]
         with self.stages("assembly"):
+            if problem.size > LARGE:
+                trim()
             self._levels = levels.hierarchy(finest.finest(problem), self._harmonic)
         self._begin(start is not None)
         self._c_norm = problem.reduce.norm(problem.scheme.c) if problem.held is None else self._norms()[0]
@@ -98,8 +102,10 @@ class Fas(Cycles):
 
     @property
     def fields(self) -> Fields:
-        z = self._own()
-        p, r = self._kernels.pressure_and_void(z, self.problem.scheme.b_C)
+        z, scheme = self._own(), self.problem.scheme
+        p, r = np.empty(z.shape), np.empty(z.shape)
+        for rows in in_strips(self.problem.grid):
+            p[rows], r[rows] = self._kernels.pressure_and_void(z[rows], scheme.rows(rows).b_C)
         return {"p": p.ravel(), "r": r.ravel()}
 
     def _norms(self) -> tuple[float, float]:
@@ -126,6 +132,8 @@ class Fas(Cycles):
             return norm
         for coarse in self._levels[1:]:
             coarse.rest()
+        if self.problem.size > LARGE:
+            trim()
         self.certificate = seen = self.problem.certify(self.fields, self.eps1)
         lost = seen.measures["mass_defect"] / (self._share if self.problem.held is None else FED)
         return max(norm, self._rest * max(lost, seen.measures["residual"] / self._share) / seen.tol)
@@ -185,6 +193,12 @@ class Fas(Cycles):
                 max(self.norm, self.eps1 * size / (SETTLED * p_max * np.sqrt(self.problem.size))) if p_max > 0 else self.norm
             )
         return Step(self.norm, size, 1.0, enough=self._rest > self.eps1 and self.norm <= self._rest)
+
+    def destroy(self) -> None:
+        super().destroy()
+        if self.problem.size > LARGE:
+            self._levels = []
+            trim()
 
     def _retreat(self) -> bool:
         """Do without the coarsest grids, on which the film's cavities are too small to be seen; false if that has been tried.
