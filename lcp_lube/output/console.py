@@ -17,7 +17,7 @@ def say(text: str) -> None:
     """
     if MPI.COMM_WORLD.rank == 0:
         try:
-            print(text, flush=True)
+            print(f"{text}\n", end="", flush=True)  # one write: after it `| head` may be gone, and the files not yet written
         except OSError as error:
             sys.stdout = open(os.devnull, "w")  # noqa: SIM115  (else Python tries to flush it once more at its end)
             raise InputError(f"standard output: {error.strerror}") from None

@@ -185,8 +185,9 @@ def summary(data: dict[str, Any]) -> str:
         )
     else:
         quantities = ", ".join(f"{name} {data[name]:.8g}" for name in QUANTITIES if data.get(name) is not None)
+    ranks = f"{data['ranks']} rank{'s' * (data['ranks'] > 1)}"
     lines = [
-        f"{data['scene']} ({size}{scheme}) by {data['method']}{first}{system}, {data['ranks']} rank{'s' * (data['ranks'] > 1)}",
+        f"{data['scene'] or 'film'} ({size}{scheme}) by {data['method']}{first}{system}, {ranks}",
         f"{data['outcome']}: {data['iterations']} iterations{inner}, {data['centrality']} centrality and "
         f"{data['backtracking']} backtracking cuts, {data['time_s']['total']:.2f} s; {data['message']}",
         quantities,

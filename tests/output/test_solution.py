@@ -54,6 +54,8 @@ def film() -> Iterator[Solution]:
 
 def test_a_solution_in_one_line_and_by_names(film: Solution) -> None:
     assert repr(film) == summary(as_dict(film)).splitlines()[0] and "problem4 (20 x 15" in str(film)
+    assert summary({**as_dict(film), "scene": "", "took_over": "din"}).startswith("film (20 x 15, ")
+    assert ", from which din took over on the " in summary({**as_dict(film), "took_over": "din"})
     numbers = film.problem.quantities(film.fields)
     assert film.load == numbers["load"] == film.quantities["load"] and film.p_max == numbers["p_max"]
     assert (film.units["load"], film.units["p"], film.units["x"], film.units["r"]) == ("N", "Pa", "m", "")
