@@ -229,3 +229,16 @@ def test_bad_input(supply, words):
     with pytest.raises(InputError, match="supply") as error:
         solve({**PAD, "supply": supply})
     assert words in str(error.value) and "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("start_mm", [0.0, 0.3, 24.0])
+def test_a_supply_beside_a_periodic_side_is_one_anywhere(start_mm):
+    """A film that does not depend on y and closes in it: where the supply lies, by whole cells, does not matter."""
+    sides = {"west": 1e5, "east": 1e5, "south": "periodic", "north": "periodic"}
+    data = {**PAD, "ny": 60, "sides": sides}
+    place, other = ({"x_mm": [40, 60], "y_mm": [y, y + 19], "p": 3e6} for y in (start_mm, start_mm % 1 + 20))
+    _, values, _, certificate = answer({**data, "supply": [place]})
+    _, expected, *_ = answer({**data, "supply": [other]})
+    assert certificate.holds and certificate.measures["mass_defect"] < 1e-12
+    assert values["supply_flow"] == pytest.approx(expected["supply_flow"], rel=1e-9)
+    assert values["load"] == pytest.approx(expected["load"], rel=1e-9)
