@@ -61,7 +61,10 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         unknown = re.match(r"unrecognized arguments: (--\S+)", message)
         if unknown:
-            message = f"{unknown[1]}: no such option{nearest(unknown[1].partition('=')[0], self.option_names())}"
+            option, below = unknown[1].partition("=")[0], [parser for parser in self.parsers() if parser is not self]
+            having = [parser.prog.split()[-1] for parser in below if option in parser._option_string_actions]
+            near = f"; it is one of {', '.join(having)}" if having else nearest(option, self.option_names())
+            message = f"{unknown[1]}: no such option{near}"
         wrong = re.match(r"argument (\S+): invalid choice: '(.*?)' \(choose from (.*)\)", message)
         if wrong:
             legal = [name.strip("' ") for name in wrong[3].split(",")]

@@ -28,6 +28,8 @@ def first_fault(error: ValidationError, model: type[BaseModel]) -> str:
     if fault["type"] == "union_tag_invalid":
         tag = str(context["tag"])
         return f"{key}.shape = {tag}: allowed are {', '.join(tags_of(tables))}{nearest(tag, tags_of(tables))}"
+    if fault["type"] in ("model_type", "model_attributes_type", "dict_type"):
+        return f"{key} = {found}: a table is needed"
     allowed = fault["msg"].removeprefix("Value error, ").replace("Input should be ", "allowed is ")
     if fault["type"] == "value_error" and isinstance(fault["input"], dict):  # a table's own check, which names its key
         return f"{key}: {allowed}" if key else allowed

@@ -43,6 +43,8 @@ def refused(capsys):
         ("solve", "the following arguments are required: SCENE"),
         ("solve problem1 extra", "unrecognized arguments: extra"),
         ("solve problem1 --methd din", "--methd: no such option; nearest is --method"),
+        ("solve problem1 --vary U=1,2", "--vary: no such option; it is one of sweep, optimise"),
+        ("solve pocketed_pad --set fluid=3", "fluid = 3: a table is needed"),
         ("solve problem1 --eps 1", "--eps: no such option; nearest is --eps"),
         ("solve problem1 --zzzzzzzz", "--zzzzzzzz: no such option"),
         ("solve problem1 --n many", "argument --n: invalid int value: 'many'"),

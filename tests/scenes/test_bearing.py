@@ -565,3 +565,14 @@ def test_any_values_make_a_problem_or_one_line(changes):
     else:
         assert problem.scheme.h.min() > 0
         problem.destroy()
+
+
+@pytest.mark.parametrize("h_end, found", [("0", "0 m"), ("-1nm", "-1e-09 m")])
+@pytest.mark.parametrize("dimension", [1, 2])
+def test_a_film_that_touches_at_a_side_is_refused(h_end, found, dimension):
+    """Between the last point and the side no point or face of the grid sees it."""
+    film = {"shape": "linear", "h_start": "20um", "h_end": h_end}
+    data = {"family": "bearing", "dimension": dimension, "L": 0.01, "U": 1.0, "n": 9, "fluid": {"mu": 0.01}}
+    data |= {"width": 0.01} if dimension == 2 else {}
+    with pytest.raises(InputError, match=f"film {found} at x = 0.01.* it must be positive everywhere"):
+        solve(data | {"film": film})

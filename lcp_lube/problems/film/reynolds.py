@@ -131,6 +131,8 @@ def box_scheme(grid: Grid, film: Film, **data: Any) -> BoxScheme:
     """
     with np.errstate(all="ignore"):
         box = coefficients(grid, film, **data)
+        x, y = (grid.nodes_and_faces(side)[0] if side < grid.dim else np.zeros(1) for side in (0, 1))
+        ends = [np.ravel(film(*at)) for at in ((x[None, [0, -1]], y[:, None]), (x[None, :], y[[0, -1], None]))]
     reduce = grid.reduce
     # Every face once: k_E and k_N are k_W and k_S but for the last ones.
     faces = [box.k_W, box.k_E[:, -1:]] + ([box.k_S, box.k_N[-1:]] if grid.dim == 2 else [])
@@ -139,7 +141,7 @@ def box_scheme(grid: Grid, film: Film, **data: Any) -> BoxScheme:
         np.min(k, where=~wall, initial=np.inf) for k, wall in zip(faces, (west, east[:, -1:], south, north[-1:]), strict=False)
     ]
     stores = [] if box.storage is None else [box.storage]
-    smallest = min(map(reduce.min, [box.h, np.array(conducting), *stores]))
+    smallest = float(np.min([reduce.min(a) for a in (box.h, *ends, np.array(conducting), *stores)]))  # NaN stays NaN
     largest = max(*map(reduce.max, faces), reduce.largest(box.b_C), reduce.largest(box.c))
     if not (smallest > 1 / LARGE and largest < LARGE):
         with np.errstate(all="ignore"):
