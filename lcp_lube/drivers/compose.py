@@ -58,7 +58,6 @@ CANNOT = (
     ("time", "nested", "it goes on in time, each step from the one before, on one grid"),
     ("grooves", "checkpoint", "its films are solved one by one"),
     ("grooves", "resume", "its films are solved one by one"),
-    ("grooves", "certify", "a band would be proved for each film between grooves alone"),
     ("supplies", "checkpoint", "its many solves make one answer; give the pressures that were found for one solve"),
     ("supplies", "resume", "its many solves make one answer; give the pressures that were found for one solve"),
     ("supplies", "certify", "a band is proved at given pressures of supplies; give those that were found"),

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -15,9 +16,10 @@ from ..problems.film.grooves import GroovedProblem, Pad
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.grid import Grid
-from ..problems.solution import Fields, Outcome, Solution
+from ..problems.solution import Enclosure, Fields, Outcome, Solution
 from ..problems.transfer import Pick, fetch, numbers
 from ..scenes.scene import Derived, Solvable
+from ..solvers.enclosure import bounds_of
 from .ask import Ask, Start
 from .chain import added
 from .compose import Inner
@@ -102,11 +104,12 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
             done[k] = inner(films[k][1], replace(ask, start=starts.get(k)))
     for start in starts.values():
         start.problem.destroy()
-    fields, dry = _spread(ring, films, done, comm)
+    fields, dry = _spread(ring, films, {k: (one.problem, one.fields) for k, one in done.items()}, comm)
     if ring.reduce.max(dry) > 0:
         ring = ring.revised(dry)  # type: ignore[assignment]
     first = {k: (one.outcome, one.message, one.steps, one.settings, one.times) for k, one in done.items()}
     told = sorted({k: one for part in comm.allgather(first) for k, one in part.items()}.items())
+    band = _band(ring, films, fields, done, comm) if ask.certify else None
     for one in done.values():
         one.destroy()
     if groups > 1:
@@ -124,9 +127,26 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         f"{len(films)} films between grooves; {message}",
         ring.certify(fields, settings["eps1"]),
         [step for _, one in told for step in one[2]],
+        enclosure=band,
         settings=settings,
         times=times,
     ).judged()
+
+
+def _band(ring: Any, films: Films, fields: Fields, done: dict[int, Solution], comm: MPI.Comm) -> Enclosure:
+    """The ring's band from those of its films, which grooves part: each is a problem of its own. Collective."""
+    mine = {k: one.enclosure or Enclosure(False, "no band: no answer") for k, one in done.items()}
+    poor = {k: one.message for k, one in mine.items() if not one.certified}
+    missing = sorted(found for part in comm.allgather(poor) for found in part.items())
+    if missing:
+        return Enclosure(False, f"film {missing[0][0] + 1} of {len(films)} between grooves: {missing[0][1]}")
+    lower, upper = (
+        _spread(ring, films, {k: (done[k].problem, getattr(band, end)) for k, band in mine.items()}, comm)[0]
+        for end in ("lower", "upper")
+    )
+    bounds = bounds_of(ring, fields, lower, upper)
+    message = f"the discrete solution is proved to be within {bounds['band_p']:.1e} Pa of p, film by film between grooves"
+    return Enclosure(True, message, lower, upper, bounds)
 
 
 def _group(films: Films, groups: int) -> list[int]:
@@ -157,7 +177,7 @@ def _starts(ring: LubricationProblem, films: Films, mine: list[int], ask: Ask, c
     }
 
 
-def _spread(ring: GroovedProblem, films: Films, done: dict[int, Solution], comm: MPI.Comm) -> tuple[Fields, Array]:
+def _spread(ring: GroovedProblem, films: Films, done: dict[int, tuple[Any, Fields]], comm: MPI.Comm) -> tuple[Fields, Array]:
     """The ring's fields from its films and grooves, and which of its points a film took to be cavitated. Collective."""
     j, i = (one.ravel() for one in np.broadcast_arrays(*numbers(ring.grid)))
     which, column = np.full(j.size, -1), np.zeros(j.size, dtype=np.int64)
@@ -165,10 +185,10 @@ def _spread(ring: GroovedProblem, films: Films, done: dict[int, Solution], comm:
         at = (i - pad.first) % ring.grid.shape[0]
         which, column = np.where(at < pad.n, k, which), np.where(at < pad.n, at, column)
     have = []
-    for k, one in done.items():
-        dry = getattr(one.problem, "dry", None)
-        fields = (one.fields["p"], one.fields["r"], dry if dry is not None else np.zeros(one.problem.grid.local_size))
-        have.append((k, one.problem.grid, np.array(fields)))
+    for k, (problem, found) in done.items():
+        dry = getattr(problem, "dry", None)
+        fields = (found["p"], found["r"], dry if dry is not None else np.zeros(problem.grid.local_size))
+        have.append((k, problem.grid, np.array(fields)))
     p, r, dry = fetch(comm, have, which, j, column)
     for inside, groove in zip(ring.columns, ring.grooves, strict=True):
         p[inside] = groove.p / ring.p_unit

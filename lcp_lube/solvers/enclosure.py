@@ -122,7 +122,7 @@ def enclose(problem: LubricationProblem, fields: Fields, system: str, stages: St
     if lower is None or upper is None:
         where = "below" if lower is None else "above"
         return Enclosure(False, f"no band: the flow balance does not have the needed sign {where} the answer; is it poor?")
-    bounds = _bounds(problem, fields, lower, upper)
+    bounds = bounds_of(problem, fields, lower, upper)
     largest = max(problem.reduce.max(np.abs(fields["p"])) * problem.p_unit, *problem.p_sides, 1e-9 * problem.p_unit)
     if not bounds["band_p"] <= WIDEST * largest:
         return Enclosure(False, f"no band worth the name: the answer may be off by {bounds['band_p']:.1e} Pa")
@@ -179,7 +179,7 @@ class _Band:
         return None
 
 
-def _bounds(problem: LubricationProblem, fields: Fields, lower: Fields, upper: Fields) -> dict[str, float]:
+def bounds_of(problem: LubricationProblem, fields: Fields, lower: Fields, upper: Fields) -> dict[str, float]:
     """Distances of the answer from the farther end of the band, in SI, what their own arithmetic rounds added. Collective."""
     reduce, unit = problem.reduce, problem.p_unit
     p, r = fields["p"], fields["r"]

@@ -176,6 +176,7 @@ def test_poor_answers_are_refused(steps):
         ("rough", {"n": 40}, "auto"),
         ("textured_slider", {"K": 1}, "auto"),
         ("journal", {"n": 48}, "auto"),
+        ("two_groove_journal", {"nx": 72, "ny": 9, "p_groove": 1e5}, "din"),
         ("problem4", {"n": 150}, "auto"),
     ],
 )
@@ -187,6 +188,11 @@ def test_every_methods_answer(name, changes, method):
     assert distance <= solution.enclosure.bounds["band_p"] + tight.enclosure.bounds["band_p"] < 1.0
     solution.destroy()
     tight.destroy()
+
+
+def test_films_between_grooves_that_have_no_band():
+    with solve(load_scene("two_groove_journal", {"nx": 60, "ny": 5}), method="din", stopping={"max_it": 1}, certify=True) as s:
+        assert not s.enclosure.certified and "of 2 between grooves: no band" in s.enclosure.message
 
 
 def test_conditions_are_checked():
@@ -258,6 +264,7 @@ def test_only_films(cli):
         ("problem4 --nx 53 --ny 41", 3),
         ("problem4 --nx 150 --ny 151", 1),
         ("problem4 --nx 150 --ny 151", 2),
+        ("two_groove_journal --nx 60 --ny 7", 2),
     ],
 )
 def test_on_several_ranks(cli, words, ranks):
