@@ -50,30 +50,14 @@ def units(dim: int) -> dict[str, str]:
 
 
 def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any]:
-    """Integrals and extrema of the fields, and the scene's own numbers (`problem.extras`). Collective.
+    """Integrals and extrema of the fields, and the scene's own numbers (`problem.extras`): keys of docs/numbers.md. Collective.
 
-    In 1D forces, powers and areas are per unit width (N/m, W/m, m), flows too (m2/s).
+    SI, pressures absolute; in 1D forces, powers and areas are per unit width (N/m, W/m, m), flows too (m2/s). What a film
+    carries is in `forces.forces`, drag and flows in `flows`, fronts and cavities in `fronts`, the largest pressure in `peak`.
 
     Parameters
     ----------
     p, r : owned points; p in units of p_unit above the cavitation pressure.
-
-    Returns
-    -------
-    p_max : largest pressure, absolute, Pa; p_max_at : its [x] or [x, y], m (of a side: its middle).
-    load, force, moment, attitude_deg : what the film carries (`forces.forces`), above p_ambient (Pa, absolute), the smallest
-    pressure at a side. pressure_integral : of p - p_c, N.
-    friction : drag on the moving wall, N (`flows.friction`). friction_coefficient : friction over load; None unless that is
-    positive. power_loss : friction U, W.
-    flow : out of each side, m3/s (`flows.side_flows`). side_leakage : south and north together (2D). flow_growth : of each when
-    the spacings are halved, None if they converge (`forces.corner_flows`; 2D).
-    min_h, min_h_at : thinnest film and where, m, sides included.
-    cavitated_fraction : share of the points (`cavity.cavitated`); cavitated_area : between the
-    fronts, m2 (`fronts.cavitated_area`).
-    ruptures, reformations : x of all of them, m; in 2D on the middle line (`fronts.fronts`). rupture : the first one, None
-    where absent. reformation : the first one behind it, or behind the void that enters.
-    p_unit : Pa. supply_p, supply_flow : of each supply, absolute, Pa, and what it gives to the film, m3/s.
-    friction_torque : of a sector, about its centre, N m.
     """
     grid, reduce = problem.grid, problem.reduce
     p_pa = p * problem.p_unit
