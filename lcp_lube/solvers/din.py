@@ -16,26 +16,17 @@ from .steplength import Centrality, feasible, halve_until, inexact_decrease, red
 Trial = tuple[Array, Array, Array]  # p, r, F1
 
 
-def mu1(gap: float, norm: float, n: int) -> float:
-    """Average complementarity p'r/n."""
-    return gap / n
-
-
-def mu2(gap: float, norm: float, n: int) -> float:
-    """||F||/sqrt(n): never vanishes before F does, so a start near zero can leave the boundary."""
-    return norm / np.sqrt(n)
-
-
-def adaptive(gap: float, norm: float, n: int) -> float:
-    """mu1 while p'r > 0.1, then mu2."""
-    return mu1(gap, norm, n) if gap > 0.1 else mu2(gap, norm, n)
-
-
-MU_RULES: dict[str, Callable[[float, float, int], float]] = {"mu1": mu1, "mu2": mu2, "adaptive": adaptive}
+# mu by gap = p'r, ||F|| and n: the average complementarity; what never vanishes before F does, so that a start near zero can
+# leave the boundary; the first while p'r > 0.1, then the second.
+MU_RULES: dict[str, Callable[[float, float, int], float]] = {
+    "mu1": lambda gap, norm, n: gap / n,
+    "mu2": lambda gap, norm, n: norm / np.sqrt(n),
+    "adaptive": lambda gap, norm, n: gap / n if gap > 0.1 else norm / np.sqrt(n),
+}
 INSIDE = " (the method starts inside p, r > 0)"
 
 
-def subset_of_FRCB(letters: str) -> bool:
+def _subset(letters: str) -> bool:
     return set(letters) <= set("FRCB") and len(set(letters)) == len(letters)
 
 
@@ -53,7 +44,7 @@ class DinOptions(MethodOptions):
     p0: float = positive(1.0, "--p0", INSIDE)
     r0: float = positive(0.1, "--r0", INSIDE)
     mu: str = one_of("mu2", MU_RULES, "--mu")
-    conditions: str = option("FCB", subset_of_FRCB, "any combination of the letters F, R, C, B, each once", "--conditions")
+    conditions: str = option("FCB", _subset, "any combination of the letters F, R, C, B, each once", "--conditions")
     sigma_max: float = part(0.9)
     sigma_factor: float = part(0.01)
     gamma: float = part(0.5)

@@ -101,10 +101,10 @@ def test_mu1_stalls_near_the_boundary(run):
 
 
 def test_mu_values():
-    assert din.mu1(6.0, 5.0, 3) == 2.0
-    assert din.mu2(6.0, 6.0, 9) == 2.0
-    assert din.adaptive(0.2, 6.0, 2) == 0.1
-    assert din.adaptive(0.1, 6.0, 4) == 3.0
+    assert din.MU_RULES["mu1"](6.0, 5.0, 3) == 2.0
+    assert din.MU_RULES["mu2"](6.0, 6.0, 9) == 2.0
+    assert din.MU_RULES["adaptive"](0.2, 6.0, 2) == 0.1
+    assert din.MU_RULES["adaptive"](0.1, 6.0, 4) == 3.0
 
 
 @pytest.mark.parametrize("conditions", ["F", "R", "FR", "C", "FC", "RC", "CB", "BCRF", ""])
