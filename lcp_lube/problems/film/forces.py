@@ -46,18 +46,8 @@ def forces(problem: LubricationProblem, p_pa: Array, known: Known | None = None)
     ----------
     p_pa : owned points, Pa above p_c. known : of a line, from which follows what the grid gets wrong.
     """
-    grid, shaft, reference, of = problem.grid, problem.shaft, ambient(problem), weights(problem)
-
-    def over(name: str, above: float, touching: Any) -> float:
-        found = integral(problem, p_pa, above, of[name])
-        found += touching.total(problem, of[name]) if touching else 0.0
-        if known is None:
-            return found
-        along = known.line.integral(antiderivative(problem, name), above)
-        return found + (along - integral(problem, known.p_pa, above, of[name]))
-
-    out: dict[str, Any] = {"pressure_integral": over("pressure_integral", 0.0, None)}
-    found = {name: over(name, reference, problem.contact) for name in of if name != "pressure_integral"}
+    shaft, found = problem.shaft, totals(problem, p_pa, known)
+    out: dict[str, Any] = {"pressure_integral": found["pressure_integral"]}
     if shaft is None:
         out["load"] = found["load"]
     else:
@@ -69,9 +59,24 @@ def forces(problem: LubricationProblem, p_pa: Array, known: Known | None = None)
         out["moment"] = found["moment"]
     elif "moment_x" in found:
         out["moment"] = moment = [found["moment_x"], found["moment_y"]]
-        if shaft is None and grid.polar is not None:
+        if shaft is None and problem.grid.polar is not None:
             degrees = float(np.degrees(np.arctan2(moment[0], -moment[1])))
             out["pressure_centre"] = [hypot(*moment) / out["load"], degrees] if out["load"] > 0 else None
+    return out
+
+
+def totals(problem: LubricationProblem, p_pa: Array, known: Known | None = None) -> dict[str, float]:
+    """Integrals of the pressure by its `weights`, but for `pressure_integral` above ambient and with contact. Collective."""
+    out, contact = {}, problem.contact
+    for name, weight in weights(problem).items():
+        whole = name == "pressure_integral"
+        above = 0.0 if whole else ambient(problem)
+        out[name] = integral(problem, p_pa, above, weight)
+        if contact is not None and not whole:
+            out[name] += contact.total(problem, weight)
+        if known is not None:
+            along = known.line.integral(antiderivative(problem, name), above)
+            out[name] += along - integral(problem, known.p_pa, above, weight)
     return out
 
 

@@ -15,7 +15,7 @@ from ...base.parallel import Array
 from .cavity import cavity_sign
 from .effects import around
 from .flows import friction, line_weights, point_weights, sheared_faces, side_flows, volume_unit
-from .forces import forces, weights
+from .forces import totals, weights
 from .grooves import GroovedProblem
 from .lubrication import LubricationProblem
 from .peak import Window
@@ -47,16 +47,7 @@ def numbers(problem: LubricationProblem, p: Array, r: Array, wanted: Collection[
         return wanted is None or any(name.startswith(start) for name in wanted)
 
     p_pa = p * problem.p_unit
-    found = forces(problem, p_pa)
-    out = {"pressure_integral": found["pressure_integral"]}
-    if problem.shaft is None:
-        out["load"] = found["load"]
-    else:
-        out |= dict(zip(("force_x", "force_y"), found["force"], strict=True))
-    if isinstance(found.get("moment"), list):
-        out |= dict(zip(("moment_x", "moment_y"), found["moment"], strict=True))
-    elif "moment" in found:
-        out["moment"] = found["moment"]
+    out = totals(problem, p_pa)
     out["friction"] = friction(problem, p_pa, r) if asked("friction") else np.nan
     if problem.grid.polar is not None:
         lever = problem.grid.polar[0] + problem.grid.y
