@@ -179,7 +179,7 @@ def bytes_needed(facts: Facts, plan: Plan) -> float | None:
 
 def _libraries(facts: Facts, plan: Plan) -> int:
     """Bytes of what a rank loads in the course of such a run."""
-    compiles = plan.system in ("", "cavity") or (plan.nested and plan.method in ("active-set", "monotone"))
+    compiles = not plan.system or (plan.nested and plan.method in ("active-set", "monotone"))
     if facts.kind == "lubrication" and compiles and "numba" not in sys.modules and find_spec("numba"):
         return LIBRARIES + COMPILER
     return LIBRARIES
