@@ -95,10 +95,11 @@ def save(
 
                 write_netcdf(solution, dict(zip("xy", coordinates(points), strict=False)), whole, temporary)
         else:
+            result = ""
             if suffix == ".h5":  # a rank that fails inside HDF5 leaves the others there
                 with on_all_ranks(grid.comm, f"{path}: could not be written"):
                     reserve(temporary, 8 * grid.size * len(fields))
-            result = grid.comm.bcast(json.dumps(finite(as_dict(solution))))  # each rank has seconds of its own
+                result = grid.comm.bcast(json.dumps(finite(as_dict(solution))))  # each rank has seconds of its own
             _save_by_viewer(points, fields, units, temporary, result)
 
 
