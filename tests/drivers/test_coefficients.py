@@ -245,11 +245,6 @@ def test_grooves_give_what_the_ends_lose():
     solution.destroy()
 
 
-def test_grooves_that_are_refused():
-    with pytest.raises(InputError, match="not for scene two_groove_journal"):
-        solve("two_groove_journal", certify=True, **SMALL)
-
-
 @pytest.mark.parametrize(
     ("name", "changes"),
     [("ring_journal", {}), ("two_groove_journal", {}), ("dimpled_pad", {}), ("hybrid_journal", {}), ("misaligned_journal", {})],
