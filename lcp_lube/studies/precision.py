@@ -62,7 +62,10 @@ LONG = 0.3  # seconds; a longer run is not repeated: its clock is steady enough
 KRYLOV_MOST = 20_000  # iterations
 ENOUGH = 3.0  # seconds; after such a run a configuration is not tried on larger grids
 
-MARKS = "`-`: no run gets there. `not run`: none did on the grids run, and larger ones, which others have, would take minutes."
+MARKS = (
+    "`-`: no run is known to, by a reference that is as sure. `not run`: none did on the grids run, and larger ones, which "
+    "others have, would take minutes."
+)
 
 KEY = ("scene", "data", "n", "method", "nested", "system", "recipe", "eps", "ranks")
 CLOCKS = ("wall_s", "cpu_s")

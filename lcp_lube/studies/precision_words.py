@@ -19,21 +19,38 @@ def seconds(row: Row) -> float:
 
 
 def timed(rows: Sequence[Row]) -> list[Row]:
-    """The rows whose seconds may be compared: of the machine that made most of them, without those made while it was busy.
+    """The rows whose seconds may be compared: by scene those of the machine that made most of them, but for those made while it
+    was busy.
 
     Where most were made while it was busy, none is left out.
     """
-    machine = Counter(row.get("machine") for row in rows).most_common(1)[0][0] if rows else None
-    cores = int(found[1]) if (found := re.search(r"(\d+) cores", machine or "")) else 1
-    here = [row for row in rows if row.get("machine") == machine]
+    return [row for mine in by_scene(rows).values() for row in _quiet(mine)]
+
+
+def _quiet(rows: Sequence[Row]) -> list[Row]:
+    machine = _machine(rows)
+    cores = int(found[1]) if (found := re.search(r"(\d+) cores", machine)) else 1
+    here = [row for row in rows if (row.get("machine") or "") == machine]
     quiet = [row for row in here if float(row.get("load_average") or 0.0) <= cores]
     return quiet if 2 * len(quiet) > len(here) else here
 
 
+def _machine(rows: Sequence[Row]) -> str:
+    return Counter(row.get("machine") or "" for row in rows).most_common(1)[0][0]
+
+
 def untimed(rows: Sequence[Row]) -> str:
-    """How many rows count for outcomes and iterations alone."""
+    """How many rows count for outcomes and iterations alone; where there are several machines, whose seconds are of which."""
     count = len(rows) - len(timed(rows))
-    return f" Seconds are not compared of {count} runs of another or a busy machine." if count else ""
+    text = f" Seconds are not compared of {count} runs of another or a busy machine." if count else ""
+    machines: dict[str, list[str]] = {}
+    for scene, mine in by_scene(rows).items():
+        machines.setdefault(_machine(mine), []).append(scene)
+    if len(machines) > 1:
+        most = max(machines, key=lambda name: len(machines[name]))
+        others = "; ".join(f"{', '.join(scenes)} on {name}" for name, scenes in machines.items() if name != most)
+        text += f" Machine: {most}; {others}."
+    return text
 
 
 def error(row: Row, quantity: str) -> float | None:
@@ -69,8 +86,9 @@ def front(rows: Sequence[Row], quantity: str) -> list[Row]:
 
 
 def fastest(rows: Sequence[Row], level: float, quantity: str = "load") -> Row | None:
-    """The run of least seconds whose error is at most `level`."""
-    good = [row for row in rows if (here := error(row, quantity)) is not None and here <= level]
+    """The run of least seconds whose error is at most `level`, of those whose reference is as sure as that."""
+    sure = [row for row in rows if float(row.get(f"{quantity}_unsure") or 0.0) <= level]
+    good = [row for row in sure if (here := error(row, quantity)) is not None and here <= level]
     return min(good, key=seconds, default=None)
 
 
@@ -104,7 +122,7 @@ def which(rows: Sequence[Row]) -> list[str]:
         for level in ASKED:
             best = fastest(mine, level)
             if best is None:
-                lines.append(f"| {scene} | {percent(level)} | no run gets there | | | |")
+                lines.append(f"| {scene} | {percent(level)} | no run is known to | | | |")
                 continue
             rivals = []
             for theirs in (list(filter(published, mine)), [row for row in mine if row["system"] == PEER]):
@@ -168,6 +186,6 @@ def sentence(rows: Sequence[Row], quantity: str) -> str:
         if ratios:
             text += f"; the paper's DIN (2n system, no coarser grids) takes {ratios[0]:.2g} to {ratios[-1]:.2g} times as long"
         lost = len(scenes) - len(bests)
-        text += f"; on {lost} of {len(scenes)} scenes no run gets there" if lost else ""
+        text += f"; on {lost} of {len(scenes)} scenes no run is known to" if lost else ""
         parts.append(f"{text}." if bests else f"Within {percent(level)}: no run.")
     return f"{' '.join(parts)} {failures(rows)}{untimed(rows)}"
