@@ -1,8 +1,6 @@
 """Reductions over arrays that each rank holds its own part of."""
 
-import ctypes
 from collections.abc import Callable
-from contextlib import suppress
 from functools import wraps
 from typing import Any, TypeVar, cast
 
@@ -26,12 +24,6 @@ def overflow_is_no_warning(function: Function) -> Function:
             return function(*args, **kwargs)
 
     return cast(Function, quiet)
-
-
-def trim() -> None:
-    """Give back what arrays that are gone have held: MPI libraries tell malloc to keep it, and holes do not fit what comes."""
-    with suppress(AttributeError, OSError):  # not glibc
-        ctypes.CDLL(None).malloc_trim(0)
 
 
 class Reduce:

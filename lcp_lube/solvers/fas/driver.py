@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ...base.parallel import Array, trim
+from ...base.parallel import Array
 from ...problems.film.lubrication import LubricationProblem
 from ...problems.film.stored import storing
 from ...problems.solution import Fields, Step
@@ -33,7 +33,6 @@ SETTLED = 1e-8  # of the largest pressure: what they may then be in the mean
 SCALED = 1e-3  # the most by which all pressures and voids are scaled (`Fas._balance`)
 CLOSE = 1e-6  # ||G|| below which a ring that is hardly fed is not what has stalled
 FED = 3e-5  # of the certificate's tolerance: the flow that a film with supplies may lose, 3e-12 in parts of what flows
-LARGE = 1_000_000  # points from which memory counts
 BORDER = 4  # lines on either side of the border between two ranks
 
 
@@ -67,8 +66,6 @@ class Fas(Cycles):
         self._kernels, self._fronts, self._transfer, self._tools, self._finest = kernels, fronts, transfer, levels, finest
         self._harmonic, self._truncation = options.weights == "harmonic", TRUNCATIONS[options.truncation]
         with self.stages("assembly"):
-            if problem.size > LARGE:
-                trim()
             self._levels = levels.hierarchy(finest.finest(problem), self._harmonic)
         self._begin(start is not None)
         self._c_norm = problem.reduce.norm(problem.scheme.c) if problem.held is None else self._norms()[0]
@@ -132,8 +129,6 @@ class Fas(Cycles):
             return norm
         for coarse in self._levels[1:]:
             coarse.rest()
-        if self.problem.size > LARGE:
-            trim()
         self.certificate = seen = self.problem.certify(self.fields, self.eps1)
         lost = seen.measures["mass_defect"] / (self._share if self.problem.held is None else FED)
         return max(norm, self._rest * max(lost, seen.measures["residual"] / self._share) / seen.tol)
@@ -196,9 +191,7 @@ class Fas(Cycles):
 
     def destroy(self) -> None:
         super().destroy()
-        if self.problem.size > LARGE:
-            self._levels = []
-            trim()
+        self._levels = []
 
     def _retreat(self) -> bool:
         """Do without the coarsest grids, on which the film's cavities are too small to be seen; false if that has been tried.
