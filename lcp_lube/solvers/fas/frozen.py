@@ -71,7 +71,6 @@ class Frozen:
             full = coarse.gather(values)
             self.full.append(full > 0.0)
         self.free = [None if level.held is None else ~level.held for level in self.levels]
-        self.of(1, False)
 
     def of(self, several: int, transposed: bool, nu: float = 0.0) -> None:
         """Take so many right-hand sides, 1 or 2; at nu > 0 they are one, real and imaginary."""

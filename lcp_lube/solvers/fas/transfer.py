@@ -56,12 +56,7 @@ def restrict(
             r[1:-1] = c[m, 1:-1]
         if by_x:
             west_shares(kx[m], harmonic, w)
-            for k in range(1, n_coarse + 1):
-                coarse[k] = r[2 * k] + ((1.0 - w[k - 1]) * r[2 * k - 1] + w[k] * r[2 * k + 1])
-            if wrap:  # periodic in x: what goes to the frame belongs to the last point
-                coarse[n_coarse] += w[0] * r[1]
-        else:
-            coarse[:] = r
+        restrict_row(r, w, by_x, wrap, coarse)
         j = y0 + m - 1
         if not by_y:
             out[m] += coarse
@@ -79,6 +74,19 @@ def restrict(
                 part = 0.5 * south[k] * coarse[k]
                 out[row, k] += part
                 out[row + 1, k] += 0.5 * coarse[k] - part
+
+
+@kernel
+def restrict_row(r: Array, w: Array, by_x: bool, wrap: bool, out: Array) -> None:
+    """What a line's values, zero in the frame, give to the coarse points of a line: `interpolate_row` transposed."""
+    if not by_x:
+        out[:] = r
+        return
+    n = out.size - 2
+    for k in range(1, n + 1):
+        out[k] = r[2 * k] + ((1.0 - w[k - 1]) * r[2 * k - 1] + w[k] * r[2 * k + 1])
+    if wrap:  # periodic in x: what goes to the frame belongs to the last point
+        out[n] += w[0] * r[1]
 
 
 @kernel
