@@ -106,15 +106,17 @@ def coefficients(
     names = FLAT if turning is None else TILTED if tilt else JOURNAL
     total = np.zeros((len(frequencies), len(motions), len(motions)), dtype=complex)
     symmetric = solution.settings.get("details", {}).get("reduction") == "mirror"
-    found: Iterator[Any] = responses(scene, model, ring, solution.fields, motions, symmetric)
     with_effects = model.law is not None or bool(model.effects)
-    if with_effects:
-        found = _with_effects(scene, solution, [partial(_moved, model.gap, motion) for motion in motions])
+    found: Iterator[Any] = iter(())
     if isinstance(scene, TiltingPadScene) or pads is not None:
-        found, turn = iter(()), np.array([[math.cos(along), -math.sin(along)], [math.sin(along), math.cos(along)]])
+        turn = np.array([[math.cos(along), -math.sin(along)], [math.sin(along), math.cos(along)]])
         follow = np.zeros(0, dtype=bool) if pads is None else pads.free
         own = _of_pads(scene, solution, frequencies, follow, with_effects)
         total += turn.T @ own @ turn if turning is not None else own
+    elif with_effects:
+        found = _with_effects(scene, solution, [partial(_moved, model.gap, motion) for motion in motions])
+    else:
+        found = responses(scene, model, ring, solution.fields, motions, symmetric)
     for response in found:
         for k, nu in enumerate(frequencies):
             total[k] += response.at(nu, stored) if nu else response.stiffness() + 1j * response.damping()

@@ -16,7 +16,6 @@ import numpy as np
 from ..base.parallel import Array
 from ..errors import InputError, nearest
 from ..problems.film.cavity import VOID
-from ..problems.film.effects import Answer, answer, factors
 from ..problems.film.grooves import GroovedProblem
 from ..problems.solution import Solution
 from ..scenes.scene import Scene
@@ -68,17 +67,9 @@ class CoupledGradient(CoupledResponse):
     def value(self, key: str) -> float:
         return values_of(self.scene)[key]
 
-    def _at(self, loop: Loop, z: Array, x: Array) -> Answer:
-        """A state of another scene near by, p in Pa and x the same."""
-        p = (self.p + np.where(self.cavity, 0.0, z)) * self.loop.base.p_unit
-        cells = loop.cells(x) if loop.names else {}
-        sides = [float(loop.law.density(np.array(p))) for p in loop.p_sides] if loop.law.dowson_higginson else None
-        by, r = factors(loop.base, cells, sides), self.r - np.where(self.cavity, z, 0.0)
-        return answer(loop.base, loop.law, cells, by, p, r, loop.p_sides)
-
     def _numbers(self, loop: Loop, z: Array, x: Array) -> dict[str, float]:
         """What is told of a state, vectors by their parts."""
-        at = self._at(loop, z, x)
+        at = self._answer(z, x, loop.base, loop)
         for effect in loop.effects:
             at.problem.more |= effect.report(at).numbers
         told = at.problem.quantities({"p": at.p / at.problem.p_unit, "r": at.r})
@@ -96,7 +87,7 @@ class CoupledGradient(CoupledResponse):
 
     def _rest(self, loop: Loop) -> Array:
         """R of another scene at the solution's state."""
-        at = self._at(loop, np.zeros(self.n), self.x)
+        at = self._answer(np.zeros(self.n), self.x, loop.base, loop)
         film = at.problem
         H = film.balance(at.p / film.p_unit, at.r) * (film.scheme.flow_unit / self.unit)
         if isinstance(loop.base, GroovedProblem):

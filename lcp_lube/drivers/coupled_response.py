@@ -28,7 +28,7 @@ from ..problems.film.grooves import GroovedProblem
 from ..problems.film.supplies import Supply, supply_flows
 from ..problems.solution import Solution
 from .ask import Ask
-from .linearised import Linear
+from .linearised import Linear, following
 from .loop import Loop
 from .supplies import Fed
 
@@ -93,11 +93,13 @@ class CoupledResponse:
         rise = (gap(e)(grid.x, grid.y) - gap(-e)(grid.x, grid.y)) / (2.0 * e)
         return np.broadcast_to(rise, grid.box).ravel()
 
-    def _answer(self, z: Array, x: Array, base: Any) -> Answer:
-        loop, cells = self.loop, self.loop.cells(x) if self.loop.names else {}
+    def _answer(self, z: Array, x: Array, base: Any, loop: Loop | None = None) -> Answer:
+        """The film of a state on `base`, the film itself or one near by; loop : of another scene, p in Pa and x the same."""
+        p = (self.p + np.where(self.cavity, 0.0, z)) * self.loop.base.p_unit
+        loop = loop or self.loop
+        cells = loop.cells(x) if loop.names else {}
         at_sides = [float(loop.law.density(np.array(p))) for p in loop.p_sides] if loop.law.dowson_higginson else None
         by = factors(base, cells, at_sides)
-        p = (self.p + np.where(self.cavity, 0.0, z)) * base.p_unit
         return answer(base, loop.law, cells, by, p, self.r - np.where(self.cavity, z, 0.0), loop.p_sides)
 
     def _system(self, z: Array, x: Array, base: Any) -> tuple[Array, Array, Array]:
@@ -133,9 +135,8 @@ class CoupledResponse:
         if (nu, stored) not in self._answers:
             self._answers[nu, stored] = [self._solve(one + 0.0j if nu else one, nu, stored) for one in self._pushes]
         answers = self._answers[nu, stored]
-        by_p, by_flow = self._sources[self.free].T
         slopes = np.stack([self._given(one, nu) for one in answers], axis=1)
-        P = np.linalg.solve(by_flow[:, None] * slopes + np.diag(by_p), -by_flow * (self._given(y, nu) + own))
+        P = following(slopes, self._given(y, nu) + own, self._sources[self.free])
         return y + sum(p * one for p, one in zip(P, answers, strict=True))
 
     def _given(self, y: Any, nu: float) -> Any:

@@ -1,7 +1,6 @@
 """The discrete film, linearised at the signs of a solution: solves with its Jacobian, and what supplies make of them."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import cached_property
 from importlib.util import find_spec
 from typing import Any
@@ -15,6 +14,7 @@ from ..base.parallel import Array
 from ..linear.krylov import Krylov
 from ..problems.facts import Facts
 from ..problems.film.assembly import assemble
+from ..problems.film.flows import volume_unit
 from ..problems.film.lubrication import LubricationProblem
 from ..registry import SMALL
 from .plan import default_recipe
@@ -39,8 +39,7 @@ class Linear:
         factored: bool = False,
     ):
         """entries : of dG/dp, where that is not A (of a fluid with a law). given : points in a groove, whose rows are those of
-        the identity. M : the diagonal of what void is stored (`at`). factored : it is
-        solved with so often that factors pay."""
+        the identity. M : the diagonal of what void is stored (`at`). factored : it is solved with so often that factors pay."""
         self.problem, self.cavity, self.entries, self.given, self.M = problem, cavity, entries, given, M
         grid, self.frozen = problem.grid, None
         apart = entries is None and not factored and (given is None or problem.held is None)
@@ -143,12 +142,11 @@ class Feed:
     """
 
     def __init__(self, problem: LubricationProblem, cavity: Any, free: Any):
-        held, whole = problem.held, replace(problem.scheme, held=None)
+        held, whole = problem.held, problem.scheme.changed(held=None)
         assert held is not None  # for the type checker: it has supplies
         self.problem, self.cavity, self.held, self.free = problem, cavity, held, np.flatnonzero(free)
         self._A, self._B = assemble(problem.grid, whole.pressure_entries()), assemble(problem.grid, whole.void_entries())
-        grid = problem.grid
-        self._unit = 0.5 * problem.scheme.flow_unit * (grid.spacing[1] if grid.dim == 2 else 1.0)
+        self._unit = volume_unit(problem)
 
     def pushed(self, t: int) -> Array:
         """Right-hand side of a pressure of 1 Pa in supply t."""
@@ -176,11 +174,15 @@ class Feed:
 
     def corrected(self, z: Any, raw: Any, answers: Any, sources: Array) -> Any:
         """z with the pressures that follow; sources : a and b of all supplies, shape (supplies, 2). Collective."""
-        by_p, by_flow = sources[self.free].T
-        matrix = by_flow[:, None] * self.slopes(answers) + np.diag(by_p)
-        P = np.linalg.solve(matrix, -by_flow * self.taken(z, raw)[self.free])
+        P = following(self.slopes(answers), self.taken(z, raw)[self.free], sources[self.free])
         return z + sum(p * answer for p, answer in zip(P, answers, strict=True))
 
     def destroy(self) -> None:
         self._A.destroy()
         self._B.destroy()
+
+
+def following(slopes: Any, taken: Any, sources: Array) -> Any:
+    """P of `Feed`'s equation, of the supplies that are free: their slopes, what they would give at P = 0, their a and b."""
+    by_p, by_flow = sources.T
+    return np.linalg.solve(by_flow[:, None] * slopes + np.diag(by_p), -by_flow * taken)

@@ -91,9 +91,10 @@ class Response:
         unit = 2.0 * grid.spacing[0] / problem.scheme.flow_unit * size
         self._M = np.where(self.cavity, unit * problem.scheme.h.ravel(), 0.0)
         self._S = [unit * (1.0 - self.r) * change for change in self.changes]
-        self._solver: Linear | Halved = Linear(problem, self.cavity, M=self._M)
-        if film is not None and grid.size > SMALL:
-            self._solver = Halved(problem, self.cavity, film, self._M)
+        halved = film is not None and grid.size > SMALL
+        self._solver: Linear | Halved = (
+            Halved(problem, self.cavity, film, self._M) if halved else Linear(problem, self.cavity, M=self._M)  # type: ignore[arg-type]
+        )
         held = problem.held
         supplies = held.supplies if held is not None else ()
         taken = supply_flows(problem, self.p, self.r)
