@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 
 from ..base.parallel import Array
-from ..problems.film.flows import drag, line_weights
+from ..problems.film.flows import drag, volume_unit
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.reynolds import BoxScheme, sides
 from ..problems.film.slopes import giving
+from ..problems.film.strip import line_weights
 from ..problems.film.tangent import effective
 from ..problems.film.turned import TurnedProblem
 from ..problems.grid import Grid
@@ -84,7 +85,7 @@ class FilmGradient:
         held = adjoint.equations.given
         rows = -adjoint.lambdas[name] if held is None else np.where(held, 0.0, -adjoint.lambdas[name])
         total = np.zeros(adjoint.equations.grid.box)
-        unit = 0.5 * (self.problem.grid.spacing[1] if self.problem.grid.dim == 2 else 1.0) * self.problem.scheme.flow_unit
+        unit = volume_unit(self.problem)
         for part, weight in adjoint.parts[name].items():
             part = FLIPPED.get(part, part) if adjoint.equations.turned else part
             if part.startswith(("groove_flow_", "supply_flow_")):

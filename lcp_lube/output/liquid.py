@@ -3,8 +3,8 @@
 import numpy as np
 
 from ..base.parallel import Array
-from ..problems.film.flows import stream_weights
 from ..problems.film.lubrication import LubricationProblem
+from ..problems.film.strip import stream_weights
 
 NOISE = 1e-9  # of a field's scale: less is rounding and is not drawn
 

@@ -46,7 +46,7 @@ def key_of(scene: Scene, text: str) -> str:
     known = values_of(scene)
     if text in known:
         return text
-    ends = [key for key in known if key.endswith(f".{text}") or numbered(scene, key) == text]
+    ends = [key for key in known if key.endswith(f".{text}") or _numbered(scene, key) == text]
     if len(ends) == 1:
         return ends[0]
     words = text.split(".")
@@ -72,11 +72,11 @@ def key_of(scene: Scene, text: str) -> str:
 
 def unit_of(scene: Scene, key: str) -> str:
     """SI unit of a number of `values_of`; empty if it has none."""
-    units, name = scene.data_units(), numbered(scene, key)
+    units, name = scene.data_units(), _numbered(scene, key)
     return units.get(name, units.get(name.rpartition(".")[0], ""))
 
 
-def numbered(scene: Scene, key: str) -> str:
+def _numbered(scene: Scene, key: str) -> str:
     """film.2.depth for film.pocket.depth: as units go by."""
     words = key.split(".")
     tables = getattr(scene, words[0], None)

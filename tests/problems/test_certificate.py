@@ -195,7 +195,7 @@ def test_blocks_of_cells_measure_what_all_together_do(solution, monkeypatch):
 def test_void_counts_as_the_flow_that_pressures_drive():
     """Beside pressures that push next to nothing, a void of 1e-9 may be all that they drive; none counts below itself."""
     problem = make_problem((20,), Wave("sinusoid", "convergent-divergent", 15e-6, 25e-6, 0, 0.1), p_sides=(1e6, 2e5, 0, 0))
-    weak = void_scale(problem, 1e-9)
-    assert np.all(weak < 1e-3) and np.all(void_scale(problem, 1e9) == 1.0)
-    np.testing.assert_allclose(void_scale(problem, 2e-9), 2 * weak)
+    weak = void_scale(problem.scheme, 1e-9)
+    assert np.all(weak < 1e-3) and np.all(void_scale(problem.scheme, 1e9) == 1.0)
+    np.testing.assert_allclose(void_scale(problem.scheme, 2e-9), 2 * weak)
     problem.destroy()

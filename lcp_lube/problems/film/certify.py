@@ -1,6 +1,5 @@
 """What certifies a film's answer: how far it is from balance in every cell, from complementarity, from flow in = flow out."""
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -8,7 +7,7 @@ from numpy.typing import NDArray
 
 from ...base.parallel import Array
 from ..certificate import Certificate, certificate_tol
-from ..strips import ghosted, in_strips
+from ..strips import ghosted
 from .graded import GradedJacobian, Pivots, within_reach
 from .reynolds import BoxScheme, side_points
 from .stored import storing
@@ -44,7 +43,7 @@ def certify(problem: "LubricationProblem", p: Array, r: Array, eps1: float) -> C
         p_max = max(p_max, 1.0)
     pressure, void, residual, diagonal, worst = misfits(problem, p, r, p_max)
     # Of p itself, which in a deep pocket is more than all that flows, and of c as a difference of the wall's flows.
-    dragged = np.sqrt(red.sum(np.array([np.sum(np.square(part.b_C)) for _, part in parts(problem)])))
+    dragged = np.sqrt(red.sum(np.array([np.sum(np.square(part.b_C)) for _, part in problem.scheme.in_strips(problem.grid)])))
     rounding = 2 * UNIT * (diagonal + dragged)
     scale = pressure + void + driven
     if not driven:
@@ -64,16 +63,12 @@ def certify(problem: "LubricationProblem", p: Array, r: Array, eps1: float) -> C
     )
 
 
-def parts(problem: "LubricationProblem") -> Iterator[tuple[slice, BoxScheme]]:
-    """The lines strip by strip, and their coefficients."""
-    return ((rows, problem.scheme.rows(rows)) for rows in in_strips(problem.grid))
-
-
 def complementarity(problem: "LubricationProblem", p: Array, r: Array, p_max: float) -> float:
     """As `certify` tells. Collective."""
     p, r = p.reshape(problem.grid.box), r.reshape(problem.grid.box)
     found = [
-        np.max(np.abs(np.minimum(p[rows] / (p_max or 1.0), r[rows] / scale_of_void(s, p_max)))) for rows, s in parts(problem)
+        np.max(np.abs(np.minimum(p[rows] / (p_max or 1.0), r[rows] / void_scale(s, p_max))))
+        for rows, s in problem.scheme.in_strips(problem.grid)
     ]
     return problem.reduce.max(np.array(found))
 
@@ -84,7 +79,7 @@ def rounding_may_dominate(problem: "LubricationProblem", p_max: float) -> bool:
     along, across = (s.k_W, s.k_E), (s.k_S, s.k_N)
     ways = along if "open" in ends[0] or not across[0].any() else along + across
     weakest = reduce.min(np.array([np.min(k, where=k > 0, initial=np.inf) for k in ways]))
-    wall = np.array([-np.min(part.b_C) for _, part in parts(problem)])
+    wall = np.array([-np.min(part.b_C) for _, part in problem.scheme.in_strips(problem.grid)])
     largest = max(reduce.max(k) for k in along + across) * p_max + reduce.max(wall)
     return not UNIT * problem.size * largest <= FINE * weakest * p_max
 
@@ -117,17 +112,12 @@ def p_error(problem: "LubricationProblem", p: Array, r: Array) -> float:
     return off / largest
 
 
-def void_scale(problem: "LubricationProblem", p_max: float) -> Array:
+def void_scale(s: BoxScheme, p_max: float) -> Array:
     """The void that carries as much through a cell as p_max could push there, at most 1.
 
     It is 1 unless the pressures are far below what the wall could build up: beside such pressures a void of 1e-10, which is
     nothing to the wall's flow, may be all the flow that they drive.
     """
-    return scale_of_void(problem.scheme, p_max).ravel()
-
-
-def scale_of_void(s: BoxScheme, p_max: float) -> Array:
-    """`void_scale` of some lines."""
     with np.errstate(divide="ignore", over="ignore"):
         pushed = s.diagonal * p_max / -s.b_C
     return np.clip(pushed, LEAST, 1.0)
@@ -141,7 +131,7 @@ def misfits(problem: "LubricationProblem", p: Array, r: Array, p_max: float) -> 
     reduce, nx, nothing = problem.reduce, problem.grid.box[1], np.zeros((0, 0), dtype=bool)
     framed = [ghosted(problem.grid, field, 0.0) for field in (p, r)]
     squares, worst = np.zeros(4), 0.0
-    for rows, s in parts(problem):  # so that what lies between is no more than the cache holds
+    for rows, s in problem.scheme.in_strips(problem.grid):  # so that what lies between is no more than the cache holds
         frames = [frame(rows) for frame in framed]
         owned = (s.k_W, s.k_E, s.k_S, s.k_N, s.b_C, s.entering, s.c, nothing if s.held is None else s.held)
         for i in range(0, nx, BLOCK):
@@ -204,7 +194,7 @@ def mass_defect(problem: "LubricationProblem", p: Array, r: Array) -> float:
     driven = reduce.norm(s.c) > 0  # or else p = 0, and p_unit measures what is left of it
     own, above = p.reshape(grid.box), 0.0 if driven else 1.0
     least, inside, in_held = np.inf, 0.0, 0.0
-    for rows, part in parts(problem):
+    for rows, part in problem.scheme.in_strips(problem.grid):
         least, terms = np.minimum(least, -np.max(part.b_E)), part.diagonal * (np.abs(own[rows]) + above)
         inside += float(np.sum(terms))
         in_held += 0.0 if part.held is None else float(np.sum(terms[part.held]))

@@ -21,9 +21,10 @@ from .assembly import assemble
 from .cavity import cavity_sign
 from .contact import areas
 from .effects import Answer, around, framed_by
-from .flows import line_weights, point_weights, sheared_faces, volume_unit
+from .flows import point_weights, sheared_faces, volume_unit
 from .forces import open_pressures
 from .reynolds import sides
+from .strip import line_weights
 
 RTOL = 1e-13  # of the linear solves
 NOTHING = 1e-24  # of that: the square of rounding

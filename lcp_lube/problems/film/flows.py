@@ -13,6 +13,7 @@ from ..strips import in_strips, places_of
 from .cavity import cavitated
 from .edges import Around, strips
 from .reynolds import BoxScheme, sides
+from .strip import line_weights, stream_weights
 
 if TYPE_CHECKING:
     from .lubrication import LubricationProblem
@@ -23,16 +24,6 @@ SIDES = ("west", "east", "south", "north")
 def point_weights(grid: Grid) -> Array:
     """What belongs to each owned point, in mean cells: 1, and 1/2 on a mirror line; of uneven lines its cell's own size."""
     return np.broadcast_to(stream_weights(grid) * grid.widths(0), grid.box).ravel()
-
-
-def line_weights(grid: Grid) -> Array:
-    """Widths of the owned lines of cells, in mean spacings, shape (ny_local, 1); 1 in 1D."""
-    return grid.widths(1)[:, None] if grid.dim == 2 else np.ones((1, 1))
-
-
-def stream_weights(grid: Grid) -> Array:
-    """What the wall of the owned lines carries, in parts of U h on a mean line: their widths, in a sector times the stretch."""
-    return line_weights(grid) * grid.stretch(grid.y)
 
 
 def volume_unit(problem: LubricationProblem) -> float:

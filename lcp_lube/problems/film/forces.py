@@ -10,8 +10,8 @@ import numpy as np
 
 from ...base.parallel import Array
 from ..strips import in_strips, places_of
-from .flows import line_weights, stream_weights
 from .reynolds import sides
+from .strip import line_weights, stream_weights
 
 if TYPE_CHECKING:
     from .line import Known

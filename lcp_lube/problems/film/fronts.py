@@ -12,8 +12,9 @@ from ...base.parallel import Array
 from ..grid import Grid
 from ..strips import ghosted, in_strips, places_of
 from .cavity import cavitated
-from .flows import line_weights, point_weights, stream_weights
+from .flows import point_weights
 from .reynolds import Film, sides
+from .strip import line_weights, stream_weights
 
 if TYPE_CHECKING:
     from .lubrication import LubricationProblem

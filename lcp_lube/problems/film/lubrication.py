@@ -14,8 +14,7 @@ from ...base.parallel import Array
 from ..certificate import Certificate
 from ..grid import Grid
 from ..solution import Fields
-from ..strips import in_strips
-from ..transfer import Transfer
+from ..transfer import interpolated
 from .assembly import assemble
 from .certify import certify
 from .exact import ExactSolution
@@ -197,8 +196,8 @@ class LubricationProblem:
 
     def leaving(self, r: Array) -> Array:
         """What the wall drags through the east faces of this rank's last column; shape (lines, 1)."""
-        r, rows = r.reshape(self.grid.box), in_strips(self.grid)
-        return np.concatenate([s.couette_E[:, -1:] + s.b_E[:, -1:] * r[at, -1:] for at in rows for s in [self.scheme.rows(at)]])
+        r, strips = r.reshape(self.grid.box), self.scheme.in_strips(self.grid)
+        return np.concatenate([s.couette_E[:, -1:] + s.b_E[:, -1:] * r[at, -1:] for at, s in strips])
 
     def quantities(self, fields: Fields) -> dict[str, Any]:
         """Load, friction, flows, largest pressure, cavity, and the scene's own `extras`. Collective."""
@@ -244,9 +243,7 @@ class LubricationProblem:
         H of the coarse grid, where p ~ (H/L)^2 and r ~ H/L: m = 10 (H/L)^3, at most 1e-3. Collective.
         """
         P, R = (coarse.reduce.max(fields[name]) or 1.0 for name in "pr")
-        transfer = Transfer(coarse.grid, self.grid)
-        z = transfer(fields["p"] / P - fields["r"] / R)
-        transfer.destroy()
+        z = interpolated(coarse.grid, self.grid, fields["p"] / P - fields["r"] / R)
         m = min(1e-3, 10.0 / max(coarse.grid.shape) ** 3)
         root = np.sqrt(z * z + 4.0 * m) if interior else np.abs(z)
         return {"p": 0.5 * P * (root + z), "r": 0.5 * R * (root - z)}
@@ -278,7 +275,7 @@ class LubricationProblem:
     def with_lift(self, lift: Array) -> Self:
         """The problem with the film thicker by `lift` at the owned points, m: what is told of it, not its coefficients."""
         other = copy(self)
-        other.plain, other.scheme = False, replace(self.scheme, h=self.scheme.h + lift.reshape(self.grid.box))
+        other.plain, other.scheme = False, self.scheme.changed(h=self.scheme.h + lift.reshape(self.grid.box))
         other.film = LiftedFilm.of(self.film, self.grid, lift)
         return other
 

@@ -1,7 +1,7 @@
 """Box scheme of the steady Reynolds equation with cavitation: film -> coefficients of A p + B r = c."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, fields
 from functools import partial
 from typing import Any
 
@@ -15,7 +15,7 @@ from ..strips import in_strips, places_of
 from .edges import Around
 from .integrals import LineIntegrals, check_film
 from .stored import Stored
-from .strip import coefficients_of, dragged, entering, leaving, weights
+from .strip import coefficients_of, dragged, entering, leaving, line_weights, stream_weights
 
 Film = Callable[[Array, Array], Array]
 USUAL = 1e6  # the largest coefficient lies between this and its inverse: absolute tolerances then mean something
@@ -78,9 +78,17 @@ class BoxScheme:
                 return partial(value.func, *map(cut, value.args))
             return value[rows] if isinstance(value, np.ndarray) else value
 
-        part = object.__new__(BoxScheme)
-        part.__dict__.update({name: cut(value) for name, value in vars(self).items()})
-        return part
+        return self.changed(**{name: cut(value) for name, value in vars(self).items()})
+
+    def in_strips(self, grid: Grid) -> Iterator[tuple[slice, "BoxScheme"]]:
+        """This rank's lines strip by strip, and their coefficients."""
+        return ((rows, self.rows(rows)) for rows in in_strips(grid))
+
+    def changed(self, **changes: Any) -> "BoxScheme":
+        """With other fields; what is made when it is asked for stays so, which `dataclasses.replace` would make and keep."""
+        other = object.__new__(BoxScheme)
+        other.__dict__.update(vars(self) | changes)
+        return other
 
     @property
     def arrays(self) -> list[str]:
@@ -159,7 +167,7 @@ def box_scheme(grid: Grid, film: Film, **data: Any) -> BoxScheme:
     for a in {id(a): a for a in arrays}.values():
         if a is not box.h and a is not box.h.base:
             a /= unit
-    return replace(box, b_C=vars(box)["b_C"], b_W=vars(box)["b_W"], flow_unit=float(unit))
+    return box.changed(flow_unit=float(unit))
 
 
 def coefficients(
@@ -213,7 +221,7 @@ def coefficients(
         (wall if U else void)[rows] = parts[3 if U else 4]
     h = films[:, 1:]
     if nodal:
-        weight = weights(grid) * np.ones((ny, 1))
+        weight = stream_weights(grid) * np.ones((ny, 1))
     k_W, k_E, k_S, k_N = kx[1:-1, 1 : nx + 1], kx[1:-1, 2 : nx + 2], ky[1 : ny + 1, 1:-1], ky[2 : ny + 2, 1:-1]
     if U == 0.0:
         # No void is carried, and there is none: any speed keeps B regular, as what cells store does.
@@ -245,9 +253,8 @@ def coefficients(
     if stored is None:
         return box
     # Twice a cell's area over the mean dy.
-    y_share = grid.widths(1)[:, None] if grid.dim == 2 else np.ones((1, 1))
-    area = 2.0 * grid.spacing[0] * grid.widths(0) * y_share * grid.stretch(grid.y)
-    return replace(box, **{"b_W": b_W} | stored.terms(grid, film, area, box.b_C, c))  # type: ignore[arg-type]
+    area = 2.0 * grid.spacing[0] * grid.widths(0) * line_weights(grid) * grid.stretch(grid.y)
+    return box.changed(**stored.terms(grid, film, area, box.b_C, c))
 
 
 def sides(grid: Grid, kinds: Sequence[str] = ("open",)) -> tuple[NDArray[np.bool_], ...]:

@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 from ...base.parallel import Array
 from .cavity import cavity_sign
 from .effects import around
-from .flows import friction, line_weights, point_weights, sheared_faces, side_flows, volume_unit
+from .flows import friction, point_weights, sheared_faces, side_flows, volume_unit
 from .forces import totals, weights
 from .grooves import GroovedProblem
 from .lubrication import LubricationProblem
 from .peak import Window
 from .quantities import largest_of, largest_pressure, thinnest
 from .reynolds import sides
+from .strip import line_weights
 from .supplies import supply_flows
 from .tangent import Tangent
 

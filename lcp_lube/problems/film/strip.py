@@ -26,7 +26,7 @@ def coefficients_of(
     """Of some lines: conductances of x and y faces, h at the points and the one before, and what goes through x faces: what the
     wall drags, and what if all is void."""
     dx, (ny, nx) = grid.steps(0), grid.box
-    x_share, y_share = grid.widths(0), grid.widths(1)[:, None] if grid.dim == 2 else np.ones((1, 1))
+    x_share, y_share = grid.widths(0), line_weights(grid)
     x_nodes, x_faces = grid.nodes_and_faces(0)
     x, y = x_nodes[None, 1:-1], grid.y
     period = [length if around else 0.0 for length, around in zip(grid.lengths, grid.periodic, strict=True)]
@@ -70,9 +70,14 @@ def coefficients_of(
     return k_x, k_y, h_x[:, :-1], wall, void
 
 
-def weights(grid: Grid) -> Array:
-    """What the wall of the owned lines drags, in parts of U h on a mean line."""
-    return (grid.widths(1)[:, None] if grid.dim == 2 else np.ones((1, 1))) * grid.stretch(grid.y)
+def line_weights(grid: Grid) -> Array:
+    """Widths of the owned lines of cells, in mean spacings, shape (ny_local, 1); 1 in 1D."""
+    return grid.widths(1)[:, None] if grid.dim == 2 else np.ones((1, 1))
+
+
+def stream_weights(grid: Grid) -> Array:
+    """What the wall of the owned lines carries, in parts of U h on a mean line: their widths, in a sector times the stretch."""
+    return line_weights(grid) * grid.stretch(grid.y)
 
 
 def dragged(void: Array, weight: Array | None, U: float) -> Array:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ...base.parallel import Array
 from ...errors import InputError
 from ..grid import Grid
+from .flows import volume_unit
 from .reynolds import BoxScheme
 
 if TYPE_CHECKING:
@@ -207,12 +208,12 @@ def hold(grid: Grid, scheme: BoxScheme, supplies: Sequence[Supply], p_unit: floa
     factors = [1.0 / _share(grid, held, dj, di) for dj, di in ((0, -1), (0, 1), (-1, 0), (1, 0))]
     names = ("k_W", "k_E", "k_S", "k_N")
     k = {name: getattr(scheme, name) * factor for name, factor in zip(names, factors, strict=True)}
-    return pressed(replace(scheme, **k, held=held.mask), held, p_unit), held
+    return pressed(scheme.changed(**k, held=held.mask), held, p_unit), held
 
 
 def pressed(scheme: BoxScheme, held: Held, p_unit: float) -> BoxScheme:
     """The scheme with the supplies' pressures in c."""
-    return replace(scheme, c=np.where(held.mask, scheme.diagonal * held.pressures(p_unit), scheme.c))
+    return scheme.changed(c=np.where(held.mask, scheme.diagonal * held.pressures(p_unit), scheme.c))
 
 
 def _nearest(grid: Grid, place: tuple[float, float]) -> NDArray[np.bool_]:
@@ -263,7 +264,7 @@ def supply_flows(problem: LubricationProblem, p: Array, r: Array) -> list[float]
         return []
     grid = problem.grid
     given = problem.face_flows(p, r).reshape(grid.box)
-    unit = 0.5 * problem.scheme.flow_unit * (grid.spacing[1] if grid.dim == 2 else 1.0)
+    unit = volume_unit(problem)
     return [unit * problem.reduce.sum(np.where(held.owner == k, given, 0.0)) for k in range(len(held.supplies))]
 
 
@@ -272,10 +273,10 @@ def supply_defects(problem: LubricationProblem, flows: Sequence[float]) -> list[
 
     flows : of `supply_flows`. A part of what the pressures drive through a supply's own faces is next to nothing.
     """
-    held, grid, s = problem.held, problem.grid, problem.scheme
+    held, s = problem.held, problem.scheme
     if held is None or not any(one.open for one in held.supplies):
         return []
-    unit = 0.5 * s.flow_unit * (grid.spacing[1] if grid.dim == 2 else 1.0)
+    unit = volume_unit(problem)
     moved = unit * (s.diagonal * held.pressures(problem.p_unit) + np.abs(s.couette_W) + np.abs(s.couette_E))
     pressed = [problem.reduce.sum(np.where(held.owner == k, moved, 0.0)) for k in range(len(flows))]
     largest = max(map(abs, [*flows, *(one.flow or 0.0 for one in held.supplies)]))

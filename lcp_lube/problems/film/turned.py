@@ -20,8 +20,6 @@ from .exact import ExactSolution
 from .lubrication import LubricationProblem
 from .views import MirroredFilm
 
-PLACES = ("rupture", "reformation")
-
 
 class TurnedProblem(LubricationProblem):
     """The film as it stands, for what is told of its answer; `moving` is the mirror image, which is solved.
@@ -91,7 +89,7 @@ class TurnedProblem(LubricationProblem):
         out, L = self.moving.quantities(self.there(fields)), self.grid.lengths[0]
         for name in ("p_max_at", "min_h_at"):
             out[name] = [L - out[name][0], *out[name][1:]] if out[name] is not None else None
-        for name in PLACES:
+        for name in ("rupture", "reformation"):
             out[name] = L - out[name] if out[name] is not None else None
         for name in ("ruptures", "reformations"):
             out[name] = sorted(L - x for x in out[name])
