@@ -71,10 +71,10 @@ def table(args: argparse.Namespace, scene: Scene, frequencies: list[float]) -> i
     for rpm in speeds:
         at = as_scene(scene, {"speed_rpm": float(rpm)})
         solution = solve(at, ask_of(args), start=near)
-        check_unread()
         if near is not None:
             near.destroy()
         one = _first(at, solution, frequencies) if solution.converged else None
+        check_unread()  # the linearised film has options of its own
         if one is not None:
             turn = np.array([[0.0, -1.0], [1.0, 0.0]])  # our axes as columns, in theirs
             K, C = (turn.T @ matrix @ turn for matrix in (one.K, one.C))

@@ -79,6 +79,13 @@ def test_equations_that_are_not_solved_are_an_outcome(cli):
     assert found.status == 1 and found.json["outcome"] == "linear_solver" and "GMRES" in found.json["message"]
 
 
+def test_a_table_over_speeds_takes_their_options_too(cli):
+    words = ["coefficients", "adiabatic_journal", "--n", 40, "--speeds", "1000:1000:1"]
+    assert cli(*words, "-coupled_response_ksp_max_it", 500).status == 0
+    unread = cli(*words, "-coupled_response_ksp_max_its", 500)
+    assert unread.status == 2 and "coupled_response_ksp_max_its" in unread.lines[0]
+
+
 LINER = {"elastic": {"compliance": 1e-12}}
 
 
