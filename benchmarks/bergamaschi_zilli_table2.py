@@ -15,6 +15,7 @@ import json
 import statistics
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -80,7 +81,7 @@ def shares(results: Path, repeat: int, quick: bool) -> None:
     print("\n" + line(["n", "keep", "it", "CPU s", "Jacobian", "factor", "solve", "rest", "MB", "k"], widths))
     for n in SIZES[: 2 if quick else None]:
         for keep in KEEPS:
-            row = store.find(n=n, keep=keep) or store.add(measured(n, keep, 1 if n > 2000 else repeat))
+            row = store.row({"n": n, "keep": keep}, partial(measured, n, keep, 1 if n > 2000 else repeat))
             total = float(row["total_s"])
             part = [100.0 * float(row[name]) / total for name in ("jacobian_s", "factor_s", "solve_s", "rest_s")]
             numbers = [row["iterations"], f"{float(row['cpu_s']):.3f}", *(f"{share:.0f} %" for share in part)]

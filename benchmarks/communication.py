@@ -13,6 +13,7 @@ import re
 import subprocess
 import sys
 import tempfile
+from functools import partial
 from pathlib import Path
 
 RANKS = (2, 4, 8)
@@ -67,8 +68,7 @@ def main() -> None:
     store = ResumableCsv(parser.parse_args().results / "communication.csv", [*KEY, *COLUMNS], KEY, signed=True)
     for n in SIZES:
         for ranks in RANKS:
-            row = store.find(scene="problem4", n=n, ranks=ranks)
-            row = row or store.add({**count(n, ranks), "scene": "problem4", "n": n, "ranks": ranks})
+            row = store.row({"scene": "problem4", "n": n, "ranks": ranks}, partial(count, n, ranks))
             print("  ".join(f"{name} {row[name]}" for name in (*KEY, *COLUMNS)), store.age(row), flush=True)
 
 

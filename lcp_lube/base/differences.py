@@ -42,16 +42,20 @@ def differences(f: Callable[[float], Array], a: float, scale: float, sizes: Arra
         value = known[change]
         return None if isinstance(value, InputError) else value
 
+    def stepped(none: Array) -> tuple[Array, Array]:
+        """The chord's slope, and where it is more than what bends leaves though there is no derivative."""
+        chord = _chord(at, CHORD * scale)
+        value = np.abs(np.nan_to_num(at(0.0))) + SLIGHT * sizes  # type: ignore[arg-type]
+        return chord, none & (np.abs(chord) * scale > SLIGHT * value)
+
     d = QUICK * scale
     if quick and all(at(m * d) is not None for m in (-1, 0, 1)):
         low, here, high = (known[m * d] for m in (-1, 0, 1))
         noise = 10.0 * ROUNDING * sizes / d
         slope, bend = (high - low) / (2.0 * d), np.abs(high - 2.0 * here + low) / d  # type: ignore[operator]
         none = np.abs(slope) <= noise
-        if (bend <= BENT * np.abs(slope) + noise).all():
-            chord = _chord(at, CHORD * scale) if none.any() else slope
-            if not (none & (np.abs(chord) * scale > SLIGHT * (np.abs(here) + SLIGHT * sizes))).any():  # type: ignore[arg-type]
-                return np.where(none, 0.0, slope), np.zeros_like(slope)
+        if (bend <= BENT * np.abs(slope) + noise).all() and not (none.any() and stepped(none)[1].any()):
+            return np.where(none, 0.0, slope), np.zeros_like(slope)
     best: tuple[float, Array] | None = None
     before, kinks = np.zeros_like(sizes), np.zeros_like(sizes)
     for k in range(TRIES):
@@ -74,12 +78,10 @@ def differences(f: Callable[[float], Array], a: float, scale: float, sizes: Arra
             break
     if best is None:
         raise max((change, one) for change, one in known.items() if isinstance(one, InputError))[1]
-    slope, wide = best[1], CHORD * scale
-    steps = np.isinf(kinks)
+    slope, steps = best[1], np.isinf(kinks)
     if steps.any() or not slope.all():
-        chord = _chord(at, wide)
-        value = np.abs(np.nan_to_num(f(a))) + SLIGHT * sizes
-        steps = steps | ((slope == 0.0) & (np.abs(chord) * scale > SLIGHT * value))  # less is what bends
+        chord, more = stepped(slope == 0.0)
+        steps = steps | more
         slope, kinks = np.where(steps, chord, slope), np.where(steps, np.inf, kinks)
     return slope, kinks
 

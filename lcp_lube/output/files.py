@@ -5,6 +5,7 @@ import json
 import zipfile
 from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
+from math import ceil
 from pathlib import Path
 from typing import Any
 
@@ -166,6 +167,12 @@ def gather(grid: Grid | Frame, values: Array, stride: tuple[int, int] = (1, 1)) 
 def taken(n: int, step: int) -> np.ndarray:
     """Numbers of the points 0 to n - 1 that a stride takes, as far from the one end as from the other."""
     return np.arange((n - 1) % step // 2, n, step)
+
+
+def thinning(grid: Grid, most: Mapping[int, int]) -> tuple[int, int]:
+    """Steps in x and in y that leave at most so many points a direction, by the grid's dimension."""
+    nx, ny = (ceil(n / most[grid.dim]) for n in (*grid.shape, 1)[:2])
+    return nx, ny
 
 
 def coordinates(grid: Grid | Frame, stride: tuple[int, int] = (1, 1)) -> tuple[Array, ...]:

@@ -15,7 +15,7 @@ from ..base.together import on_all_ranks
 from ..errors import InputError
 from ..problems.film.fronts import middle_row
 from ..problems.solution import Outcome, Solution
-from .files import check_target, coordinates, gather, save, taken, write_collection
+from .files import check_target, coordinates, gather, save, taken, thinning, write_collection
 from .units import prefix
 
 MOST = {1: 1000, 2: 160}  # points a direction of a frame
@@ -115,7 +115,7 @@ class Frames:
     def add(self, moment: Any) -> None:
         """Keep a frame. Collective."""
         problem, grid = moment.problem, moment.problem.grid
-        stride = tuple(ceil(n / MOST[grid.dim]) for n in (*grid.shape, 1)[:2])
+        stride = thinning(grid, MOST)
         physical = problem.physical(moment.fields)
         kept = {name: gather(grid, physical[name][0], stride) for name in ("p", "r", "h")}
         self.x, *y = coordinates(grid, stride)

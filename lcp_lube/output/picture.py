@@ -1,6 +1,5 @@
 """What rank 0 draws of a Solution: fields thinned and gathered, units that suit them, the title."""
 
-import math
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,9 +13,8 @@ from ..problems.film.exact import ExactSolution
 from ..problems.film.front_curves import front_curves
 from ..problems.film.fronts import middle_row
 from ..problems.film.lubrication import LubricationProblem
-from ..problems.grid import Grid
 from ..problems.solution import Solution
-from .files import coordinates, gather, taken
+from .files import coordinates, gather, taken, thinning
 from .liquid import NOISE, ahead, void_at_faces
 from .units import prefix, with_unit
 
@@ -126,7 +124,7 @@ def collect(solution: Solution) -> Picture | None:
     """What there is to draw, on rank 0; None elsewhere. Collective."""
     problem: Any = solution.problem
     grid = problem.grid
-    stride = nx, ny = thinning(grid)
+    stride = nx, ny = thinning(grid, MOST_POINTS)
     fields = {name: (gather(grid, values, stride), unit) for name, (values, unit) in problem.physical(solution.fields).items()}
     quantities = problem.quantities(solution.fields)
     scales = {
@@ -155,12 +153,6 @@ def collect(solution: Solution) -> Picture | None:
         return None
     x, *y = coordinates(grid, stride)
     return Picture(solution, x, y[0] if y else np.empty(0), fields, quantities, scales, sign, void, **more)
-
-
-def thinning(grid: Grid) -> tuple[int, int]:
-    """Steps in x and in y between the points that a picture takes."""
-    nx, ny = (math.ceil(n / MOST_POINTS[grid.dim]) for n in (*grid.shape, 1)[:2])
-    return nx, ny
 
 
 def trace(solution: Solution) -> float:

@@ -10,9 +10,9 @@ from ..drivers.goal_error import GoalError
 from ..drivers.gradient import Gradient
 from ..problems.solution import Solution
 from ..scenes.values import unit_of as key_unit
-from .files import gather
+from .files import gather, thinning
 from .maps import outline
-from .picture import Picture, collect, thinning
+from .picture import MOST_POINTS, Picture, collect
 from .style import BLUE, RED, Axes, new_figure, save_figure
 from .table import table
 from .units import with_unit
@@ -112,7 +112,7 @@ def plot_error(error: GoalError, solution: Solution, path: str | Path) -> None:
 def _gathered(solution: Solution, field: Array) -> tuple[Picture | None, Array]:
     """A field on the picture's points, on rank 0. Collective."""
     grid = solution.problem.grid
-    return collect(solution), gather(grid, field, thinning(grid))
+    return collect(solution), gather(grid, field, thinning(grid, MOST_POINTS))
 
 
 def _bars(axes: Axes, gradient: Gradient, keys: list[str]) -> None:

@@ -116,9 +116,9 @@ class Designs:
             self._store.write()
 
     def at(self, x: Array) -> Design:
-        """Of numbers between 0 and 1, the ends of the ranges."""
-        x = np.clip(x, 0.0, 1.0)
-        name = np.asarray(x, dtype=float).tobytes()
+        """The design at numbers from 0, the low ends of the ranges, to 1; those beyond are clipped."""
+        x = np.clip(x, 0.0, 1.0).astype(float)
+        name = x.tobytes()
         if name not in self.known:
             values = {one.key: one.low + float(t) * (one.high - one.low) for one, t in zip(self.ranges, x, strict=True)}
             self.known[name] = self._made(values)

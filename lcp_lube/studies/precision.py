@@ -29,8 +29,15 @@ from .precision_picture import draw_all, seconds
 from .precision_words import cheapest, sentence, which
 
 SCENES = (
-    *("problem1", "problem2", "problem3", "parabolic_slider", "journal", "problem4", "textured_slider"),
-    *("dimpled_pad", "dimpled_pad_round"),
+    "problem1",
+    "problem2",
+    "problem3",
+    "parabolic_slider",
+    "journal",
+    "problem4",
+    "textured_slider",
+    "dimpled_pad",
+    "dimpled_pad_round",
 )
 VARIANTS = {"dimpled_pad_round": ("dimpled_pad", {"film.dimples.form": "round"})}  # scenes of this chart alone
 SIZES = {1: (50, 100, 200, 500, 1000, 2000, 5000), 2: (31, 63, 127, 255, 511)}  # points a side by dimension

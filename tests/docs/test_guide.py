@@ -68,7 +68,7 @@ def test_commands(page, block, tmp_path, environment):
     for line in block.splitlines():
         assert re.match(r"(mpiexec -n \d |)lcp-lube ", line), line
         command = line.partition("  #")[0].strip()
-        if command in DONE and not re.search(r"--(plot|output|checkpoint)| new ", command):
+        if command in DONE and not re.search(r"--(plot|output|checkpoint|history|errors)| new ", command):
             continue
         DONE.add(command)
         done = run(["sh", "-c", line], tmp_path, environment)

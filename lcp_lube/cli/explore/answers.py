@@ -14,7 +14,7 @@ import numpy as np
 from ... import api
 from ...drivers.ask import Ask
 from ...errors import InputError
-from ...output.files import gather, taken
+from ...output.files import gather, taken, thinning
 from ...output.results import as_dict, finite
 from ...problems.solution import Outcome, Solution
 from ...registry import scene_names
@@ -138,8 +138,7 @@ def _numbers(solution: Solution) -> list[dict[str, Any]]:
 def _fields(solution: Solution) -> dict[str, Any]:
     """Coordinates, and fields as 32-bit numbers in base64; a fine grid thinned."""
     grid = solution.problem.grid
-    steps = tuple(max(1, -(-n // SHOWN[grid.dim])) for n in grid.shape)
-    stride = (steps[0], steps[1] if grid.dim == 2 else 1)
+    stride = thinning(grid, SHOWN)
     lines = {name: line[taken(line.size, step)] for name, line, step in zip("xy", grid.lines, stride, strict=False)}
     fields = {
         name: {"unit": unit, "values": _packed(gather(grid, values, stride))}
