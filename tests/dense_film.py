@@ -398,7 +398,9 @@ class Dense:
                 pressed = np.max(np.abs(new / self.a), initial=0)
                 flips = (new >= 0) != (y >= 0)
                 tiny = (np.abs(new) / self.a <= max(1e-12 * pressed, self.rounding)) & (np.abs(new) / self.b <= 1e-12)
-                if not np.any(flips & ~tiny if step == self.step else flips):
+                if step == self.exact_step:  # a pressure that is 0 comes out as 1e-75
+                    tiny = (np.abs(new) / self.a <= 1e-50 * pressed) | (np.abs(new) / np.minimum(self.a, self.b) <= 1e-50)
+                if not np.any(flips & ~tiny):
                     return self.fields(new)
                 y = new
             if not np.all(np.isfinite(y)):

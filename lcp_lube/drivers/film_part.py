@@ -159,12 +159,12 @@ def part_of(scene: Solvable, problem: Problem) -> Part | None:
     pressures = {side.p for side in model.sides[: 2 * grid.dim] if side.kind == "open"}
     if _at_rest(model):
         return Part(scene, "constant")
-    still = model.stored is None and not model.supplies and not west.r and "closed" not in (west.kind, east.kind)
+    rims = problem.coefficients_for is not None  # faces see round edges that no point or middle of a face may lie in
+    still = model.stored is None and not model.supplies and not west.r and "closed" not in (west.kind, east.kind) and not rims
     if len(pressures) == 1 and still and _is_constant(problem):
         return Part(scene, "constant")
     if grid.dim == 1:
         return None
-    rims = problem.coefficients_for is not None  # faces see round edges that no point or middle of a face may lie in
     if "open" not in (ends[0].kind, ends[1].kind) and not model.supplies and not rims and _all_lines_are_one(problem):
         return Part(scene, "line")
     faces = not (model.mean_cubes and model.scheme == "upwind")  # whether the discretisation asks for the film there

@@ -77,7 +77,8 @@ class ZForm:
         p_max, s = max(reduce.max(z), 0.0), self.problem.scheme
         if left > ACCURATE * p_max:
             weakest = reduce.min(np.array([np.min(k, where=k > 0, initial=np.inf) for k in (s.k_W, s.k_E, s.k_S, s.k_N)]))
-            rounding = 8 * EPS * self.problem.size * reduce.max(np.abs(s.b_C)) / weakest
+            dragged = max(reduce.max(np.abs(flow)) for flow in (s.couette_W, s.couette_E))  # b_C stands for a wall at rest too
+            rounding = 8 * EPS * self.problem.size * dragged / weakest
             if left > ACCURATE * p_max + rounding:
                 words = f"{left / (p_max or 1.0):.1e} of the largest"
                 raise StalledError(f"rounding in the factors leaves pressures uncertain by {words}")

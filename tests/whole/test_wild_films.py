@@ -58,6 +58,10 @@ ONCE_FAILED = [
     (6004666, "empty all over"),
     (6015374, "empty all over, a ring's misfit of one rounding"),
     (8013844, "a ring at 6e7 m/s and 5e-3 Pa, whose signs settle after 200 steps"),
+    (8012352, "a wall at rest, conductances of 1e15"),
+    (8013643, "a ring, signs that 68 sets of full cells settle"),
+    (8014881, "round dimples that no point lies in, one side open"),
+    (8018035, "a dead end at 1e7 m/s, empty but for rounding"),
     (1032, "a ring, half a cell before x = 0, where sqrt(x) is none"),
     *CERTIFIED_WRONG_ONCE,
 ]
