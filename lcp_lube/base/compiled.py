@@ -2,9 +2,16 @@
 
 from collections.abc import Callable
 from functools import cache
+from importlib.util import find_spec
 from typing import Any, TypeVar, cast
 
 Kernel = TypeVar("Kernel", bound=Callable)
+
+
+@cache
+def has_numba() -> bool:
+    """Whether numba is installed."""
+    return find_spec("numba") is not None
 
 
 @cache

@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 from functools import cached_property
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from ..base.compiled import has_numba
 from ..base.options import recipe
 from ..base.parallel import Array
 from ..linear.krylov import Krylov
@@ -43,7 +43,7 @@ class Linear:
         self.problem, self.cavity, self.entries, self.given, self.M = problem, cavity, entries, given, M
         grid, self.frozen = problem.grid, None
         apart = entries is None and not factored and (given is None or problem.held is None)
-        if apart and grid.dim == 2 and grid.size > SMALL and find_spec("numba"):
+        if apart and grid.dim == 2 and grid.size > SMALL and has_numba():
             from ..solvers.fas.frozen import Frozen  # here: numba starts with it
 
             self.frozen = Frozen(problem, cavity, M, given)

@@ -10,7 +10,6 @@ import os
 import resource
 import sys
 from dataclasses import dataclass
-from importlib.util import find_spec
 from math import log2
 from pathlib import Path
 
@@ -18,6 +17,7 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from ..base.compiled import has_numba
 from ..base.options import recipe
 from ..errors import InputError
 from ..problems.facts import Facts
@@ -180,7 +180,7 @@ def bytes_needed(facts: Facts, plan: Plan) -> float | None:
 def _libraries(facts: Facts, plan: Plan) -> int:
     """Bytes of what a rank loads in the course of such a run."""
     compiles = not plan.system or (plan.nested and plan.method in ("active-set", "monotone"))
-    if facts.kind == "lubrication" and compiles and "numba" not in sys.modules and find_spec("numba"):
+    if facts.kind == "lubrication" and compiles and "numba" not in sys.modules and has_numba():
         return LIBRARIES + COMPILER
     return LIBRARIES
 

@@ -2,10 +2,10 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from importlib.util import find_spec
 
 from petsc4py import PETSc
 
+from ..base.compiled import has_numba
 from ..base.options import names_solver, wants_ksp
 from ..errors import InputError, nearest
 from ..problems.facts import Facts
@@ -101,7 +101,7 @@ def _suits_multigrid(facts: Facts) -> bool:
     # A ring's coarser grids need even numbers of points; one that is hardly fed stalls at once and is handed over.
     ring = facts.periodic == (True, False) and facts.size > LARGE_RING and facts.shape[0] % 8 == 0
     suits = plane and (ring or not any(facts.periodic))
-    return suits and find_spec("numba") is not None and not wants_ksp()
+    return suits and has_numba() and not wants_ksp()
 
 
 def default_recipe(facts: Facts, system: str, large: bool) -> tuple[str, str]:

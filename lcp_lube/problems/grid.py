@@ -244,7 +244,7 @@ class Grid:
         Returns an array of shape (ny_local + 2, nx_local + 2); its corners are not to be used. Collective.
         """
         if self.comm.size == 1:
-            out = np.empty((self.box[0] + 2, self.box[1] + 2))
+            out = np.empty((self.box[0] + 2, self.box[1] + 2), dtype=bool if owned.dtype == bool and not outside else float)
             out[1:-1, 1:-1] = np.reshape(owned, self.box)
             out[:, 0], out[:, -1] = (out[:, -2], out[:, 1]) if self.periodic[0] else (outside, outside)
             out[0], out[-1] = (out[-2], out[1]) if self.periodic[-1] and self.dim == 2 else (outside, outside)

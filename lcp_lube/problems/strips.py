@@ -3,8 +3,8 @@
 from collections.abc import Callable, Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..base.parallel import Array
 from .grid import Grid
 
 STRIP = 16_384  # points
@@ -26,16 +26,16 @@ def places_of(grid: Grid, rows: slice) -> Grid:
     return part
 
 
-def ghosted(grid: Grid, owned: Array, outside: float) -> Callable[[slice], Array]:
+def ghosted(grid: Grid, owned: NDArray, outside: float) -> Callable[[slice], NDArray]:
     """`Grid.ghosted` strip by strip: of one rank, without an array of them all. Collective."""
     if grid.comm.size > 1 or grid.dim == 1:
         whole = grid.ghosted(owned, outside)
         return lambda rows: whole[rows.start : rows.stop + 2]
     (ny, _), a = grid.box, owned.reshape(grid.box)
 
-    def framed(rows: slice) -> Array:
+    def framed(rows: slice) -> NDArray:
         first, last = rows.start - 1, rows.stop
-        out = np.empty((last - first + 1, a.shape[1] + 2))
+        out = np.empty((last - first + 1, a.shape[1] + 2), dtype=a.dtype)
         out[1:-1, 1:-1] = a[rows]
         out[:, 0], out[:, -1] = (out[:, -2], out[:, 1]) if grid.periodic[0] else (outside, outside)
         for line, row in ((first, out[0]), (last, out[-1])):

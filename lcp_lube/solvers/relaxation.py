@@ -6,11 +6,9 @@ the void does. G is an M-function (off-diagonally antitone, inverse isotone), fo
 (Ortega and Rheinboldt, 13.5); here only what a few of them do locally is wanted.
 """
 
-from importlib.util import find_spec
-
 import numpy as np
 
-from ..base.compiled import compiled
+from ..base.compiled import compiled, has_numba
 from ..base.parallel import Array
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Fields
@@ -18,7 +16,7 @@ from ..problems.solution import Fields
 
 def relaxation(problem: LubricationProblem) -> "Relaxation | None":
     """Sweeps for a problem; None without numba, as interpreted ones cost more than the Newton steps they save."""
-    return Relaxation(problem) if find_spec("numba") else None
+    return Relaxation(problem) if has_numba() else None
 
 
 class Relaxation:

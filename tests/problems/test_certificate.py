@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from lcp_lube import load_scene, solve
 from lcp_lube.problems.certificate import Certificate, certificate_tol
-from lcp_lube.problems.film.certify import cell_misfits, misfits, void_scale
+from lcp_lube.problems.film.cell_loops import loop_misfits
+from lcp_lube.problems.film.certify import cell_misfits, misfits
 
 
 @pytest.fixture(scope="module")
@@ -138,10 +139,10 @@ def test_where_next_to_nothing_flows_through(name):
     found.destroy()
 
 
-def one_by_one(p, r, k_W, k_E, k_S, k_N, b_C, b_W, c, held, p_max):
+def one_by_one(p, r, k_W, k_E, k_S, k_N, b_C, b_W, c, held, p_max, above):
     """`certify.cell_misfits` cell by cell."""
     ny, nx = c.shape
-    pressure, void, balance, diagonal, worst = 0.0, 0.0, 0.0, 0.0, 0.0
+    sums, worst, gap = np.zeros(6), 0.0, 0.0
     for j in range(ny):
         for i in range(nx):
             here, west, east, south, north = p[j + 1, i + 1], p[j + 1, i], p[j + 1, i + 2], p[j, i + 1], p[j + 2, i + 1]
@@ -152,10 +153,7 @@ def one_by_one(p, r, k_W, k_E, k_S, k_N, b_C, b_W, c, held, p_max):
             own, entering = b_C[j, i] * r[j + 1, i + 1], b_W[j, i] * r[j + 1, i]
             a, b, k = x + y, own + entering, w + e + s + n
             left = a + b - c[j, i]
-            pressure += a * a
-            void += b * b
-            balance += left * left
-            diagonal += (k * here) ** 2
+            sums += a * a, b * b, left * left, (k * here) ** 2, b_C[j, i] ** 2, k * (abs(here) + above)
             terms = k * abs(here) + w * abs(west) + e * abs(east) + s * abs(south) + n * abs(north)
             excess = abs(left) - 8 * 2.0**-53 * (terms + abs(b_C[j, i]) + abs(b_W[j, i]) + abs(c[j, i]))
             if excess > 0.0:
@@ -163,20 +161,37 @@ def one_by_one(p, r, k_W, k_E, k_S, k_N, b_C, b_W, c, held, p_max):
                 if here < r[j + 1, i + 1] * p_max:
                     moved = min(moved, -b_C[j, i])
                 worst = max(worst, excess / moved if moved > 0.0 else np.inf)
-    return pressure, void, balance, diagonal, worst
+            gap = max(gap, abs(min(here / (p_max or 1.0), r[j + 1, i + 1] / min(max(-k * p_max / b_C[j, i], 1e-200), 1.0))))
+    return [*sums, worst, gap]
 
 
-def test_arrays_measure_what_each_cell_does():
+@pytest.mark.parametrize("look", [cell_misfits, loop_misfits])
+def test_arrays_and_loops_measure_what_each_cell_does(look):
     random = np.random.default_rng(3)
     p, r = random.uniform(0, 1e3, (2, 9, 12))
     r[r < 500] = 0.0
     scheme = random.uniform(1e-3, 1, (4, 7, 10))
     carried, c = -random.uniform(0, 1, (2, 7, 10)), random.uniform(-1, 1, (7, 10))
     masks = (np.zeros((0, 0), dtype=bool), random.uniform(0, 1, (7, 10)) < 0.2)
-    for p_max, held in product((1e3, 1e-3), masks):
-        cells = one_by_one(p, r, *scheme, *carried, c, held, p_max)
-        np.testing.assert_allclose(cells, cell_misfits(p, r, *scheme, *carried, c, held, p_max), rtol=1e-10)
-        assert cells[-1] > 0
+    for p_max, above, held in product((1e3, 1e-3, 0.0), (0.0, 1.0), masks if look is cell_misfits else masks[:1]):
+        cells = one_by_one(p, r, *scheme, *carried, c, held, p_max, above)
+        np.testing.assert_allclose(np.concatenate(look(p, r, *scheme, *carried, c, held, p_max, above)), cells, rtol=1e-10)
+        assert min(cells[-2:]) > 0
+    for field in (p, r):
+        field[4, 5] = np.nan
+        sums, (_, gap) = look(p, r, *scheme, *carried, c, masks[0], 1e3, 0.0)
+        assert np.isnan(sums[2]) and np.isnan(gap)
+        field[4, 5] = 0.0
+
+
+def test_large_films_are_certified_by_loops(monkeypatch):
+    """One film, by arrays and by loops."""
+    found = solve(load_scene("journal", {"nx": 40, "ny": 21}), method="active-set", nested=False)
+    p, r = found.fields["p"] * 1.001, found.fields["r"]
+    by_arrays = misfits(found.problem, p, r, 2.0, 1.0)
+    monkeypatch.setattr("lcp_lube.problems.film.certify.MANY", 1)
+    np.testing.assert_allclose(misfits(found.problem, p, r, 2.0, 1.0), by_arrays, rtol=1e-12)
+    found.destroy()
 
 
 def test_blocks_of_cells_measure_what_all_together_do(solution, monkeypatch):
@@ -195,7 +210,8 @@ def test_blocks_of_cells_measure_what_all_together_do(solution, monkeypatch):
 def test_void_counts_as_the_flow_that_pressures_drive():
     """Beside pressures that push next to nothing, a void of 1e-9 may be all that they drive; none counts below itself."""
     problem = make_problem((20,), Wave("sinusoid", "convergent-divergent", 15e-6, 25e-6, 0, 0.1), p_sides=(1e6, 2e5, 0, 0))
-    weak = void_scale(problem.scheme, 1e-9)
-    assert np.all(weak < 1e-3) and np.all(void_scale(problem.scheme, 1e9) == 1.0)
-    np.testing.assert_allclose(void_scale(problem.scheme, 2e-9), 2 * weak)
+    p, r = np.full(20, 1e10), np.full(20, 1e-9)
+    weak = misfits(problem, p, r, 1e-9).gap
+    assert weak > 1e-6 and misfits(problem, p, r, 1e9).gap == 1e-9
+    assert misfits(problem, p, r, 2e-9).gap == pytest.approx(0.5 * weak)
     problem.destroy()

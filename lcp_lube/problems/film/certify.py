@@ -1,15 +1,17 @@
 """What certifies a film's answer: how far it is from balance in every cell, from complementarity, from flow in = flow out."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...base.compiled import has_numba
 from ...base.parallel import Array
 from ..certificate import Certificate, certificate_tol
 from ..strips import ghosted
 from .graded import GradedJacobian, Pivots, within_reach
-from .reynolds import BoxScheme, side_points
+from .reynolds import side_points
 from .stored import storing
 from .supplies import supply_defects, supply_flows
 
@@ -20,9 +22,29 @@ UNIT = 2.0**-53  # largest relative error of one operation
 IDLE = 1e-8  # share of what the pressures alone would drive through the sides, below which a flow is none
 UNEVEN = 1e-4  # part of the flow that the rounding of pressures inside may make of a mass defect, at most
 BLOCK = 16_384  # cells of a line that are looked at together
+MANY = 250_000  # points from which compiled loops are worth being loaded
 LEAST = 1e-200  # below any void or pressure
 FINE = 1e-7  # of p_max: rounding that may leave less than this in p needs no closer look
 CHECKS = 30  # sets of full cells that the closer look may try
+
+
+class Misfits(NamedTuple):
+    """What `misfits` reads off all cells in one pass.
+
+    pressure, void, residual, diagonal : ||A p||, ||B r||, ||A p + B r - c|| and ||diag(A) p||, rows of A p as the sums of their
+        face flows. dragged : ||b_C||. worst : the worst cell. gap : the complementarity. inside : sum of diag(A) (|p| + above).
+    least : void that a cell hands on to the east, at least.
+    """
+
+    pressure: float
+    void: float
+    residual: float
+    diagonal: float
+    dragged: float
+    worst: float
+    gap: float
+    inside: float
+    least: float
 
 
 def certify(problem: "LubricationProblem", p: Array, r: Array, eps1: float) -> Certificate:
@@ -32,7 +54,7 @@ def certify(problem: "LubricationProblem", p: Array, r: Array, eps1: float) -> C
     more, the largest balance of one cell in parts of what would move its own pressure by max|p|, or its void by 1 (`worst`), or
     what a supply's restrictor and its film disagree by (`supply_defects`);
     complementarity: max_i |min(p_i / max|p|, r_i)|, which bounds negative p, negative r and products alike; where the wall
-    drags more than the pressures could push, r counts as the pressure that would push as much (`void_scale`);
+    drags more than the pressures could push, r counts as the pressure that would push as much (`pushed`);
     mass_defect: |flow in - flow out| / flow, over the open sides (`mass_defect`);
     p_error: max|p - p*| / max p* where rounding may dominate what the others see (`p_error`).
     """
@@ -41,18 +63,17 @@ def certify(problem: "LubricationProblem", p: Array, r: Array, eps1: float) -> C
     p_max, driven = max(red.largest(p), max(problem.p_sides) / problem.p_unit), red.norm(s.c)
     if not driven and not any(problem.p_sides):  # p = 0: what is left of it is measured by its unit
         p_max = max(p_max, 1.0)
-    pressure, void, residual, diagonal, worst = misfits(problem, p, r, p_max)
+    found, supplied = misfits(problem, p, r, p_max, 0.0 if driven else 1.0), supply_flows(problem, p, r)
     # Of p itself, which in a deep pocket is more than all that flows, and of c as a difference of the wall's flows.
-    dragged = np.sqrt(red.sum(np.array([np.sum(np.square(part.b_C)) for _, part in problem.scheme.in_strips(problem.grid)])))
-    rounding = 2 * UNIT * (diagonal + dragged)
-    scale = pressure + void + driven
+    rounding = 2 * UNIT * (found.diagonal + found.dragged)
+    scale = found.pressure + found.void + driven
     if not driven:
         scale += red.norm(s.diagonal.ravel())
-    over_all = np.maximum(residual - rounding, 0.0) / scale if scale != 0 else 0.0  # NaN stays NaN
+    over_all = np.maximum(found.residual - rounding, 0.0) / scale if scale != 0 else 0.0  # NaN stays NaN
     measures = {
-        "residual": float(np.max([over_all, worst, *supply_defects(problem, supply_flows(problem, p, r))])),
-        "complementarity": complementarity(problem, p, r, p_max),
-        "mass_defect": mass_defect(problem, p, r),
+        "residual": float(np.max([over_all, found.worst, *supply_defects(problem, supplied)])),
+        "complementarity": found.gap,
+        "mass_defect": mass_defect(problem, p, r, supplied, found),
     }
     if within_reach(problem.grid) and rounding_may_dominate(problem, p_max):
         measures["p_error"] = p_error(problem, p, r)
@@ -61,16 +82,6 @@ def certify(problem: "LubricationProblem", p: Array, r: Array, eps1: float) -> C
         tol=certificate_tol(eps1),
         extremes={"min_p": red.min(p) * problem.p_unit, "min_r": red.min(r)},
     )
-
-
-def complementarity(problem: "LubricationProblem", p: Array, r: Array, p_max: float) -> float:
-    """As `certify` tells. Collective."""
-    p, r = p.reshape(problem.grid.box), r.reshape(problem.grid.box)
-    found = [
-        np.max(np.abs(np.minimum(p[rows] / (p_max or 1.0), r[rows] / void_scale(s, p_max))))
-        for rows, s in problem.scheme.in_strips(problem.grid)
-    ]
-    return problem.reduce.max(np.array(found))
 
 
 def rounding_may_dominate(problem: "LubricationProblem", p_max: float) -> bool:
@@ -112,34 +123,27 @@ def p_error(problem: "LubricationProblem", p: Array, r: Array) -> float:
     return off / largest
 
 
-def void_scale(s: BoxScheme, p_max: float) -> Array:
-    """The void that carries as much through a cell as p_max could push there, at most 1.
+def misfits(problem: "LubricationProblem", p: Array, r: Array, p_max: float, above: float = 0.0) -> Misfits:
+    """Sums and extremes over all cells. Collective."""
+    reduce, grid, nothing = problem.reduce, problem.grid, np.zeros((0, 0), dtype=bool)
+    framed, look = [ghosted(grid, field, 0.0) for field in (p, r)], cell_misfits
+    if problem.held is None and grid.size >= MANY and has_numba():
+        from .cell_loops import loop_misfits
 
-    It is 1 unless the pressures are far below what the wall could build up: beside such pressures a void of 1e-10, which is
-    nothing to the wall's flow, may be all the flow that they drive.
-    """
-    with np.errstate(divide="ignore", over="ignore"):
-        pushed = s.diagonal * p_max / -s.b_C
-    return np.clip(pushed, LEAST, 1.0)
-
-
-def misfits(problem: "LubricationProblem", p: Array, r: Array, p_max: float) -> tuple[float, float, float, float, float]:
-    """||A p||, ||B r||, ||A p + B r - c|| and ||diag(A) p||, rows of A p as the sums of their face flows, and the worst cell.
-
-    Collective.
-    """
-    reduce, nx, nothing = problem.reduce, problem.grid.box[1], np.zeros((0, 0), dtype=bool)
-    framed = [ghosted(problem.grid, field, 0.0) for field in (p, r)]
-    squares, worst = np.zeros(4), 0.0
-    for rows, s in problem.scheme.in_strips(problem.grid):  # so that what lies between is no more than the cache holds
-        frames = [frame(rows) for frame in framed]
-        owned = (s.k_W, s.k_E, s.k_S, s.k_N, s.b_C, s.entering, s.c, nothing if s.held is None else s.held)
-        for i in range(0, nx, BLOCK):
+        look = loop_misfits
+    sums, most, least = np.zeros(6), np.zeros(2), np.inf
+    for rows, s in problem.scheme.in_strips(grid):  # so that what lies between is no more than the cache holds
+        frames, b_C = [frame(rows) for frame in framed], s.b_C
+        least = np.minimum(least, -np.max(b_C if s.storage is None else b_C + s.storage))
+        owned = (s.k_W, s.k_E, s.k_S, s.k_N, b_C, s.entering, s.c, nothing if s.held is None else s.held)
+        for i in range(0, grid.box[1], BLOCK):
             arrays = [*(a[:, i : i + BLOCK + 2] for a in frames), *(a[:, i : i + BLOCK] for a in owned)]
-            *sums, off = cell_misfits(*arrays, p_max)  # type: ignore[arg-type, call-arg]
-            squares, worst = squares + sums, np.maximum(worst, off)  # NaN stays NaN
-    norms = [float(np.sqrt(reduce.sum(np.array([square])))) for square in squares]
-    return *norms, reduce.max(np.array([worst]))  # type: ignore[return-value]
+            own, largest = look(*arrays, p_max, above)  # type: ignore[arg-type, call-arg]
+            sums, most = sums + own, np.maximum(most, largest)  # NaN stays NaN
+    *squares, inside = (reduce.sum(np.array([part])) for part in sums)
+    worst, gap = (reduce.max(np.array([part])) for part in most)
+    pressure, void, residual, diagonal, dragged = np.sqrt(squares).tolist()
+    return Misfits(pressure, void, residual, diagonal, dragged, worst, gap, inside, reduce.min(np.array([least])))
 
 
 def cell_misfits(
@@ -154,30 +158,47 @@ def cell_misfits(
     c: Array,
     held: NDArray[np.bool_],
     p_max: float,
-) -> tuple[float, float, float, float, float]:
-    """Sums of the squares of A p, B r, A p + B r - c and diag(A) p over some cells, and the worst one.
-
-    p and r have a frame of neighbours. A cell's misfit, beyond the rounding of its own terms, is at least its diagonal times
-    the change of p that mends it: it is told in parts of that for p_max, and where the cell is cavitated, of b_C if that is
-    less. The norms cannot see a film that is thin, or pressures next to nothing, beside flows that are large.
-    """
-    here, void_here, entering = p[1:-1, 1:-1], r[1:-1, 1:-1], b_W * r[1:-1, :-2]
+    above: float,
+) -> tuple[Array, Array]:
+    """Of some cells the sums of the squares of A p, B r, A p + B r - c, diag(A) p and b_C, and of diag(A) (|p| + above), and
+    the largest of `worst` and `gap`. p and r have a frame of neighbours."""
+    here, void = p[1:-1, 1:-1], r[1:-1, 1:-1]
     around = (p[1:-1, :-2], p[1:-1, 2:], p[:-2, 1:-1], p[2:, 1:-1])
     if held.size:
         around = tuple(np.where(held, 0.0, beside) for beside in around)  # type: ignore[assignment]
-    pairs = tuple(zip((k_W, k_E, k_S, k_N), around, strict=True))
-    a, k, own = sum(k * (here - beside) for k, beside in pairs), k_W + k_E + k_S + k_N, b_C * void_here
-    b, left = own + entering, a + own + entering - c
-    terms = k * np.abs(here) + sum(k * np.abs(beside) for k, beside in pairs)
-    excess = np.abs(left) - 8 * UNIT * (terms + np.abs(b_C) + np.abs(b_W) + np.abs(c))
-    moved = np.where(here < void_here * p_max, np.minimum(k * p_max, -b_C), k * p_max if p_max > 0 else -b_C)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        worst = np.where(excess > 0, np.where(moved > 0, excess / moved, np.inf), 0.0)
-    squares = [float(np.sum(np.square(term))) for term in (a, b, left, k * here)]
-    return *squares, float(np.max(worst, initial=0.0))  # type: ignore[return-value]
+        found = cell_misfit(np.where, here, *around, void, r[1:-1, :-2], k_W, k_E, k_S, k_N, b_C, b_W, c, p_max, above)
+    *squared, inside, worst, gap = found
+    sums = [float(np.sum(np.square(term))) for term in squared]
+    return np.array([*sums, float(np.sum(inside))]), np.array([np.max(worst, initial=0.0), np.max(gap, initial=0.0)])
 
 
-def mass_defect(problem: "LubricationProblem", p: Array, r: Array) -> float:
+def cell_misfit(
+    where: Any, here: Any, west: Any, east: Any, south: Any, north: Any, void: Any, void_west: Any,
+    k_W: Any, k_E: Any, k_S: Any, k_N: Any, b_C: Any, b_W: Any, c: Any, p_max: float, above: float,
+) -> tuple[Any, ...]:  # fmt: skip
+    """Of arrays, or in `cell_loops` of one cell: A p, B r, A p + B r - c, diag(A) p, b_C, diag(A) (|p| + above), worst and gap.
+
+    A cell's misfit, beyond the rounding of its own terms, is at least its diagonal times the change of p that mends it: `worst`
+    tells it in parts of that for p_max, and where the cell is cavitated, of b_C if that is less. The norms cannot see a film
+    that is thin, or pressures next to nothing, beside flows that are large. gap : as `certify` tells of complementarity.
+    """
+    k, entering = k_W + k_E + k_S + k_N, b_W * void_west
+    a = k_W * (here - west) + k_E * (here - east) + k_S * (here - south) + k_N * (here - north)
+    b = b_C * void + entering
+    left, size = a + b - c, k * np.abs(here)
+    beside = k_W * np.abs(west) + k_E * np.abs(east) + k_S * np.abs(south) + k_N * np.abs(north)
+    excess = np.abs(left) - 8 * UNIT * (size + beside + np.abs(b_C) + np.abs(b_W) + np.abs(c))
+    moved = where(here < void * p_max, np.minimum(k * p_max, -b_C), k * p_max if p_max > 0 else -b_C)
+    worst = where(excess > 0, where(moved > 0, excess / moved, np.inf), 0.0)
+    # The void that carries as much through a cell as p_max could push there: 1, unless the pressures are far below what the
+    # wall could build up. Beside such pressures a void of 1e-10, nothing to the wall's flow, may be all that they drive.
+    pushed = np.minimum(np.maximum(k * p_max / -b_C, LEAST), 1.0)
+    gap = np.abs(np.minimum(here / (p_max or 1.0), void / pushed))
+    return a, b, left, k * here, b_C, size + k * above, worst, gap
+
+
+def mass_defect(problem: "LubricationProblem", p: Array, r: Array, supplies: Sequence[float], found: Misfits) -> float:
     """|flow in - flow out| over the open sides, beyond what rounding makes of it, in parts of the flow. Collective.
 
     The flow is the largest of what comes in, of what the wall drags through every cross-section of the film, also if
@@ -188,27 +209,22 @@ def mass_defect(problem: "LubricationProblem", p: Array, r: Array) -> float:
     s, reduce, grid = problem.scheme, problem.reduce, problem.grid
     flows = west, east, south, north = problem.boundary_flows(p, r)
     # Halves of these in m3/s, as are the supplies' flows.
-    supplied = [2.0 * flow / (grid.spacing[1] if grid.dim == 2 else 1.0) for flow in supply_flows(problem, p, r)]
+    supplied = [2.0 * flow / (grid.spacing[1] if grid.dim == 2 else 1.0) for flow in supplies]
     net = abs(west - east + south - north + sum(supplied) - storing(problem, r))
     inflow = max(west, 0.0) + max(-east, 0.0) + max(south, 0.0) + max(-north, 0.0) + sum(max(q, 0.0) for q in supplied)
     driven = reduce.norm(s.c) > 0  # or else p = 0, and p_unit measures what is left of it
     own, above = p.reshape(grid.box), 0.0 if driven else 1.0
-    least, inside, in_held = np.inf, 0.0, 0.0
-    for rows, part in problem.scheme.in_strips(problem.grid):
-        least, terms = np.minimum(least, -np.max(part.b_E)), part.diagonal * (np.abs(own[rows]) + above)
-        inside += float(np.sum(terms))
-        in_held += 0.0 if part.held is None else float(np.sum(terms[part.held]))
-    dragged = s.flow_unit * (reduce.min(np.array([least])) if problem.U else 0.0) * (grid.shape[1] if grid.dim == 2 else 1)
+    dragged = s.flow_unit * (found.least if problem.U else 0.0) * (grid.shape[1] if grid.dim == 2 else 1)
     pressed = 0.0
     for k, points, side in zip((s.k_W, s.k_E, s.k_S, s.k_N), side_points(grid), problem.p_sides, strict=True):
         pressed += s.flow_unit * reduce.sum(k[points] * (np.abs(own[points]) + above + side / problem.p_unit))
-    pressed += s.flow_unit * reduce.sum(np.array([in_held]))
+    if s.held is not None:
+        pressed += s.flow_unit * reduce.sum(np.where(s.held, s.diagonal * (np.abs(own) + above), 0.0))
     flow = max(inflow, dragged, IDLE * pressed if driven else pressed)
     if s.storage is not None:  # in the middle of a stroke nothing flows: rounding is measured by what is stored
         held = s.flow_unit * reduce.sum(s.storage)
         flow = max(flow, abs(storing(problem, r)), certificate_tol(0.0) * held)
         pressed += held
-    inside = UNIT * s.flow_unit * reduce.sum(np.array([inside]))
-    rounding = 8 * UNIT * (pressed + sum(map(abs, [*flows, *supplied]))) + min(inside, UNEVEN * flow)
+    rounding = 8 * UNIT * (pressed + sum(map(abs, [*flows, *supplied]))) + min(UNIT * s.flow_unit * found.inside, UNEVEN * flow)
     excess = net - rounding  # NaN stays NaN
     return 0.0 if excess <= 0 else excess / flow if flow != 0 else np.inf

@@ -103,10 +103,10 @@ def drag(problem: LubricationProblem, scheme: BoxScheme, p_pa: Array, r: Array, 
     p, r = p_pa.reshape(grid.box), r.reshape(grid.box)
     first, last, south, north = sides(grid)
     h_east, resting, h_moving = sheared_faces(problem, grid.x + behind / 2, lifted)
-    still, p_east = s.couette_E == 0.0, grid.ghosted(p_pa)[1:-1, 2:]
+    still, p_east = s.couette_E == 0.0, beside(grid, p)
     liquid = s.b_E * r / (np.where(still, np.inf, s.couette_E) if still.any() else s.couette_E)
     east = resting + (1.0 + liquid) / h_moving
-    own, push_own = np.zeros_like(east), np.zeros_like(east)
+    own, push_own = np.zeros_like(east), np.zeros_like(east[:, :1])
     if first.any():
         h_west, *west = sheared_faces(problem, grid.x[:, :1] - before[0] / 2, lifted)
         own[:, :1] = before[0] / behind[0] * (west[0] + 1.0 / west[1])
@@ -121,9 +121,22 @@ def drag(problem: LubricationProblem, scheme: BoxScheme, p_pa: Array, r: Array, 
     if walls[1].any():  # its faces have neither
         east[:, -1], p_east[:, -1] = 0.0, p[:, -1]
     push = 0.5 * h_east * (p_east - p)
-    per_row = muU * grid.stretch(grid.y) ** 2 * behind * (1.0 + 0.5 * (rims[0] * south + rims[1] * north) / weight)
     scale = weight * (grid.spacing[1] if grid.dim == 2 else 1.0)
-    return (per_row * east + push) * scale, (per_row * own + push_own) * scale
+    lines = scale * grid.stretch(grid.y) ** 2 * (1.0 + 0.5 * (rims[0] * south + rims[1] * north) / weight)
+    per_row = np.broadcast_to(muU * behind * lines, grid.box)
+    for at in {0, grid.box[1] - 1}:  # there is nothing between
+        own[:, at] *= per_row[:, at]
+    own[:, :1] += push_own * scale
+    return np.asarray(per_row * east + push * scale), own
+
+
+def beside(grid: Grid, p: Array) -> Array:
+    """The value east of each owned point, NaN where there is none; p has the shape `grid.box`. Collective."""
+    if grid.box[1] < grid.shape[0]:
+        return grid.ghosted(p.ravel())[1:-1, 2:]
+    out: Array = np.empty_like(p)
+    out[:, :-1], out[:, -1] = p[:, 1:], p[:, 0] if grid.periodic[0] else np.nan
+    return out
 
 
 def sheared_faces(problem: LubricationProblem, x: Array, lifted: complex = 0.0) -> tuple[Array, Array, Array]:

@@ -67,16 +67,17 @@ def forces(problem: LubricationProblem, p_pa: Array, known: Known | None = None)
 
 def totals(problem: LubricationProblem, p_pa: Array, known: Known | None = None) -> dict[str, float]:
     """Integrals of the pressure by its `weights`, but for `pressure_integral` above ambient and with contact. Collective."""
-    out, contact = {}, problem.contact
-    for name, weight in weights(problem).items():
-        whole = name == "pressure_integral"
-        above = 0.0 if whole else ambient(problem)
-        out[name] = integral(problem, p_pa, above, weight)
-        if contact is not None and not whole:
+    by, contact = weights(problem), problem.contact
+    asked = [(0.0 if name == "pressure_integral" else ambient(problem), weight) for name, weight in by.items()]
+    out = dict(zip(by, integrals(problem, p_pa, asked), strict=True))
+    for name, weight in by.items() if contact is not None else ():
+        if name != "pressure_integral":
             out[name] += contact.total(problem, weight)
-        if known is not None:
-            along = known.line.integral(antiderivative(problem, name), above)
-            out[name] += along - integral(problem, known.p_pa, above, weight)
+    if known is not None:
+        for (name, discrete), (above, _) in zip(
+            zip(by, integrals(problem, known.p_pa, asked), strict=True), asked, strict=True
+        ):
+            out[name] += known.line.integral(antiderivative(problem, name), above) - discrete
     return out
 
 
@@ -123,18 +124,35 @@ def attitude(widest: float, force: Sequence[float], U: float) -> float:
 
 
 def integral(problem: LubricationProblem, p_pa: Array, above: float, weight: Weight) -> float:
-    """Integral of (p - above) weight(x, y): trapezoidal to the open sides, a corner having the mean of its two; cells end at
-    the others. Collective."""
+    """The integral of (p - above) weight(x, y), as `integrals` tells. Collective."""
+    return integrals(problem, p_pa, [(above, weight)])[0]
+
+
+def integrals(problem: LubricationProblem, p_pa: Array, asked: Sequence[tuple[float, Weight]]) -> list[float]:
+    """Integrals of (p - above) weight(x, y), in one pass: trapezoidal to the open sides, a corner having the mean of its two;
+    cells end at the others. Collective."""
     grid = problem.grid
-    inside, p = 0.0, p_pa.reshape(grid.box)
+    inside, p = np.zeros(len(asked)), p_pa.reshape(grid.box)
     for rows in in_strips(grid):
         part = places_of(grid, rows)
-        along, lines, w = part.widths(0), stream_weights(part)[:, 0], np.atleast_2d(weight(part.x, part.y))
-        if w.shape[0] == 1:  # of x alone
-            inside += float(lines @ ((p[rows] - above) @ (w[0] * along)))
-        else:
-            inside += float(lines @ (((p[rows] - above) * w) @ along))
-    total = problem.reduce.sum(np.array([inside]))
+        x, y, along, lines = part.x, part.y, part.widths(0), stream_weights(part)[:, 0]
+        for k, (above, weight) in enumerate(asked):
+            w, own = np.atleast_2d(weight(x, y)), p[rows] - above if above else p[rows]
+            if w.shape[1] == 1:  # of y alone
+                inside[k] += (lines * w[:, 0]) @ (own @ along)
+            elif w.shape[0] == 1:
+                inside[k] += lines @ (own @ (w[0] * along))
+            else:
+                inside[k] += lines @ ((own * w) @ along)
+    return [
+        float(grid.cell * (problem.reduce.sum(np.array([part])) + _in_rims(problem, above, weight)))
+        for part, (above, weight) in zip(inside, asked, strict=True)
+    ]
+
+
+def _in_rims(problem: LubricationProblem, above: float, weight: Weight) -> float:
+    """What the strips along the open sides add to an integral, in mean cells; on every rank."""
+    grid, total = problem.grid, 0.0
     pressures = open_pressures(problem)
     coordinates = grid.lines  # of all points, on every rank
     for k, p_side in enumerate(pressures):
@@ -154,7 +172,7 @@ def integral(problem: LubricationProblem, p_pa: Array, above: float, weight: Wei
         places, shares = np.concatenate([along, ends]), np.concatenate([share, corner_shares])
         x, y = (np.full_like(places, at), places) if axis == 0 else (places, np.full_like(places, at))
         total += (p_side - above) * float(np.sum(shares * grid.stretch(y) * weight(x, y)))
-    return float(grid.cell * total)
+    return total
 
 
 def corner_flows(problem: LubricationProblem) -> dict[str, float] | None:

@@ -1,11 +1,11 @@
 """A film's Jacobian factored without subtraction: right are also pressures that hang on 1e-16 of the flows beside them."""
 
-from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...base.compiled import has_numba
 from ...base.elimination import Elimination
 from ...base.parallel import Array
 from ..grid import Grid
@@ -22,7 +22,7 @@ PATIENCE = HALVES + 250  # and of all of them before: what is wrong on a ring ma
 
 def within_reach(grid: Grid) -> bool:
     """Whether a factorisation is a matter of less than a second, and its band one of 100 MB."""
-    return grid.size * _bands(grid)[1] ** 2 <= WORK[find_spec("numba") is not None]
+    return grid.size * _bands(grid)[1] ** 2 <= WORK[has_numba()]
 
 
 class GradedJacobian:

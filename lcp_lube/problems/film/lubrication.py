@@ -196,8 +196,9 @@ class LubricationProblem:
 
     def leaving(self, r: Array) -> Array:
         """What the wall drags through the east faces of this rank's last column; shape (lines, 1)."""
-        r, strips = r.reshape(self.grid.box), self.scheme.in_strips(self.grid)
-        return np.concatenate([s.couette_E[:, -1:] + s.b_E[:, -1:] * r[at, -1:] for at, s in strips])
+        (ny, nx), s = self.grid.box, self.scheme
+        last = s.b_E_at(np.arange(ny), nx - 1)
+        return s.couette_E[:, -1:] + (last * r.reshape(ny, nx)[:, -1])[:, None]
 
     def quantities(self, fields: Fields) -> dict[str, Any]:
         """Load, friction, flows, largest pressure, cavity, and the scene's own `extras`. Collective."""

@@ -15,7 +15,7 @@ from ..strips import in_strips, places_of
 from .edges import Around
 from .integrals import LineIntegrals, check_film
 from .stored import Stored
-from .strip import coefficients_of, dragged, entering, leaving, line_weights, stream_weights
+from .strip import coefficients_of, dragged, entering, entering_at, leaving, leaving_at, line_weights, stream_weights
 
 Film = Callable[[Array, Array], Array]
 USUAL = 1e6  # the largest coefficient lies between this and its inverse: absolute tolerances then mean something
@@ -100,6 +100,17 @@ class BoxScheme:
     def b_E(self) -> Array:
         """What of b_C r leaves by the east face: all of it in a steady film."""
         return self.b_C if self.storage is None else self.b_C + self.storage
+
+    def b_E_at(self, row: Any, i: Any) -> Array:
+        """`b_E` of some cells, without an array of them all."""
+        b_C = vars(self)["b_C"]
+        some = leaving_at(row, i, *b_C.args) if isinstance(b_C, partial) else b_C[row, i]
+        return some if self.storage is None else some + self.storage[row, i]
+
+    def b_W_at(self, row: Any, i: Any) -> Array:
+        """`b_W` of some cells."""
+        b_W = vars(self)["b_W"]
+        return entering_at(row, i, *b_W.args) if isinstance(b_W, partial) else b_W[row, i]
 
     @property
     def diagonal(self) -> Array:

@@ -65,8 +65,9 @@ def coefficients_of(
             cubes_y = rims_across_y(grid, film, rims, cavity, cubes_y, period[1])
         arcs = grid.spacing[0] * x_share * grid.stretch(y_faces)[:, None]
         k_y = k * cubes_y * arcs / (grid.steps(1) * grid.spacing[1])[:, None]
-    void = y_share * m * (U * (h_face if scheme == "face" else h_x[:, :-1]))
-    wall = void if scheme != "nodal" else y_share * m * (U * h_face)
+    weight = y_share * m
+    void = dragged(h_face if scheme == "face" else h_x[:, :-1], weight, U)
+    wall = void if scheme != "nodal" else dragged(h_face, weight, U)
     return k_x, k_y, h_x[:, :-1], wall, void
 
 
@@ -82,20 +83,32 @@ def stream_weights(grid: Grid) -> Array:
 
 def dragged(void: Array, weight: Array | None, U: float) -> Array:
     """What goes through x faces if all is void: given as it is, or as films that are dragged."""
-    return void if weight is None else weight * (U * void)
+    return void if weight is None else (weight * U) * void
 
 
 def leaving(void: Array, last: Array | None, weight: Array | None, U: float) -> Array:
     """b_C; last: through the last face, where that is closed."""
-    b_C = -dragged(void[:, 1:], weight, U)
+    b_C = -void[:, 1:] if weight is None else dragged(void[:, 1:], weight, -U)
     if last is not None:
         b_C[:, -1] = -last
     return b_C
 
 
+def leaving_at(row: Any, i: Any, void: Array, last: Array | None, weight: Array | None, U: float) -> Array:
+    """b_C of some cells."""
+    inside = -dragged(void[row, i + 1], None if weight is None else weight[row, 0], U)
+    return inside if last is None else np.where(i == void.shape[1] - 2, -last[row], inside)
+
+
 def entering(void: Array, first: bool, weight: Array | None, U: float) -> Array:
     """b_W; first: whether anything enters the first column."""
-    b_W = dragged(void[:, :-1], weight, U) * 1.0
+    b_W = void[:, :-1].copy() if weight is None else dragged(void[:, :-1], weight, U)
     if not first:
         b_W[:, 0] = 0.0
     return b_W
+
+
+def entering_at(row: Any, i: Any, void: Array, first: bool, weight: Array | None, U: float) -> Array:
+    """b_W of some cells."""
+    inside = dragged(void[row, i], None if weight is None else weight[row, 0], U)
+    return inside if first else np.where(i == 0, 0.0, inside)

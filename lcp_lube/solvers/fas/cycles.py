@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.util import find_spec
 from math import inf
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
+from ...base.compiled import has_numba
 from ...errors import InputError
 from ...problems.grid import Grid
 from ...problems.solution import Step
@@ -50,7 +50,7 @@ class Cycles(Method):
 
     def __init__(self, job: Job):
         super().__init__(job)
-        if find_spec("numba") is None:
+        if not has_numba():
             raise InputError("--method fas: its loops need numba, which is not installed (pip install numba)")
 
     def _begin(self, started: bool) -> None:
