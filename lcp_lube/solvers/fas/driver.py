@@ -28,6 +28,7 @@ from .cycles import COARSEST_SWEEPS, WINDOW, CycleOptions, Cycles
 EPS = float(np.finfo(float).eps)
 TRUNCATIONS = {"none": 0, "clip": 1, "points": 2}  # see `transfer.correct`
 EXACT = (1200, 5000, 10_000)  # points of the coarsest grid once the cycles have stalled, and stalled again
+OWN = 17_000  # points of a problem that is then solved so itself
 EXTREME = 1000.0  # film ratio above which a small ||G|| says little of p, and the corrections have to be small too
 SETTLED = 1e-8  # of the largest pressure: what they may then be in the mean
 SCALED = 1e-3  # the most by which all pressures and voids are scaled (`Fas._balance`)
@@ -199,9 +200,9 @@ class Fas(Cycles):
         The finest grid that can be solved exactly takes their place: the problem's own one if it is small.
         """
         own = self._levels[0].nx * self._levels[0].ny
-        if self._levels[0].periodic[0] and own > EXACT[-1] and self.norm > CLOSE:  # what goes round has no coarse grid
+        if self._levels[0].periodic[0] and own > OWN and self.norm > CLOSE:  # what goes round has no coarse grid
             return False
-        for points in EXACT if own > EXACT[-1] else EXACT[-1:]:
+        for points in EXACT if own > OWN else (OWN,):
             for k, level in enumerate(self._levels[: self._depth - 1]):
                 if level.nx * level.ny <= points:
                     self._depth, self._recent = k + 1, (inf,) * WINDOW

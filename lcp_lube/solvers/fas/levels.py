@@ -13,7 +13,7 @@ from . import exact, held, transfer
 
 FEWEST = 3  # points a side of the coarsest grid, at least
 FEWEST_LINES = 16  # of a rank; grids with fewer are held whole by every rank. With 8 a dimpled pad stalls on three
-MOST_ENTRIES = 5_000_000  # of a banded matrix that is eliminated
+MOST_ENTRIES = 9_000_000  # of a banded matrix that is eliminated
 # Times the mean conductance of the other direction: then points are left out in the strong one alone. 8 costs 6 % less work on
 # six stretched films and 6 cycles more, on a rough one above all; 64 doubles both (benchmarks/constants.py).
 STRONG = 4.0
