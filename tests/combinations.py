@@ -37,6 +37,7 @@ FILMS = 3  # for each of the sides and shapes
 LOOSE, LOOSEST = 1e-8, 1e-6  # of the largest p, and of r; between them a certificate must say what was reached
 STEP = 0.1 * LOOSE  # the last one at most: answers of inexact steps are as far off as these are long
 STEPS, INNER = 60, 200  # outer and inner iterations: what needs more may fail
+LEAVE = 400  # inner iterations in all after which a run on several ranks is left, as each waits for messages
 
 
 @dataclass(frozen=True)
@@ -125,8 +126,20 @@ def dense(mat: Any) -> np.ndarray:
     return out
 
 
+class LeftError(Exception):
+    """Ends a run from within its monitor."""
+
+
 def attempt(case: Combination) -> str:
-    """'converged', 'refused: ...' or another outcome; 'WRONG: ...' and 'ERROR: ...' are what must not be. Collective."""
+    """'converged', 'refused: ...', 'left' or another outcome; 'WRONG: ...', 'ERROR: ...' are what must not be. Collective."""
+    inner = 0
+
+    def monitor(_: int, step: Any) -> None:
+        nonlocal inner
+        inner += step.linear_iterations
+        if case.ranks > 1 and inner > LEAVE:
+            raise LeftError
+
     try:
         solution = solve(
             load_scene(case.scene()),
@@ -135,7 +148,10 @@ def attempt(case: Combination) -> str:
             recipe=case.recipe,
             stopping={"eps1": 1e-11, "eps2": STEP, "max_it": STEPS},
             memory_check=False,
+            monitor=monitor,
         )
+    except LeftError:
+        return "left"
     except InputError as refusal:
         return f"refused: {refusal}" if str(refusal).strip() else "ERROR: refused without a reason"
     except Exception as error:

@@ -3,7 +3,7 @@
 import atexit
 import gc
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 
 import numpy as np
 from petsc4py import PETSc
@@ -17,6 +17,7 @@ ZERO_PIVOT = (71, 81)  # PETSc's codes for LU and Cholesky: the matrix is singul
 MAX_INNER_ITERATIONS = 10_000  # the paper's limit; -ksp_max_it overrides it
 MUMPS_SHORT = (-8, -9, -11, -14, -15, -17, -18, -19, -20)  # INFOG(1): a workspace or buffer is too small
 MUMPS_LARGEST_RESERVE = 2000
+SHIFT = "pc_sor_diagonal_shift"
 
 
 class LinearSolverError(ArithmeticError):
@@ -47,6 +48,25 @@ def own_errors() -> Iterator[None]:
         if cause is error:
             raise
         raise cause from None
+
+
+@contextmanager
+def zeros_fail_together() -> Iterator[None]:
+    """Options by which SOR, wherever it is read here, fails on all ranks at a zero on the diagonal of one of them.
+
+    Without a shift it raises on the rank that has the zero, while the others wait inside the solve for ever; with one below
+    any number PETSc notes the failure, and all ranks hear of it.
+    """
+    options, given = PETSc.Options(), set_names()
+    prefixes = {"", *(name.removesuffix("pc_type") for name in given if name.endswith("pc_type"))}
+    names = [name for p in prefixes for name in (p + SHIFT, f"{p}mg_levels_{SHIFT}") if name not in given]
+    for name in names:
+        options.setValue(name, "-1e-300")
+    try:
+        yield
+    finally:
+        for name in names:
+            options.delValue(name)
 
 
 class Krylov:
@@ -81,7 +101,7 @@ class Krylov:
         self._ready = False
         self.fields = fields or {}
         try:
-            with own_errors():
+            with own_errors(), zeros_fail_together():
                 self.ksp.setFromOptions()
         except PETSc.Error as error:
             raise InputError(explain_error(error)) from None
@@ -117,7 +137,7 @@ class Krylov:
                 if sorted(order.split(",")) != sorted(self.fields):
                     raise InputError(f"-fieldsplit_order {order}: allowed are {','.join(self.fields)} in any order")
                 pc.setFieldSplitIS(*((name, self.fields[name]) for name in order.split(",")))
-            with own_errors():
+            with own_errors(), nullcontext() if self.direct else zeros_fail_together():
                 self.ksp.setUp()
                 self.ksp.setUpOnBlocks()
         except PETSc.Error as error:

@@ -49,3 +49,14 @@ def test_right_or_refused_or_an_open_failure(tmp_path: Path, ranks: int, part: i
     outcomes, found = faults(cases, ranks, tmp_path)
     assert not found, f"LCP_LUBE_SEED={SEED}: " + "\n".join(found)
     assert len(cases) <= FEW or outcomes.count("converged") > 0.2 * len(outcomes)
+
+
+def test_a_zero_on_the_diagonal_of_one_rank_fails_on_all(tmp_path: Path) -> None:
+    """SOR raised there, and the other ranks waited for ever."""
+    cases = [
+        Combination("sor", "active-set", "full", "ring", 3, (9, 1), 0),
+        Combination("multigrid", "active-set", "full", "pressures", 3, (3, 41), 2),
+        Combination("bcgs_ml", "active-set", "full", "ring, mirror", 3, (7, 5), 0),
+    ]
+    outcomes, found = faults(cases, 3, tmp_path)
+    assert not found and set(outcomes) == {"converged"}
