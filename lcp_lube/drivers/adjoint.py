@@ -42,6 +42,8 @@ class Adjoint:
     InputError : no film, no converged solution, a quantity without a derivative.
     """
 
+    quick = False  # derivatives of second order do
+
     def __init__(self, scene: Scene, solution: Solution, quantities: Sequence[str], flip: bool = False):
         if not solution.converged:
             raise InputError(f"{scene.name}: {solution.outcome.sentence}: no solution, no derivatives")
@@ -164,7 +166,7 @@ class Adjoint:
             slope, jump = differences(at, value, max(abs(value), 1e-3 * unit), sizes)
         else:
             scale = abs(value) or self.scale(key)
-            quick = self.equations.grid.size > SMALL
+            quick = self.quick or self.equations.grid.size > SMALL
 
             def near(a: float) -> Array:
                 return self._here if a == value else self.lagrangians(with_values(self.scene, {key: a}))

@@ -1,0 +1,183 @@
+"""What effects change of a number, to first order: one transposed solve on an answer of the film, no solve with the effects.
+
+With J' lambda = dQ/dz at an answer (`adjoint`), coefficients that change by d on it, their fields z held, change Q by
+dL(d) = dQ - lambda' dG. An effect's d is what it makes of the answer: of the logarithm of viscosity, density and film, so that
+exp(dL/Q) - 1 is near the truth for large effects too (a film whose viscosity doubles everywhere carries twice the load). What
+is found for the scene, where a load is carried, follows by the conditions that it meets.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import expm1
+from typing import Any
+
+import numpy as np
+
+from ..base.parallel import Array
+from ..errors import InputError
+from ..problems.film.effects import Answer, Cells, Compressible, Effect, answer, factors, neutral
+from ..problems.film.fluid import Law
+from ..problems.solution import Solution
+from ..scenes.effects.named import named, without
+from ..scenes.values import values_of
+from .adjoint import Adjoint, Implicit, conditions_of
+from .coefficients import placed
+from .equations import Equations, cavity_of, fields_of
+from .linearised import Linear
+from .turned import Mirrored
+
+STEP = 1e-4  # of an effect: its derivative is a difference of two values of L
+THINNEST = -0.9  # of the rigid film, of a lift
+
+
+class FirstOrder:
+    """A film's answer with some of its scene's effects, and what the others would change. Collective, as its methods.
+
+    Parameters
+    ----------
+    scene : with all its effects. kept : those that `solution` was solved with. quantity : a key of its results, or what a
+        balance has found. found : how what is found follows, of an earlier answer; by default of this one, without effects.
+
+    Raises
+    ------
+    InputError : a quantity, or a film, without derivatives.
+    """
+
+    def __init__(self, scene: Any, solution: Solution, kept: Sequence[str], quantity: str, found: Implicit | None = None):
+        grid = solution.problem.grid
+        self.scene, self.kept = scene.with_shape(grid.shape), list(kept)
+        self._fields: dict[tuple[str, ...], Cells] = {}
+        self._known: dict[tuple[str, ...], tuple[Law, tuple[Effect, ...]]] = {}
+        bare = without(self.scene, named(scene))
+        if found is None:
+            found = Implicit([], [], np.zeros((0, 0)), {})
+            if conditions_of(bare, solution)[0] or solution.settings.get("supply_pressures"):
+                law = without(self.scene, [name for name in named(scene) if name != "barus" or name not in kept])
+                adjoint = Adjoint(law, solution, [quantity])
+                adjoint.quick = True
+                found = Implicit.of(adjoint)
+                adjoint.destroy()
+        self.found, self.quantity = found, quantity
+        pressures = [float(P) for P in solution.settings.get("supply_pressures", ())]
+        self.scene = placed(self.scene, solution)
+        bare = without(self.scene, named(scene))
+        self.equations = eq = Equations(bare, grid.petsc_comm, pressures)
+        self.base, (self.p, self.r) = eq.constant, fields_of(solution)
+        self.h = self.base.scheme.h.ravel()
+        every = self._physics(named(scene))[1]
+        if any(getattr(effect, "even_lines", False) for effect in every) and not self.base.grid.even:
+            raise InputError(f"scene {scene.name}: an effect of it needs even lines")
+        solved: Any = getattr(solution.problem, "moving", solution.problem)
+        self.cells = {**neutral(every, self.h.size), **solved.cells}
+        if "barus" in named(scene):
+            self.cells.setdefault("viscosity", np.ones(self.h.size))
+        self.law = self._physics(self.kept)[0]
+        self._film(self.cells)
+        self.at = Answer(eq.constant, self.p, self.r, self.cells, self.law, self.base)
+        names = [name for name in dict.fromkeys([quantity, *found.conditions]) if name not in found.found]
+        numbers = eq.numbers(self.p, self.r, None if self.quantity != "load" else ())
+        self.parts = {name: eq.partials(numbers, name) for name in names}
+        self.value = eq.report(numbers).get(quantity)
+        if quantity in found.found:
+            self.value = values_of(self.scene)[quantity]
+        self.lambdas = self._adjoints()
+        self.start = self._lagrangians(self.cells)
+
+    def change(self, name: str) -> tuple[float | None, float]:
+        """dQ/Q by an effect that was not solved for, or by Barus' law, and the largest change of a coefficient. Collective."""
+        sign = -1.0 if name in self.kept else 1.0
+        with np.errstate(all="ignore"):
+            if sign < 0.0:
+                d = {"viscosity": -np.log(self.law.viscosity(self.p))}
+            else:
+                after = self._made([*self.kept, name])
+                d = {key: self._over(key, after[key], self.cells[key]) for key in after}
+            slopes = (self._lagrangians(self._moved(d, STEP), STEP) - self.start) / STEP
+            total = self.found.total(self.quantity, name, dict(zip(self.lambdas, slopes, strict=True)))
+        size = max((self.base.reduce.max(np.abs(change)) for key, change in d.items() if key != "contact"), default=0.0)
+        if not self.value or not np.isfinite(total / self.value) or total / self.value > 100.0:
+            return None, size
+        return expm1(sign * total / self.value), size
+
+    def made(self, names: Sequence[str]) -> Cells:
+        """The fields that effects make of this answer: a start for the loop that solves for them."""
+        return {name: values for name, values in self._made(names).items() if name in neutral(self._physics(names)[1], 0)}
+
+    def _physics(self, names: Sequence[str]) -> tuple[Law, tuple[Effect, ...]]:
+        """The law of pressure and the effects, in the order in which the loop has them, of these names."""
+        key = tuple(sorted(names))
+        if key not in self._known:
+            one = without(self.scene, [name for name in named(self.scene) if name not in names])
+            model = (Mirrored(one) if self.equations.turned else one).model
+            law = model.law or Law()
+            self._known[key] = law, (*((Compressible(law),) if law.dowson_higginson else ()), *model.effects)
+        return self._known[key]
+
+    def _made(self, names: Sequence[str]) -> Cells:
+        key = tuple(sorted(names))
+        if key in self._fields:
+            return self._fields[key]
+        out = neutral(self._physics(named(self.scene))[1], self.h.size)
+        if "barus" in named(self.scene):
+            out.setdefault("viscosity", np.ones(self.h.size))
+        for effect in self._physics(names)[1]:
+            effect.apply(self.at, out)
+        if (barus := self._physics(names)[0]).barus and not self.law.barus:
+            out["viscosity"] = out["viscosity"] * barus.viscosity(self.p)
+        self._fields[key] = out
+        return out
+
+    def _over(self, key: str, after: Array, before: Array) -> Array:
+        """The change of a coefficient: of its logarithm, and of the film's; of asperities' pressure in Pa."""
+        if key == "contact":
+            return after - before
+        if key == "lift":
+            after, before = (1.0 + np.maximum(lift / self.h, THINNEST) for lift in (after, before))
+        return np.asarray(np.log(after / before))
+
+    def _moved(self, d: Cells, t: float) -> Cells:
+        out = dict(self.cells)
+        for key, change in d.items():
+            if key == "contact":
+                out[key] = out[key] + t * change
+            elif key == "lift":
+                out[key] = (self.h + out[key]) * np.exp(t * change) - self.h
+            else:
+                out[key] = out[key] * np.exp(t * change)
+        return out
+
+    def _film(self, cells: Cells, t: float = 0.0) -> None:
+        """The equations are those of the film with these coefficients; t : the part of what was not solved for in them."""
+        eq, law = self.equations, self._physics(self.kept)[0]
+        dense, power = self._physics(named(self.scene))[0], 1.0 if law.dowson_higginson else t
+        by = factors(self.base, cells, [float(dense.density(np.array(p))) ** power for p in eq._p_sides])
+        film = answer(self.base, law, cells, by, self.p, self.r, eq._p_sides).problem  # type: ignore[arg-type]
+        if "contact" in cells and (contact := getattr(getattr(self, "at", None), "problem", film).contact) is not None:
+            film.contact = replace(contact, p_a=cells["contact"])
+        eq.constant = film
+
+    def _adjoints(self) -> dict[str, Array]:
+        eq, p, r = self.equations, self.p, self.r
+        cavity, _ = cavity_of(eq, p, r)
+        rows = []
+        for weights in self.parts.values():
+            slopes = {part: eq.slope(p, r, part) for part in weights}
+            rows.append(sum((w * np.where(cavity, -slopes[k].r, slopes[k].p) for k, w in weights.items()), np.zeros(p.size)))
+        linear = Linear(eq.constant, cavity, given=eq.held)
+        try:
+            z = np.where(cavity, -r, p / eq.constant.p_unit)
+            return dict(zip(self.parts, linear.solve_transposed(rows, z), strict=True))
+        finally:
+            linear.destroy()
+
+    def _lagrangians(self, cells: Cells, t: float = 0.0) -> Array:
+        eq, p, r = self.equations, self.p, self.r
+        self._film(cells, t)
+        report = eq.report(eq.numbers(p, r, {part for weights in self.parts.values() for part in weights}))
+        G = eq.balance(p, r) / self.base.scheme.flow_unit
+        G = G if eq.held is None else np.where(eq.held, 0.0, G)
+        return np.array([report[name] - eq.grid.reduce.dot(one, G) for name, one in self.lambdas.items()])
+
+    def destroy(self) -> None:
+        self.equations.constant = self.base
+        self.equations.destroy()

@@ -1,0 +1,231 @@
+"""The look at a scene's effects that `decision` takes: to first order on a film's answer, or by solving without each."""
+
+from dataclasses import replace
+from math import exp, isfinite, log1p, prod
+from typing import Any
+
+from ..errors import InputError
+from ..problems.solution import Solution
+from ..registry import RUNGS, SMALL
+from ..scenes.effects.named import named, without
+from ..scenes.moving import motion_of
+from .accuracy import DEFAULT_QUANTITY, find_value
+from .ask import Ask, Start
+from .compose import Inner
+from .coupling import NESTED_ABOVE
+from .decision import total_work
+from .first_order import FirstOrder
+
+TOLERANCE = 0.01  # of the quantity, unless an accuracy is asked for
+PART = 0.1  # of the tolerance: what changes the quantity by less is left out, so that ten such effects stay within it
+WIDEST = 10.0  # change of log(e/(1 - e)) that is foretold
+INFINITE = 1e30  # where the place of the walls is found, every effect acts on all others
+ACTING, DOUBT = 0.2, 0.5  # of the product of two effects' sizes: what one may change by acting on the other; of the rigid film
+FIRST, SHARE_FIRST = 600, 0.05  # points of the film that is looked at, at least, and in parts of the fine grid
+SHARE = 0.10  # of the fine solve's work that coarse ones may take, by points: films differ in number, 0.15 is promised
+LEAST = {1: 15, 2: 6}  # points a side of a coarse grid, at least
+FREE = {"barus"}  # a change of the unknown: it costs nothing, and is always kept
+COARSE_EPS1 = 1e-7
+
+
+def coarse_shape(shape: tuple[int, ...], solves: int) -> tuple[int, ...] | None:
+    """The grid for the decision: so many solves on it cost `SHARE` of one on `shape`; None where it would be too small."""
+    factor = (SHARE / solves) ** (1.0 / len(shape))
+    coarse = tuple(max(1, int(factor * n)) for n in shape)
+    if len(shape) == 2 and coarse[1] < LEAST[2] <= shape[1]:  # few lines: keep them, take the points along
+        coarse = (int(SHARE / solves * prod(shape) / LEAST[2]), LEAST[2])
+    return coarse if min(coarse) >= LEAST[len(shape)] and coarse[0] >= 2 * LEAST[2] else None
+
+
+class Look:
+    """What is known of a scene's effects so far. Collective, as its methods.
+
+    Attributes
+    ----------
+    kept : effects to solve for. effects : what each changes, dQ/Q. doubtful : left out, to be looked at again on the answer.
+    record : how that was found. work : of the decision, unknowns times films. solution : the answer, where it is known already.
+    ask : that of the solve which follows.
+    """
+
+    def __init__(self, scene: Any, names: list[str], ask: Ask, inner: Inner):
+        self.scene, self.names, self.ask, self.inner = scene, names, ask, inner
+        self.kept, self.effects, self.sizes = list(names), dict[str, float](), dict[str, float]()
+        self.record: dict[str, Any] = {}
+        self.doubtful: list[str] = []
+        self.work, self.limit = 0.0, PART * (ask.accuracy or TOLERANCE)
+        self.solution: Solution | None = None
+        self.first: Solution | None = None
+        self.found: Any = None
+
+    @property
+    def _free(self) -> list[str]:
+        return [name for name in self.names if name in FREE]
+
+    @property
+    def reduced(self) -> Any:
+        """The scene with the effects that are kept."""
+        gone = [name for name in self.names if name not in self.kept]
+        return without(self.scene, gone) if gone else self.scene
+
+    def decide(self) -> None:
+        """By first order; where there are no derivatives, by solving without each."""
+        if set(self.names) <= FREE or motion_of(self.scene) is not None:
+            alone = set(self.names) <= FREE
+            self.record = {"reason": "alone it costs nothing" if alone else "in time an effect is another at every step"}
+            return
+        if coarse_shape(self.scene.shape, len(self.names) + 1) is None:
+            self.record = {"reason": "the grid is so small that all are solved for"}
+            return
+        shape = first_shape(self.scene.shape)
+        own = shape == self.scene.shape and self.ask.accuracy is None
+        try:
+            rigid = without(self.scene.with_shape(shape), [name for name in self.names if name not in FREE])
+            first = self.inner(rigid, self.ask if own else quick(self.ask))
+        except InputError:
+            self.record = {"reason": f"no film without effects on {shape} points"}
+            return
+        self.first = first
+        if not first.converged:
+            self.record = {"reason": f"no answer without effects: {first.message}"}
+            return
+        try:
+            quantity = _quantity(first, self.ask.quantity, self.scene)[1]
+            film = FirstOrder(self.scene, first, self._free, quantity)
+        except InputError:
+            self._by_solving()
+            return
+        changes = {name: film.change(name) for name in self.names}
+        self.found = film.found
+        self.effects = {name: change for name, (change, _) in changes.items() if change is not None}
+        self.sizes = {name: size for name, (_, size) in changes.items()}
+        small = [name for name in self.names if abs(self.effects.get(name, 1.0)) < self.limit]
+        self.kept = [name for name in self.names if name in FREE or name not in small]
+        acting = DOUBT if not film.found.found else INFINITE
+        self.doubtful = [name for name in self.names if name not in self.kept and not self._sure(name, acting)]
+        self.work = first.problem.unknowns + (0 if own else total_work(first))
+        self.record = {"quantity": quantity, "tolerance": self.ask.accuracy or TOLERANCE, "grid": list(shape)}
+        if own and self.kept == self._free:
+            self.solution, self.first = first, None
+        elif own and self.ask.start is None:
+            solved: Any = getattr(first.problem, "moving", first.problem)
+            solved.cells = film.made(self.kept)
+            self.ask = replace(self.ask, start=Start(first.problem, first.fields, self._foretold(first.settings)))
+        film.destroy()
+
+    def _foretold(self, settings: Any) -> Any:
+        """Settings of the film without effects, with the value that a balance is expected to find with those kept."""
+        balance = settings.get("balance")
+        if not balance or balance["vary"] != self.record["quantity"]:
+            return settings
+        value = balance["value"]
+        grows = sum(log1p(self.effects.get(name, 0.0)) for name in self.kept if name not in FREE)
+        if balance["vary"].rpartition(".")[2] == "eccentricity":
+            value = 1.0 / (1.0 + (1.0 / value - 1.0) * exp(-min(max(grows / (1.0 - value), -WIDEST), WIDEST)))
+        else:
+            value *= exp(grows)
+        return {**settings, "balance": {**balance, "value": value}}
+
+    def _sure(self, name: str, acting: float) -> bool:
+        """Whether an effect could not count by acting on those that are kept."""
+        others = sum(self.sizes[other] for other in self.kept)
+        return abs(self.effects[name]) + (acting * self.sizes[name] * others if others else 0.0) < self.limit
+
+    def again(self, solution: Solution) -> bool:
+        """Look at the answer; whether more effects are kept now."""
+        try:
+            film = FirstOrder(self.scene, solution, self.kept, self.record["quantity"], self.found)
+        except InputError:
+            return False
+        more = []
+        for name in self.doubtful:
+            change, self.sizes[name] = film.change(name)
+            self.effects[name] = self.effects[name] if change is None else change
+            if change is None or not self._sure(name, ACTING):
+                more.append(name)
+        film.destroy()
+        self.work += solution.problem.unknowns
+        self.kept = [name for name in self.names if name in self.kept or name in more]
+        self.doubtful = [name for name in self.doubtful if name not in more]
+        return bool(more)
+
+    def destroy(self) -> None:
+        if self.first is not None:
+            self.first.destroy()
+
+    def _by_solving(self) -> None:
+        """On a coarse grid, with all effects and without each."""
+        self.kept, self.effects, self.record = _by_solving(self.scene, self.names, self.ask, self.inner)
+        self.work = self.record.pop("coarse_work", 0)
+
+
+def quick(ask: Ask) -> Ask:
+    """For a film that is looked at, and thrown away."""
+    none = dict.fromkeys(("accuracy", "quantity", "finest", "start", "monitor", "checkpoint", "resume"))
+    return replace(ask, **none, certify=False, stopping={"eps1": COARSE_EPS1})  # type: ignore[arg-type]
+
+
+def first_shape(shape: tuple[int, ...]) -> tuple[int, ...]:
+    """The grid on which the film without effects is looked at."""
+    points = prod(shape)
+    if points <= NESTED_ABOVE:
+        return shape
+    factor = (min(max(FIRST, SHARE_FIRST * points), SMALL) / points) ** (1.0 / len(shape))
+    coarse = tuple(max(1, int(factor * n)) for n in shape)
+    if len(shape) == 2 and coarse[1] < LEAST[2] <= shape[1]:
+        coarse = (max(int(factor * factor * points / LEAST[2]), 1), LEAST[2])
+    return coarse
+
+
+def _by_solving(scene: Any, names: list[str], ask: Ask, inner: Inner) -> tuple[list[str], dict[str, float], dict[str, Any]]:
+    """Effects to keep, what each changes on a coarse grid, and how that was found. Collective."""
+    tol = ask.accuracy or TOLERANCE
+    shape = coarse_shape(scene.shape, len(names) + 1)
+    assert shape is not None  # for the type checker: `decide` has looked
+    coarse = scene.with_shape(shape)
+    try:
+        full = inner(coarse, quick(ask))
+    except InputError:
+        return names, {}, {"reason": f"no film on the coarse grid {shape}"}
+    work, effects = total_work(full), {}
+    try:
+        if not full.converged:
+            return names, {}, {"reason": f"no answer on the coarse grid {shape}: {full.message}"}
+        value, quantity = _quantity(full, ask.quantity, scene)
+
+        def effect(gone: list[str]) -> float | None:
+            """What these change together, dQ/Q."""
+            nonlocal work
+            bare = without(coarse, gone)
+            if not named(bare):  # a line's numbers are exact without effects, and the others have the grid's error
+                bare = bare.model_copy(update={"viscosity": RUNGS["viscosity"].load()(factor="1")})
+            other = inner(bare, replace(quick(ask), start=full))
+            work += total_work(other)
+            reference = _quantity(other, quantity, scene)[0] if other.converged else None
+            other.destroy()
+            if reference is None or value is None or reference == 0.0 or not isfinite(value / reference):
+                return None
+            return value / reference - 1.0
+
+        effects = {name: found for name in names if (found := effect([name])) is not None}
+        kept = [name for name in names if not abs(effects.get(name, 1.0)) < PART * tol]
+        gone = sorted((name for name in names if name not in kept), key=lambda name: abs(effects[name]))
+        together = effect(gone) if len(gone) > 1 else 0.0
+        while len(gone) > 1 and (together is None or not abs(together) < len(gone) * PART * tol):
+            kept.append(gone.pop())
+            together = effect(gone) if len(gone) > 1 else 0.0
+    finally:
+        full.destroy()
+    record = {"quantity": quantity, "tolerance": tol, "grid": list(shape), "coarse_work": work}
+    return kept, effects, record
+
+
+def _quantity(solution: Solution, quantity: str | None, scene: Any) -> tuple[float | None, str]:
+    """The quantity asked for, as `accuracy` has it, and its name; None where this model has no such number."""
+    found = solution.problem.quantities(solution.fields)
+    balance = solution.settings.get("balance")
+    if balance:
+        found = {balance["vary"]: balance["value"], **found}
+    name = quantity or (balance["vary"] if balance else next((one for one in DEFAULT_QUANTITY if one in found), ""))
+    if quantity is not None and name not in found:
+        return None, name
+    return find_value(found, name, scene), name
