@@ -2,7 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from math import ceil, inf, isfinite, prod
+from itertools import count
+from math import ceil, inf, isfinite, log2, prod
 from time import perf_counter
 from typing import Any
 
@@ -13,6 +14,7 @@ from petsc4py import PETSc
 from ..base.progress import of_ladder
 from ..errors import InputError, nearest
 from ..problems.film.model import Model
+from ..problems.grid import OFFSET
 from ..problems.solution import Outcome, Solution
 from ..registry import METHODS
 from ..scenes.scene import Solvable
@@ -25,6 +27,9 @@ from .memory import DENSE, available
 from .plan import SMALL
 
 COARSEST = {1: 12, 2: 4}  # points a side at least on the first grid
+FEW = {1: 12, 2: 100}  # points of the first grid at least: coarser ones cost as much, and tell less
+FEW_KNOWN = 64  # of a line whose number is known: no coarser grid is cheaper
+JUMP, NEARLY = 1, 0.5  # doublings of the points a side at once, and part of a rung that is not worth one more
 ALGEBRAIC = 1e-3  # ||F|| relative to the tolerance: with many small cavities it leaves up to 60 times itself in a load
 ALLOWED = (1e-10, 0.5)  # tolerances
 HOPELESS = 1_000_000  # points on which an estimate that has not come down is taken to stay up
@@ -73,14 +78,18 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     assert tol is not None
     begin = perf_counter()
     fewest = model.fewest_meshes() if isinstance(model := getattr(scene, "model", None), Model) else ()
-    shape = first_shape(scene.shape, ask.mpi.size, fewest, finest)
-    grids: list[tuple[tuple[int, ...], tuple[float, ...]]] = []  # shapes and meshes a side
+    known = known_numbers(scene, ask.comm)
+    first = first_shape(scene.shape, fewest, finest, FEW_KNOWN if known else None)
+    kinds = [model.sides[2 * k : 2 * k + 2] if isinstance(model, Model) else () for k in range(len(first))]
+    meshes = [n + 1.0 - sum(1.0 - OFFSET[side.kind] for side in ends) for n, ends in zip(first, kinds, strict=True)]
+    rung = next(k for k in count() if ask.mpi.size == 1 or finer(first, meshes, k)[-1] >= 2 * ask.mpi.size)
+    shape = finer(first, meshes, rung)
+    sizes: list[float] = []  # meshes a side
     solution: Solution | None = None
     history: list[dict[str, float]] = []
     misplaced: list[float] = []
     levels: list[dict[str, Any]] = []
     times: dict[str, float] = {}
-    known = known_numbers(scene, ask.comm)
     end, best = "", Estimate(np.nan, inf)
     while not end:
         level_begin, before = perf_counter(), solution
@@ -98,9 +107,8 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         value = find_value(found, quantity, scene)
         history.append({**scalars(found), quantity: value} if solution.converged else {})
         misplaced.append(misplaced_film(problem))
-        grids.append((shape, problem.grid.meshes))
-        finer = [prod(meshes) ** (1.0 / len(meshes)) for _, meshes in grids]
-        best = _best(quantity, history, misplaced, finer, known)
+        sizes.append(prod(problem.grid.meshes) ** (1.0 / len(first)))
+        best = _best(quantity, history, misplaced, sizes, known)
         levels.append(
             {
                 **dict(zip(("nx", "ny"), problem.grid.shape, strict=False)),
@@ -111,16 +119,15 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
                 "estimate": best.relative,
             }
         )
-        seconds_by_level = [float(level["time_s"]) for level in levels]
-        ask.tell(
-            "accuracy", f"{quantity} to {best.relative:.0e}", of_ladder(seconds_by_level, best.relative, tol, 2.0 ** len(shape))
-        )
+        values, estimates, seconds = ([level[name] for level in levels] for name in ("value", "estimate", "time_s"))
+        ask.tell("accuracy", f"{quantity} to {best.relative:.0e}", of_ladder(seconds, best.relative, tol, 2.0 ** len(shape)))
         times = added(times, solution.times)
-        shape = next_shape(grids)
-        values = [level["value"] for level in levels]
-        end = _end([level["estimate"] for level in levels], values, tol, problem.grid.size) or _no_room(
-            solution, shape, finest, best.relative, tol
-        )
+        end = _end(estimates, values, tol, problem.grid.size)
+        for up in range(0 if end else rungs_up(estimates, tol, known is not None, len(first)), 0, -1):
+            shape = finer(first, meshes, rung + up)
+            if not (end := _no_room(solution, shape, finest, best.relative, tol)):
+                rung += up
+                break
     assert solution is not None and quantity is not None  # for the type checker: there is a first grid
     if solution.converged and not best.relative <= tol:
         solution.outcome = Outcome.ACCURACY
@@ -132,11 +139,13 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         "accuracy_extrapolated": best.extrapolated,
         "accuracy_grid_value": history[-1].get(quantity),
         "estimates": {
-            name: vars(one) for name in history[-1] if isfinite((one := _best(name, history, misplaced, finer, known)).error)
+            name: vars(one) for name in history[-1] if isfinite((one := _best(name, history, misplaced, sizes, known)).error)
         },
     }
     if best.extrapolated and quantity in solution.numbers:
         solution.numbers[quantity] = best.value
+        if quantity == "load" and value == np.hypot(*(force := solution.numbers.get("force") or [0.0, 0.0])):
+            solution.numbers["force"] = [part * best.value / value for part in force]  # the grid's direction
     solution.because(*ladder(levels, quantity, tol), after=True)
     solution.levels = levels
     solution.times = {**times, "total": perf_counter() - begin}
@@ -144,38 +153,48 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
 
 
 def first_shape(
-    shape: tuple[int, ...], ranks: int = 1, fewest: Sequence[int] = (), finest: tuple[int, ...] | None = None
+    shape: tuple[int, ...], fewest: Sequence[int] = (), finest: tuple[int, ...] | None = None, few: int | None = None
 ) -> tuple[int, ...]:
-    """The coarsest grid, of the scene's own proportions; every rank gets two lines at least.
+    """The first grid, of the scene's own proportions: FEW points, or fewer, so that `finest` leaves room for three grids.
 
     fewest : meshes a side, without which a film's straight edges find no lines: coarser grids would tell nothing of it. Heeded
         where that is no finer than the scene's own grid, or `finest`.
+    few : points, in the place of FEW.
     """
-    most = finest or shape
+    most, few = finest or shape, few or FEW[len(shape)]
 
-    def enough(n: tuple[int, ...]) -> bool:
-        return min(n) >= COARSEST[len(n)] and (ranks == 1 or n[-1] >= 2 * ranks)
+    def enough(n: tuple[int, ...], now: tuple[int, ...]) -> bool:
+        cramped = any(2 * points >= end for points, end in zip(now, most, strict=True)) if finest else False
+        return min(n) >= COARSEST[len(n)] and (prod(n) >= few or cramped)
 
-    while enough(half := tuple((n - 1) // 2 for n in shape)):
+    while enough(half := tuple((n - 1) // 2 for n in shape), shape):
         shape = half
     short = max((meshes / (n + 1) for n, meshes in zip(shape, fewest, strict=False)), default=0.0)
     first = tuple(ceil(short * (n + 1)) - 1 for n in shape)
     return first if short > 1.0 and all(n <= m for n, m in zip(first, most, strict=True)) else shape
 
 
-def next_shape(grids: Sequence[tuple[tuple[int, ...], tuple[float, ...]]]) -> tuple[int, ...]:
-    """Twice the points, from shapes and meshes a side of the grids so far: half the spacing of a line or of the plane grid
-    before the last one."""
-    shape, meshes = grids[-1] if len(grids[0][0]) == 1 else grids[-2:][0]
-    more = 1.0 if len(shape) == 1 or len(grids) > 1 else 2.0**0.5 - 1.0
-    return tuple(n + max(1, round(more * m)) for n, m in zip(shape, meshes, strict=True))
+def finer(shape: tuple[int, ...], meshes: Sequence[float], rung: int) -> tuple[int, ...]:
+    """The grid so many rungs above one of this shape and these meshes a side: each has twice the points of the one before, in
+    the plane every other one half the spacing. The same on any number of ranks."""
+    doublings, odd = divmod(rung, 2) if len(shape) == 2 else (rung, 0)
+    more = [max(1, round((2.0**0.5 - 1.0) * m)) * odd for m in meshes]
+    return tuple(n + k + round((2**doublings - 1) * (m + k)) for n, m, k in zip(shape, meshes, more, strict=True))
+
+
+def rungs_up(estimates: Sequence[float], tol: float, known: bool, dim: int) -> int:
+    """How many rungs the next grid lies above this one: the first that reaches the tolerance, if an estimate below ASYMPTOTIC
+    (of three grids, or of one whose error is known) falls by second order; at most JUMP doublings of the points a side."""
+    if not (known or len(estimates) >= 3) or not estimates[-1] < ASYMPTOTIC:
+        return 1
+    return min(max(1, ceil(0.5 * dim * log2(estimates[-1] / tol) - NEARLY)), dim * JUMP)
 
 
 def _best(
     name: str,
     history: Sequence[Mapping[str, float]],
     misplaced: Sequence[float],
-    finer: Sequence[float],
+    sizes: Sequence[float],
     known: Mapping[str, float] | None,
 ) -> Estimate:
     """The best value of a number and its error: from what is known of a line, or from its values on all grids."""
@@ -184,7 +203,7 @@ def _best(
     if np.isfinite(truth):
         above = max(1.0, abs(value / truth)) if truth else 1.0  # relative to the truth, not to a value that is too large
         return Estimate(value, above * abs(value - truth) + QUADRATURE * abs(value))
-    return estimate([found.get(name, np.nan) for found in history], misplaced, finer)
+    return estimate([found.get(name, np.nan) for found in history], misplaced, sizes)
 
 
 def ladder(levels: list[dict[str, Any]], quantity: str, tol: float) -> list[str]:
@@ -260,8 +279,8 @@ def _no_room(solution: Solution, shape: tuple[int, ...], finest: tuple[int, ...]
         """Bytes of all ranks."""
         return DENSE * points**2 if dense else each * points
 
-    factor = max(1.0, 0.5 * (estimate / tol) ** 0.5) if estimate < ASYMPTOTIC else 1.0
-    points = prod(factor * n for n in shape)
+    factor = 0.7 * (estimate / tol) ** 0.5 if estimate < ASYMPTOTIC else 0.0
+    points = max(prod(shape), prod(factor * n for n in problem.grid.shape))
     if needed(points) < SMALL_CHANGE:
         return ""
     comm = problem.grid.comm
@@ -269,10 +288,10 @@ def _no_room(solution: Solution, shape: tuple[int, ...], finest: tuple[int, ...]
     share = comm.allreduce(machine.size / comm.size, MPI.MAX)  # of the points, on the machine that has the most ranks
     machine.Free()
     left = comm.allreduce(available(), MPI.MIN) / share
-    if factor > 1.0 and not finest and (needed(points) > left or points > np.iinfo(PETSc.IntType).max // 2):
+    if points > prod(shape) and not finest and (needed(points) > left or points > np.iinfo(PETSc.IntType).max // 2):
         raise InputError(
-            f"--accuracy {tol:g}: takes some {ceil(factor * shape[0])} points along x (with {problem.grid.shape[0]} it is "
-            f"{estimate:.1e}), {needed(points) / 1e9:.0f} GB; {left / 1e9:.0f} GB are available"
+            f"--accuracy {tol:g}: takes some {ceil(factor * problem.grid.shape[0])} points along x (with "
+            f"{problem.grid.shape[0]} it is {estimate:.1e}), {needed(points) / 1e9:.0f} GB; {left / 1e9:.0f} GB are available"
         )
     if needed(prod(shape)) > left:
         return f"a grid of {name} needs {needed(prod(shape)) / 1e9:.0f} GB, {left / 1e9:.0f} GB are available"

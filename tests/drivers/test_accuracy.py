@@ -8,7 +8,7 @@ import pytest
 from films import FilmScene, L, Pieces, random_films
 
 from lcp_lube.api import solve
-from lcp_lube.drivers.accuracy import first_shape, next_shape
+from lcp_lube.drivers.accuracy import finer, first_shape, rungs_up
 from lcp_lube.drivers.estimate import estimate, known_numbers, misplaced_film
 from lcp_lube.errors import InputError
 from lcp_lube.problems.solution import Outcome
@@ -114,6 +114,14 @@ def test_the_load_of_a_shaft_is_its_force():
     assert found["sommerfeld"] == pytest.approx(3.22777817, rel=1e-4)
 
 
+def test_the_force_of_a_shaft_is_as_large_as_its_extrapolated_load():
+    with solve(load_scene("journal"), accuracy=2e-2) as solution:
+        found, grid = solution.numbers, solution.problem.quantities(solution.fields)
+        assert solution.settings["accuracy_extrapolated"] and found["load"] != grid["load"]
+        assert np.hypot(*found["force"]) == pytest.approx(found["load"], rel=1e-12)
+        assert np.cross(found["force"], grid["force"]) == pytest.approx(0.0, abs=1e-9 * found["load"] ** 2)
+
+
 def test_no_grid_finer_than_needed():
     """The grid before the last one was not known to be good enough; a coarser tolerance ends sooner."""
     sizes = []
@@ -199,24 +207,35 @@ def test_jump_is_seen_where_values_do_not_show_it():
     smooth.destroy()
 
 
-def test_first_shape_keeps_two_lines_for_every_rank():
-    assert first_shape((100, 100)) == (5, 5)
-    assert first_shape((360, 79)) == (21, 4)
-    assert first_shape((360, 79), ranks=3)[1] >= 6
+def test_first_shape():
+    """A hundred points or so, fewer where the finest grid allowed leaves no room for three; in 1D two dozens."""
+    assert first_shape((100, 100)) == (11, 11)
+    assert first_shape((360, 79)) == (44, 9)
     assert first_shape((3, 3)) == (3, 3)
+    assert first_shape((20, 20), finest=(20, 20)) == (9, 9)
+    assert first_shape((100,)) == (24,)
+    assert first_shape((100,), few=64) == (100,)
 
 
 def test_grids_begin_where_lines_lie_on_all_edges():
-    """Twice the points from grid to grid; every other one has half the spacing."""
     assert first_shape((600, 600), fewest=(81, 81)) == (80, 80)
     assert first_shape((60, 60), fewest=(81, 81)) == first_shape((60, 60))
-    assert first_shape((600, 600), fewest=(81, 81), finest=(60, 60)) == first_shape((600, 600))
-    grids = [((80, 80), (81.0, 81.0))]
-    for _ in range(4):
-        n, _ = next_shape(grids)
-        grids.append(((n, n), (n + 1.0, n + 1.0)))
-    assert [shape[0] for shape, _ in grids] == [80, 114, 161, 229, 323]
-    assert next_shape([((12,), (13.0,))]) == (25,)
+    assert first_shape((600, 600), fewest=(81, 81), finest=(60, 60)) == first_shape((600, 600), finest=(60, 60))
+
+
+def test_rungs():
+    """Twice the points from grid to grid; every other one has half the spacing."""
+    assert [finer((80, 80), (81.0, 81.0), k)[0] for k in range(5)] == [80, 114, 161, 229, 323]
+    assert finer((12,), (13.0,), 1) == (25,)
+    assert finer((10, 10), (10.0, 11.0), 2) == (20, 21)  # a ring has as many meshes as points
+
+
+def test_grids_that_an_estimate_leaves_out():
+    """None before three values, nor while they are far off; at most half the spacing at once."""
+    assert rungs_up([math.inf, math.inf], 1e-2, False, 2) == 1
+    assert rungs_up([math.inf, math.inf, 9e-2], 1e-2, False, 2) == 2
+    assert rungs_up([math.inf, math.inf, 1.1e-2], 1e-2, False, 2) == 1
+    assert rungs_up([5e-2], 1e-2, True, 1) == 1
 
 
 def test_what_a_line_is_known_by():
@@ -284,4 +303,5 @@ def test_ranks(cli, ranks):
     one = cli("solve", "problem4", "--accuracy", "2e-2", "--json").json
     more = cli("solve", "problem4", "--accuracy", "2e-2", "--json", ranks=ranks).json
     assert more["converged"]
-    assert more["load"] == pytest.approx(one["load"], rel=2e-2)
+    assert [level["nx"] for level in more["levels"]] == [level["nx"] for level in one["levels"]]
+    assert more["load"] == pytest.approx(one["load"], rel=1e-6)

@@ -243,11 +243,18 @@ def _gauss(f: Callable[[Array], Array], a: Array, b: Array) -> Array:
 
 
 def bisect(f: Callable[[Array], Array], a: Array, b: Array) -> Array:
-    """Return the roots of f, positive at a and not at b, in all brackets at once; rounding cannot make it fail."""
-    for _ in range(60 if np.size(a) else 0):
-        m = (a + b) / 2
-        if not ((a < m) & (m < b)).any():
+    """Return the roots of f, positive at a and not at b, in all brackets at once; rounding cannot make it fail.
+
+    f is asked at 15 places of each bracket at once, along a first axis: a call costs more than a place.
+    """
+    parts = (np.arange(1, 16) / 16.0).reshape(-1, *[1] * np.ndim(a))
+    for _ in range(15 if np.size(a) else 0):
+        inside = np.clip(a + (b - a) * parts, a, b)
+        if not ((a < inside) & (inside < b)).any():
             break
-        left = f(m) > 0
-        a, b = np.where(left, m, a), np.where(left, b, m)
+        left = np.logical_and.accumulate(f(inside) > 0, axis=0)
+        a, b = (
+            np.max(np.where(left, inside, a), axis=0),
+            np.min(np.where(left, b, inside), axis=0),
+        )
     return b
