@@ -39,7 +39,7 @@ from ..scenes.scene import Solvable
 
 MOVED, PART = 1.1, 0.75  # factor of n, and what is added of a correction
 EXPECTED = 1.0 / 3.0  # of what corrections before lead one to expect of the last one, which can be small by chance
-SPAN = 10.0  # over the square of finest over coarsest grid: factor of n
+SPAN = 12.0  # over the square of finest over coarsest grid: factor of n
 ENOUGH = 3.9  # finest over coarsest of grids that are enough without those before
 CLEAN = 0.01  # what moves of w leave over the last correction
 QUADRATURE = 1e-9  # relative: what a line's quadrature may leave

@@ -179,7 +179,7 @@ class Bench:
     def accuracy(self, store: ResumableCsv, tol: float) -> None:
         """What `auto --accuracy TOL` takes, all its grids together. Collective."""
         key = {"method": "auto --accuracy", "nested": True, "system": "auto", "recipe": "auto", "eps": tol, "n": "auto"}
-        self.row(store, key, self.scene, accuracy=tol, quantity="load", finest=FINEST[len(self.scene.shape)])
+        self.row(store, key, self.scene, accuracy=tol, quantity="pressure_integral", finest=FINEST[len(self.scene.shape)])
 
     def row(self, store: ResumableCsv, key: dict[str, Any], scene: Scene, **choices: Any) -> Row | None:
         """One run's row, from the csv or made now; None if it was refused. Collective."""

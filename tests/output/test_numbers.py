@@ -37,7 +37,7 @@ def answers():
     """What the built-in scenes print on small grids, and the options that print more."""
     film = {"n": 15, "U": 1.0}
     extra = {
-        "accuracy": printed(solve("problem1", accuracy=1e-2)),
+        "accuracy": printed(solve("problem1", accuracy=1e-4)),
         "fas": printed(solve("problem4", n=20, method="fas")),
         "certify": printed(solve(load_scene("problem1", {"n": 20}), certify=True)),
         "round": printed(solve(load_scene("dimpled_pad", {"nx": 30, "ny": 30, "film.dimples.form": "round"}))),
