@@ -245,10 +245,11 @@ def _gauss(f: Callable[[Array], Array], a: Array, b: Array) -> Array:
 def bisect(f: Callable[[Array], Array], a: Array, b: Array) -> Array:
     """Return the roots of f, positive at a and not at b, in all brackets at once; rounding cannot make it fail.
 
-    f is asked at 15 places of each bracket at once, along a first axis: a call costs more than a place.
+    f is asked at 15 places of a bracket at once, along a first axis, where they are few: a call costs more than a place then.
     """
-    parts = (np.arange(1, 16) / 16.0).reshape(-1, *[1] * np.ndim(a))
-    for _ in range(15 if np.size(a) else 0):
+    bits = 4 if np.size(a) < 256 else 1
+    parts = (np.arange(1, 2**bits) / 2**bits).reshape(-1, *[1] * np.ndim(a))
+    for _ in range(60 // bits if np.size(a) else 0):
         inside = np.clip(a + (b - a) * parts, a, b)
         if not ((a < inside) & (inside < b)).any():
             break
