@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from .grid import Grid
 
 STRIP = 16_384  # points
+MANY = 250_000  # points of a grid from which compiled loops over its strips are worth being loaded
 
 
 def in_strips(grid: Grid) -> Iterator[slice]:

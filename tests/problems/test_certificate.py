@@ -12,6 +12,7 @@ from lcp_lube import load_scene, solve
 from lcp_lube.problems.certificate import Certificate, certificate_tol
 from lcp_lube.problems.film.cell_loops import loop_misfits
 from lcp_lube.problems.film.certify import cell_misfits, misfits
+from lcp_lube.problems.film.flows import friction
 
 
 @pytest.fixture(scope="module")
@@ -184,13 +185,29 @@ def test_arrays_and_loops_measure_what_each_cell_does(look):
         field[4, 5] = 0.0
 
 
-def test_large_films_are_certified_by_loops(monkeypatch):
-    """One film, by arrays and by loops."""
-    found = solve(load_scene("journal", {"nx": 40, "ny": 21}), method="active-set", nested=False)
-    p, r = found.fields["p"] * 1.001, found.fields["r"]
-    by_arrays = misfits(found.problem, p, r, 2.0, 1.0)
-    monkeypatch.setattr("lcp_lube.problems.film.certify.MANY", 1)
-    np.testing.assert_allclose(misfits(found.problem, p, r, 2.0, 1.0), by_arrays, rtol=1e-12)
+@pytest.mark.parametrize(
+    "name, keys",
+    [
+        ("journal", {}),
+        ("problem4", {"p_a": 2e5, "scheme": "upwind"}),
+        ("textured_slider", {"K": 3}),
+        ("pocketed_pad_2d", {}),
+        ("step_thrust", {}),
+    ],
+)
+def test_large_films_are_read_by_loops(monkeypatch, name, keys):
+    """One film's misfits and friction, by arrays and by loops."""
+    found = solve(load_scene(name, {"nx": 40, "ny": 21, **keys}), method="active-set", nested=False)
+    problem, p, r = found.problem, found.fields["p"] * 1.001, found.fields["r"]
+    levers = [1.0] if problem.grid.polar is None else [1.0, problem.grid.polar[0] + problem.grid.y]
+
+    def read():
+        return [*misfits(problem, p, r, 2.0, 1.0), *(friction(problem, p * problem.p_unit, r, lever) for lever in levers)]
+
+    by_arrays = read()
+    for module in ("certify", "flows"):
+        monkeypatch.setattr(f"lcp_lube.problems.film.{module}.MANY", 1)
+    np.testing.assert_allclose(read(), by_arrays, rtol=1e-11)
     found.destroy()
 
 

@@ -1,4 +1,4 @@
-"""The certificate's cells one by one, compiled when this module is imported: of large films, whose arrays would cost more."""
+"""Cells and faces of large films one by one, where arrays take several times as long; compiled when this is imported."""
 
 from typing import Any
 
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from ...base.compiled import kernel
 from ...base.parallel import Array
 from .certify import cell_misfit
+from .flows import face_drag
 
 
 @kernel
@@ -16,7 +17,7 @@ def choose(condition: Any, a: Any, b: Any) -> Any:
     return a if condition else b
 
 
-misfit = kernel(cell_misfit)
+misfit, face = kernel(cell_misfit), kernel(face_drag)
 
 
 @kernel
@@ -52,3 +53,32 @@ def loop_misfits(
             most[0, i] = worst if worst > most[0, i] or worst != worst else most[0, i]
             most[1, i] = gap if gap > most[1, i] or gap != gap else most[1, i]
     return sums.sum(axis=1), np.array([most[0].max(), most[1].max()])
+
+
+@kernel
+def loop_drag(
+    h: Array,
+    resting: Array,
+    moving: Array,
+    couette: Array,
+    b: Array,
+    r: Array,
+    p: Array,
+    beyond: Array,
+    columns: Array,
+    lines: Array,
+    scale: Array,
+) -> float:
+    """Sum of `flows.face_drag` by its shares (`flows._shares`); beyond : pressures east of the last points."""
+    ny, nx = p.shape
+    total = np.zeros(nx)
+    for j in range(ny):
+        for i in range(nx - 1):
+            east, push = face(
+                choose, h[j, i], resting[j, i], moving[j, i], couette[j, i], b[j, i], r[j, i], p[j, i], p[j, i + 1]
+            )
+            total[i] += lines[j] * columns[i] * east + scale[j] * push
+        i = nx - 1
+        east, push = face(choose, h[j, i], resting[j, i], moving[j, i], couette[j, i], b[j, i], r[j, i], p[j, i], beyond[j])
+        total[i] += lines[j] * columns[i] * east + scale[j] * push
+    return total.sum()

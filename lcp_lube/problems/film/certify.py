@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ...base.compiled import has_numba
 from ...base.parallel import Array
 from ..certificate import Certificate, certificate_tol
-from ..strips import ghosted
+from ..strips import MANY, ghosted
 from .graded import GradedJacobian, Pivots, within_reach
 from .reynolds import side_points
 from .stored import storing
@@ -22,7 +22,6 @@ UNIT = 2.0**-53  # largest relative error of one operation
 IDLE = 1e-8  # share of what the pressures alone would drive through the sides, below which a flow is none
 UNEVEN = 1e-4  # part of the flow that the rounding of pressures inside may make of a mass defect, at most
 BLOCK = 16_384  # cells of a line that are looked at together
-MANY = 250_000  # points from which compiled loops are worth being loaded
 LEAST = 1e-200  # below any void or pressure
 FINE = 1e-7  # of p_max: rounding that may leave less than this in p needs no closer look
 CHECKS = 30  # sets of full cells that the closer look may try

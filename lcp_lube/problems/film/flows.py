@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from copy import copy
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...base.compiled import has_numba
 from ...base.parallel import Array
 from ..grid import Grid
-from ..strips import in_strips, places_of
+from ..strips import MANY, in_strips, places_of
 from .cavity import cavitated
 from .edges import Around, strips
 from .reynolds import BoxScheme, sides
@@ -85,9 +86,46 @@ def friction(problem: LubricationProblem, p_pa: Array, r: Array, lever: Array | 
         if alone:
             part.grid, part.scheme = places_of(grid, rows), s.rows(rows)
         along = lever[rows] if isinstance(lever, np.ndarray) else lever
-        of_film += float(np.sum(sum(drag(part, part.scheme, p_pa[rows].ravel(), r[rows].ravel())) * along))  # type: ignore[arg-type]
+        if alone and grid.size >= MANY and has_numba():
+            of_film += _drag_sum(part, p_pa[rows], r[rows], along)
+        else:
+            of_film += float(np.sum(sum(drag(part, part.scheme, p_pa[rows].ravel(), r[rows].ravel())) * along))  # type: ignore[arg-type]
     of_film = problem.reduce.sum(np.array([of_film]))
     return of_film if problem.contact is None else of_film + problem.contact.drag(problem, lever)
+
+
+def _drag_sum(problem: LubricationProblem, p: Array, r: Array, lever: Array | float) -> float:
+    """The sum of `drag` times the lever, over lines of a large film without walls before or behind it."""
+    from .cell_loops import loop_drag
+
+    grid, s = problem.grid, problem.scheme
+    columns, lines, scale = _shares(problem)
+    faces = sheared_faces(problem, grid.x + grid.steps(0)[1:] / 2)
+    first, last = sides(grid)[:2]
+    beyond = np.full(p.shape[0], problem.p_sides[1]) if last.any() else p[:, 0].copy()
+    total = loop_drag(*faces, s.couette_E, s.b_E, r, p, beyond, columns, (lines * lever).ravel(), (scale * lever).ravel())
+    if first.any():
+        before, push = _before_first(problem, p, 0.0)
+        total += float(np.sum(lever * (columns[0] * lines * before + scale * push)))
+    return total
+
+
+def _shares(problem: LubricationProblem) -> tuple[Array, Array, Array]:
+    """What shears a face counts by the product of the first two, of its column and of its line, pressure by the third."""
+    grid = problem.grid
+    weight, rims = line_weights(grid), grid.rims(1) if grid.dim == 2 else (0.0, 0.0)
+    *_, south, north = sides(grid)
+    scale = weight * (grid.spacing[1] if grid.dim == 2 else 1.0)
+    lines = scale * grid.stretch(grid.y) ** 2 * (1.0 + 0.5 * (rims[0] * south + rims[1] * north) / weight)
+    return problem.mu * problem.U * grid.steps(0)[1:], lines, scale
+
+
+def _before_first(problem: LubricationProblem, p: Array, lifted: complex) -> tuple[Array, Array]:
+    """`face_drag` of the faces before the first points, as parts of the faces behind these."""
+    grid = problem.grid
+    before, behind = grid.steps(0)[:2]
+    h, resting, moving = sheared_faces(problem, grid.x[:, :1] - before / 2, lifted)
+    return before / behind * (resting + 1.0 / moving), 0.5 * h * (p[:, :1] - problem.p_sides[0])
 
 
 def drag(problem: LubricationProblem, scheme: BoxScheme, p_pa: Array, r: Array, lifted: complex = 0.0) -> tuple[Array, Array]:
@@ -99,35 +137,39 @@ def drag(problem: LubricationProblem, scheme: BoxScheme, p_pa: Array, r: Array, 
     """
     grid, s = problem.grid, scheme
     before, behind = grid.steps(0)[:-1], grid.steps(0)[1:]
-    muU, weight, rims = problem.mu * problem.U, line_weights(grid), grid.rims(1) if grid.dim == 2 else (0.0, 0.0)
     p, r = p_pa.reshape(grid.box), r.reshape(grid.box)
-    first, last, south, north = sides(grid)
-    h_east, resting, h_moving = sheared_faces(problem, grid.x + behind / 2, lifted)
-    still, p_east = s.couette_E == 0.0, beside(grid, p)
-    liquid = s.b_E * r / (np.where(still, np.inf, s.couette_E) if still.any() else s.couette_E)
-    east = resting + (1.0 + liquid) / h_moving
-    own, push_own = np.zeros_like(east), np.zeros_like(east[:, :1])
-    if first.any():
-        h_west, *west = sheared_faces(problem, grid.x[:, :1] - before[0] / 2, lifted)
-        own[:, :1] = before[0] / behind[0] * (west[0] + 1.0 / west[1])
-        push_own[:, :1] = 0.5 * h_west * (p[:, :1] - problem.p_sides[0])
+    first, last, *_ = sides(grid)
+    p_east = beside(grid, p)
     if last.any():
         p_east[:, -1] = problem.p_sides[1]
     walls = sides(grid, ("closed",))[:2]
+    if walls[1].any():
+        p_east[:, -1] = p[:, -1]
+    faces = sheared_faces(problem, grid.x + behind / 2, lifted)
+    east, push = face_drag(np.where, *faces, s.couette_E, s.b_E, r, p, p_east)
+    if walls[1].any():  # its faces have neither
+        east[:, -1] = 0.0
+    own, push_own = np.zeros_like(east), np.zeros_like(east[:, :1])
+    if first.any():
+        own[:, :1], push_own[:] = _before_first(problem, p, lifted)
     dry = cavitated(problem.reduce, p_pa, r.ravel()).reshape(grid.box) if "closed" in grid.ends[0] else None
     for at, wall, share in zip((0, -1), walls, (0.5 * before[0] / behind[0], 0.5), strict=True):
         if dry is not None and wall.any():
             own[:, at] += share * np.where(dry[:, at], 1.0 - r[:, at], 4.0) / s.h[:, at]
-    if walls[1].any():  # its faces have neither
-        east[:, -1], p_east[:, -1] = 0.0, p[:, -1]
-    push = 0.5 * h_east * (p_east - p)
-    scale = weight * (grid.spacing[1] if grid.dim == 2 else 1.0)
-    lines = scale * grid.stretch(grid.y) ** 2 * (1.0 + 0.5 * (rims[0] * south + rims[1] * north) / weight)
-    per_row = np.broadcast_to(muU * behind * lines, grid.box)
+    columns, lines, scale = _shares(problem)
+    per_row = np.broadcast_to(columns * lines, grid.box)
     for at in {0, grid.box[1] - 1}:  # there is nothing between
         own[:, at] *= per_row[:, at]
     own[:, :1] += push_own * scale
     return np.asarray(per_row * east + push * scale), own
+
+
+def face_drag(
+    where: Any, h: Any, resting: Any, moving: Any, couette: Any, b: Any, r: Any, p: Any, p_east: Any
+) -> tuple[Any, Any]:
+    """Of arrays, or in `cell_loops` of one face: what shears it per mu U (1/m), and the pull of the pressure (N/m)."""
+    liquid = b * r / where(couette == 0.0, np.inf, couette)
+    return resting + (1.0 + liquid) / moving, 0.5 * h * (p_east - p)
 
 
 def beside(grid: Grid, p: Array) -> Array:
