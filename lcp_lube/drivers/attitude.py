@@ -11,7 +11,7 @@ from .chain import Chain
 from .compose import Inner
 
 MOST_SOLVES = 20
-TOLERANCE = 1e-9  # rad: the force across the load is then 1e-9 of it
+TOLERANCE, PART = 1e-9, 0.1  # rad: the force across the load is then 1e-9 of it; of an eps1 that was given
 STEEPEST, FLATTEST = 2.0, 0.3  # slope of the force's angle over the attitude; without grooves it is 1
 
 
@@ -33,7 +33,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     attitude = math.radians(known) if known is not None else half_film_attitude(scene.eccentricity)
     chain = Chain(ask, inner)
     before: tuple[float, float] | None = None
-    slope = 1.0
+    slope, tol = 1.0, max(TOLERANCE, PART * ask.stopping_for((0.0, 0.0)).eps1)
     for _ in range(MOST_SOLVES):
         solution = chain.solve(scene.model_copy(update={"attitude_deg": math.degrees(attitude)}))
         if not solution.converged:
@@ -42,11 +42,11 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         off = math.atan2(-fy, -fx)
         if before is not None and attitude != before[0]:
             slope = min(max((off - before[1]) / (attitude - before[0]), FLATTEST), STEEPEST)
-        if abs(off) <= TOLERANCE:
+        if abs(off) <= tol:
             break
         before = (attitude, off)
         attitude -= off / slope
-    if solution.converged and abs(off) > TOLERANCE:
+    if solution.converged and abs(off) > tol:
         solution.outcome = Outcome.LOAD_NOT_CARRIED
         solution.message = (
             f"at eccentricity {scene.eccentricity:g} no attitude was found at which the film pushes against the load: the last "

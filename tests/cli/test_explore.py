@@ -1,6 +1,7 @@
 """`lcp-lube explore`: token, values refused in place, two pages at once, exports, Ctrl-C; and in a browser, if there is one."""
 
 import base64
+import http.client
 import json
 import os
 import shutil
@@ -47,7 +48,7 @@ class Page:
     def ask(self, level: int = 0, **changes: str) -> dict[str, Any]:
         status, body = self.get("solve", {"changes": changes, "level": level})
         assert status == 200, body
-        return json.loads(body)
+        return json.loads(body.splitlines()[-1])
 
 
 def served(*words: str) -> Page:
@@ -113,7 +114,7 @@ def test_what_no_page_sends_is_refused(page: Page, body: bytes) -> None:
 
 def test_numbers_follow_and_get_finer(page: Page) -> None:
     slow, fast = page.ask(), page.ask(U="10 m/s")
-    assert number(fast, "load") == pytest.approx(2 * number(slow, "load"), rel=1e-6)  # p grows with mu U
+    assert number(fast, "load") == pytest.approx(2 * number(slow, "load"), rel=1e-2)  # p grows with mu U; a first answer
     fine = slow
     for level in range(1, 10):
         if fine["last"]:
@@ -130,7 +131,33 @@ def test_two_pages_at_once_do_not_mix(page: Page) -> None:
     speeds = [1.0 + k % 2 for k in range(12)]
     with ThreadPoolExecutor(4) as pool:
         loads = list(pool.map(lambda speed: number(page.ask(U=str(speed)), "load"), speeds))
-    assert loads[1::2] == [pytest.approx(2 * loads[0], rel=1e-6)] * 6 and len(set(loads[::2])) == 1
+    assert loads == [pytest.approx(loads[0] * speed, rel=1e-2) for speed in speeds]
+
+
+def test_a_film_in_time_is_shown_on_its_way_and_given_up_when_the_hand_moves() -> None:
+    """The first answer is a film before the end; the whole march comes in lines; a page that leaves holds nobody up."""
+    found = served("moving_texture")
+    try:
+        first = found.ask()
+        t, end = first["time"]
+        assert first["solved"] and not first["last"] and 0 < t < end and first["fields"]["p"]
+        status, body = found.get("solve", {"changes": {"motion.steps": "40"}, "level": 1})
+        lines = [json.loads(line) for line in body.splitlines()]
+        times = [line["time"][0] for line in lines[:-1]]
+        assert status == 200 and times == sorted(times) and "time" not in lines[-1] and "40 time steps" in lines[-1]["message"]
+        host, port = found.address.split("/")[2].split(":")
+        path = "/" + found.address.split("/")[3]
+        left = http.client.HTTPConnection(host, int(port))
+        changes = {"motion.steps": "1000000"}  # which would take hours
+        left.request(
+            "POST", f"{path}/solve", json.dumps({"changes": changes, "level": 1}), {"Content-Type": "application/json"}
+        )
+        assert found.ask()["solved"]  # a hand comes before what is refined
+        left.close()
+        assert found.ask(1, **{"motion.steps": "40"})["solved"]
+    finally:
+        found.process.kill()
+        found.process.communicate()
 
 
 def test_exports(page: Page, tmp_path: Path) -> None:

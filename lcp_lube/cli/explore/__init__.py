@@ -20,10 +20,15 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("explore: a page is served by one rank; leave mpiexec out")
     if not 0 <= args.port < 65536:
         raise InputError(f"--port {args.port}: allowed are 0 (any free port) to 65535")
-    answers = Answers(scene_of(args), ask_of(args), args.accuracy)
-    level = 0  # what cannot be solved at all is refused here, and loops are compiled before the first slider moves
-    while not answers.solve({}, level)["last"]:
-        level += 1
+    scene, ask = scene_of(args), ask_of(args)
+    trial, answers = Answers(scene, ask, args.accuracy), Answers(scene, ask, args.accuracy)
+    for level in (
+        0,
+        0,
+        1 - trial.moves,
+    ):  # what cannot be solved is refused here; loops are compiled, a start's too
+        trial.solve({}, level)
+    trial.forget()
     check_unread()
     try:
         with Server(answers, args.port) as server:

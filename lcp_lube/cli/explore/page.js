@@ -3,7 +3,7 @@
 const REST = 300; // ms without a change
 const $ = (id) => document.getElementById(id);
 const changes = {}; // key -> text, as --set has it
-let scene, shown, last = "", busy = false, moved = false, timer = 0;
+let scene, shown, last = "", busy = null, moved = false, timer = 0; // busy: what ends a request, while there is one
 
 const PREFIXED = /^(m|Pa|Pa s|N|N\/m|W|W\/m|m\/s|N m|s)$/;
 const PREFIX = { "-9": "n", "-6": "u", "-3": "m", 0: "", 3: "k", 6: "M", 9: "G" };
@@ -77,9 +77,14 @@ function control(c) {
 function change(key, text) {
   changes[key] = text;
   last = key;
+  again();
+}
+
+function again() {
   moved = true;
   clearTimeout(timer);
-  ask(0);
+  if (busy && busy.level > 0) busy.abort(); // what refines the values before is not waited for
+  else ask(0);
 }
 
 function fault(text) { // beside the control that was touched last
@@ -92,28 +97,47 @@ function fault(text) { // beside the control that was touched last
 }
 
 // Asking -----------------------------------------------------------------------------------------------------------
-async function post(what, level) {
+async function post(what, level, signal) {
   const body = JSON.stringify({ changes, level });
-  const reply = await fetch(what, { method: "POST", headers: { "Content-Type": "application/json" }, body });
-  if (!reply.ok) throw Object.assign(new Error((await reply.json()).refused), { refused: reply.status === 400 });
+  const reply = await fetch(what, { method: "POST", headers: { "Content-Type": "application/json" }, body, signal });
+  if (!reply.ok) throw refusal(reply.status, await reply.json());
   return reply;
+}
+const refusal = (status, answer) => Object.assign(new Error(answer.refused), { refused: status === 400 });
+
+async function answered(reply) { // the last of its lines; those before, of a film in time, are shown as they come
+  const reader = reply.body.pipeThrough(new TextDecoderStream()).getReader();
+  let text = "";
+  for (;;) {
+    const { done, value } = await reader.read();
+    text += value || "";
+    const lines = text.split("\n");
+    if (lines.length > 1 && !moved) show(JSON.parse(lines[lines.length - 2]));
+    text = lines[lines.length - 1];
+    if (done) break;
+  }
+  const answer = JSON.parse(text);
+  if (answer.refused) throw refusal(400, answer);
+  return answer;
 }
 
 async function ask(level) {
   if (busy) return; // one request at a time; what moved meanwhile is asked when its answer is there
-  busy = true;
+  busy = Object.assign(new AbortController(), { level });
   moved = false;
   let next = null;
   try {
-    const answer = await (await post("solve", level)).json();
+    const answer = await answered(await post("solve", level, busy.signal));
     if (!moved || level === 0) show(answer);
     if (!answer.last) next = level + 1;
   } catch (error) {
     const ended = error instanceof TypeError;
-    if (!ended) fault(error.message);
-    state(ended ? "the program has ended" : error.refused ? "not solved: the value is refused, see beside it" : error.message, true);
+    if (error.name !== "AbortError") {
+      if (!ended) fault(error.message);
+      state(ended ? "the program has ended" : error.refused ? "not solved: the value is refused, see beside it" : error.message, true);
+    }
   }
-  busy = false;
+  busy = null;
   if (moved) ask(0);
   else if (next !== null) timer = setTimeout(() => ask(next), next === 1 ? REST : 0);
 }
@@ -138,9 +162,10 @@ function state(text, bad = false) {
 function show(answer) {
   shown = answer;
   fault("");
-  const error = answer.estimate === null ? "no estimate yet" : `${answer.quantity}: estimated error ${digits(100 * answer.estimate, 2)} %`;
+  const time = answer.time ? `t = ${words(answer.time[0], "s", 3)} of ${words(answer.time[1], "s", 3)}, ` : "";
+  const error = answer.estimate === null ? answer.last ? "no estimate" : "no estimate yet" : `${answer.quantity}: estimated error ${digits(100 * answer.estimate, 2)} %`;
   const going = answer.reached ? "" : answer.last ? " (a finer grid would take too long here: lcp-lube solve --accuracy)" : ", refining ...";
-  state(answer.solved ? `${error}; grid ${answer.grid}, ${digits(1000 * answer.seconds, 3)} ms${going}` : `${answer.outcome}: ${answer.message}`, !answer.solved);
+  state(answer.solved ? `${time}${error}; grid ${answer.grid}, ${digits(1000 * answer.seconds, 3)} ms${going}` : `${answer.outcome}: ${answer.message}`, !answer.solved);
   $("state").dataset.level = answer.level;
   $("state").dataset.last = String(answer.last);
   $("warnings").textContent = answer.warnings.join("; ");
@@ -229,7 +254,7 @@ async function begin() {
   $("name").textContent = scene.name;
   $("line").textContent = scene.line;
   lay();
-  $("reset").addEventListener("click", () => { for (const key of Object.keys(changes)) delete changes[key]; lay(); moved = true; ask(0); });
+  $("reset").addEventListener("click", () => { for (const key of Object.keys(changes)) delete changes[key]; lay(); again(); });
   $("toml").addEventListener("click", () => save("toml", `${scene.name}.toml`));
   $("picture").addEventListener("click", () => save("picture", `${scene.name}.png`));
   ask(0);

@@ -2,15 +2,18 @@
 
 Of the standard library: Panel, marimo and trame would each bring a web framework (tornado and bokeh, starlette, aiohttp) for
 one page, and run Python in threads of their own, where PETSc must be called from one. Here handlers only queue what a page
-asks, and the thread that started PETSc answers.
+asks, and the thread that started PETSc answers: a hand that moves before grids that are refined, these meanwhile.
 """
 
 import hmac
+import itertools
 import json
 import queue
 import secrets
+import select
+import socket
 import threading
-from concurrent.futures import Future
+from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib.resources import files
 from typing import Any, Self
@@ -27,6 +30,32 @@ POLICY = (
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 
+HEADERS = {
+    "Content-Security-Policy": POLICY,
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "Cache-Control": "no-store",
+}
+
+
+class Gone(Exception):
+    """Nobody waits for the answer any more."""
+
+
+@dataclass
+class Job:
+    """What a page asks. replies : lines on the way, as bytes, then the answer and its kind, or what was raised."""
+
+    what: str
+    request: dict[str, Any]
+    replies: queue.SimpleQueue[bytes | tuple[bytes, str] | Exception] = field(default_factory=queue.SimpleQueue)
+    gone: bool = False
+
+    @property
+    def waits(self) -> bool:
+        """Whether it may take seconds: a finer grid."""
+        return self.what == "picture" or (self.what == "solve" and self.request.get("level", 0) != 0)
+
 
 class Server:
     """Handlers in threads, answers in the thread that calls `serve`; address: of the page, with its token."""
@@ -34,7 +63,8 @@ class Server:
     def __init__(self, answers: Answers, port: int = 0):
         self.answers = answers
         self.token = secrets.token_urlsafe(24)
-        self.asked: queue.SimpleQueue[tuple[str, dict[str, Any], Future[tuple[bytes, str]]]] = queue.SimpleQueue()
+        self.asked: queue.PriorityQueue[tuple[bool, int, Job]] = queue.PriorityQueue()
+        self._count = itertools.count()
         handler = type("PageHandler", (Handler,), {"server_of_page": self})
         try:
             self._http = ThreadingHTTPServer((HOST, port), handler)
@@ -52,20 +82,36 @@ class Server:
         self._http.shutdown()
         self._http.server_close()
 
+    def ask(self, job: Job) -> None:
+        """Have it answered."""
+        self.asked.put((job.waits, next(self._count), job))
+
     def serve(self) -> None:
-        """Answer, one request after the other, until KeyboardInterrupt."""
+        """Answer until KeyboardInterrupt."""
         while True:
             try:
-                what, request, future = self.asked.get(timeout=0.5)  # wakes up: a signal is looked at between two waits
+                _, _, job = self.asked.get(timeout=0.5)  # wakes up: a signal is looked at between two waits
             except queue.Empty:
                 continue
-            try:
-                future.set_result(self.answers.reply(what, request))
-            except KeyboardInterrupt:
-                future.cancel()
-                raise
-            except Exception as error:  # one page's fault is no other's
-                future.set_exception(error)
+            self._answer(job)
+
+    def _answer_quick(self) -> None:
+        """What hands wait for; this thread alone takes jobs away."""
+        while self.asked.qsize() and not self.asked.queue[0][0]:
+            self._answer(self.asked.get()[-1])
+
+    def _answer(self, job: Job) -> None:
+        def alive(*news: Any) -> None:
+            if job.gone:
+                raise Gone
+            if job.waits:
+                self._answer_quick()
+
+        try:
+            alive()
+            job.replies.put(self.answers.reply(job.what, job.request, alive, job.replies.put))
+        except Exception as error:  # one page's fault is no other's
+            job.replies.put(error)
 
 
 class Handler(BaseHTTPRequestHandler):
@@ -121,36 +167,51 @@ class Handler(BaseHTTPRequestHandler):
         return name
 
     def _ask(self, what: str, request: dict[str, Any]) -> None:
-        future: Future[tuple[bytes, str]] = Future()
-        self.server_of_page.asked.put((what, request, future))
-        try:
-            body, kind = future.result()
-        except InputError as error:
-            self._refuse(400, str(error))
-        except Exception as error:
-            self._refuse(500, f"{type(error).__name__}: {error}")
-        else:
-            self._send(200, body, kind)
+        job, page, streams = Job(what, request), self.server_of_page, False
+        page.ask(job)
+        while True:
+            try:
+                reply = job.replies.get(timeout=0.1)
+            except queue.Empty:
+                job.gone = self.close_connection = self._left()
+                if job.gone:
+                    return
+                continue
+            if isinstance(reply, bytes):  # a film on its way in time: a line each, and the connection's end is the answer's
+                self._send(200, reply, "application/json", streams, ends=False)
+                streams = True
+            elif isinstance(reply, Exception):
+                words = str(reply) if isinstance(reply, InputError) else f"{type(reply).__name__}: {reply}"
+                self._refuse(400 if isinstance(reply, InputError) else 500, words, streams)
+                return
+            else:
+                self._send(200, *reply, streams)
+                return
 
-    def _refuse(self, status: int, words: str) -> None:
+    def _left(self) -> bool:
+        """Whether the page has ended the connection: its hand has moved on, or it was closed."""
+        try:
+            ready, _, _ = select.select([self.connection], [], [], 0.0)
+            return bool(ready) and self.connection.recv(1, socket.MSG_PEEK) == b""
+        except (OSError, ValueError):
+            return True
+
+    def _refuse(self, status: int, words: str, streams: bool = False) -> None:
         self.close_connection = True  # whatever was sent along is not read
-        self._send(status, json.dumps({"refused": words}).encode(), "application/json")
+        self._send(status, json.dumps({"refused": words}).encode(), "application/json", streams)
 
-    def _send(self, status: int, body: bytes, kind: str) -> None:
+    def _send(self, status: int, body: bytes, kind: str, streams: bool = False, ends: bool = True) -> None:
+        """An answer, or one of several lines of it. streams : the first one was sent; ends : this is the last one."""
+        self.close_connection |= not ends
+        length = {"Content-Length": str(len(body))} if ends else {}
+        closes = {"Connection": "close"} if self.close_connection else {}
         try:
-            self.send_response(status)
-            for name, value in {
-                "Content-Type": kind,
-                "Content-Length": str(len(body)),
-                "Content-Security-Policy": POLICY,
-                "Referrer-Policy": "no-referrer",
-                "X-Content-Type-Options": "nosniff",
-                "Cache-Control": "no-store",
-                **({"Connection": "close"} if self.close_connection else {}),
-            }.items():
-                self.send_header(name, value)
-            self.end_headers()
-            self.wfile.write(body)
+            if not streams:
+                self.send_response(status)
+                for name, value in {"Content-Type": kind, **HEADERS, **length, **closes}.items():
+                    self.send_header(name, value)
+                self.end_headers()
+            self.wfile.write(body if ends else body + b"\n")
         except ConnectionError:
             self.close_connection = True  # the page was closed
 

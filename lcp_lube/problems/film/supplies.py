@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 MARGIN = 1e-9  # of a shape's extent: a point so near an edge is on it, and belongs to the supply
 NEAREST = 1e-4  # part of a spacing: a face to an edge that is nearer resists over this
 KNOWN, IDLE, ROUNDINGS = 1e-8, 1e-8, 64  # parts of a pressure and a flow that count as none; of 2^-53 in a supply's flows
+WAYS = ((0, -1), (0, 1), (-1, 0), (1, 0))  # dj, di to the neighbours west, east, south, north
 HALVINGS = 40  # of the interval in which an edge is looked for: derivatives see no steps, both cells of a face find the same
 
 
@@ -205,9 +206,8 @@ def hold(grid: Grid, scheme: BoxScheme, supplies: Sequence[Supply], p_unit: floa
             raise InputError(f"supply {other + 1} and supply {number + 1} overlap: allowed where both hold the same p")
         owner = np.where(mine & (owner < 0), number, owner)
     held = Held(tuple(supplies), owner)
-    factors = [1.0 / _share(grid, held, dj, di) for dj, di in ((0, -1), (0, 1), (-1, 0), (1, 0))]
     names = ("k_W", "k_E", "k_S", "k_N")
-    k = {name: getattr(scheme, name) * factor for name, factor in zip(names, factors, strict=True)}
+    k = {name: getattr(scheme, name) / share for name, share in zip(names, _shares(grid, held), strict=True)}
     return pressed(scheme.changed(**k, held=held.mask), held, p_unit), held
 
 
@@ -228,34 +228,34 @@ def _nearest(grid: Grid, place: tuple[float, float]) -> NDArray[np.bool_]:
     return mine
 
 
-def _share(grid: Grid, held: Held, dj: int, di: int) -> Array:
-    """Part of the way to the neighbour (dj, di) over which a face resists: to the edge between a held point and a free one."""
-    (ny, nx), share, outside = grid.box, np.ones(grid.box), -2
+def _shares(grid: Grid, held: Held) -> Array:
+    """Parts of the ways to the four neighbours over which faces resist: to the edge between a held and a free point."""
+    (ny, nx), outside = grid.box, -2
     framed = grid.ghosted(held.owner.astype(float).ravel(), outside=outside).astype(np.int64)
-    beside = framed[1 + dj : 1 + dj + ny, 1 + di : 1 + di + nx]
-    j, i = np.nonzero(((held.owner < 0) != (beside < 0)) & ((beside != outside) | (held.owner >= 0)))
-    numbers = np.maximum(held.owner[j, i], beside[j, i])
+    beside = np.stack([framed[1 + dj : 1 + dj + ny, 1 + di : 1 + di + nx] for dj, di in WAYS])
+    shares = np.ones(beside.shape)
+    way, j, i = np.nonzero(((held.owner < 0) != (beside < 0)) & ((beside != outside) | (held.owner >= 0)))
+    dj, di = np.array(WAYS)[way].T
+    owner, other = held.owner[j, i], beside[way, j, i]
     at_x, at_y = grid.with_neighbours(0), grid.with_neighbours(1) if grid.dim == 2 else np.zeros(3)
-    x, y = at_x[grid.x_start + i + 1], at_y[grid.y_start + j + 1]
-    to_x, to_y = at_x[grid.x_start + i + 1 + di], at_y[grid.y_start + j + 1 + dj]
-    starts_held = held.owner[j, i] >= 0
-    found = np.ones(j.size)
+    start = np.stack([at_x[grid.x_start + i + 1], at_y[grid.y_start + j + 1]])
+    end = np.stack([at_x[grid.x_start + i + 1 + di], at_y[grid.y_start + j + 1 + dj]])
+    free, full = np.where(owner >= 0, end, start), np.where(owner >= 0, start, end)
+    numbers, found = np.maximum(owner, other), np.ones(j.size)
     for number in np.unique(numbers):
         at = numbers == number
-        region = held.supplies[number].region
-        free = [np.where(starts_held, b, a)[at] for a, b in ((x, to_x), (y, to_y))]
-        full = [np.where(starts_held, a, b)[at] for a, b in ((x, to_x), (y, to_y))]
-        low, high = np.zeros(int(at.sum())), np.ones(int(at.sum()))
+        region, first, last = held.supplies[number].region, free[:, at], full[:, at]
+        low, high = np.zeros(first.shape[1]), np.ones(first.shape[1])
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
-            at_x_y = [a + middle * (b - a) for a, b in zip(free, full, strict=True)]
+            place = first + middle * (last - first)
             for side in np.flatnonzero(grid.periodic):  # both cells of a face there see the same edge
-                at_x_y[side] = grid.origin[side] + np.remainder(at_x_y[side] - grid.origin[side], grid.lengths[side])
-            there = region.inside(*at_x_y)
+                place[side] = grid.origin[side] + np.remainder(place[side] - grid.origin[side], grid.lengths[side])
+            there = region.inside(*place)
             low, high = np.where(there, low, middle), np.where(there, middle, high)
         found[at] = np.maximum(high, NEAREST)
-    share[j, i] = np.where((beside[j, i] == outside) & (found == NEAREST), 1.0, found)  # 1: a supply that reaches the side
-    return share
+    shares[way, j, i] = np.where((other == outside) & (found == NEAREST), 1.0, found)  # 1: a supply that reaches the side
+    return shares
 
 
 def supply_flows(problem: LubricationProblem, p: Array, r: Array) -> list[float]:
