@@ -138,6 +138,11 @@ class GroovedJournalScene(ShaftScene, WithEffects):
         return [a + 0.5 * ((b - a) % 360.0) for a, b in zip(places, [*places[1:], *places[:1]], strict=True)]
 
     @property
+    def edges_deg(self) -> list[float]:
+        """Of the grooves, from the first one's first edge on, degrees."""
+        return [at - self.grooves_deg[0] + edge for at in self.grooves_deg for edge in (0.0, self.groove_deg)]
+
+    @property
     def grooves(self) -> tuple[Groove, ...]:
         """Their columns: edges on points of the grid, exactly where groove_deg and the middles are whole numbers of meshes."""
         nx = self.shape[0]

@@ -75,6 +75,11 @@ class TiltingPadScene(ShaftScene, WithEffects):
         )
 
     @property
+    def edges_deg(self) -> list[float]:
+        """Of the pads, from the first one's outlet on, degrees."""
+        return [at - self.pivots_deg[0] - edge for at in self.pivots_deg for edge in (0.0, self.pad_deg)]
+
+    @property
     def grooves(self) -> tuple[Groove, ...]:
         """The columns between the pads, whose edges are points of the grid: that behind pad k is the k-th."""
         nx, meshes = self.shape[0], self.shape[0] / 360.0

@@ -32,9 +32,7 @@ from .controls import controls
 COARSE = {1: 400, 2: 3000}  # points of the first grid at most
 FOLLOWS = 0.12  # seconds that it may take: half of the delay that one notices, the rest is the browser's
 PATIENCE = 2.0  # seconds that a finer grid may take
-QUICK = (
-    1e-3  # where the first answer is slow: its eps1, and what may be left of a load: less than its grid's error
-)
+QUICK = 1e-3  # where the first answer is slow: its eps1, and what may be left of a load: less than its grid's error
 GRIDS = 7.0  # times a march that an estimate of its error takes: three grids
 SHOWN = {1: 1200, 2: 160}  # points a side that are sent
 TOO_FAR = 30  # levels that anyone could ask for
@@ -140,7 +138,7 @@ class Answers:
             "estimate": estimate,
             "quantity": record.get("accuracy_quantity"),
             "why": [line for line in solution.settings["why"] if line],
-            "warnings": record["warnings"],
+            "warnings": record["warnings"] if level else [],  # those of the first grid are not the scene's
             **_shown(solution.problem, solution.fields, solution.numbers, solution.units),
         }
 
@@ -195,9 +193,9 @@ class Answers:
         """The scene on the grid of a level, or what is asked of a ladder that ends there."""
         scene = load_scene(self.base, changes)  # type: ignore[arg-type]
         moves = self.moves
-        shape = scene.shape
+        shape, grooved = scene.shape, bool(getattr(getattr(scene, "model", None), "grooves", ()))  # their edges are points
         while prod(shape) > (self._most if level else self._points) and min(shape) > 8:
-            shape = tuple((n - 1) // 2 for n in shape)
+            shape = (shape[0] // 2 if grooved else (shape[0] - 1) // 2, *((n - 1) // 2 for n in shape[1:]))
         if level > moves:
             shape = tuple((n + 1) * 2 ** (level - 1 - moves) - 1 for n in shape)
             return scene, replace(self.ask, accuracy=self.accuracy, finest=shape)
