@@ -11,6 +11,7 @@ import json
 import queue
 import secrets
 import select
+import signal
 import socket
 import threading
 from dataclasses import dataclass, field
@@ -75,6 +76,8 @@ class Server:
         self.address = f"http://{self.host}/{self.token}/"
 
     def __enter__(self) -> Self:
+        if hasattr(signal, "SIGPIPE"):
+            signal.signal(signal.SIGPIPE, signal.SIG_IGN)  # a page that leaves in the middle of a line ends no server
         threading.Thread(target=self._http.serve_forever, daemon=True).start()
         return self
 
