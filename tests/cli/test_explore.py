@@ -39,7 +39,7 @@ class Page:
         kind = {} if data is None else {"Content-Type": "application/json"}
         request = urllib.request.Request(self.address + path, data, {**kind, **headers})
         try:
-            with urllib.request.urlopen(request, timeout=60) as reply:
+            with urllib.request.urlopen(request, timeout=120) as reply:
                 return reply.status, reply.read()
         except urllib.error.HTTPError as error:
             with error:

@@ -182,7 +182,9 @@ class Handler(BaseHTTPRequestHandler):
                 continue
             if isinstance(reply, bytes):  # a film on its way in time: a line each, and the connection's end is the answer's
                 self._send(200, reply, "application/json", streams, ends=False)
-                streams = True
+                streams, job.gone = True, self._left()
+                if job.gone:
+                    return
             elif isinstance(reply, Exception):
                 words = str(reply) if isinstance(reply, InputError) else f"{type(reply).__name__}: {reply}"
                 self._refuse(400 if isinstance(reply, InputError) else 500, words, streams)
