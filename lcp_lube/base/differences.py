@@ -16,16 +16,16 @@ CHORD, SLIGHT = 1e-2, 1e-2  # relative: width and least slope of a function that
 ROUNDING, TINY = 1e-15, 1e-300
 
 
-def differences(f: Callable[[float], Array], a: float, scale: float, sizes: Array, quick: bool = False) -> tuple[Array, Array]:
+def differences(f: Callable[[float], Array], a: float, scale: float, sizes: Array) -> tuple[Array, Array]:
     """df/da of a vector function to rounding, and by how much its derivatives to both sides differ where it has a kink.
 
     A kink's derivative is the mean of both sides. Where f changes by steps (it jumps at a, or nothing changes but over a wider
-    range), it is the slope of its chord over a hundredth to both sides, and the difference inf.
+    range), it is the slope of its chord over a hundredth to both sides, and the difference inf. Where it hardly bends, two
+    values of it do beside f(a).
 
     Parameters
     ----------
     scale : a change of a that is not small. sizes : of the terms that f is made of, whose rounding is left in it.
-    quick : f is expensive: where it hardly bends, two values of it have to do beside f(a).
 
     Raises
     ------
@@ -49,7 +49,7 @@ def differences(f: Callable[[float], Array], a: float, scale: float, sizes: Arra
         return chord, none & (np.abs(chord) * scale > SLIGHT * value)
 
     d = QUICK * scale
-    if quick and all(at(m * d) is not None for m in (-1, 0, 1)):
+    if all(at(m * d) is not None for m in (-1, 0, 1)):
         low, here, high = (known[m * d] for m in (-1, 0, 1))
         noise = 10.0 * ROUNDING * sizes / d
         slope, bend = (high - low) / (2.0 * d), np.abs(high - 2.0 * here + low) / d  # type: ignore[operator]

@@ -6,7 +6,7 @@ from typing import Any
 
 from ..base.files import write_text
 from ..base.options import check_unread
-from ..drivers.equations import check_film
+from ..drivers.gradient import check
 from ..errors import InputError
 from ..output.console import say
 from ..output.results import finite
@@ -21,7 +21,7 @@ from .asked import ask_of, scene_of
 def run(args: argparse.Namespace) -> int:
     """Exit status 0 where the optimiser came to rest at a design that keeps the limits, else 1. Collective."""
     scene = scene_of(args)
-    check_film(scene)
+    check(scene)
     if (args.maximise is None) == (args.minimise is None):
         raise InputError("optimise: --maximise Q or --minimise Q is needed, one of them")
     for path, suffix in ((args.output, ".toml"), (args.history, ".csv")):

@@ -9,15 +9,16 @@ from ..api import solve
 from ..base.options import check_unread
 from ..drivers.adjoint import Adjoint
 from ..drivers.ask import Ask
-from ..drivers.equations import check_film
 from ..drivers.film_gradient import FilmGradient
 from ..drivers.goal_error import finer_shape, goal_error
-from ..drivers.gradient import Gradient, gradients
+from ..drivers.gradient import Gradient, check, gradients
+from ..drivers.march_course import Trace
 from ..errors import InputError
 from ..output import files, sensitivity
 from ..output.console import say
 from ..output.results import as_dict, finite
 from ..problems.solution import Solution
+from ..scenes.moving import motion_of
 from ..scenes.scene import Scene
 from ..scenes.values import key_of, values_of
 from ..studies.error_bars import deviations, first_order, monte_carlo
@@ -29,7 +30,7 @@ HEAD = ("scene", "nx", "ny", "outcome", "converged", "message")
 def run(args: argparse.Namespace) -> int:
     """Exit status 0 if the film's solution converged, else 1. Collective."""
     scene = scene_of(args)
-    check_film(scene)
+    check(scene, film=bool(args.plot or args.output))
     names = [name.strip() for name in args.quantity.split(",")]
     keys = [word.strip() for word in args.by.split(",")] if args.by else None
     for key in keys or []:
@@ -42,15 +43,17 @@ def run(args: argparse.Namespace) -> int:
     if args.monte_carlo is not None and not deviation:
         raise InputError(f"--monte-carlo {args.monte_carlo}: --tolerance KEY=U is needed too")
     keys = [*keys, *(key for key in deviation if key not in map(partial(key_of, scene), keys))] if keys else keys
-    ask = ask_of(args)
-    with solve(scene, ask) as solution:
+    ask, trace = ask_of(args), Trace() if motion_of(scene) is not None else None
+    if trace is not None and args.errors:
+        raise InputError(f"--errors: scene {scene.name} goes on in time, and where errors come from is known of one film")
+    with solve(scene, ask, watch=trace) as solution:
         check_unread()
         data = as_dict(solution)
         record: dict[str, Any] = {key: data.get(key) for key in HEAD}
         if args.errors:
             finer_shape(solution)  # refused before the work that it costs
         if solution.converged:
-            found = gradients(scene, solution, names, keys)
+            found = gradients(scene, solution, names, keys, trace)
             record |= sensitivity.as_dict(found[0], solution)
             if found[1:]:
                 record["others"] = [sensitivity.as_dict(one, solution) for one in found[1:]]

@@ -29,6 +29,7 @@ from .halved import Halved
 from .linearised import Linear
 
 CANCELLED = 1e-10
+DIRECT = {"load", "friction", "p_max"}  # numbers that are made of no others in a film without a shaft
 SUPPLY = "supply.{}.p"  # the key of a supply's pressure, Pa above p_c
 
 
@@ -42,7 +43,6 @@ class Adjoint:
     InputError : no film, no converged solution, a quantity without a derivative.
     """
 
-    quick = False  # derivatives of second order do
 
     def __init__(self, scene: Scene, solution: Solution, quantities: Sequence[str], flip: bool = False):
         if not solution.converged:
@@ -68,7 +68,8 @@ class Adjoint:
         self.asked = list(quantities)
         names = [name for name in [*quantities, *self.conditions] if name not in self.found]
         eq, p, r = self.equations, self.p, self.r
-        self.numbers = eq.numbers(p, r)
+        itself = quantities and eq.constant.extras is None and DIRECT.issuperset(names)
+        self.numbers = eq.numbers(p, r, names if itself and eq.constant.shaft is None else None)
         parts = {name: eq.partials(self.numbers, name) for name in names}
         self.cavity, switching = cavity_of(eq, p, r)
         if flip:
@@ -166,12 +167,11 @@ class Adjoint:
             slope, jump = differences(at, value, max(abs(value), 1e-3 * unit), sizes)
         else:
             scale = abs(value) or self.scale(key)
-            quick = self.quick or self.equations.grid.size > SMALL
 
             def near(a: float) -> Array:
                 return self._here if a == value else self.lagrangians(with_values(self.scene, {key: a}))
 
-            slope, jump = differences(near, value, scale, sizes, quick)
+            slope, jump = differences(near, value, scale, sizes)
         return dict(zip(names, slope, strict=True)), dict(zip(names, jump, strict=True))
 
     @property

@@ -78,7 +78,7 @@ class Equations:
         self.law, self._p_sides = model.law, tuple(side.p if side.kind == "open" else 0.0 for side in model.sides)
         film = Frozen(film, self.law) if self.law else film
         self._model: Model = film.constant if self.law else model
-        places = None if near is None or near.grid.even else _followed(near.grid, near._model, self._model)
+        places = None if near is None or near.grid.even else followed(near.grid, near._model, self._model)
         self._lent = type(solved) is LubricationProblem and not (self.turned or self.law or solved.held)
         if self._lent:
             self.constant: LubricationProblem = solved
@@ -215,7 +215,7 @@ def _flat(told: dict[str, Any]) -> dict[str, Any]:
     return {**told, **parts, **dict(zip(("force_x", "force_y"), told.get("force", ()), strict=False))}
 
 
-def _followed(grid: Grid, before: Model, after: Model) -> Places | None:
+def followed(grid: Grid, before: Model, after: Model) -> Places | None:
     """The lines of a grid where the film's edges have moved, as many between two edges; None where edges came or went."""
     out: list[Array | None] = []
     for side, places in enumerate(grid.places):

@@ -54,7 +54,6 @@ class FirstOrder:
             if conditions_of(bare, solution)[0] or solution.settings.get("supply_pressures"):
                 law = without(self.scene, [name for name in named(scene) if name != "barus" or name not in kept])
                 adjoint = Adjoint(law, solution, [quantity])
-                adjoint.quick = True
                 found = Implicit.of(adjoint)
                 adjoint.destroy()
         self.found, self.quantity = found, quantity

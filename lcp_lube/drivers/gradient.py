@@ -16,11 +16,15 @@ from typing import Any
 from ..errors import InputError
 from ..problems.solution import Solution
 from ..scenes.grooved import GroovedJournalScene
+from ..scenes.moving import motion_of
 from ..scenes.scene import Scene
 from ..scenes.values import key_of, values_of
 from .adjoint import Adjoint, Implicit
 from .coefficients import placed
 from .coupled_gradient import CoupledGradient
+from .equations import check_film
+from .march_course import Trace, check_march
+from .march_gradient import MarchGradient
 
 STEPWISE = "the edges of grooves lie on points of the grid: the answer changes by steps"
 FOUND = "it was found for the load"
@@ -81,20 +85,24 @@ def _scene(solution: Solution) -> Scene:
     return solution.solved_scene
 
 
-def gradients(scene: Scene, solution: Solution, quantities: Sequence[str], keys: Sequence[str] | None = None) -> list[Gradient]:
+def gradients(
+    scene: Scene, solution: Solution, quantities: Sequence[str], keys: Sequence[str] | None = None, trace: Trace | None = None
+) -> list[Gradient]:
     """Derivatives of numbers of a converged solution by numbers of its scene. Collective.
 
     Parameters
     ----------
     scene : that was solved. quantities : keys of the results; vectors by their parts (force_x, flow_west), or what a balance
-        has found. keys : of the scene, SI; default all of `values_of`.
+        has found; of a march those at its end, and their means (mean_load).
+    keys : of the scene, SI; default all of `values_of`.
+    trace : that heard the march; without it, it is marched once more.
 
     Raises
     ------
     InputError : a quantity without a derivative, a key that is no number, a solution that is none, a scene without a film.
     """
-    first = _gradients(scene, solution, quantities, keys)
-    if _coupled(scene) or not any(one.switching for one in first):
+    first = _gradients(scene, solution, quantities, keys, trace=trace)
+    if motion_of(scene) is not None or _coupled(scene) or not any(one.switching for one in first):
         return first
     other = _gradients(scene, solution, quantities, keys, flip=True)
     out = []
@@ -105,15 +113,34 @@ def gradients(scene: Scene, solution: Solution, quantities: Sequence[str], keys:
     return out
 
 
+def check(scene: Scene, film: bool = False) -> None:
+    """Raise InputError for a scene without derivatives; film : that of the film itself is asked for too."""
+    if motion_of(scene) is not None:
+        check_march(scene)
+    else:
+        check_film(scene)
+    if film and (motion_of(scene) is not None or _coupled(scene)):
+        what = "of films with effects" if motion_of(scene) is None else "in time"
+        raise InputError(f"scene {scene.name}: dQ/dh at every point is not known {what}: leave --plot and --output out")
+
+
 def _coupled(scene: Any) -> bool:
     return bool(getattr(getattr(scene, "model", None), "effects", ()))
 
 
 def _gradients(
-    scene: Scene, solution: Solution, quantities: Sequence[str], keys: Sequence[str] | None, flip: bool = False
+    scene: Scene,
+    solution: Solution,
+    quantities: Sequence[str],
+    keys: Sequence[str] | None,
+    flip: bool = False,
+    trace: Trace | None = None,
 ) -> list[Gradient]:
-    if _coupled(scene):
-        adjoint: Any = CoupledGradient(scene, solution, quantities)
+    adjoint: Any
+    if motion_of(scene) is not None:
+        adjoint = MarchGradient(scene, solution, quantities, trace)
+    elif _coupled(scene):
+        adjoint = CoupledGradient(scene, solution, quantities)
     else:
         adjoint = Adjoint(scene, solution, quantities, flip)
     try:

@@ -10,6 +10,7 @@ from ..errors import InputError
 from ..problems.certificate import Certificate
 from ..problems.film.edges import jumps_of
 from ..problems.film.lubrication import LubricationProblem
+from ..problems.film.model import Model
 from ..problems.grid import EVEN
 from ..problems.solution import Outcome, Solution, Step
 from ..scenes.motion import MotionTable
@@ -34,7 +35,7 @@ TOLD = ("load", "force", "moment", "p_max", "min_h", "cavitated_fraction", "fric
 
 @dataclass(frozen=True)
 class Moment:
-    """A step that was taken: what those hear who watch a march. row : its line of the history."""
+    """A step that was taken: what those hear who watch a march. row : its line of the history; before : the fields before."""
 
     t: float
     t_end: float
@@ -42,6 +43,7 @@ class Moment:
     fields: dict[str, Any]
     row: dict[str, Any]
     count: int
+    before: dict[str, Any] | None
 
 
 class Run:
@@ -58,10 +60,7 @@ class Run:
         self.watch, self.seen = ask.watch, getattr(scene, "observer", lambda: None)()
         self.times = sorted({t for t in ask.times if 0 < t < table.t_end})
         ask = replace(ask, nested=None if ask.nested else False, checkpoint=None, resume=None, every=1, watch=None, start=None)
-        first = self.models(0.0, self._given(0.0))
-        later = self.models(SOME * table.t_end, self._given(0.0))
-        if any(set(jumps_of(first.gap, axis)) != set(jumps_of(later.gap, axis)) for axis in "xy"):
-            first = replace(first, places=EVEN)  # its edges move: no line of points can lie on them
+        first = first_film(scene, self.models, self._given(0.0))
         problem = self._at(0.0, lambda: first.build(scene.shape, ask.comm))
         problem.shares_grid = True
         self.march = March(problem.grid, table.scheme == "bdf2")
@@ -175,7 +174,8 @@ class Run:
         self._sweeps()
         self.lengths = [min(self.lengths[0], dt), max(self.lengths[1], dt)]
         if self.watch is not None:
-            self.watch(Moment(march.t, self.table.t_end, problem, solution.fields, row, len(self.history)))
+            before = march.fields[1] if len(march.fields) > 1 else None
+            self.watch(Moment(march.t, self.table.t_end, problem, solution.fields, row, len(self.history), before))
         self.file.after(self)
 
     def _step(self, t: float, dt: float) -> tuple[Solution, Any, str, list[list[Step]]]:
@@ -251,6 +251,14 @@ class Run:
         measures = {name: max((c.measures[name] for c in found), key=_badness) for name in found[0].measures}
         lowest = {name: min(c.extremes[name] for c in found) for name in found[0].extremes}
         return Certificate(measures, found[0].tol, lowest)
+
+
+def first_film(scene: Any, models: Any, place: Any) -> Model:
+    """The film at t = 0, on whose grid the march goes on."""
+    first, later = (models(t, place) for t in (0.0, SOME * scene.motion.t_end))
+    if any(set(jumps_of(first.gap, axis)) != set(jumps_of(later.gap, axis)) for axis in "xy"):
+        first = replace(first, places=EVEN)  # its edges move: no line of points can lie on them
+    return first  # type: ignore[no-any-return]
 
 
 def _badness(measure: float) -> float:

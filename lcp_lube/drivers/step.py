@@ -50,7 +50,7 @@ def contents(grid: Grid, model: Model, fields: Fields | None, problem: Any = Non
     if fields is None:
         return h
     moving = getattr(problem, "moving", None)  # of a film that is turned round
-    cells = problem.cells if moving is None else {name: problem._here(values) for name, values in moving.cells.items()}
+    cells = getattr(problem, "cells", {}) if moving is None else {name: problem._here(a) for name, a in moving.cells.items()}
     return (h + cells.get("lift", 0.0)) * (1.0 - fields["r"]) * cells.get("density", 1.0)
 
 

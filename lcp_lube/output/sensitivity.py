@@ -8,6 +8,7 @@ import numpy as np
 from ..base.parallel import Array
 from ..drivers.goal_error import GoalError
 from ..drivers.gradient import Gradient
+from ..drivers.march_gradient import MEAN
 from ..problems.solution import Solution
 from ..scenes.values import unit_of as key_unit
 from .files import gather, thinning
@@ -22,7 +23,7 @@ MOST_BARS = 20
 
 def unit_of(solution: Solution, name: str) -> str:
     """Of a number, a part of a vector, or what a balance has found."""
-    units = solution.units
+    units, name = solution.units, name.removeprefix(MEAN)
     words = [name, name.rpartition("_")[0], name.rpartition("_")[0].rpartition("_")[0]]
     found = next((units[word] for word in words if word in units), None)
     return key_unit(solution.solved_scene, name) if found is None else found

@@ -14,8 +14,10 @@ from ..base.quantity import in_si
 from ..drivers.adjoint import Adjoint
 from ..drivers.ask import Ask
 from ..drivers.gradient import Gradient
+from ..drivers.march_gradient import means
 from ..errors import InputError
 from ..problems.solution import Solution
+from ..scenes.moving import motion_of
 from ..scenes.scene import Scene
 from ..scenes.values import key_of, unit_of, values_of, with_values
 
@@ -106,7 +108,7 @@ def monte_carlo(
         changed = {key: values[key] + u * float(x) for (key, u), x in zip(deviation.items(), draw, strict=True)}
         try:
             at = with_values(scene, changed)
-            with solve(at, ask, start=near) as solution:
+            with solve(at, ask, start=near if motion_of(scene) is None else None) as solution:
                 if solution.converged:
                     rows.append(numbers(at, solution, quantities))
         except InputError:
@@ -121,7 +123,7 @@ def monte_carlo(
 
 def numbers(scene: Scene, solution: Solution, quantities: Sequence[str]) -> list[float]:
     """Values of quantities as `gradients` has them. Collective."""
-    known = solution.numbers
+    known = {**solution.numbers, **means(solution.history)}
     if all(isinstance(known.get(name), float) for name in quantities):
         return [known[name] for name in quantities]
     adjoint = Adjoint(scene, solution, [])

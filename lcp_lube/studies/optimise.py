@@ -21,8 +21,10 @@ from ..base.quantity import quantity as read
 from ..base.resumable import ResumableCsv
 from ..drivers.ask import Ask
 from ..drivers.gradient import gradients
+from ..drivers.march_course import Trace
 from ..errors import InputError
 from ..problems.solution import Solution
+from ..scenes.moving import motion_of
 from ..scenes.scene import Scene
 from ..scenes.values import key_of, values_of, with_values
 
@@ -152,7 +154,8 @@ class Designs:
     def _solved(self, values: dict[str, float]) -> Design:
         try:
             scene = with_values(self.scene, values)
-            solution = solve(scene, self.ask, start=self._near)
+            trace = Trace() if motion_of(scene) is not None else None
+            solution = solve(scene, self.ask, start=self._near if trace is None else None, watch=trace)
         except InputError as error:
             return Design(values, message=str(error))
         if not solution.converged:
@@ -161,7 +164,7 @@ class Designs:
         if self._near is not None:
             self._near.destroy()
         self._near = solution
-        found = gradients(scene, solution, self.quantities, list(values))
+        found = gradients(scene, solution, self.quantities, list(values), trace)
         for one in found:
             if missing := next((key for key in values if key not in one.gradient), None):
                 raise InputError(f"--vary {missing}: no derivative: {one.held[missing]}")

@@ -211,7 +211,7 @@ def scaled(
     names = ("k_W", "k_E", "k_S", "k_N")
     k: dict[str, Any] = {name: getattr(s, name) * f[name] * (mobility[i] if mobility else 1.0) for i, name in enumerate(names)}
     couette_W, couette_E = s.couette_W * f["u_W"], s.couette_E * f["u_E"]
-    c, carried = couette_W - couette_E + problem._sources, s.b_E * f["u_E"]
+    c, carried = couette_W - couette_E + problem.sources(slice(None), s), s.b_E * f["u_E"]
     stored: dict[str, Any] = {}
     if s.storage is not None:
         stored["storage"] = s.storage * f["stored"]

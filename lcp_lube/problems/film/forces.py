@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from math import hypot, inf
 from typing import TYPE_CHECKING, Any
 
@@ -65,11 +65,17 @@ def forces(problem: LubricationProblem, p_pa: Array, known: Known | None = None)
     return out
 
 
-def totals(problem: LubricationProblem, p_pa: Array, known: Known | None = None) -> dict[str, float]:
-    """Integrals of the pressure by its `weights`, but for `pressure_integral` above ambient and with contact. Collective."""
-    by, contact = weights(problem), problem.contact
+def totals(
+    problem: LubricationProblem, p_pa: Array, known: Known | None = None, wanted: Collection[str] | None = None
+) -> dict[str, float]:
+    """Integrals of the pressure by its `weights`, but for `pressure_integral` above ambient and with contact. Collective.
+
+    wanted : those alone, the others are NaN; None: all.
+    """
+    every, contact = weights(problem), problem.contact
+    by = {name: weight for name, weight in every.items() if wanted is None or name in wanted}
     asked = [(0.0 if name == "pressure_integral" else ambient(problem), weight) for name, weight in by.items()]
-    out = dict(zip(by, integrals(problem, p_pa, asked), strict=True))
+    out = dict.fromkeys(every, np.nan) | dict(zip(by, integrals(problem, p_pa, asked), strict=True))
     for name, weight in by.items() if contact is not None else ():
         if name != "pressure_integral":
             out[name] += contact.total(problem, weight)

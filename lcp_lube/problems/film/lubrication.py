@@ -14,6 +14,7 @@ from ...base.parallel import Array
 from ..certificate import Certificate
 from ..grid import Grid
 from ..solution import Fields
+from ..strips import ghosted
 from ..transfer import interpolated
 from .assembly import assemble
 from .certify import certify
@@ -21,7 +22,6 @@ from .exact import ExactSolution
 from .integrals import LineIntegrals
 from .quantities import open_pressures, quantities, units
 from .reynolds import BoxScheme, side_points, sides
-from .stored import rates
 from .supplies import Held, Supply, pressed
 from .turning import Shaft
 from .views import LiftedFilm
@@ -137,32 +137,36 @@ class LubricationProblem:
 
     def face_flows(self, p: Array, r: Array) -> Array:
         """What leaves each point's cell through its faces, and its sources: its balance, were it not held. Collective."""
-        s, box, at_sides = self.scheme, self.grid.box, self._at_sides
-        frame_p, frame_r = (self.grid.ghosted(a, outside=0.0) for a in (p, r))
-        p, r = p.reshape(box), r.reshape(box)
-        around = [frame_p[1:-1, :-2], frame_p[1:-1, 2:], frame_p[:-2, 1:-1], frame_p[2:, 1:-1]]
-        p_W, p_E, p_S, p_N = (
-            np.where(at_side, p_side / self.p_unit, beside) if p_side else beside
-            for at_side, p_side, beside in zip(at_sides, self.p_sides, around, strict=True)
-        )
+        framed = [ghosted(self.grid, a, 0.0) for a in (p, r)]
+        out = np.empty(self.grid.box, dtype=np.result_type(p, self.scheme.c))
+        for rows, s in self.scheme.in_strips(self.grid):  # what lies between is then no more than the cache holds
+            out[rows] = self._strip_flows(rows, s, *(frame(rows) for frame in framed))
+        return out.ravel()
+
+    def _strip_flows(self, rows: slice, s: BoxScheme, p: Array, r: Array) -> Array:
+        """Of some lines; p, r : with a frame of neighbours."""
+        around = [p[1:-1, :-2], p[1:-1, 2:], p[:-2, 1:-1], p[2:, 1:-1]]
+        at_sides = zip([mask if len(mask) == 1 else mask[rows] for mask in self._at_sides], self.p_sides, around, strict=True)
+        p_W, p_E, p_S, p_N = (np.where(at, side / self.p_unit, beside) if side else beside for at, side, beside in at_sides)
+        p = p[1:-1, 1:-1]
         pressed = s.k_E * (p - p_E) - s.k_W * (p_W - p)
         if self.grid.dim == 2:
             pressed += s.k_N * (p - p_N) - s.k_S * (p_S - p)
         # The difference first: it may be small, and the pressures too, where the flows themselves are large.
-        dragged = (s.couette_E + s.b_E * r) - (s.couette_W - s.b_W * frame_r[1:-1, :-2])
-        return (pressed + dragged + rates(self, r)).ravel()
+        dragged = (s.couette_E + s.b_E * r[1:-1, 1:-1]) - (s.couette_W - s.b_W * r[1:-1, :-2])
+        if s.storage is None or s.kept is None:
+            return pressed + dragged - self.sources(rows, s)  # type: ignore[no-any-return]
+        return pressed + dragged + (s.storage * (1.0 - r[1:-1, 1:-1]) - s.kept)  # type: ignore[no-any-return]
 
     @cached_property
     def _at_sides(self) -> tuple[Any, ...]:
         return sides(self.grid)
 
-    @cached_property
-    def _sources(self) -> Array:
-        """What c has beyond the flows of the wall and the sides' pressures: nothing in a steady film."""
-        s = self.scheme
+    def sources(self, rows: slice, s: BoxScheme) -> Array:
+        """What c has beyond the flows of the wall and the sides' pressures on some lines: nothing in a steady film."""
         c = s.couette_W - s.couette_E
-        for k, at_side, p_side in zip((s.k_W, s.k_E, s.k_S, s.k_N), sides(self.grid), self.p_sides, strict=True):
-            c += np.where(at_side, k * (p_side / self.p_unit), 0.0)
+        for k, at_side, p_side in zip((s.k_W, s.k_E, s.k_S, s.k_N), self._at_sides, self.p_sides, strict=True):
+            c += np.where(at_side if len(at_side) == 1 else at_side[rows], k * (p_side / self.p_unit), 0.0)
         return s.c - c if s.held is None else np.where(s.held, 0.0, s.c - c)
 
     def hold_at(self, supplies: Sequence[Supply]) -> None:
@@ -253,8 +257,6 @@ class LubricationProblem:
         """The same film with the faces that round edges cut (`rims`) made for these points, 1 where cavitated. Collective."""
         assert self.coefficients_for is not None
         other = copy(self)
-        for name in ("_at_sides", "_sources"):
-            other.__dict__.pop(name, None)
         other.dry, other.scheme = dry, self.coefficients_for(cavity=dry)
         return other
 

@@ -41,14 +41,14 @@ class Slope:
 def numbers(problem: LubricationProblem, p: Array, r: Array, wanted: Collection[str] | None = None) -> dict[str, float]:
     """The numbers that have slopes, SI units; vectors by their parts, force_x, flow_west. Collective.
 
-    wanted : of those that take time, what drags, flows and the largest pressure, the others are NaN; None: all.
+    wanted : the others that take time, what is an integral, flows and the largest pressure, are NaN; None: all.
     """
 
     def asked(start: str) -> bool:
         return wanted is None or any(name.startswith(start) for name in wanted)
 
     p_pa = p * problem.p_unit
-    out = totals(problem, p_pa)
+    out = totals(problem, p_pa, wanted=wanted)
     out["friction"] = friction(problem, p_pa, r) if asked("friction") else np.nan
     if problem.grid.polar is not None:
         lever = problem.grid.polar[0] + problem.grid.y
@@ -110,7 +110,7 @@ def _friction(problem: LubricationProblem, tangent: Tangent, p: Array, r: Array,
     full = (cavity_sign(problem.reduce, p, r) >= 0).reshape(grid.box)
     void = r.reshape(grid.box)
     passes = ~np.broadcast_to(walls[1], grid.box)
-    share = s.b_C / np.where(passes & (s.couette_E != 0.0), s.couette_E, np.inf)  # the liquid's share of a face is 1 + share r
+    share = s.b_E / np.where(passes & (s.couette_E != 0.0), s.couette_E, np.inf)  # the liquid's share of a face is 1 + share r
     sheared = np.where(passes, share / h_moving, 0.0)
     parts: list[tuple[NDArray[np.bool_], Any]] = list(zip(walls, (0.5 * before / behind, 0.5), strict=True))
     for wall, part in parts:
@@ -160,7 +160,7 @@ def _flow(problem: LubricationProblem, tangent: Tangent, side: str) -> Slope:
     own = dict(zip(SIDES, tangent.own, strict=True))
     dp, dr = np.where(at[side], own[side], 0.0), np.zeros(grid.box)
     if side == "east":
-        dr = np.where(at[side], s.b_C, 0.0)
+        dr = np.where(at[side], s.b_E, 0.0)
     if grid.dim == 2:
         lines = line_weights(grid)
         for end, rim in zip(("south", "north"), grid.rims(1), strict=True):
@@ -171,7 +171,7 @@ def _flow(problem: LubricationProblem, tangent: Tangent, side: str) -> Slope:
             strip = 0.5 * rim / lines
             carried, entered = (np.where(at[way] & at[end], strip, 0.0) for way in ("east", "west"))
             dp = dp + leaves * carried * tangent.carried + enters * entered * tangent.entering
-            dr = dr + leaves * carried * s.b_C
+            dr = dr + leaves * carried * s.b_E
     size = volume_unit(problem)
     return Slope((size * dp).ravel(), (size * dr).ravel())
 

@@ -63,17 +63,12 @@ class Stored:
         return replace(self, first=self.first + self.step * first)
 
 
-def rates(problem: "LubricationProblem", r: Array) -> Array:
-    """What the cells come to store with the void r, shape `box`: nothing in a steady film."""
-    s = problem.scheme
-    return -problem._sources if s.storage is None or s.kept is None else s.storage * (1.0 - r) - s.kept
-
-
 def storing(problem: "LubricationProblem", r: Array) -> float:
     """What all cells come to store, as `boundary_flows` has flows; 0 in a steady film. Collective."""
-    if problem.scheme.storage is None:
+    s = problem.scheme
+    if s.storage is None:
         return 0.0
-    return problem.scheme.flow_unit * problem.reduce.sum(rates(problem, r.reshape(problem.grid.box)))
+    return s.flow_unit * problem.reduce.sum(s.storage * (1.0 - r.reshape(problem.grid.box)) - s.kept)
 
 
 def mean_film(grid: Grid, film: Any) -> Array:

@@ -66,7 +66,7 @@ def tangent(problem: LubricationProblem, law: Law | None, constant: LubricationP
     q, dq, drho = (a[1:-1, 1:-1] for a in (q, dq, drho))
     void = grid.ghosted(r, outside=0.0)
     none = np.zeros(grid.box)
-    dragged = [-(s.couette_W - s.b_W * void[1:-1, :-2]), s.couette_E + s.b_C * r.reshape(grid.box), none, none]
+    dragged = [-(s.couette_W - s.b_W * void[1:-1, :-2]), s.couette_E + s.b_E * r.reshape(grid.box), none, none]
     own, other = [], []
     for k, (q_there, dq_there, drho_there), mean, drag in zip(conductances, beside, rho, dragged, strict=True):
         leaving = k * (q - q_there) / unit + drag

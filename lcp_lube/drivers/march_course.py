@@ -1,0 +1,116 @@
+"""A march in time as scenes near by have it: the equations of its steps at the fields that were found."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..base.parallel import Array
+from ..errors import InputError
+from ..problems.film.stored import Stored
+from ..problems.grid import Grid
+from ..scenes.scene import Scene
+from .equations import Equations, followed
+from .march import Formula, March
+from .marching import Moment, first_film
+from .step import TimeStep, contents
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A step's end; p in Pa above p_c. dry : as the film's own. place : of the journal."""
+
+    t: float
+    dt: float
+    p: Array
+    r: Array
+    dry: Array | None
+    place: Any
+
+
+class Trace:
+    """Keeps the fields of all steps; heard as `Ask.watch`."""
+
+    def __init__(self) -> None:
+        self.begun: Kept | None = None  # the steady film at t = 0; None where the march began with a full one
+        self.steps: list[Kept] = []
+
+    def __call__(self, moment: Moment) -> None:
+        problem, row = moment.problem, moment.row
+        if not self.steps and moment.before is not None:
+            self.begun = Kept(0.0, 0.0, moment.before["p"] * problem.p_unit, moment.before["r"].copy(), None, None)
+        place = np.array([row["journal_x"], row["journal_y"]]) if "journal_x" in row else None
+        p, r = moment.fields["p"] * problem.p_unit, moment.fields["r"].copy()
+        self.steps.append(Kept(moment.t, row["dt"], p, r, problem.dry, place))
+
+
+def check_march(scene: Scene) -> None:
+    """Raise InputError for a march whose derivatives are not known, with the reason."""
+    model: Any = scene.models()(0.0, None)  # type: ignore[attr-defined]
+    for found, what in (
+        (bool(model.effects) or (model.law is not None and model.law.dowson_higginson), "effects and densities that change"),
+        (any(one.open for one in model.supplies), "supplies whose pressures follow"),
+        (model.U < 0, "a wall that moves to smaller x (give the mirror image, with -U)"),
+        (hasattr(scene, "observer"), "events"),
+    ):
+        if found:
+            raise InputError(f"scene {scene.name}: [motion]: no derivatives in time through {what}")
+
+
+class Course:
+    """A march at the times, voids and places of a trace. near : whose grid's edges are followed."""
+
+    def __init__(self, scene: Any, trace: Trace, comm: Any, near: "Course | None" = None):
+        self.scene, self.trace, self.comm, self.table = scene, trace, comm, scene.motion
+        self.models, self._given = scene.models(), scene.motion.course(scene._folder)
+        self.first = first_film(scene, self.models, self.place(0))
+        if near is not None and not near.grid.even:
+            places = followed(near.grid, near.first, self.first)
+            if places is None:
+                raise InputError("the film's edges are others beside this value")
+            self.first = replace(self.first, places=places)
+        problem = self.first.build(scene.shape, comm)
+        problem.shares_grid = True
+        self.grid: Grid = problem.grid
+        problem.destroy()
+        self.known: dict[int, Array] = {}
+
+    def kept(self, n: int) -> Kept | None:
+        return self.trace.steps[n - 1] if n else self.trace.begun
+
+    def place(self, n: int, shift: Any = 0.0) -> Any:
+        t = self.trace.steps[n - 1].t if n else 0.0
+        if not self.table.free:
+            return None if self._given is None else self._given(t)
+        e = self.trace.steps[n - 1].place if n else np.array(self.table.position or self.scene.place)
+        return tuple(map(float, e + shift))
+
+    def film(self, n: int, shift: Any = 0.0) -> Any:
+        t = self.trace.steps[n - 1].t if n else 0.0
+        return replace(self.models(t, self.place(n, shift)), places=self.grid.places)
+
+    def formula(self, n: int) -> Formula:
+        steps = self.trace.steps
+        before = [steps[n - 2].dt] if n > 1 else []
+        return March(self.grid, self.table.scheme == "bdf2", dts=before).formula(steps[n - 1].dt)
+
+    def content(self, n: int) -> Array:
+        """h (1 - r) at the end of step n; those of the last few are kept."""
+        if n not in self.known:
+            kept = self.kept(n)
+            self.known = {k: a for k, a in self.known.items() if abs(k - n) <= 2}
+            self.known[n] = contents(self.grid, self.film(n), None if kept is None else {"r": kept.r})
+        return self.known[n]
+
+    def at(self, n: int, shift: Any = 0.0) -> Equations:
+        """G and Q of step n; n = 0: of the steady film that it begins with."""
+        model, kept = self.film(n, shift), self.kept(n)
+        assert kept is not None  # as its caller asks for no others
+        if n:
+            formula = self.formula(n)
+            old = formula.old([self.content(n - 1), self.content(n - 2) if formula.before else None])
+            model = replace(model, stored=Stored(formula.weight, old, self.grid))
+        return Equations(TimeStep(self.scene, model, self.grid), self.comm, dry=kept.dry)  # type: ignore[arg-type]
+
+    def destroy(self) -> None:
+        self.grid.destroy()

@@ -1,0 +1,251 @@
+"""Derivatives of a film that goes on in time by its scene's numbers: the discrete adjoint of the march.
+
+A step's balance is G_n(z_n, z_{n-1}, z_{n-2}; a) = 0, z = p in the full film and -r in the cavity; what it has of
+earlier fields are the contents u = h (1 - r) of cells of size s, d/dt u ~ w_n u_n - l_n u_{n-1} - b_n u_{n-2}. From the last on
+
+    J_n' lambda_n = dQ/dz_n + s h (l_{n+1} lambda_{n+1} + b_{n+2} lambda_{n+2}) in the cavity,
+    dQ/da = d/da [ Q - sum over n of lambda_n' G_n ] at held z:
+
+one transposed solve a step and quantity, whatever the number of parameters. A journal that is free adds its place e_n and speed
+v_n, with V_n = v_n - d/dt e and E_n = m c d/dt v - F(z_n) - W: G_n(e_n) makes their adjoints four numbers a step.
+"""
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..base.differences import differences
+from ..base.parallel import Array
+from ..errors import InputError
+from ..problems.film.flows import point_weights
+from ..problems.film.stored import mean_film
+from ..problems.solution import Solution
+from ..scenes.scene import Scene
+from ..scenes.values import values_of, with_values
+from .adjoint import scale_of
+from .ask import Ask
+from .compose import solve
+from .equations import Equations, cavity_of
+from .linearised import Linear
+from .march_course import Course, Trace, check_march
+
+MEAN = "mean_"  # of a quantity: its mean over the march, of the steps' ends
+NUDGE = 1e-5  # of the thinnest film: of the journal's place, for differences
+HELD = ("t_end", "dt", "tol")
+STEPS = "the steps in time are held"
+
+
+class MarchGradient:
+    """As `adjoint.Adjoint`, of a march: quantities at its end, and their means by `mean_`. Collective, as its methods.
+
+    Raises
+    ------
+    InputError : no converged solution, a march without derivatives, a quantity without one.
+    """
+
+    found: Sequence[str] = ()
+
+    def __init__(self, scene: Scene, solution: Solution, quantities: Sequence[str], trace: Trace | None = None):
+        if not solution.converged:
+            raise InputError(f"{scene.name}: {solution.outcome.sentence}: no solution, no derivatives")
+        check_march(scene)
+        comm = solution.problem.grid.petsc_comm
+        if trace is None or len(trace.steps) != len(solution.history):
+            trace = Trace()
+            solve(scene, Ask(method=solution.settings.get("method", "auto"), implied=True, comm=comm, watch=trace)).destroy()
+        self.scene, self.trace, self.comm, self.names = scene, trace, comm, list(dict.fromkeys(quantities))
+        self.lambdas: dict[str, list[Any]] = {name: [None] * (len(trace.steps) + 1) for name in self.names}
+        self.journal: dict[str, Array] = {name: np.zeros((len(trace.steps) + 1, 4)) for name in self.names}  # of E and V
+        self.units: dict[int, float] = {}  # of flow, of each step
+        self.sizes = dict.fromkeys(self.names, 0.0)
+        self.report: dict[str, float] = {}
+        self.conditions: dict[str, float] = {}
+        self.ties: dict[str, int] = {}
+        self.switching = 0
+        self.course = Course(scene, trace, comm)
+        for n in range(len(trace.steps), 0 if trace.begun is None else -1, -1):
+            self._back(n)
+
+    def _asked(self, n: int) -> dict[str, tuple[str, float]]:
+        """By quantity the number of step n that it has, and the share of it."""
+        last = n == len(self.trace.steps)
+        share = self.trace.steps[n - 1].dt / self.trace.steps[-1].t if n else 0.0
+        parts = {name: (name.removeprefix(MEAN), share if name.startswith(MEAN) else float(last)) for name in self.names}
+        return {name: part for name, part in parts.items() if part[1]}
+
+    def _later(self, n: int) -> list[tuple[int, float]]:
+        """The steps that keep what step n left, and by what part."""
+        N, found = len(self.trace.steps), []
+        for m, name in ((n + 1, "last"), (n + 2, "before")):
+            if m <= N and (part := getattr(self.course.formula(m), name)):
+                found.append((m, part))
+        return found
+
+    def _back(self, n: int) -> None:
+        """The adjoints of step n, from those of later ones."""
+        eq, kept = self.course.at(n), self.course.kept(n)
+        assert kept is not None  # as `__init__` asks
+        p, r = kept.p, kept.r
+        numbers, grid = eq.numbers(p, r), eq.grid
+        told = eq.report(numbers)
+        for name, (base, share) in self._asked(n).items():
+            self.report[name] = self.report.get(name, 0.0) + share * told.get(base, np.nan)
+        if n == len(self.trace.steps):
+            self.report = told | self.report
+        cavity, switching = cavity_of(eq, p, r)
+        self.switching += int(grid.reduce.sum(switching.astype(float)))
+        asked = self._asked(n)
+        parts = {
+            name: {part: share * w for part, w in eq.partials(numbers, base).items()} for name, (base, share) in asked.items()
+        }
+        forces = ("force_x", "force_y") if self.course.table.free and n else ()
+        slopes = {part: eq.slope(p, r, part) for part in dict.fromkeys([*(q for one in parts.values() for q in one), *forces])}
+        later = self._later(n)
+        left = np.where(
+            cavity, 2.0 * grid.spacing[0] * point_weights(grid) * mean_film(grid, self.course.film(n).film).ravel(), 0.0
+        )
+        rows = {
+            name: self._row(slopes, parts.get(name, {}), cavity)
+            + left * sum(part * self.lambdas[name][m] / self.units[m] for m, part in later)
+            for name in self.names
+        }
+        problem = eq.problem(p)
+        entries = None if eq.law is None else eq.tangent(p, r).entries(problem.scheme)
+        linear = Linear(problem, cavity, entries, eq.held)
+        z = np.where(cavity, -r, p / problem.p_unit)
+        some = [*rows.values(), *(self._row(slopes, {force: 1.0}, cavity) for force in forces)]
+        solved = linear.solve_transposed(some, z)
+        linear.destroy()
+        self.units[n], terms = problem.scheme.flow_unit, eq.terms(p, r) / problem.scheme.flow_unit
+        found = dict(zip(rows, solved, strict=False))
+        if forces:
+            self._place(n, found, solved[-2:], later)
+        for name, one in found.items():
+            self.lambdas[name][n] = one
+            own = sum(abs(w * numbers[part]) for part, w in parts.get(name, {}).items())
+            self.sizes[name] += own + grid.reduce.dot(np.abs(one), terms)
+        eq.destroy()
+
+    def _place(self, n: int, found: dict[str, Array], pushed: list[Array], later: list[tuple[int, float]]) -> None:
+        """Adjoints of a free journal's E_n and V_n; those of the film with them. pushed : J'^-1 of both forces."""
+        course, kept, dot = self.course, self.trace.steps[n - 1], self.course.grid.reduce.dot
+        weight, inertia = course.formula(n).weight, course.table.mass * course.scene.turning.c
+        h = mean_film(course.grid, course.film(n).film)
+        d = NUDGE * course.grid.reduce.min(h) / course.scene.turning.c
+        size = 2.0 * course.grid.spacing[0] * point_weights(course.grid) * (1.0 - kept.r)
+        by_place = []  # of G, h and the numbers told, by X and Y
+        for shift in np.eye(2) * d:
+            ends = []
+            for eq in (course.at(n, shift), course.at(n, -shift)):
+                G = self._scaled(n, eq)
+                h = mean_film(course.grid, eq.constant.film).ravel()
+                ends.append((G, h, eq.report(eq.numbers(kept.p, kept.r))))
+                eq.destroy()
+            (G, h, above), (G_below, h_below, below) = ends
+            told = {name: (above[name] - below[name]) / (2.0 * d) for name in above}
+            by_place.append(((G - G_below) / (2.0 * d), (h - h_below) / (2.0 * d), told))
+        C = np.array([[dot(one, G) for one in pushed] for G, _, _ in by_place]) + inertia * weight**2 * np.eye(2)
+        for name in self.names:
+            mu, nu = (sum((part * self.journal[name][m, k : k + 2] for m, part in later), np.zeros(2)) for k in (0, 2))
+            kept_on = sum((part * self.lambdas[name][m] / self.units[m] for m, part in later), np.zeros(size.size))
+            base, share = self._asked(n).get(name, ("", 0.0))
+            own = [share * told.get(base, 0.0) - dot(found[name], G) + dot(kept_on, size * h) for G, h, told in by_place]
+            one = np.linalg.solve(C, np.array(own) + weight * inertia * mu - nu)
+            self.journal[name][n] = *one, *(inertia * (mu - weight * one))
+            found[name] = found[name] + one[0] * pushed[0] + one[1] * pushed[1]
+
+    def _scaled(self, n: int, eq: Equations) -> Array:
+        """G of step n in the units of its adjoints."""
+        kept = self.course.kept(n)
+        assert kept is not None  # as it has adjoints
+        G = eq.balance(kept.p, kept.r) / self.units[n]
+        return G if eq.held is None else np.where(eq.held, G * self.units[n] / eq.constant.p_unit, G)
+
+    def lagrangians(self, course: Course) -> Array:
+        """Q minus what the adjoints make of all equations, of a scene near by, what was solved for held. Collective."""
+        total = dict.fromkeys(self.names, 0.0)
+        start = np.array(course.table.velocity, dtype=float)  # of a free journal, which is held later
+        for n in range(0 if self.trace.begun is not None else 1, len(self.trace.steps) + 1):
+            eq, kept, dot = course.at(n), course.kept(n), course.grid.reduce.dot
+            assert kept is not None
+            numbers = eq.numbers(kept.p, kept.r)
+            told, G = eq.report(numbers), self._scaled(n, eq)
+            for name, (base, share) in self._asked(n).items():
+                total[name] += share * told[base]
+            rest = np.zeros(4)
+            if course.table.free and n:
+                formula, places = course.formula(n), [np.array(course.place(k)) for k in range(max(n - 2, 0), n + 1)][::-1]
+                inertia = course.table.mass * course.scene.turning.c
+                own, at = self.speeds[n], [*self.speeds[1:n][::-1], start]
+                rest[:2] = inertia * (formula.weight * own - formula.old(at)) - course.table.load_at(kept.t)
+                rest[:2] -= numbers["force_x"], numbers["force_y"]
+                rest[2:] = own - (formula.weight * places[0] - formula.old(places[1:]))
+            for name in self.names:
+                total[name] -= dot(self.lambdas[name][n], G) + float(self.journal[name][n] @ rest)
+            eq.destroy()
+        return np.array([total[name] for name in self.names])
+
+    @cached_property
+    def speeds(self) -> list[Array]:
+        """Of a free journal at the end of each step, the first at t = 0, clearances per second."""
+        course, found = self.course, [np.array(self.course.table.velocity, dtype=float)]
+        for n in range(1, len(self.trace.steps) + 1):
+            places = [np.array(course.place(k)) for k in range(max(n - 2, 0), n + 1)][::-1]
+            formula = course.formula(n)
+            found.append(formula.weight * places[0] - formula.old(places[1:]))
+        return found
+
+    @cached_property
+    def _here(self) -> Array:
+        return self.lagrangians(self.course)
+
+    def value(self, key: str) -> float:
+        return values_of(self.scene)[key]
+
+    def slopes(self, key: str) -> tuple[dict[str, float], dict[str, float]]:
+        """dQ/da and the difference between both sides, by quantity. Collective.
+
+        Raises
+        ------
+        InputError : no scene on either side.
+        """
+        if key.removeprefix("motion.") in HELD:
+            raise InputError(STEPS)
+        value, last = self.value(key), self.trace.steps[-1]
+
+        def at(a: float) -> Array:
+            if a == value:
+                return self._here
+            course = Course(with_values(self.scene, {key: a}), self.trace, self.comm, self.course)
+            try:
+                if course.grid.shape != self.course.grid.shape:
+                    raise InputError("the grid has another number of points")
+                return self.lagrangians(course)
+            finally:
+                course.destroy()
+
+        scale = abs(value)
+        if not scale:
+            eq = self.course.at(len(self.trace.steps))
+            scale = scale_of(self.scene, key, eq.constant, last.p / eq.constant.p_unit)
+            eq.destroy()
+        found = differences(at, value, scale, np.array([self.sizes[name] for name in self.names]))
+        slope, jump = (dict(zip(self.names, map(float, one), strict=True)) for one in found)
+        return slope, jump
+
+    def destroy(self) -> None:
+        self.course.destroy()
+
+    @staticmethod
+    def _row(slopes: dict[str, Any], parts: dict[str, float], cavity: Any) -> Array:
+        none = np.zeros(cavity.size)
+        return sum((w * np.where(cavity, -slopes[part].r, slopes[part].p) for part, w in parts.items()), none)
+
+
+def means(history: Sequence[dict[str, Any]]) -> dict[str, float]:
+    """Those over a march, of what its history has."""
+    t_end = sum(row["dt"] for row in history)
+    numbers = [name for name, value in (history[-1] if history else {}).items() if isinstance(value, float)]
+    return {MEAN + name: sum(row["dt"] * row[name] for row in history) / t_end for name in numbers}

@@ -1,0 +1,80 @@
+"""Derivatives of films that go on in time: the adjoint of the march against differences of marches."""
+
+import numpy as np
+import pytest
+
+from lcp_lube import solve
+from lcp_lube.drivers import rotor
+from lcp_lube.drivers.gradient import check, gradients
+from lcp_lube.drivers.march_course import Trace
+from lcp_lube.drivers.march_gradient import means
+from lcp_lube.errors import InputError
+from lcp_lube.scenes.scene import load_scene
+from lcp_lube.scenes.values import values_of, with_values
+
+PUSH = ["2000*exp(-400*(mod(50*t,1)-0.1)^2)", "900.0"]
+TEXTURE = {"t_end": 0.01, "steps": 7}
+FREE = {"t_end": 0.002, "steps": 4, "free": True, "mass": 15.0, "load": PUSH}
+ON_A_COURSE = {"t_end": 0.002, "steps": 5, "journal": ["0.5 + 0.2*cos(400*t)", "0.2*sin(400*t)"]}
+CASES = {
+    "texture": ("moving_texture", {"n": 40, "motion": TEXTURE}, ["fluid.mu", "film.constant.h", "fluid.p_supply"]),
+    "euler": ("moving_texture", {"n": 40, "motion": {**TEXTURE, "scheme": "euler", "start": "full"}}, ["fluid.mu"]),
+    "barus": ("moving_texture", {"n": 40, "fluid.barus": 2e-8, "motion": TEXTURE}, ["fluid.barus", "fluid.mu"]),
+    "course": ("dynamic_journal", {"nx": 24, "motion": ON_A_COURSE}, ["film.journal.c", "U", "sides.south.p"]),
+    "free": (
+        "dynamic_journal",
+        {"nx": 16, "ny": 4, "motion": {**FREE, "start": "full", "position": [0.5, 0.5]}},
+        ["motion.mass", "motion.position.1", "film.journal.c"],
+    ),
+    "free, steady start": ("dynamic_journal", {"nx": 16, "ny": 4, "motion": FREE}, ["film.journal.eccentricity"]),
+}
+
+
+def marched(scene, names):
+    """Quantities, and the trace of the march."""
+    trace = Trace()
+    with solve(scene, watch=trace) as solution:
+        assert solution.converged
+        known = {**solution.history[-1], **means(solution.history)}
+        return np.array([known[name] for name in names])
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_against_differences_of_marches(case, monkeypatch):
+    monkeypatch.setattr(rotor, "TOL", 1e-11)
+    name, changes, keys = CASES[case]
+    scene, names = load_scene(name, **changes), ["load", "mean_load", "friction", "mean_friction", "p_max"]
+    trace = Trace()
+    with solve(scene, watch=trace) as solution:
+        found = gradients(scene, solution, names, keys, trace)
+    assert [one.value for one in found] == pytest.approx(marched(scene, names), rel=1e-12)
+    for key in keys:
+        value = values_of(scene)[key]
+        d = 2e-6 * (abs(value) or 1.0)
+        low2, low, high, high2 = (marched(with_values(scene, {key: value + m * d}), names) for m in (-2, -1, 1, 2))
+        slopes = (8.0 * (high - low) - (high2 - low2)) / (12.0 * d)
+        for one, slope in zip(found, slopes, strict=True):
+            noise = 1e-11 * abs(one.value) / d
+            assert abs(one.gradient[key] - slope) <= 1e-6 * abs(slope) + noise, (key, one.quantity)
+
+
+def test_taylor_and_the_march_is_marched_again_without_a_trace():
+    scene, key = load_scene("moving_texture", n=40, motion=TEXTURE), "film.constant.h"
+    with solve(scene) as solution:
+        slope, here = solution.gradient("load", [key])[key], marched(scene, ["load"])[0]
+    h, errors = 6e-6, []
+    for step in (4e-4, 2e-4):
+        errors.append(marched(with_values(scene, {key: h * (1 + step)}), ["load"])[0] - here - slope * h * step)
+    assert np.log2(abs(errors[0] / errors[1])) == pytest.approx(2.0, abs=0.1)
+
+
+@pytest.mark.parametrize("changes", [{"fluid.density": "dowson-higginson"}, {"U": -2.0}])
+def test_what_has_no_derivative_in_time_is_said(changes):
+    with pytest.raises(InputError, match="no derivatives in time through"):
+        check(load_scene("moving_texture", **changes))
+
+
+@pytest.mark.parametrize(("name", "what"), [("moving_texture", "in time"), ("lined_pad", "of films with effects")])
+def test_the_films_own_derivative_is_refused_before_the_solve(name, what):
+    with pytest.raises(InputError, match=f"not known {what}"):
+        check(load_scene(name), film=True)
