@@ -43,7 +43,6 @@ class Adjoint:
     InputError : no film, no converged solution, a quantity without a derivative.
     """
 
-
     def __init__(self, scene: Scene, solution: Solution, quantities: Sequence[str], flip: bool = False):
         if not solution.converged:
             raise InputError(f"{scene.name}: {solution.outcome.sentence}: no solution, no derivatives")
