@@ -74,7 +74,7 @@ class FirstOrder:
         self._film(self.cells)
         self.at = Answer(eq.constant, self.p, self.r, self.cells, self.law, self.base)
         names = [name for name in dict.fromkeys([quantity, *found.conditions]) if name not in found.found]
-        numbers = eq.numbers(self.p, self.r, None if self.quantity != "load" else ())
+        numbers = eq.numbers(self.p, self.r, None if self.quantity != "load" else ("load", "force_x", "force_y"))
         self.parts = {name: eq.partials(numbers, name) for name in names}
         self.value = eq.report(numbers).get(quantity)
         if quantity in found.found:
