@@ -144,7 +144,7 @@ def _of_pads(scene: Any, solution: Solution, frequencies: Sequence[float], free:
     n, felt = bearing.sizes.size, 2 if isinstance(scene, TiltingPadScene) else 1
     total = np.zeros((len(frequencies), n, n), dtype=complex)
     if with_effects:
-        q, each = bearing.start(None), np.eye(n)
+        q, each = bearing.start(), np.eye(n)
         gaps = [lambda e, one=one: bearing.at(q + e * one).gap for one in each]  # type: ignore[attr-defined]
         for response in _with_effects(scene, solution, gaps):
             for k, nu in enumerate(frequencies):

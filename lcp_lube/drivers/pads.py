@@ -11,13 +11,15 @@ which the journal has moved so far that it finds no place with stiffness idles: 
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.parallel import Array
+from ..errors import InputError
 from ..problems.film.forces import ambient, integral
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
@@ -64,7 +66,7 @@ class Bearing(Protocol):
     @property
     def pitches(self) -> Sequence[int]: ...
 
-    def start(self, known: Any) -> Array: ...
+    def start(self) -> Array: ...
 
     def at(self, q: Array) -> Scene: ...
 
@@ -94,12 +96,8 @@ class JournalPads:
     def pitches(self) -> Sequence[int]:
         return range(2, self.sizes.size)
 
-    def start(self, known: Any) -> Array:
-        scene, n = self.scene, len(self.scene.pivots_deg)
-        if known is not None and len(known) == n + 2:
-            q = np.array(known)
-            if self.free[0]:
-                return q
+    def start(self) -> Array:
+        scene = self.scene
         angle = math.radians(scene.attitude_deg)
         e = scene.clearance * scene.eccentricity * np.array([math.cos(angle), math.sin(angle)])
         # Pads that follow the journal, each inlet open by a part of the film at its pivot: no film is below 0 that need not be.
@@ -166,9 +164,7 @@ class ThrustPads:
     def pitches(self) -> Sequence[int]:
         return (1,)
 
-    def start(self, known: Any) -> Array:
-        if known is not None and len(known) == 3:
-            return np.array(known)
+    def start(self) -> Array:
         scene = self.scene
         return np.array([scene.h_min, self.sizes[1] if scene.pitch is None else scene.pitch, scene.roll or 0.0])
 
@@ -209,16 +205,23 @@ def applies(scene: Solvable, ask: Ask) -> bool:
 
 
 def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
-    """The solution at the place and the tilts at which everything balances. Collective.
-
-    Returns
-    -------
-    Solution : where none was found, outcome LOAD_NOT_CARRIED.
-    """
+    """The solution where everything balances; its outcome is LOAD_NOT_CARRIED where no such place was found. Collective."""
     bearing = bearing_of(scene)
     assert bearing is not None  # as `applies` found
-    known = ask.start.settings.get("coordinates") if ask.start is not None else None
-    q = bearing.start(known)
+    q = bearing.start()
+    known = ask.start.settings.get("relative_coordinates") if ask.start is not None else None
+    if known is None or len(known) != q.size or not bearing.free[0]:
+        return _from(bearing, q, scene, ask, inner)
+    with suppress(InputError):  # a neighbour's pads may leave no film here
+        solution = _from(bearing, np.where(bearing.free, bearing.sizes * known, q), scene, ask, inner)
+        if solution.converged:
+            return solution
+        solution.destroy()
+    return _from(bearing, q, scene, replace(ask, start=None), inner)
+
+
+def _from(bearing: Bearing, q: Array, scene: Solvable, ask: Ask, inner: Inner) -> Solution:
+    """From one place. Collective."""
     chain = Chain(ask, inner)
     found, again = False, False
     nudges, nudge = np.zeros(q.size, dtype=int), np.zeros(q.size)
@@ -287,7 +290,7 @@ def _tell(scene: Any, bearing: Bearing, solution: Solution, q: Array, found: boo
         solution.message = f"{wanted}no balance was found in {count} solves; the last: {place} carries {values['load']:.8g}"
     tilts = [float(tilt) for tilt in told["tilts"]]
     solution.problem.more |= {"pad_tilts": tilts}  # type: ignore[attr-defined]
-    solution.settings |= {"coordinates": [float(one) for one in q]}
+    solution.settings |= {"coordinates": [float(one) for one in q], "relative_coordinates": q / bearing.sizes}
     solution.because(f"pads: {place}, found in {count} solves", after=True)
     if "attitude_deg" in told:
         solution.settings["attitude_deg"] = told["attitude_deg"]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from lcp_lube import InputError, load_scene, solve
+from lcp_lube.drivers.ask import Ask
 from lcp_lube.drivers.coefficients import coefficients
 from lcp_lube.drivers.pads import JournalPads, ThrustPads
 
@@ -97,6 +98,20 @@ def test_thrust_pads():
         assert solution.converged and values["pad_tilts"][1] == 0.0
         radius, angle = values["pressure_centre"]
         assert math.sin(math.radians(angle - 0.6 * 38.0)) * radius == pytest.approx(0.0, abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "near", "here"),
+    [
+        ("tilting_pad_journal", SMALL, {"D": 0.02}, {"D": 0.2}),  # tilts that would close the film of a larger journal
+        ("tilting_pad_thrust", FLAT, {"balance": None}, {"balance": None, "h_min": 2e-5}),  # a film that is given
+    ],
+)
+def test_from_a_neighbour_the_answer_is_the_same(name, size, near, here):
+    scene = load_scene(name, {**size, **here})
+    with solve(name, **size, **near) as start, solve(scene, Ask(start=start)) as warm, solve(scene) as cold:
+        assert warm.converged and cold.converged
+        assert warm.settings["coordinates"] == pytest.approx(cold.settings["coordinates"], rel=1e-5, abs=1e-10)
 
 
 @pytest.mark.parametrize(
