@@ -64,6 +64,12 @@ def test_completion(line: str, expected: set[str], tmp_path) -> None:
     assert {word for word in found if word} == expected, done.stderr
 
 
+def test_no_help_begins_with_what_a_man_page_takes_for_a_request() -> None:
+    (commands,) = (action.choices for action in parser_of_all()._actions if isinstance(action.choices, dict))
+    words = [action.help for parser in commands.values() for action in parser._actions if action.help]
+    assert len(words) > len(commands) and not [word for word in words if word.startswith((".", "'"))]
+
+
 def test_names_are_those_of_the_registry() -> None:
     from lcp_lube.cli.completion import NAMES
 
