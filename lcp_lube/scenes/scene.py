@@ -167,7 +167,7 @@ def as_scene(source: "str | Path | dict[str, Any] | Scene", changes: dict[str, A
         if key.partition(".")[0] not in keys and (near := nearest(key, also)):
             raise InputError(f"{label}: {key} is neither a key of the scene nor an argument{near}")
     try:
-        scene: Scene = model(**{"name": name, **changed(data, plain(changes), {name, str(family)}, keys)})
+        scene: Scene = model(**{"name": name or str(family), **changed(data, plain(changes), {name, str(family)}, keys)})
     except ValidationError as error:
         raise InputError(f"{label}: {first_fault(error, model)}") from None
     scene._folder = folder

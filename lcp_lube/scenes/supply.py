@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import Field
 
 from ..problems.film.supplies import Patch, Region, Supply, Where
@@ -13,6 +14,7 @@ from .units import Measured, measured, metres
 
 Span = tuple[Finite, Finite]
 SLACK = 1e-6  # of a side: a supply may reach so far beyond it
+LATTICE, CLOSER = 101, 12  # values of a formula along a side among which a positive one is looked for, and how often nearer
 
 
 @dataclass(frozen=True)
@@ -95,7 +97,7 @@ class SupplyTable(Measured):
     def _region(self, place: Place) -> Region:
         L, width = place.lengths[0], place.lengths[1] if len(place.lengths) == 2 else math.inf
         if self.where is not None and self.shape == "formula":
-            return Where(Formula(self.where), (0.5 * L, 0.5 * width if width < math.inf else 0.0))
+            return Where(Formula(self.where), _deepest(Formula(self.where), place.lengths))
         x, half_x = self._along(place)
         y, half_y = self._across(width)
         if not place.ring:
@@ -139,6 +141,29 @@ class SupplyTable(Measured):
         if self.shape == "axial_groove":
             return 0.5 * width, math.inf
         raise ValueError(f"a supply of shape {self.shape} needs y, or length")
+
+
+def _deepest(where: Formula, lengths: tuple[float, ...]) -> tuple[float, float]:
+    """A point at which a formula is positive: where its supply lies on grids too coarse to have a point in it.
+
+    The largest of LATTICE values along each side of the film, and of as many about it, ever nearer, until one is positive.
+
+    Raises
+    ------
+    ValueError : none is.
+    """
+    sides = np.array([*lengths, 0.0][:2])
+    low, high = 0.0 * sides, sides
+    for _ in range(CLOSER):
+        x, y = np.linspace(low, high, LATTICE).T
+        values = np.broadcast_to(np.nan_to_num(where(x, y[:, None]), nan=-np.inf), (LATTICE, LATTICE))
+        j, i = np.unravel_index(np.argmax(values), values.shape)
+        best, reach = np.array([x[i], y[j]]), 0.1 * (high - low)
+        if values[j, i] > 0:
+            return float(x[i]), float(y[j])
+        low, high = np.maximum(best - reach, 0.0), np.minimum(best + reach, sides)
+    size = " x ".join(f"{side:g}" for side in lengths)
+    raise ValueError(f"where = {where.text}: positive nowhere in the film, which is {size} m: the supply lies outside it")
 
 
 def _check_inside(axis: str, middle: float, half: float, length: float) -> None:

@@ -89,7 +89,7 @@ class ThrustScene(WithEffects):
         if not self.D_inner < self.D_outer:
             raise ValueError(f"D_inner = {self.D_inner:g}: less than D_outer = {self.D_outer:g} is needed")
         if self.pad_deg is not None and self.pads * self.pad_deg > 360.0 * (1 + 1e-9):
-            raise ValueError(f"pads = {self.pads}, pad_deg = {self.pad_deg:g}: pads overlap; {360 / self.pads:g} at most")
+            raise ValueError(f"pads = {self.pads}, pad_deg = {self.pad_deg:g}: pads overlap; {360 / self.pads:g} deg at most")
         if self.profile == "spiral" and (self.pad_deg is not None or not self.angle_deg):
             raise ValueError("profile = spiral: a sector is a groove and its land; neither pad_deg nor angle_deg = 0")
         if self.profile != "spiral" and self.pad_deg is None and not max(self.p_inner, self.p_outer) > 0 and not self.supply:

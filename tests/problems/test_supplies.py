@@ -144,6 +144,14 @@ def test_formula_region_and_turned_wall():
     assert closes(values) < 1e-10
 
 
+def test_a_formula_smaller_than_a_cell_is_where_it_says():
+    """As the hole of the same place and size: the point nearest to it."""
+    circle = {"shape": "formula", "where": "1e-4 - hypot(x - 0.0303, y - 0.0212)", "p": 4e5}
+    hole = {"shape": "hole", "at_mm": [30.3, 21.2], "diameter_mm": 0.2, "p": 4e5}
+    found = [answer({**PAD, "supply": [one]})[1]["load"] for one in (circle, hole)]
+    assert found[0] == pytest.approx(found[1], rel=1e-3)
+
+
 def test_fluid_that_depends_on_pressure():
     data = {**PAD, "fluid": {"mu": MU, "p_supply": 1e5, "barus": 2e-8, "density": "dowson-higginson"}}
     data["supply"] = [{**RECESS, "restrictor": "capillary", "K": 1e-12, "p_s": 9e6}]
@@ -223,10 +231,11 @@ def test_stiffness_of_a_hybrid_bearing_against_differences(effects):
         ([{"shape": "hole", "at_mm": [10, 10], "p": 1e5}], "diameter is missing"),
         ([{"angle_deg": 30.0, "extent_deg": 10.0, "y_mm": [0, 10], "p": 1e5}], "the film is no journal's"),
         ([{**RECESS, "restrictor": "capillary", "p_s": 1e6}], "a restrictor has K and p_s"),
+        ([{"shape": "formula", "where": "x - 5", "p": 1e5}], "where = x - 5: positive nowhere in the film"),
     ],
 )
 def test_bad_input(supply, words):
-    with pytest.raises(InputError, match="supply") as error:
+    with pytest.raises(InputError, match=r"^(scene|bearing): supply") as error:
         solve({**PAD, "supply": supply})
     assert words in str(error.value) and "\n" not in str(error.value)
 

@@ -174,7 +174,7 @@ def test_recess_in_every_pad():
 @pytest.mark.parametrize(
     ("keys", "words"),
     [
-        ({"pads": 8}, "pads overlap; 45 at most"),
+        ({"pads": 8}, "pads overlap; 45 deg at most"),
         ({"D_inner": 0.2}, "less than D_outer"),
         ({"profile": "spiral"}, "neither pad_deg nor angle_deg = 0"),
         ({"pad_deg": None}, "pad_deg is missing"),
