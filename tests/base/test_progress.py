@@ -10,9 +10,10 @@ from pathlib import Path
 import pytest
 from conftest import ENVIRONMENT
 
-from lcp_lube import solve
+from lcp_lube import load_scene, solve
 from lcp_lube.base.progress import ORDER, Line, decades, duration, of_ladder
 from lcp_lube.output.console import coloured
+from lcp_lube.studies.compare import compare
 
 
 class Terminal(io.StringIO):
@@ -69,6 +70,16 @@ def test_loops_tell(scene: str, how: dict[str, object], loop: str) -> None:
     assert parts and (loop == "grids" or parts[-1] == pytest.approx(1.0))
     if loop == "time":
         assert parts == sorted(parts) and len(parts) >= 6
+
+
+def test_a_comparison_tells_which_run_it_is_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[tuple[str, str, float]] = []
+    monkeypatch.setattr(Line, "__call__", lambda self, *what: told.append(what))
+    compare(load_scene("problem1", n=50), ["din", "active-set"])
+    assert [what for what in told if what[0] == "sweep"] == [
+        ("sweep", "din, run 1 of 2", 0.0),
+        ("sweep", "active-set, run 2 of 2", 0.5),
+    ]
 
 
 def test_colours_on_a_terminal_alone(monkeypatch: pytest.MonkeyPatch) -> None:
