@@ -41,7 +41,9 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     """
     assert isinstance(scene, GroovedJournalScene) and scene.balance is not None  # as `applies` found
     table, known = scene.balance, ask.start.settings if ask.start is not None else {}
-    e = known.get("balance", {}).get("value", scene.eccentricity)
+    touches = scene.preload or scene.tilt or scene.tilt_across  # the wall, at some eccentricity below 1
+    guess = scene.eccentricity if touches else half_film_eccentricity(scene, table.load)
+    e = known.get("balance", {}).get("value", guess)
     phi = math.radians(known["attitude_deg"]) if "attitude_deg" in known else half_film_attitude(e)
     free = scene.model_copy(update={"balance": None})
     shapes = [scene.shape]
@@ -76,6 +78,20 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         "why": [*solution.settings["why"], f"balance: {answer}, found in {count} solves on this grid, {solves} in all"],
     }
     return solution
+
+
+def half_film_eccentricity(scene: GroovedJournalScene, load: float) -> float:
+    """The eccentricity at which a journal with half a film carries the load, as a start.
+
+    1/W = 1/W_short + 1/W_long, of Ocvirk's short and Sommerfeld's long bearing: between them for every L/D, and near both.
+    """
+    e = 1.0 / (1.0 + np.exp(-np.linspace(-0.5 * WIDEST, 0.5 * WIDEST, 561)))
+    round_, ratio = 1.0 - e * e, 4.0 * scene.L_over_D**2  # (B/R)^2
+    short = 0.25 * ratio * e / round_**2 * np.sqrt(16.0 * e * e + np.pi**2 * round_)
+    long = 6.0 * e / ((2.0 + e * e) * round_) * np.sqrt(4.0 * e * e + np.pi**2 * round_)
+    turning = scene.turning
+    unit = scene.mu_0 * turning.omega * turning.R * turning.B * (turning.R / turning.c) ** 2
+    return float(np.interp(math.log(load / unit), -np.log(1.0 / short + 1.0 / long), e))
 
 
 def _on_grid(

@@ -63,6 +63,7 @@ def answer(run: Run) -> Solution:
     if run.outcome is Outcome.CONVERGED:
         solves = f"{run.solves / max(count, 1):.1f} solves each, " if run.solves > count else ""
         run.message = f"{count} time steps, {solves}{len(run.steps) / max(run.solves, 1):.1f} iterations a solve"
+        run.message += f"; {march.defect:.1e} of the oil lost"
     if run.seen is not None:
         problem = run.seen.answer(problem)
     details = {
