@@ -2,10 +2,14 @@
 
 import argparse
 import json
+from dataclasses import replace
 from typing import Any
+
+from mpi4py import MPI
 
 from ..base.files import write_text
 from ..base.options import check_unread
+from ..base.progress import Line
 from ..drivers.gradient import check
 from ..errors import InputError
 from ..output.console import say
@@ -30,8 +34,12 @@ def run(args: argparse.Namespace) -> int:
     goal, sign = (args.maximise, 1.0) if args.maximise is not None else (args.minimise, -1.0)
     ranges, limits = [parse_range(scene, text) for text in args.vary], [parse_limit(text) for text in args.subject]
     history = args.history or (args.output.with_suffix(".csv") if args.output else None)
-    ask = ask_of(args)
-    found = optimise(scene, goal, sign, ranges, limits, ask=ask, history=history, most=args.steps)
+    line = Line()
+    ask = replace(ask_of(args), progress=line if MPI.COMM_WORLD.rank == 0 else None)
+    try:
+        found = optimise(scene, goal, sign, ranges, limits, ask=ask, history=history, most=args.steps)
+    finally:
+        line.end()
     check_unread()
     if args.output is not None:
         write_text(args.output, toml_of(with_values(scene, found.best.values)))

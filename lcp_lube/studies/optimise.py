@@ -122,6 +122,9 @@ class Designs:
         x = np.clip(x, 0.0, 1.0).astype(float)
         name = x.tobytes()
         if name not in self.known:
+            last = [design for design in self.known.values() if design.results][-1:]
+            so_far = "".join(f", {name} {design.results[name]:.4g}" for design in last for name in self.quantities)
+            self.ask.tell("sweep", f"design {len(self.known) + 1}{so_far}", 0.0)
             values = {one.key: one.low + float(t) * (one.high - one.low) for one, t in zip(self.ranges, x, strict=True)}
             self.known[name] = self._made(values)
         return self.known[name]

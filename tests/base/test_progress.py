@@ -12,8 +12,10 @@ from conftest import ENVIRONMENT
 
 from lcp_lube import load_scene, solve
 from lcp_lube.base.progress import ORDER, Line, decades, duration, of_ladder
+from lcp_lube.drivers.ask import Ask
 from lcp_lube.output.console import coloured
 from lcp_lube.studies.compare import compare
+from lcp_lube.studies.optimise import optimise, parse_range
 
 
 class Terminal(io.StringIO):
@@ -80,6 +82,16 @@ def test_a_comparison_tells_which_run_it_is_at(monkeypatch: pytest.MonkeyPatch) 
         ("sweep", "din, run 1 of 2", 0.0),
         ("sweep", "active-set, run 2 of 2", 0.5),
     ]
+
+
+def test_a_design_tells_where_it_is() -> None:
+    told: list[tuple[str, str, float]] = []
+    scene = load_scene("pocketed_pad", n=40)
+    ranges = [parse_range(scene, "film.pocket.depth=5e-6:2e-5")]
+    found = optimise(scene, "load", -1.0, ranges, ask=Ask(progress=lambda *what: told.append(what)), most=3)
+    designs = [words for name, words, _ in told if name == "sweep"]
+    assert len(designs) == found.designs > 1
+    assert designs[0] == "design 1" and designs[1] == f"design 2, load {found.start.results['load']:.4g}"
 
 
 def test_colours_on_a_terminal_alone(monkeypatch: pytest.MonkeyPatch) -> None:
