@@ -24,7 +24,7 @@ from ..scenes.grooved import GroovedJournalScene
 from ..scenes.scene import Scene
 from ..scenes.values import values_of, with_values
 from .coefficients import placed
-from .equations import MISFIT, Equations, cavity_of, check_film, fields_of
+from .equations import MISFIT, Equations, cavity_of, check_film, fields_of, right_side, unknowns
 from .halved import Halved
 from .linearised import Linear
 
@@ -77,10 +77,7 @@ class Adjoint:
         needed = list(dict.fromkeys(part for weights in parts.values() for part in weights))
         slopes = {part: eq.slope(p, r, part, last=flip) for part in needed}
         self.ties = {name: sum(slopes[part].ties for part in weights) for name, weights in parts.items()}
-        rows = [
-            sum((w * np.where(self.cavity, -slopes[part].r, slopes[part].p) for part, w in weights.items()), np.zeros(p.size))
-            for weights in parts.values()
-        ]
+        rows = [right_side(slopes, weights, self.cavity) for weights in parts.values()]
         self.lambdas = dict(zip(parts, self._solve(rows), strict=True))
         self.parts = parts
         self.flow_unit = eq.problem(p).scheme.flow_unit
@@ -106,14 +103,9 @@ class Adjoint:
             entries = None if eq.law is None else eq.tangent(self.p, self.r).entries(problem.scheme)
             linear = Linear(problem, self.cavity, entries, eq.held)
         try:
-            return linear.solve_transposed(rows, self._z)
+            return linear.solve_transposed(rows, unknowns(self.cavity, self.p, self.r, eq.constant.p_unit))
         finally:
             linear.destroy()
-
-    @property
-    def _z(self) -> Array:
-        """p (p_unit) where the film is full, -r where it is not."""
-        return np.where(self.cavity, -self.r, self.p / self.equations.constant.p_unit)
 
     @property
     def _halved(self) -> bool:
@@ -139,9 +131,7 @@ class Adjoint:
             wanted = {part for weights in self.parts.values() for part in weights}
             numbers = self.numbers if same else eq.numbers(self.p, self.r, wanted)
             report = eq.report(numbers)
-            G = eq.balance(self.p, self.r) / self.flow_unit
-            if (held := eq.held) is not None:
-                G = np.where(held, G * self.flow_unit / eq.constant.p_unit, G)
+            G = eq.scaled(self.p, self.r, self.flow_unit)
             return np.array([report[name] - eq.grid.reduce.dot(one, G) for name, one in self.lambdas.items()])
         finally:
             if eq is not self.equations:

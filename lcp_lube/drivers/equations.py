@@ -5,7 +5,7 @@ same points of the grid, which moves where the number moves it.
 """
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -122,6 +122,11 @@ class Equations:
             for inside, groove in zip(problem.columns, problem.grooves, strict=True):
                 G = np.where(inside, p - groove.p, G)
         return G
+
+    def scaled(self, p: Array, r: Array, unit: float) -> Array:
+        """`balance` in a unit of flow, and in p_unit where pressures are given."""
+        G = self.balance(p, r) / unit
+        return G if self.held is None else np.where(self.held, G * unit / self.constant.p_unit, G)
 
     def terms(self, p: Array, r: Array) -> Array:
         """The size of the terms that G is the sum of, m2/s."""
@@ -275,3 +280,14 @@ def cavity_of(equations: Equations, p: Array, r: Array) -> tuple[NDArray[np.bool
         switching &= ~equations.given
         cavity &= ~equations.given
     return cavity, switching
+
+
+def unknowns(cavity: NDArray[np.bool_], p: Array, r: Array, p_unit: float) -> Array:
+    """z: p (p_unit) where the film is full, -r where it is not."""
+    return np.where(cavity, -r, p / p_unit)
+
+
+def right_side(slopes_of: Mapping[str, slopes.Slope], weights: Mapping[str, float], cavity: NDArray[np.bool_]) -> Array:
+    """dQ/dz of the adjoint equation, of a number that is made of parts with these weights."""
+    none = np.zeros(cavity.size)
+    return sum((w * np.where(cavity, -slopes_of[part].r, slopes_of[part].p) for part, w in weights.items()), none)

@@ -22,7 +22,7 @@ from ..scenes.effects.named import named, without
 from ..scenes.values import values_of
 from .adjoint import Adjoint, Implicit, conditions_of
 from .coefficients import placed
-from .equations import Equations, cavity_of, fields_of
+from .equations import Equations, cavity_of, fields_of, right_side, unknowns
 from .linearised import Linear
 from .turned import Mirrored
 
@@ -161,10 +161,10 @@ class FirstOrder:
         rows = []
         for weights in self.parts.values():
             slopes = {part: eq.slope(p, r, part) for part in weights}
-            rows.append(sum((w * np.where(cavity, -slopes[k].r, slopes[k].p) for k, w in weights.items()), np.zeros(p.size)))
+            rows.append(right_side(slopes, weights, cavity))
         linear = Linear(eq.constant, cavity, given=eq.held)
         try:
-            z = np.where(cavity, -r, p / eq.constant.p_unit)
+            z = unknowns(cavity, p, r, eq.constant.p_unit)
             return dict(zip(self.parts, linear.solve_transposed(rows, z), strict=True))
         finally:
             linear.destroy()

@@ -92,7 +92,7 @@ class Look:
             quantity = _quantity(first, self.ask.quantity, self.scene)[1]
             film = FirstOrder(self.scene, first, self._free, quantity)
         except InputError:
-            self._by_solving()
+            self.kept, self.effects, self.record, self.work = _by_solving(self.scene, self.names, self.ask, self.inner)
             return
         changes = {name: film.change(name) for name in self.names}
         self.found = film.found
@@ -152,11 +152,6 @@ class Look:
         if self.first is not None:
             self.first.destroy()
 
-    def _by_solving(self) -> None:
-        """On a coarse grid, with all effects and without each."""
-        self.kept, self.effects, self.record = _by_solving(self.scene, self.names, self.ask, self.inner)
-        self.work = self.record.pop("coarse_work", 0)
-
 
 def quick(ask: Ask) -> Ask:
     """For a film that is looked at, and thrown away."""
@@ -176,8 +171,10 @@ def first_shape(shape: tuple[int, ...]) -> tuple[int, ...]:
     return coarse
 
 
-def _by_solving(scene: Any, names: list[str], ask: Ask, inner: Inner) -> tuple[list[str], dict[str, float], dict[str, Any]]:
-    """Effects to keep, what each changes on a coarse grid, and how that was found. Collective."""
+def _by_solving(
+    scene: Any, names: list[str], ask: Ask, inner: Inner
+) -> tuple[list[str], dict[str, float], dict[str, Any], float]:
+    """Effects to keep, what each changes on a coarse grid, how that was found, and the work. Collective."""
     tol = ask.accuracy or TOLERANCE
     shape = coarse_shape(scene.shape, len(names) + 1)
     assert shape is not None  # for the type checker: `decide` has looked
@@ -185,11 +182,11 @@ def _by_solving(scene: Any, names: list[str], ask: Ask, inner: Inner) -> tuple[l
     try:
         full = inner(coarse, quick(ask))
     except InputError:
-        return names, {}, {"reason": f"no film on the coarse grid {shape}"}
+        return names, {}, {"reason": f"no film on the coarse grid {shape}"}, 0.0
     work, effects = total_work(full), {}
     try:
         if not full.converged:
-            return names, {}, {"reason": f"no answer on the coarse grid {shape}: {full.message}"}
+            return names, {}, {"reason": f"no answer on the coarse grid {shape}: {full.message}"}, 0.0
         value, quantity = _quantity(full, ask.quantity, scene)
 
         def effect(gone: list[str]) -> float | None:
@@ -215,8 +212,7 @@ def _by_solving(scene: Any, names: list[str], ask: Ask, inner: Inner) -> tuple[l
             together = effect(gone) if len(gone) > 1 else 0.0
     finally:
         full.destroy()
-    record = {"quantity": quantity, "tolerance": tol, "grid": list(shape), "coarse_work": work}
-    return kept, effects, record
+    return kept, effects, {"quantity": quantity, "tolerance": tol, "grid": list(shape)}, work
 
 
 def _quantity(solution: Solution, quantity: str | None, scene: Any) -> tuple[float | None, str]:

@@ -27,7 +27,7 @@ from ..scenes.values import values_of, with_values
 from .adjoint import scale_of
 from .ask import Ask
 from .compose import solve
-from .equations import Equations, cavity_of
+from .equations import Equations, cavity_of, right_side, unknowns
 from .linearised import Linear
 from .march_course import Course, Trace, check_march
 
@@ -107,15 +107,15 @@ class MarchGradient:
             cavity, 2.0 * grid.spacing[0] * point_weights(grid) * mean_film(grid, self.course.film(n).film).ravel(), 0.0
         )
         rows = {
-            name: self._row(slopes, parts.get(name, {}), cavity)
+            name: right_side(slopes, parts.get(name, {}), cavity)
             + left * sum(part * self.lambdas[name][m] / self.units[m] for m, part in later)
             for name in self.names
         }
         problem = eq.problem(p)
         entries = None if eq.law is None else eq.tangent(p, r).entries(problem.scheme)
         linear = Linear(problem, cavity, entries, eq.held)
-        z = np.where(cavity, -r, p / problem.p_unit)
-        some = [*rows.values(), *(self._row(slopes, {force: 1.0}, cavity) for force in forces)]
+        z = unknowns(cavity, p, r, problem.p_unit)
+        some = [*rows.values(), *(right_side(slopes, {force: 1.0}, cavity) for force in forces)]
         solved = linear.solve_transposed(some, z)
         linear.destroy()
         self.units[n], terms = problem.scheme.flow_unit, eq.terms(p, r) / problem.scheme.flow_unit
@@ -160,8 +160,7 @@ class MarchGradient:
         """G of step n in the units of its adjoints."""
         kept = self.course.kept(n)
         assert kept is not None  # as it has adjoints
-        G = eq.balance(kept.p, kept.r) / self.units[n]
-        return G if eq.held is None else np.where(eq.held, G * self.units[n] / eq.constant.p_unit, G)
+        return eq.scaled(kept.p, kept.r, self.units[n])
 
     def lagrangians(self, course: Course) -> Array:
         """Q minus what the adjoints make of all equations, of a scene near by, what was solved for held. Collective."""
@@ -237,11 +236,6 @@ class MarchGradient:
 
     def destroy(self) -> None:
         self.course.destroy()
-
-    @staticmethod
-    def _row(slopes: dict[str, Any], parts: dict[str, float], cavity: Any) -> Array:
-        none = np.zeros(cavity.size)
-        return sum((w * np.where(cavity, -slopes[part].r, slopes[part].p) for part, w in parts.items()), none)
 
 
 def means(history: Sequence[dict[str, Any]]) -> dict[str, float]:

@@ -20,7 +20,7 @@ from importlib.resources import files
 from typing import Any, Self
 
 from ...errors import InputError
-from .answers import Answers
+from .answers import JSON, Answers
 
 HOST = "127.0.0.1"
 LARGEST = 100_000  # bytes of a request
@@ -140,7 +140,7 @@ class Handler(BaseHTTPRequestHandler):
         name = self._inside()
         if name is None:
             return
-        if self.headers.get_content_type() != "application/json":
+        if self.headers.get_content_type() != JSON:
             self._refuse(415, "JSON is needed")  # which no form of another site can send
             return
         try:
@@ -181,7 +181,7 @@ class Handler(BaseHTTPRequestHandler):
                     return
                 continue
             if isinstance(reply, bytes):  # a film on its way in time: a line each, and the connection's end is the answer's
-                self._send(200, reply, "application/json", streams, ends=False)
+                self._send(200, reply, JSON, streams, ends=False)
                 streams, job.gone = True, self._left()
                 if job.gone:
                     return
@@ -203,7 +203,7 @@ class Handler(BaseHTTPRequestHandler):
 
     def _refuse(self, status: int, words: str, streams: bool = False) -> None:
         self.close_connection = True  # whatever was sent along is not read
-        self._send(status, json.dumps({"refused": words}).encode(), "application/json", streams)
+        self._send(status, json.dumps({"refused": words}).encode(), JSON, streams)
 
     def _send(self, status: int, body: bytes, kind: str, streams: bool = False, ends: bool = True) -> None:
         """An answer, or one of several lines of it. streams : the first one was sent; ends : this is the last one."""
