@@ -22,7 +22,7 @@ from ..solvers.newton import Stopping
 from .ask import Ask
 from .chain import added
 from .compose import Inner
-from .estimate import QUADRATURE, Estimate, estimate, known_numbers, misplaced_film, scalars
+from .estimate import QUADRATURE, Estimate, estimate, follow, known_numbers, misplaced_film, scalars
 from .memory import DENSE, available
 from .plan import SMALL
 
@@ -143,9 +143,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         },
     }
     if best.extrapolated and quantity in solution.numbers:
-        solution.numbers[quantity] = best.value
-        if quantity == "load" and value == np.hypot(*(force := solution.numbers.get("force") or [0.0, 0.0])):
-            solution.numbers["force"] = [part * best.value / value for part in force]  # the grid's direction
+        follow(solution.numbers, quantity, value, best.value)
     solution.because(*ladder(levels, quantity, tol), after=True)
     solution.levels = levels
     solution.times = {**times, "total": perf_counter() - begin}

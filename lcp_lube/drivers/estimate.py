@@ -45,6 +45,10 @@ CLEAN = 0.01  # what moves of w leave over the last correction
 QUADRATURE = 1e-9  # relative: what a line's quadrature may leave
 ANSWER = (1.0, 10.0)  # least and greatest answer to what is misplaced: relative change over share of Int h^-3
 UNSEEN = 0.05  # share of its h^-3 that the face must miss for a cell without a jump to count: a steep ramp, a narrow ridge
+FOLLOWING = {  # numbers that are a power of another times what does not change with it
+    "load": {"sommerfeld": 1, "pad_load": 1, "S": -1, "friction_coefficient": -1},
+    "friction": {"friction_coefficient": 1},
+}
 LINES, PARTS = 65, 16  # lines across a 2D film on which it is looked at, and looks between two points
 # Looks, in spacings from the left one of two points: just inside of both, where a film that jumps at a point has its own side.
 _LOOKS = np.clip(np.linspace(0.0, 1.0, PARTS + 1), 1e-7, 1.0 - 1e-7)
@@ -108,6 +112,16 @@ def _of_film(steps: np.ndarray, misplaced: Sequence[float], value: float) -> flo
     shares = (np.array(misplaced[:-1]) + misplaced[1:])[-len(steps) :]
     answers = steps[shares > 0] / shares[shares > 0] / abs(value)
     return float(np.clip(np.max(answers, initial=0.0), *ANSWER) * misplaced[-1] * abs(value))
+
+
+def follow(numbers: dict[str, Any], quantity: str, value: float, best: float) -> None:
+    """Put the best value in the place of the grid's own, and let what is this number times others follow, in place."""
+    numbers[quantity] = best
+    for name, power in FOLLOWING.get(quantity, {}).items():
+        if numbers.get(name) is not None:
+            numbers[name] *= (best / value) ** power
+    if quantity == "load" and value == np.hypot(*(force := numbers.get("force") or [0.0, 0.0])):
+        numbers["force"] = [part * best / value for part in force]  # the grid's direction
 
 
 def scalars(found: Mapping[str, Any]) -> dict[str, float]:

@@ -119,6 +119,8 @@ def test_the_force_of_a_shaft_is_as_large_as_its_extrapolated_load():
         found, grid = solution.numbers, solution.problem.quantities(solution.fields)
         assert solution.settings["accuracy_extrapolated"] and found["load"] != grid["load"]
         assert np.hypot(*found["force"]) == pytest.approx(found["load"], rel=1e-12)
+        assert found["friction_coefficient"] * found["load"] == pytest.approx(found["friction"], rel=1e-12)
+        assert found["sommerfeld"] / found["load"] == pytest.approx(grid["sommerfeld"] / grid["load"], rel=1e-12)
         assert np.cross(found["force"], grid["force"]) == pytest.approx(0.0, abs=1e-9 * found["load"] ** 2)
 
 
