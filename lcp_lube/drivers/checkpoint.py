@@ -19,10 +19,11 @@ from mpi4py import MPI
 
 from .. import __version__
 from ..base.files import not_writable
+from ..base.parallel import Array
 from ..errors import InputError
 from ..problems.grid import Grid
 from ..problems.solution import Fields, Outcome, Step
-from ..scenes.scene import Scene, Solvable
+from ..scenes.scene import Derived, Scene, Solvable
 from ..solvers.method import Method
 from ..solvers.newton import Monitor, Stopping, iterate
 from . import checkpoint_file
@@ -182,27 +183,24 @@ class Checkpointer:
                 signal.signal(number, handler)
 
     def save(self) -> None:
-        """Write the file.
+        """Write the run's file; raises as `write`."""
+        assert self._run is not None and self._grid is not None
+        leaves = [*_leaves(self._run, state_names(self._run)), *self._reached.items()]
+        arrays = [(name, np.asarray(value, dtype=float)) for name, value in leaves if isinstance(value, np.ndarray)]
+        numbers = [(name, value) for name, value in leaves if not isinstance(value, np.ndarray)]
+        scalars = {name: value.item() if isinstance(value, np.generic) else value for name, value in numbers}
+        self.write(self._grid, {"scalars": scalars}, arrays, self.steps)
+
+    def write(self, grid: Grid, more: dict[str, Any], arrays: list[tuple[str, Array]], steps: list[Step]) -> None:
+        """Write a file with these numbers and arrays.
 
         Raises
         ------
         InputError : it cannot be written; the last checkpoint is still there then.
         """
-        assert self._run is not None and self._grid is not None
-        leaves = [*_leaves(self._run, state_names(self._run)), *self._reached.items()]
-        header = {
-            **self.record,
-            "version": __version__,
-            "steps": [astuple(step) for step in self.steps],
-            "scalars": {
-                name: value.item() if isinstance(value, np.generic) else value
-                for name, value in leaves
-                if not isinstance(value, np.ndarray)
-            },
-        }
-        arrays = [(name, np.asarray(value, dtype=float)) for name, value in leaves if isinstance(value, np.ndarray)]
+        header = {**self.record, "version": __version__, "steps": [astuple(step) for step in steps], **more}
         try:
-            checkpoint_file.write(self.path, self._grid, header, arrays)
+            checkpoint_file.write(self.path, grid, header, arrays)
         except OSError as error:
             kept = "; the last one is still there" if self._saved else ""
             raise InputError(f"--checkpoint {self.path}: could not be written: {error}{kept}") from None
@@ -293,6 +291,8 @@ def load(path: str | Path, scene: Solvable, comm: MPI.Comm = MPI.COMM_WORLD) -> 
 
 
 def scene_record(scene: Solvable) -> dict[str, Any]:
-    """A scene's data as JSON holds them."""
+    """A scene's data as JSON holds them; of what a driver made of one, those of that."""
+    while isinstance(scene, Derived):
+        scene = scene.whole
     assert isinstance(scene, Scene)  # `compose` lets no other be checkpointed
     return json.loads(json.dumps({"class": type(scene).__name__, **scene.model_dump(mode="json")}, default=str))

@@ -63,9 +63,6 @@ CANNOT = (
     ("supplies", "certify", "a band is proved at given pressures of supplies; give those that were found"),
     ("turned", "checkpoint", "U < 0 is solved as its mirror image; give that, with -U"),
     ("turned", "resume", "U < 0 is solved as its mirror image; give that, with -U"),
-    ("coupling", "checkpoint", "the coupling's iterations hold several answers at once"),
-    ("coupling", "resume", "the coupling's iterations hold several answers at once"),
-    ("coupling", "certify", "the theorem holds where the film's coefficients do not depend on its answer"),
 )
 
 

@@ -9,22 +9,27 @@ where other effects vary the viscosity as well. The certificate of the answer ha
 that it was solved with, `coupling`, the largest relative change that the effects still make of these, and the effects' own.
 """
 
+from contextlib import nullcontext
 from dataclasses import replace
 from math import prod
+from typing import Any
 
 import numpy as np
 
 from ..problems.film.effects import Cells, neutral
 from ..problems.film.fluid import Law
 from ..problems.film.model import Model
-from ..problems.solution import Outcome, Solution
+from ..problems.solution import Enclosure, Fields, Outcome, Solution
 from ..problems.transfer import Transfer
 from ..scenes.scene import Solvable
+from ..solvers.enclosure import bounds_of
 from .ask import Ask, Start
 from .compose import Inner
+from .coupling_file import CouplingFile
 from .levels import level_shapes
 from .loop import SETTLED, Loop
 
+ROUNDED = 2.0**-50  # relative error of p made of q, at most
 NESTED_ABOVE = 2_000  # points from which the fields are first found on coarser grids
 
 
@@ -46,20 +51,35 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     ------
     InputError : a scheme that has no faces where densities or lifts could act.
     """
-    loop = Loop(scene, _reduced(ask, scene.model.law), inner)  # type: ignore[attr-defined]
-    cells = neutral(loop.effects, loop.h.size)
-    if not loop.effects:
-        loop.film(cells)
+    model: Model = scene.model  # type: ignore[attr-defined]
+    if not model.effects and not (model.law and model.law.dowson_higginson):
+        loop = Loop(scene, _reduced(ask, model.law), inner)
+        loop.film({})
         loop.change = 0.0
+        return _told(ask, loop)
+    file = CouplingFile(scene, ask)
+    with file.keeper.listening() if file.keeper.active else nullcontext():
+        return _settled_on(scene, file.ask, inner, file)
+
+
+def _settled_on(scene: Solvable, ask: Ask, inner: Inner, file: CouplingFile) -> Solution:
+    """The solution on this grid, from that on coarser ones, or from where the file has it."""
+    inside = replace(ask, certify=False)
+    loop, coarse = Loop(scene, _reduced(inside, scene.model.law), inner), None  # type: ignore[attr-defined]
+    if file.holds(loop):
+        begin = file.restore(loop)
     else:
-        known, coarse = _known(loop), None
+        known = _known(loop)
         if known is None:
-            coarse = _coarser(scene, ask, inner, loop)
+            coarse = _coarser(scene, inside, inner, loop, file)
             known = _taken(loop, coarse.problem) if coarse is not None else None
-        loop.settle(known or cells, _settled(ask))
-        if coarse is not None:
-            coarse.destroy()
-    return _told(scene, ask, loop)
+        begin = loop.vector(known or neutral(loop.effects, loop.h.size))
+    loop.settle(begin, _settled(ask), lambda: file.save(loop))
+    if loop.solution is None or (ask.certify and loop.answer is not None):  # all of its films were taken from the file
+        loop.again(ask.certify)
+    if coarse is not None:
+        coarse.destroy()
+    return _told(ask, loop)
 
 
 def _reduced(ask: Ask, law: Law | None) -> Ask:
@@ -93,14 +113,14 @@ def _taken(loop: Loop, problem: object) -> Cells | None:
     return found
 
 
-def _coarser(scene: Solvable, ask: Ask, inner: Inner, loop: Loop) -> Solution | None:
+def _coarser(scene: Solvable, ask: Ask, inner: Inner, loop: Loop, file: CouplingFile) -> Solution | None:
     """The answer on the next coarser grid, as a start: there the loop costs a quarter, or a half in 1D."""
     if ask.nested is False or prod(scene.shape) <= NESTED_ABOVE or loop.model.grooves:
         return None
     shapes = level_shapes(scene.shape, loop.base.grid.comm.size)
     if len(shapes) < 2 or prod(shapes[-2]) >= prod(scene.shape):
         return None
-    found = solve(scene.with_shape(shapes[-2]), replace(ask, start=None, stopping=_loose(ask)), inner)
+    found = _settled_on(scene.with_shape(shapes[-2]), replace(ask, start=None, stopping=_loose(ask)), inner, file)
     if not found.converged:
         found.destroy()
         return None
@@ -120,7 +140,7 @@ def _loose(ask: Ask) -> dict:
     return {"eps1": max(given.eps1, 1e-5), "max_it": given.max_it}
 
 
-def _told(scene: Solvable, ask: Ask, loop: Loop) -> Solution:
+def _told(ask: Ask, loop: Loop) -> Solution:
     """The loop's last answer as a solution of the scene. Collective."""
     solution, first, law = loop.solution, loop.first, loop.law
     assert solution is not None and first is not None  # a film was solved
@@ -154,6 +174,7 @@ def _told(scene: Solvable, ask: Ask, loop: Loop) -> Solution:
     fields = {"p": at.p / problem.p_unit, "r": at.r}
     problem.cells = at.cells
     certificate = problem.certify(fields, eps1)
+    enclosure = _band(loop, solution.enclosure, fields) if ask.certify else None
     solution.destroy()
     count = f"{loop.solves} film{'s' * (loop.solves > 1)} solved"
     inside = f"; {', '.join(loop.names)} by Anderson's method" if loop.effects else ""
@@ -163,4 +184,29 @@ def _told(scene: Solvable, ask: Ask, loop: Loop) -> Solution:
         settings |= {"method": loop.rescued.method, "took_over": loop.rescued.asked}
     settings["details"] = {**first.settings["details"], "fluid_solves": loop.solves, "coupling_work": loop.work}
     done = {"problem": problem, "fields": fields, "outcome": outcome, "message": message, "certificate": certificate}
+    done |= {"enclosure": enclosure}
     return replace(first, **done, steps=loop.steps, settings=settings, times=loop.times).judged()  # type: ignore[arg-type]
+
+
+def _band(loop: Loop, of_q: Enclosure | None, fields: Fields) -> Enclosure:
+    """The band around the last film's answer, in p. Collective.
+
+    With Barus' law alone it is around the answer of the film whose viscosity follows the pressure: q is a rising function of p.
+    What effects vary is held as it was found.
+    """
+    if of_q is None or not of_q.certified:
+        return of_q or Enclosure(False, "no band: no answer")
+    problem: Any = loop.answer.problem  # type: ignore[union-attr]
+    lower, upper, unit = of_q.lower, of_q.upper, problem.p_unit
+    if loop.law.barus:
+        lower, upper = (
+            {**end, "p": loop.law.pressure(end["p"] * unit * more) * more / unit}
+            for end, more in ((lower, 1.0 - ROUNDED), (upper, 1.0 + ROUNDED))
+        )
+        if not np.isfinite(problem.reduce.max(upper["p"])):
+            return Enclosure(False, "no band: viscosity grows without bound within it")
+    bounds = bounds_of(problem, fields, lower, upper)
+    still = f"with {', '.join(loop.names)} held as found, which the effects still change by {loop.change:.1e}"
+    held = still if loop.effects else ""
+    message = f"the discrete solution{' ' * bool(held)}{held} is proved to be within {bounds['band_p']:.1e} Pa of p"
+    return Enclosure(True, message, lower, upper, bounds, held)

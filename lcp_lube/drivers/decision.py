@@ -9,6 +9,7 @@ What has no derivatives (pads that tilt) is solved on a coarse grid with all its
 coarse films as `SHARE` of the work allows; small grids have all effects. A film that goes on in time has all.
 """
 
+from dataclasses import replace
 from time import perf_counter
 
 from ..errors import InputError
@@ -52,6 +53,10 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         look.record = {"reason": "named"}
     else:
         look.decide()
+        if ask.resume is not None:
+            from .coupling_file import kept_in  # here, as above
+
+            look.taken_up(kept_in(ask.resume, ask.mpi))
     spent = perf_counter() - begin
     solution = look.solution or inner(look.reduced, look.ask)
     while look.doubtful and solution.converged:
@@ -61,7 +66,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         if not more:
             break
         solution.destroy()
-        solution = inner(look.reduced, ask)
+        solution = inner(look.reduced, replace(ask, resume=None))
     look.destroy()
     if ask.start is None and "start" in solution.settings:
         solution.settings["start"] = "cold"  # what it started from is its own

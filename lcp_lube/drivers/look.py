@@ -77,7 +77,8 @@ class Look:
             self.record = {"reason": "the grid is so small that all are solved for"}
             return
         shape = first_shape(self.scene.shape)
-        own = shape == self.scene.shape and self.ask.accuracy is None
+        filed = self.ask.checkpoint is not None or self.ask.resume is not None
+        own = shape == self.scene.shape and self.ask.accuracy is None and not filed
         try:
             rigid = without(self.scene.with_shape(shape), [name for name in self.names if name not in FREE])
             first = self.inner(rigid, self.ask if own else quick(self.ask))
@@ -147,6 +148,11 @@ class Look:
         self.kept = [name for name in self.names if name in self.kept or name in more]
         self.doubtful = [name for name in self.doubtful if name not in more]
         return bool(more)
+
+    def taken_up(self, kept: list[str]) -> None:
+        """A run goes on that may have found at its first answer that more effects count."""
+        self.kept = [name for name in self.names if name in {*self.kept, *kept}]
+        self.doubtful = [name for name in self.doubtful if name not in kept]
 
     def destroy(self) -> None:
         if self.first is not None:

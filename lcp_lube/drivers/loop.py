@@ -1,5 +1,6 @@
 """The loop of `coupling`: a film with its coefficients held, and Anderson's method for the fields that these come from."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -94,15 +95,22 @@ class Loop:
         self.answer: Answer | None = None
         self.beyond = False  # whether no pressure carries the last film's flow
         self.start: Solution | Start | None = ask.start
+        self.begun = self.last = np.zeros(0)  # the vectors of fields that the loop began with, and of the last film's
+        self.log: list[Array] = []  # what the effects have made of each film's answer
+        self.given: list[Array] = []  # those that an earlier run has found: they are taken instead of films
 
     def vector(self, cells: Cells) -> Array:
         """Fields as one vector, in which equal steps are equal relative changes of coefficients."""
         parts = {"viscosity": np.log, "warmth": np.log, "lift": lambda a: a / self.h, "contact": lambda a: a / self.base.p_unit}
         return np.concatenate([parts.get(name, lambda a: a)(cells[name]) for name in self.names])  # type: ignore[operator]
 
+    def split(self, x: Array) -> list[Array]:
+        """The parts of a vector, in the order of `names`."""
+        return np.split(x, len(self.names))
+
     def cells(self, x: Array) -> Cells:
         """The other way round; what no film can have is cut."""
-        found = dict(zip(self.names, np.split(x, len(self.names)), strict=True))
+        found = dict(zip(self.names, self.split(x), strict=True))
         for name in {"viscosity", "warmth"} & set(found):
             found[name] = np.exp(np.clip(found[name], -WIDEST, WIDEST))
         if "lift" in found:
@@ -111,10 +119,21 @@ class Loop:
             found["contact"] = self.base.p_unit * np.maximum(found["contact"], 0.0)
         return found
 
+    def by(self, cells: Cells) -> FaceFactors:
+        """What these fields make of the film's scheme."""
+        dense = self.law.dowson_higginson
+        return factors(self.base, cells, [float(self.law.density(np.array(p))) for p in self.p_sides] if dense else None)
+
+    def again(self, certify: bool) -> None:
+        """Solve the last film once more, from its own answer, and count it not; with a band around it, if that is asked for."""
+        solves, work = self.solves, self.work
+        self.ask = replace(self.ask, certify=certify)
+        self.film(self.cells(self.last))
+        self.solves, self.work = solves, work
+
     def film(self, cells: Cells) -> bool:
         """Solve the film with these coefficients; whether it has an answer, which is then `answer`."""
-        at_sides = [float(self.law.density(np.array(p))) for p in self.p_sides] if self.law.dowson_higginson else None
-        by = factors(self.base, cells, at_sides)
+        by = self.by(cells)
         ask = replace(self.ask, start=self.start)
         if self.solves:
             ask = replace(ask, nested=None)
@@ -148,26 +167,27 @@ class Loop:
             effect.apply(self.answer, out)
         return out
 
-    def settle(self, cells: Cells, tol: float) -> None:
+    def settle(self, begin: Array, tol: float, watch: Callable[[], None]) -> None:
         """Anderson's method from these fields on, until they change by no more than `tol` or no film can be solved.
 
         Far from the answer old steps mislead: there it combines two answers alone, and many once coefficients change by less
         than `NEAR`. Where steps lead away from the best fields so far, or a cycle ends, it begins anew from these.
+        watch : called after every film.
         """
         comm = self.base.grid.petsc_comm
         x = PETSc.Vec().createMPI((len(self.names) * self.h.size, None), comm=comm)
-        x.setArray(self.vector(cells))
-        best, last, near = (np.inf, x.array_r.copy()), (x.array_r.copy() + 1.0, x.array_r.copy()), False
+        x.setArray(begin)
+        self.begun = begin
+        best, last, near = (np.inf, begin), (begin + 1.0, begin), False
 
         def residual(snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
             nonlocal best, last
             before = x.array_r.copy()
             if self.base.reduce.max(np.abs(before - last[0])) > 0.0:  # not those that the cycle before has ended with
-                if self.film(self.cells(before)):
-                    with np.errstate(all="ignore"):
-                        after = before - self.vector(self.made())
-                else:
-                    after = np.full_like(before, np.nan)  # ends the iteration
+                self.last = before
+                found = self._found(before, watch)
+                with np.errstate(all="ignore"):
+                    after = before - found
                 last, self.change = (before, after), self.base.reduce.max(np.abs(after))
                 if self.change < best[0]:
                     best = self.change, before
@@ -186,6 +206,17 @@ class Loop:
             if best[0] < self.change < np.inf:
                 x.setArray(best[1])
         x.destroy()
+
+    def _found(self, x: Array, watch: Callable[[], None]) -> Array:
+        """The vector of what the effects make of the film with these fields; NaN, which ends the loop, if it has no answer."""
+        if len(self.log) < len(self.given):
+            self.log.append(self.given[len(self.log)])
+            self.solves += 1
+            return self.log[-1]
+        with np.errstate(all="ignore"):
+            self.log.append(self.vector(self.made()) if self.film(self.cells(x)) else np.full_like(x, np.nan))
+        watch()
+        return self.log[-1]
 
     def _cycle(self, comm: PETSc.Comm, x: PETSc.Vec, residual: Any, ended: Any, memory: int) -> None:
         """Some steps of Anderson's method. Collective."""

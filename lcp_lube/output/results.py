@@ -204,9 +204,10 @@ def summary(data: dict[str, Any]) -> str:
             f"({data['accuracy']:g} was asked for), {len(data['levels'])} grid{'s' * (len(data['levels']) > 1)}{own}"
         )
     if data.get("certified"):
+        held = f"; {data['certified_held']}" if data.get("certified_held") else ""
         lines.append(
             f"proved: the exact discrete solution is within {data['band_p']:.1e} Pa of p, {data['band_p_max']:.1e} Pa of "
-            f"p_max, {data['band_load']:.1e} {load_unit} of the load (the grid's own error comes on top)"
+            f"p_max, {data['band_load']:.1e} {load_unit} of the load (the grid's own error comes on top{held})"
         )
     elif "certified" in data:
         lines.append(f"not proved: {data['certified_message']}")

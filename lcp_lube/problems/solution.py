@@ -121,6 +121,7 @@ class Enclosure:
         solution p*, r*; empty if not certified.
     bounds : band_p, band_p_max (Pa), band_load (N; N/m in 1D), band_r: how far the answer's p anywhere, its p_max, its load
         and its r anywhere are from the discrete solution's at most; empty if not certified.
+    held : what the discrete solution takes as given, in words; empty: nothing but the scene.
     """
 
     certified: bool
@@ -128,11 +129,12 @@ class Enclosure:
     lower: Fields = field(default_factory=dict)
     upper: Fields = field(default_factory=dict)
     bounds: dict[str, float] = field(default_factory=dict)
+    held: str = ""
 
     def as_dict(self) -> dict[str, Any]:
         """The keys of the command line's --json."""
         bounds = {name: self.bounds.get(name) for name in ("band_p", "band_p_max", "band_load", "band_r")}
-        return {"certified": self.certified, "certified_message": self.message, **bounds}
+        return {"certified": self.certified, "certified_message": self.message, "certified_held": self.held or None, **bounds}
 
 
 @dataclass(eq=False, repr=False)
