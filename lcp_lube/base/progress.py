@@ -1,10 +1,14 @@
 """How far a long run has come: what loops tell, and a line of it on a terminal with the time that is left."""
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from math import isfinite, log
 from time import perf_counter
-from typing import TextIO
+from typing import Self, TextIO, TypeVar
+
+from mpi4py import MPI
+
+Item = TypeVar("Item")
 
 # Told by a loop: its name in ORDER, what it is at in words, and the part of its work that is done, from 0 to 1.
 Progress = Callable[[str, str, float], None]
@@ -23,7 +27,7 @@ def decades(first: float, now: float, last: float) -> float:
 
 
 class Line:
-    """One line on a terminal that is written over and over, and cleared at the end. Elsewhere it does nothing.
+    """One line on a terminal that is written over and over, and cleared at the end (of its `with`). Elsewhere it does nothing.
 
     Parameters
     ----------
@@ -33,6 +37,7 @@ class Line:
 
     def __init__(self, stream: TextIO | None = None, clock: Callable[[], float] = perf_counter):
         self.stream = stream or sys.stderr
+        self._mute = MPI.COMM_WORLD.rank > 0
         self._clock, self._begin = clock, clock()
         self._next = self._begin + PATIENCE
         self._told: dict[str, tuple[str, float]] = {}
@@ -43,7 +48,9 @@ class Line:
         self._told = {other: told for other, told in self._told.items() if ORDER.index(other) < ORDER.index(name)}
         self._told[name] = (words, part)
         now = self._clock()
-        if now < self._next or not self.stream.isatty():
+        if part == 0.0 and len(self._told) == 1:  # the outermost loop begins: what came before is none of its time
+            self._begin = now
+        if now < self._next or self._mute or not self.stream.isatty():
             return
         self._next = now + PAUSE
         self._shown = True
@@ -56,6 +63,24 @@ class Line:
         part = known[0][1][1]
         left = f"; about {duration((now - self._begin) * (1.0 - part) / part)} left" if part > 0.01 else ""
         return f"lcp-lube: {', '.join(words for _, (words, _) in known)}{left}"
+
+    def over(
+        self, items: Iterable[Item], words: Callable[[Item], str], kept: Callable[[Item], bool] = lambda _: False
+    ) -> Iterator[Item]:
+        """The items, each told before it is worked on; not those whose work was kept from before, which take no time."""
+        items = list(items)
+        due, done = [not kept(item) for item in items], 0
+        for item, waits in zip(items, due, strict=True):
+            if waits:
+                self("sweep", f"{words(item)} {done + 1} of {sum(due)}", done / sum(due))
+                done += 1
+            yield item
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.end()
 
     def end(self) -> None:
         """Clear the line."""

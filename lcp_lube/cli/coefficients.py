@@ -3,6 +3,7 @@
 import argparse
 import json
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from ..api import solve
 from ..base.files import write_text
 from ..base.options import check_unread
+from ..base.progress import Line
 from ..drivers.coefficients import Coefficients, coefficients, placed, stability
 from ..errors import InputError, NotFound
 from ..output.console import say
@@ -41,10 +43,11 @@ def run(args: argparse.Namespace) -> int:
     for option, file in (("--output", args.output), ("--plot", args.plot)):
         if file is not None:
             raise InputError(f"{option} {file}: --speeds FROM:TO:N is needed too")
-    with solve(scene, ask_of(args)) as solution:
+    with Line() as line, solve(scene, replace(ask_of(args), progress=line)) as solution:
         data = as_dict(solution)
         record = {key: data.get(key) for key in ("scene", "nx", "ny", "outcome", "converged", "message", *KEYS)}
         if record["converged"]:
+            line("sweep", "stiffness and damping", 0.5)
             try:
                 found = coefficients(scene, solution, frequencies, args.tilt)
                 record |= report(found, placed(scene, solution), data)
@@ -68,20 +71,22 @@ def table(args: argparse.Namespace, scene: Scene, frequencies: list[float]) -> i
         check_target(args.plot, plot=True)
     rows: list[list[float]] = []
     near, failed, drawn = None, 0, []
-    for rpm in speeds:
-        at = as_scene(scene, {"speed_rpm": float(rpm)})
-        solution = solve(at, ask_of(args), start=near)
-        if near is not None:
-            near.destroy()
-        one = _first(at, solution, frequencies) if solution.converged else None
-        check_unread()  # the linearised film has options of its own
-        if one is not None:
-            turn = np.array([[0.0, -1.0], [1.0, 0.0]])  # our axes as columns, in theirs
-            K, C = (turn.T @ matrix @ turn for matrix in (one.K, one.C))
-            rows.append([at.omega, *K.ravel(), *C.ravel()])  # type: ignore[attr-defined]
-            drawn.append(report([one], placed(at, solution), as_dict(solution)))
-        failed += one is None
-        near = solution
+    with Line() as line:
+        ask = replace(ask_of(args), progress=line)
+        for rpm in line.over(speeds, lambda rpm: f"{rpm:g} rpm, speed"):
+            at = as_scene(scene, {"speed_rpm": float(rpm)})
+            solution = solve(at, ask, start=near)
+            if near is not None:
+                near.destroy()
+            one = _first(at, solution, frequencies) if solution.converged else None
+            check_unread()  # the linearised film has options of its own
+            if one is not None:
+                turn = np.array([[0.0, -1.0], [1.0, 0.0]])  # our axes as columns, in theirs
+                K, C = (turn.T @ matrix @ turn for matrix in (one.K, one.C))
+                rows.append([at.omega, *K.ravel(), *C.ravel()])  # type: ignore[attr-defined]
+                drawn.append(report([one], placed(at, solution), as_dict(solution)))
+            failed += one is None
+            near = solution
     if near is not None:
         near.destroy()
     told = [",".join(f"{value:.9g}" for value in row) for row in rows]

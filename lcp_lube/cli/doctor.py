@@ -20,6 +20,7 @@ from petsc4py import PETSc
 
 from .. import __version__
 from ..api import solve
+from ..base.progress import Line
 from ..base.together import all_come
 from ..output.table import table
 from ..registry import PACKAGE
@@ -95,10 +96,13 @@ def blas() -> str | None:
 def self_checks() -> list[dict[str, Any]]:
     """One rank by itself, then two: this job's first two, or a job of their own. The same list on every rank. Collective."""
     world = MPI.COMM_WORLD
-    checks = self_check(MPI.COMM_SELF) if world.rank == 0 else []
-    if world.size == 1:
-        checks += two_ranks()
-    else:
+    with Line() as line:
+        line("sweep", "self-check on one rank", 0.0)
+        checks = self_check(MPI.COMM_SELF) if world.rank == 0 else []
+        line("sweep", "self-check on two ranks", 0.4)
+        if world.size == 1:
+            checks += two_ranks()
+    if world.size > 1:
         pair = world.Split(0 if world.rank < 2 else MPI.UNDEFINED, world.rank)
         if pair != MPI.COMM_NULL:
             checks += self_check(pair)

@@ -50,12 +50,11 @@ def run_solve(args: argparse.Namespace) -> int:
         if args.monitor and MPI.COMM_WORLD.rank == 0:
             print(monitor_line(k, step), file=sys.stderr, flush=True)
 
-    line = Line()
     try:
-        quiet = args.monitor or MPI.COMM_WORLD.rank or moves  # a march has a bar of its own
-        solution = solution_of(args, monitor, None if quiet else line, watching if moves else None, scene)
+        with Line() as line:
+            quiet = args.monitor or moves  # a march has a bar of its own
+            solution = solution_of(args, monitor, None if quiet else line, watching if moves else None, scene)
     finally:
-        line.end()
         watching.close()
     try:
         check_unread()

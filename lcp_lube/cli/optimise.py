@@ -5,8 +5,6 @@ import json
 from dataclasses import replace
 from typing import Any
 
-from mpi4py import MPI
-
 from ..base.files import write_text
 from ..base.options import check_unread
 from ..base.progress import Line
@@ -34,12 +32,9 @@ def run(args: argparse.Namespace) -> int:
     goal, sign = (args.maximise, 1.0) if args.maximise is not None else (args.minimise, -1.0)
     ranges, limits = [parse_range(scene, text) for text in args.vary], [parse_limit(text) for text in args.subject]
     history = args.history or (args.output.with_suffix(".csv") if args.output else None)
-    line = Line()
-    ask = replace(ask_of(args), progress=line if MPI.COMM_WORLD.rank == 0 else None)
-    try:
+    with Line() as line:
+        ask = replace(ask_of(args), progress=line)
         found = optimise(scene, goal, sign, ranges, limits, ask=ask, history=history, most=args.steps)
-    finally:
-        line.end()
     check_unread()
     if args.output is not None:
         write_text(args.output, toml_of(with_values(scene, found.best.values)))

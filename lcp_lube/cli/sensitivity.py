@@ -2,11 +2,13 @@
 
 import argparse
 import json
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 from ..api import solve
 from ..base.options import check_unread
+from ..base.progress import Line
 from ..drivers.adjoint import Adjoint
 from ..drivers.ask import Ask
 from ..drivers.film_gradient import FilmGradient
@@ -43,16 +45,17 @@ def run(args: argparse.Namespace) -> int:
     if args.monte_carlo is not None and not deviation:
         raise InputError(f"--monte-carlo {args.monte_carlo}: --tolerance KEY=U is needed too")
     keys = [*keys, *(key for key in deviation if key not in map(partial(key_of, scene), keys))] if keys else keys
-    ask, trace = ask_of(args), Trace() if motion_of(scene) is not None else None
+    trace = Trace() if motion_of(scene) is not None else None
     if trace is not None and args.errors:
         raise InputError(f"--errors: scene {scene.name} goes on in time, and where errors come from is known of one film")
-    with solve(scene, ask, watch=trace) as solution:
+    with Line() as line, solve(scene, ask := replace(ask_of(args), progress=line), watch=trace) as solution:
         check_unread()
         data = as_dict(solution)
         record: dict[str, Any] = {key: data.get(key) for key in HEAD}
         if args.errors:
             finer_shape(solution)  # refused before the work that it costs
         if solution.converged:
+            line("sweep", "derivatives", 0.5)
             found = gradients(scene, solution, names, keys, trace)
             record |= sensitivity.as_dict(found[0], solution)
             if found[1:]:

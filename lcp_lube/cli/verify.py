@@ -12,6 +12,7 @@ from mpi4py import MPI
 
 from ..api import solve
 from ..base.options import check_unread
+from ..base.progress import Line, Progress
 from ..output.results import finite
 from ..output.table import table as rows_of
 from ..scenes.scene import load_scene
@@ -75,7 +76,8 @@ class Verdict:
 
 def verify(cases: Sequence[Case] = CASES) -> list[Verdict]:
     """Run the cases. Collective."""
-    return [_run_case(case) for case in cases]
+    with Line() as line:
+        return [_run_case(case, line) for case in line.over(cases, lambda case: case.name)]
 
 
 def quick_cases() -> list[Case]:
@@ -83,13 +85,13 @@ def quick_cases() -> list[Case]:
     return [case for case in CASES if case.name == QUICK]
 
 
-def _run_case(case: Case) -> Verdict:
+def _run_case(case: Case, progress: Progress) -> Verdict:
     begin = perf_counter()
     found, spacings, grids, failures = [], [], [], []
     for grid in case.grids:
         scene = load_scene(case.scene, {**case.data, **grid})
         grids.append(" x ".join(map(str, scene.shape)))
-        with solve(scene, **case.how) as solution:
+        with solve(scene, **case.how, progress=progress) as solution:
             check_unread()
             values = solution.problem.quantities(solution.fields)
             found.append({**values, **DERIVED[case.derive](solution, values)} if solution.converged else {})

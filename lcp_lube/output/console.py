@@ -9,7 +9,7 @@ from ..errors import InputError
 
 
 def say(text: str) -> None:
-    """Print on rank 0.
+    """Print on rank 0, on a terminal over the line that tells progress (base/progress).
 
     Raises
     ------
@@ -17,7 +17,9 @@ def say(text: str) -> None:
     """
     if MPI.COMM_WORLD.rank == 0:
         try:
-            print(f"{text}\n", end="", flush=True)  # one write: after it `| head` may be gone, and the files not yet written
+            clear = "\r\x1b[K" if on_terminal() else ""
+            # One write: after it `| head` may be gone, and the files not yet written.
+            print(f"{clear}{text}\n", end="", flush=True)
         except OSError as error:
             sys.stdout = open(os.devnull, "w")  # noqa: SIM115  (else Python tries to flush it once more at its end)
             raise InputError(f"standard output: {error.strerror}") from None
@@ -28,6 +30,11 @@ def coloured(text: str, word: str, good: bool) -> str:
 
     NO_COLOR, or TERM=dumb, switch that off.
     """
-    if not sys.stdout.isatty() or os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb":
+    if not on_terminal() or os.environ.get("NO_COLOR"):
         return text
     return f"\n{text}".replace(f"\n{word}", f"\n\x1b[{'32' if good else '1;31'}m{word}\x1b[0m", 1)[1:]
+
+
+def on_terminal() -> bool:
+    """Whether someone sees it. Ranks that mpiexec started may have a pseudo-terminal for stdout, but a pipe for stderr."""
+    return sys.stdout.isatty() and sys.stderr.isatty() and os.environ.get("TERM") != "dumb"

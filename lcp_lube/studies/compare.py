@@ -4,8 +4,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import product
 from typing import Any
 
-from mpi4py import MPI
-
 from ..api import solve
 from ..base.progress import Line
 from ..errors import InputError, nearest
@@ -67,20 +65,16 @@ def compare(
         if recipe is not None:
             read_recipe(recipe)
     rows: list[dict[str, Any]] = []
-    runs, line = [*product(methods, recipes)], Line()
-    progress = line if MPI.COMM_WORLD.rank == 0 else None
-    how: dict[str, Any] = {"system": system, "stopping": stopping, "nested": nested, "rescue": rescue, "progress": progress}
-    for method, recipe in runs:
-        if progress:
-            progress("sweep", f"{method}, run {len(rows) + 1} of {len(runs)}", len(rows) / len(runs))
-        try:
-            with solve(scene, method=method, recipe=recipe, options=options(method), **how) as solution:
-                data = as_dict(solution)
-                rows.append({**data, **exact_errors(solution.problem, data)})
-        except InputError as error:
-            asked = {"scene": scene.name, "method": method, "system": system, "recipe": recipe}
-            rows.append({**asked, "outcome": "refused", "converged": False, "message": str(error)})
-    line.end()
+    with Line() as line:
+        how: dict[str, Any] = {"system": system, "stopping": stopping, "nested": nested, "rescue": rescue, "progress": line}
+        for method, recipe in line.over(product(methods, recipes), lambda run: f"{run[0]}, run"):
+            try:
+                with solve(scene, method=method, recipe=recipe, options=options(method), **how) as solution:
+                    data = as_dict(solution)
+                    rows.append({**data, **exact_errors(solution.problem, data)})
+            except InputError as error:
+                asked = {"scene": scene.name, "method": method, "system": system, "recipe": recipe}
+                rows.append({**asked, "outcome": "refused", "converged": False, "message": str(error)})
     if all(row["outcome"] == "refused" for row in rows):
         raise InputError(rows[0]["message"])
     return rows

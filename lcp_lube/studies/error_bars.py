@@ -1,13 +1,10 @@
 """Error bars: what tolerances of a scene's numbers make of a result, to first order and by solving for samples of them."""
 
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
-from tqdm import tqdm
 
 from ..api import solve
 from ..base.quantity import in_si
@@ -103,8 +100,8 @@ def monte_carlo(
     draws = np.random.default_rng(seed).standard_normal((count, len(deviation)))
     values = values_of(scene)
     rows: list[list[float]] = []
-    quiet = None if MPI.COMM_WORLD.rank == 0 else True
-    for draw in tqdm(draws, unit="sample", disable=quiet, file=sys.stderr):
+    for k, draw in enumerate(draws):
+        ask.tell("sweep", f"sample {k + 1} of {count}", k / count)
         changed = {key: values[key] + u * float(x) for (key, u), x in zip(deviation.items(), draw, strict=True)}
         try:
             at = with_values(scene, changed)

@@ -11,12 +11,14 @@ from dataclasses import dataclass, field
 from hashlib import sha256
 from math import isfinite
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 from ..api import solve
 from ..base.parallel import Array
+from ..base.progress import duration
 from ..base.quantity import quantity as read
 from ..base.resumable import ResumableCsv
 from ..drivers.ask import Ask
@@ -108,10 +110,13 @@ def parse_limit(text: str) -> Limit:
 class Designs:
     """Designs as they are asked for, from the csv or by a solve. Collective."""
 
-    def __init__(self, scene: Scene, ranges: Sequence[Range], quantities: Sequence[str], ask: Ask, path: Path | None):
+    def __init__(
+        self, scene: Scene, ranges: Sequence[Range], quantities: Sequence[str], ask: Ask, path: Path | None, most: int
+    ):
         self.scene, self.ranges, self.quantities, self.ask = scene, list(ranges), list(dict.fromkeys(quantities)), ask
         self.known: dict[bytes, Design] = {}
         self._near: Solution | None = None
+        self._most, self._begin = most, perf_counter()
         self._digest = sha256(f"{scene.model_dump_json()} {self.quantities} {ask.choices}".encode()).hexdigest()[:12]
         self._store = ResumableCsv(path, ["design"], ["design"], ask.mpi, growing=True) if path else None
         if self._store:
@@ -124,7 +129,10 @@ class Designs:
         if name not in self.known:
             last = [design for design in self.known.values() if design.results][-1:]
             so_far = "".join(f", {name} {design.results[name]:.4g}" for design in last for name in self.quantities)
-            self.ask.tell("sweep", f"design {len(self.known) + 1}{so_far}", 0.0)
+            done = len(self.known)
+            each = (perf_counter() - self._begin) / max(done, 1)  # nobody knows when it ends: after all its steps at the latest
+            left = f", {duration(each * max(self._most - done, 1))} left if it takes all {self._most} steps" if done else ""
+            self.ask.tell("sweep", f"design {done + 1}{so_far}{left}", 0.0)
             values = {one.key: one.low + float(t) * (one.high - one.low) for one, t in zip(self.ranges, x, strict=True)}
             self.known[name] = self._made(values)
         return self.known[name]
@@ -207,7 +215,7 @@ def optimise(
         raise InputError("--vary KEY=FROM:TO is needed: what may change")
     if len({one.key for one in ranges}) < len(ranges):
         raise InputError("--vary: a key is given twice")
-    designs = Designs(scene, ranges, [goal, *(one.quantity for one in limits)], ask or Ask(), history)
+    designs = Designs(scene, ranges, [goal, *(one.quantity for one in limits)], ask or Ask(), history, most)
     known = values_of(scene)
     x = np.array([min(max((known[one.key] - one.low) / (one.high - one.low), 0.0), 1.0) for one in ranges])
     try:

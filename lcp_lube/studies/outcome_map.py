@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ..base.progress import Line
 from ..base.resumable import ResumableCsv, Row
 from ..errors import InputError
 from ..output.console import say
@@ -101,7 +102,9 @@ class OutcomeMap:
         key = (*cases[0].key, "ranks")
         store = open_store(results / f"{stem}.csv", key, (*COLUMNS, *self.columns))
         find = self.reference or References().of
-        rows = [row for case in cases if (row := self.row(store, case, find)) is not None]
+        with Line() as line:
+            runs = line.over(cases, lambda _: f"{self.stem}, run", lambda case: store.find(**self.key(store, case)) is not None)
+            rows = [row for case in runs if (row := self.row(store, case, find)) is not None]
         sentence = f"Numbers: steps. {self.sentence(rows)} {judged(rows)}"
         say(sentence)
         failed = [row for row in rows if row.get("method") == "auto" and not self.right(row)]
@@ -115,9 +118,13 @@ class OutcomeMap:
         say(f"{path}: {len(rows)} runs, {store.said}")
         return 0
 
+    @staticmethod
+    def key(store: ResumableCsv, case: Case) -> dict[str, Any]:
+        return {**case.key, "ranks": store.comm.size}
+
     def row(self, store: ResumableCsv, case: Case, reference: Callable[[Scene], Reference]) -> Row | None:
         """The row of one run, from the csv or made now; None if it was refused. Collective."""
-        key = {**case.key, "ranks": store.comm.size}
+        key = self.key(store, case)
         row = store.find(**key)
         if row is None:
             scene, steps = case.load(), list[Step]()

@@ -13,6 +13,7 @@ from typing import Any
 
 from mpi4py import MPI
 
+from ..base.progress import Line
 from ..base.resumable import ResumableCsv, Row
 from ..errors import InputError
 from ..output.console import say
@@ -118,13 +119,20 @@ def chart(sources: Sequence[str], quick: bool, results: Path) -> int:
     scenes = [film(source) for source in sources or SCENES]
     stem = "precision_quick" if quick else "precision"
     store = open_store(results / f"{stem}.csv", KEY, COLUMNS)
-    for scene in scenes:
-        bench = Bench(scene, known_answer(scene, results / f"{stem}_references.csv", quick), 1 if quick else REPEATS)
-        dimension = len(scene.shape)
-        for configuration in configurations(dimension, quick):
-            bench.fill(store, configuration, grids(scene, quick))
-        for tol in ACCURACIES[dimension][: 2 if quick else None]:
-            bench.accuracy(store, tol)
+    jobs: list[tuple[int, Configuration | float]] = []
+    for k, scene in enumerate(scenes):
+        jobs += [(k, configuration) for configuration in configurations(len(scene.shape), quick)]
+        jobs += [(k, tol) for tol in ACCURACIES[len(scene.shape)][: 2 if quick else None]]
+    benches: list[Bench] = []
+    with Line() as line:
+        for k, job in line.over(jobs, lambda job: f"{scenes[job[0]].name}, configuration"):
+            if k == len(benches):
+                known = known_answer(scenes[k], results / f"{stem}_references.csv", quick)
+                benches.append(Bench(scenes[k], known, 1 if quick else REPEATS))
+            if isinstance(job, Configuration):
+                benches[k].fill(store, job, grids(scenes[k], quick))
+            else:
+                benches[k].accuracy(store, job)
     wanted = [scene_key(scene) for scene in scenes]
     rows = [row for row in store.rows if (row["scene"], row["data"]) in wanted and row["ranks"] == str(store.comm.size)]
     table = "\n".join(cheapest(rows))

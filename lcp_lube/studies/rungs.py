@@ -12,6 +12,7 @@ from typing import Any
 from mpi4py import MPI
 
 from ..api import solve
+from ..base.progress import Line
 from ..base.resumable import ResumableCsv, Row
 from ..drivers.decision import total_work
 from ..output.console import say
@@ -49,7 +50,9 @@ COLUMNS = (*KEY, "outcome", "quantity", "value", "error", "work", "share_of_work
 def chart(quick: bool, results: Path) -> int:
     """Make the runs that are not there, draw them; exit status. Collective."""
     store = ResumableCsv(results / f"rungs{'_quick' * quick}.csv", COLUMNS, KEY)
-    rows = [row for name, (source, n, few) in SCENES.items() for row in _of_scene(store, name, source, few if quick else n)]
+    with Line() as line:
+        scenes = line.over(SCENES.items(), lambda scene: f"{scene[0]}, scene")
+        rows = [row for name, (source, n, few) in scenes for row in _of_scene(store, name, source, few if quick else n)]
     path = results / f"rungs{'_quick' * quick}.png"
     save(lambda: _draw(rows), path, MPI.COMM_WORLD)
     say(f"{path}: {len(rows)} runs of {len(SCENES)} scenes")

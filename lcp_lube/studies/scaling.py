@@ -13,6 +13,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+from ..base.progress import Line
 from ..base.resumable import ResumableCsv, Row
 from ..output.console import say
 from ..output.style import Axes, Figure
@@ -46,9 +47,10 @@ def chart(quick: bool, results: Path) -> int:
     ]
     if wanted:
         run(load_scene("problem4", {"n": 63}), **CHOICES)  # what is compiled and loaded at first use is so before a clock runs
-    for kind, scene, n in wanted:
-        counts_only = quick or store.comm.size > (os.cpu_count() or 1)
-        fill(store, kind, scene, n, 1 if counts_only else REPEATS)
+    counts_only = quick or store.comm.size > (os.cpu_count() or 1)
+    with Line() as line:
+        for kind, scene, n in line.over(wanted, lambda run: "{} {} {}, run".format(*run)):
+            fill(store, kind, scene, n, 1 if counts_only else REPEATS)
     say("\n".join(table(store.rows)))
     save(lambda: picture(store.rows), results / f"{stem}.png", store.comm)
     say(f"{results / stem}.png, from {store.path} (remove it to run them again)")

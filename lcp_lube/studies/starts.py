@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from ..base.progress import Line
 from ..base.resumable import Row
 from ..output.console import say
 from ..output.style import Axes, Figure
@@ -45,7 +46,10 @@ def chart(quick: bool, results: Path) -> int:
     """Make the runs that are not in starts.csv (starts_quick.csv) yet, then draw both pictures. Collective."""
     stem = "starts" + "_quick" * quick
     store = open_store(results / f"{stem}.csv", KEY, ())
-    rows = with_rules([store.row({**start, "ranks": store.comm.size}, partial(_run, start)) for start in starts(quick)])
+    keys = [{**start, "ranks": store.comm.size} for start in starts(quick)]
+    with Line() as line:
+        runs = line.over(keys, lambda _: "starts, run", lambda key: store.find(**key) is not None)
+        rows = with_rules([store.row(key, partial(_run, key)) for key in runs])
     say(f"{lines_sentence(rows)}\n{map_sentence(rows)}")
     pictures = [results / f"{stem}_{kind}.png" for kind in ("lines", "map")]
     if not quick:

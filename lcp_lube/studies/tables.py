@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..base.progress import Line, Progress
 from ..base.resumable import ResumableCsv, Row
 from ..cli.arguments import parse
 from ..cli.asked import solution_of
@@ -102,9 +103,16 @@ def run_published_table(
     )
     say(layout.head())
     kept = stale = absent = refused = 0
-    for printed in runs:
-        command = row_command(spec, printed, fitted)
-        record = store.find(command=command, ranks=store.comm.size)
+
+    def find(printed: Row) -> Row | None:
+        return store.find(command=row_command(spec, printed, fitted), ranks=store.comm.size)
+
+    def stands(printed: Row) -> bool:
+        return stored or ((row := find(printed)) is not None and store.current(row))
+
+    line = Line()
+    for printed in line.over(runs, lambda _: "row", stands):
+        command, record = row_command(spec, printed, fitted), find(printed)
         if stored and record is None:
             absent += 1
             say(layout.name(printed, "not run"))
@@ -113,7 +121,7 @@ def run_published_table(
             stale, record = stale + 1, None
         kept += record is not None
         if record is None:
-            values = {"command": command, "ranks": store.comm.size, **run_command(command, spec.points)}
+            values = {"command": command, "ranks": store.comm.size, **run_command(command, spec.points, line)}
             if values["outcome"] == "refused":
                 refused += 1
                 say(layout.name(printed, f"refused: {values['message']}"))
@@ -121,6 +129,7 @@ def run_published_table(
             record = store.add(values)
         age = store.age(record)
         say(layout.line(printed, record) + (f"  [{age}]" if age else ""))
+    line.end()
     say(layout.summary())
     left = f", {len(rows) - len(runs)} left out by --quick" if len(rows) > len(runs) else ""
     again = f", {stale} run again that other code had made" if stale else ""
@@ -129,12 +138,12 @@ def run_published_table(
     return 1 if refused or absent else 0
 
 
-def run_command(command: str, points: tuple[int, ...] = ()) -> dict[str, Any]:
+def run_command(command: str, points: tuple[int, ...] = (), progress: Progress | None = None) -> dict[str, Any]:
     """Run a `lcp-lube solve` command line: the columns RECORD, and p_i in the problem's unit for the points asked for; outcome
     'refused' and a message alone where the run could not start. Collective."""
     begin = process_time()
     try:
-        solution = solution_of(parse(shlex.split(command)[1:]))
+        solution = solution_of(parse(shlex.split(command)[1:]), progress=progress)
     except InputError as error:
         return {"outcome": "refused", "message": str(error)}
     cpu_s = process_time() - begin

@@ -74,6 +74,49 @@ def test_loops_tell(scene: str, how: dict[str, object], loop: str) -> None:
         assert parts == sorted(parts) and len(parts) >= 6
 
 
+def test_a_loop_over_items_tells_those_that_are_worked_on() -> None:
+    """What was kept takes no time, and is not counted; the time left is that since the loop began, not since the start."""
+    now = [0.0]
+    screen = Terminal()
+    line = Line(screen, clock=lambda: now[0])
+    told: list[str] = []
+    now[0] = 100.0
+    with line:
+        for _ in line.over("abcde", lambda item: f"{item}, row", lambda item: item in "bc"):
+            now[0] += 3.0
+            told.append(line.text(now[0]))
+    assert told[0] == "lcp-lube: a, row 1 of 3" and told[1] == told[0] and told[2] == told[0]  # b and c were kept
+    assert told[3] == "lcp-lube: d, row 2 of 3; about 24 s left"
+    assert screen.getvalue().endswith("\r\x1b[K")
+
+
+@pytest.mark.parametrize(
+    "words, told",
+    [
+        (["table", "3", "--quick", "--results", "here"], b"row 2 of"),
+        (["verify"], b" 2 of "),
+        (["coefficients", "two_groove_journal", "--speeds", "1000:9000:60"], b"speed 9 of 60"),
+    ],
+)
+def test_long_commands_tell_on_a_terminal(words: list[str], told: bytes, tmp_path: Path) -> None:
+    """With the time that is left, and the words on stdout begin on a line of their own."""
+    patience = "import sys; from lcp_lube.base import progress; progress.PATIENCE = progress.PAUSE = 0.0; "
+    command = [sys.executable, "-c", f"{patience}from lcp_lube.__main__ import main; sys.exit(main())", *words]
+    ours, theirs = pty.openpty()
+    job = subprocess.Popen(command, cwd=tmp_path, env=ENVIRONMENT, stdout=theirs, stderr=theirs)
+    os.close(theirs)
+    shown = b""
+    try:
+        while told not in shown or b" left" not in shown:
+            shown += os.read(ours, 4096)  # at the job's end: an error
+    finally:
+        job.kill()
+        job.wait()
+        os.close(ours)
+    screen = shown.replace(b"\r\x1b[K", b"\n")
+    assert all(line.startswith(b"lcp-lube: ") for line in screen.splitlines() if b" left" in line)
+
+
 def test_a_comparison_tells_which_run_it_is_at(monkeypatch: pytest.MonkeyPatch) -> None:
     told: list[tuple[str, str, float]] = []
     monkeypatch.setattr(Line, "__call__", lambda self, *what: told.append(what))
@@ -91,13 +134,17 @@ def test_a_design_tells_where_it_is() -> None:
     found = optimise(scene, "load", -1.0, ranges, ask=Ask(progress=lambda *what: told.append(what)), most=3)
     designs = [words for name, words, _ in told if name == "sweep"]
     assert len(designs) == found.designs > 1
-    assert designs[0] == "design 1" and designs[1] == f"design 2, load {found.start.results['load']:.4g}"
+    assert designs[0] == "design 1" and designs[1].startswith(f"design 2, load {found.start.results['load']:.4g}, ")
+    assert designs[1].endswith(" left if it takes all 3 steps")
 
 
 def test_colours_on_a_terminal_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     text = "scene\nconverged: 3 iterations"
     assert coloured(text, "converged", True) == text  # pytest's stdout is none
     monkeypatch.setattr(sys, "stdout", Terminal())
+    monkeypatch.setattr(sys, "stderr", io.StringIO())
+    assert coloured(text, "converged", True) == text  # a rank's, whose stdout mpiexec made a terminal
+    monkeypatch.setattr(sys, "stderr", Terminal())
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.delenv("NO_COLOR", raising=False)
     assert coloured(text, "converged", True) == "scene\n\x1b[32mconverged\x1b[0m: 3 iterations"

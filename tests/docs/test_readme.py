@@ -10,7 +10,7 @@ import pytest
 
 README = Path(__file__).parents[2] / "README.md"
 RESULTS = README.parent / "docs" / "results.md"
-MOST_LINES = 100  # a screen and a half
+MOST_LINES = 70  # a screen and a half: as GitHub sets it 1,560 pixels at 894 wide, where a screen has 1,080
 BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```", README.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
 LINES = [line for kind, block in BLOCKS if kind == "sh" for line in block.splitlines()]
 COMMANDS = [line for line in LINES if re.match(r"(mpiexec .*)?lcp-lube ", line)]

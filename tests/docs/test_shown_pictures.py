@@ -22,7 +22,7 @@ def shown() -> set[Path]:
     for page in PAGES:
         found |= {
             (page.parent / name).resolve()
-            for name in re.findall(r"!\[[^\]]*\]\(([^)]+\.png)\)", page.read_text(encoding="utf-8"))
+            for name in re.findall(r"(?:!\[[^\]]*\]\(|<img src=\")([^)\"]+\.png)", page.read_text(encoding="utf-8"))
         }
     return found
 

@@ -107,7 +107,7 @@ def small_paper(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[str]:
     monkeypatch.setattr(tables, "PUBLISHED", tmp_path / "published")
     made: list[str] = []
 
-    def counted(command: str, points: tuple[int, ...] = ()) -> dict[str, Any]:
+    def counted(command: str, points: tuple[int, ...] = (), progress: Any = None) -> dict[str, Any]:
         made.append(command)
         return run_command(command, points)
 
