@@ -1,24 +1,30 @@
 """Load balance: the eccentricity, film level or other value at which a film carries the load that is asked for.
 
 With t = log(e/(1 - e)) for an eccentricity e, the logarithm of the thinnest film for a film level, and that of any other value,
-the load W follows powers of e^t over wide ranges, so log(W/load) is nearly linear in t: a secant iteration, kept inside the
-bracket once there is one, finds its root in a handful of solves, each started from the nearest answer. On large grids the
-search begins on coarse ones.
+the load W follows powers of e^t over wide ranges, so log(W/load) is nearly linear in t: Newton's method with the film's exact
+stiffness, for other values a secant iteration, kept inside the bracket once there is one, finds its root in a handful of
+solves, each started from the nearest answer. On large grids the search begins on coarse ones.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import exp, inf, log, prod
+from math import atan2, cos, exp, inf, log, prod, sin
 from typing import Any
 
+import numpy as np
+
 from ..errors import InputError
+from ..problems.film.model import Model
 from ..problems.solution import Outcome, Solution
 from ..scenes.balance import BalanceTable
 from ..scenes.scene import Scene, Solvable, as_scene
+from ..scenes.thrust import ThrustScene
 from .ask import Ask
 from .chain import added
+from .coefficients import coefficients
 from .compose import Inner
 from .levels import level_shapes
+from .position import half_film_eccentricity
 from .root import Search
 
 MOST_SOLVES = 30  # on a grid
@@ -67,6 +73,9 @@ def variable(scene: Scene, table: BalanceTable, begin: float | None) -> Variable
     slope = 1.0
     if key.rpartition(".")[2] == "eccentricity":
         to_t, to_value, upper = _logit, lambda t: 1.0 / (1.0 + exp(-t)), 1.0
+        turning = getattr(scene, "turning", None)
+        if turning is not None and begin is None:
+            value = half_film_eccentricity(turning, scene.mu_0, table.load, len(scene.shape) == 1)  # type: ignore[attr-defined]
         value = 0.5 if value is None else min(max(value, 1e-3), 0.999)
     elif key == "h_offset":
         problem: Any = scene.build()
@@ -122,20 +131,21 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         shapes = [shape for shape in level_shapes(scene.shape) if shape == scene.shape or prod(shape) > ONE_GRID]
     known = near.settings.get("balance", {}).get("value") if near is not None else None
     unknown = variable(scene.with_shape(shapes[0]), table, known)
-    t, slope, solves, found = unknown.start, unknown.slope, 0, False
+    t, slope, solves, work, found = unknown.start, unknown.slope, 0, 0.0, False
     start: Any = near
     times: dict[str, float] = {}
     for shape in shapes:
         search = Search(unknown.low, unknown.high, slope, explore=not found)
         tol = table.tol if shape == shapes[-1] else max(table.tol, COARSE_TOL)
 
-        def solve_at(t: float, near: Any, shape: tuple[int, ...] = shape) -> Solution:
-            trial = as_scene(scene, {unknown.key: unknown.to_value(t)}).with_shape(shape)
-            solution = inner(trial.model_copy(update={"balance": None}), replace(ask, start=near))
+        def solve_at(t: float, near: Any, shape: tuple[int, ...] = shape) -> tuple[Solution, Callable[[], float | None]]:
+            trial = as_scene(scene, {unknown.key: unknown.to_value(t)}).with_shape(shape).model_copy(update={"balance": None})
+            solution = inner(trial, replace(ask, start=near))
             times.update(added(times, solution.times))
-            return solution
+            return solution, lambda: exact_slope(trial, solution, unknown, t)
 
         solution, t, count, found = _on_grid(solve_at, search, t, start, table.load, tol)
+        work += count * prod(shape) / prod(scene.shape)
         if start is not None and start is not near:
             start.destroy()
         start, slope, solves = solution, search.slope, solves + count
@@ -153,14 +163,33 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
             "carried": load,
             "iterations": count,
             "solves": solves,
+            "work": work,
         },
         "why": [*solution.settings["why"], f"balance: {answer}, found in {count} solves on this grid, {solves} in all"],
     }
     return solution
 
 
+def exact_slope(scene: Any, solution: Solution, unknown: Variable, t: float) -> float | None:
+    """d log W/dt by the film's stiffness, where t displaces a wall of a film without effects; else None. Collective."""
+    model, turning = getattr(scene, "model", None), getattr(scene, "turning", None)
+    if not isinstance(model, Model) or model.effects or model.law is not None or model.U < 0:
+        return None
+    W, key = carried(solution.problem.quantities(solution.fields)), unknown.key.rpartition(".")[2]
+    if key == "eccentricity" and turning is not None and turning.widest is not None:
+        (one,) = coefficients(scene, solution)
+        fx, fy = turning.force(solution.problem, solution.fields["p"])
+        e, along = unknown.to_value(t), atan2(-fy, -fx) - turning.widest
+        move = turning.c * e * (1.0 - e) * np.array([-cos(along), sin(along)])  # away from the widest gap, in the load's axes
+        return float(one.K[0] @ move) / W
+    if turning is None and (key == "h_offset" or (key == "h_min" and isinstance(scene, ThrustScene))):
+        (one,) = coefficients(scene, solution)
+        return -float(one.K[0, 0]) * exp(t) / W
+    return None
+
+
 def _on_grid(
-    solve_at: Callable[[float, Any], Solution],
+    solve_at: Callable[[float, Any], tuple[Solution, Callable[[], float | None]]],
     search: Search,
     t: float,
     near: Any,
@@ -171,7 +200,7 @@ def _on_grid(
     best: Solution | None = None
     best_t, best_g = t, inf
     for count in range(1, MOST_SOLVES + 1):
-        solution = solve_at(t, best or near)
+        solution, slope = solve_at(t, best or near)
         if not solution.converged:
             if best is None:
                 return solution, t, count, False
@@ -181,7 +210,7 @@ def _on_grid(
             continue
         ratio = carried(solution.problem.quantities(solution.fields)) / load
         g = log(ratio) if ratio > 0 else -inf
-        search.add(t, g)
+        search.add(t, g, None if abs(g) <= tol or g == -inf else slope())
         if best is None or abs(g) < abs(best_g):
             best, solution, best_t, best_g = solution, best, t, g
         if solution is not None:

@@ -117,6 +117,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     outcome, message, _, settings, _ = next((one for _, one in told if one[0] is not Outcome.CONVERGED), told[0][1])
     how = "solved one by one" if groups == 1 else f"solved by {groups} groups of ranks side by side"
     settings = {**settings, "why": [f"{len(films)} films between grooves, {how}", *settings["why"]]}
+    longest = max(told, key=lambda one: len(one[1][2]))[0]
     times: dict[str, float] = {}
     for _, (*_, seconds) in told:
         times = added(times, seconds)
@@ -126,7 +127,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         outcome,
         f"{len(films)} films between grooves; {message}",
         ring.certify(fields, settings["eps1"]),
-        [step for _, one in told for step in one[2]],
+        [step if k == longest else replace(step, beside=True) for k, one in told for step in one[2]],
         enclosure=band,
         settings=settings,
         times=times,

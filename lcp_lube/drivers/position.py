@@ -1,8 +1,10 @@
-"""Where a journal lies under a load of given size and direction: Newton's method with the film's exact stiffness.
+"""Where a journal lies under a load of given size, and direction too where its attitude is open: Newton's method with the
+film's exact stiffness.
 
-Unknowns are t = log(e/(1 - e)) of the eccentricity e, in which the logarithm of the load is nearly linear, and the attitude;
-the equations are log(W/load) = 0 and that the force lies in the load's line. The stiffness matrix of the film
-(`coefficients`) gives their derivatives, so a handful of solves do, each started from the last; coarse grids come first.
+Unknowns are t = log(s/(1 - s)) of s = e/e_touch, the eccentricity in parts of that at which the journal touches its bore, in
+which the logarithm of the load is nearly linear, and the attitude; the equations are log(W/load) = 0 and that the force lies
+in the load's line. The stiffness matrix of the film (`coefficients`) gives their derivatives, so a handful of solves do, each
+started from the last; coarse grids come first, where they cost next to nothing.
 """
 
 import math
@@ -11,6 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from ..base.parallel import Array
+from ..problems.film.turning import Turning
 from ..problems.solution import Outcome, Solution
 from ..scenes.effects.named import named, without
 from ..scenes.grooved import GroovedJournalScene
@@ -22,9 +26,15 @@ from .coefficients import coefficients
 from .compose import Inner
 
 MOST_SOLVES = 25  # on a grid
-COARSEST, COARSE_TOL = 120, 1e-2  # points around on the first grid, and how well its journal's place is worth knowing
+COARSEST, COARSE_TOL = (36, 7), 1e-2  # fewest points around and across, and how well a coarse grid's place is worth knowing
+SEEN = 0.5  # a mesh in parts of the stretch sqrt(2 (1 - s)) on which the film is thin, at most
+MOST_COARSE = 8  # solves on a grid that is not the last
 LONGEST = (2.0, 0.4)  # of a step in t and in the attitude (rad)
-WIDEST = 14.0  # of t: eccentricities from 1e-6 to 1 - 1e-6
+SHORTEST = 1e-4  # of a step that was halved
+WIDEST = 14.0  # of t: s from 1e-6 to 1 - 1e-6
+AWRY = 0.7  # rad from the load's line: then the force goes on in a line, not its logarithm
+ACROSS = 0.4  # of such a step, clearances
+DIRECTIONS = np.linspace(-0.5, 0.5, 2881)[1:-1] * math.pi  # from the attitude, in which the bore may be touched
 
 
 def applies(scene: Solvable, ask: Ask) -> bool:
@@ -41,26 +51,30 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     """
     assert isinstance(scene, GroovedJournalScene) and scene.balance is not None  # as `applies` found
     table, known = scene.balance, ask.start.settings if ask.start is not None else {}
-    touches = scene.preload or scene.tilt or scene.tilt_across  # the wall, at some eccentricity below 1
-    guess = scene.eccentricity if touches else half_film_eccentricity(scene, table.load)
-    e = known.get("balance", {}).get("value", guess)
-    phi = math.radians(known["attitude_deg"]) if "attitude_deg" in known else half_film_attitude(e)
+    guess = half_film_eccentricity(scene.turning, scene.mu_0, table.load)
+    phi = math.radians(known.get("attitude_deg", scene.attitude_deg or 0.0))
+    if scene.attitude_deg is None and "attitude_deg" not in known:
+        phi = half_film_attitude(guess)
+    value = known.get("balance", {}).get("value")
+    s = guess if value is None else value / touching(scene, phi)
     free = scene.model_copy(update={"balance": None})
     shapes = [scene.shape]
-    while ask.nested is not False and not known and shapes[0][0] >= 2 * COARSEST and shapes[0][1] >= 7:
-        shapes.insert(0, (shapes[0][0] // 2, shapes[0][1] // 2 | 1))
-    near, solves = ask.start, 0
-    t = math.log(max(e, 1e-3) / (1.0 - max(e, 1e-3)))
+    if ask.nested is not False and not known:
+        shapes = _coarse(scene, s)
+    near, counts = ask.start, list[int]()
+    t = math.log(max(s, 1e-3) / max(1.0 - s, 1e-6))
     for shape in shapes:
         tol = table.tol if shape == shapes[-1] else max(table.tol, COARSE_TOL)
-        solution, t, phi, count, found = _on_grid(
-            free.with_shape(shape), replace(ask, start=near), inner, t, phi, table.load, tol
+        most = MOST_SOLVES if shape == shapes[-1] else MOST_COARSE
+        solution, (t, phi), count, found = _on_grid(
+            free.with_shape(shape), replace(ask, start=near), inner, t, phi, table.load, tol, most
         )
         if near is not None and near is not ask.start:
             near.destroy()  # type: ignore[union-attr]
-        near, solves = solution, solves + count
+        near, counts = solution, [*counts, count]
+    solves, work = sum(counts), sum(n * math.prod(s) for n, s in zip(counts, shapes, strict=True)) / math.prod(shapes[-1])
     carried = solution.problem.quantities(solution.fields)["load"]
-    value = 1.0 / (1.0 + math.exp(-t))
+    value = eccentricity(scene, t, phi)
     answer = f"eccentricity = {value:.8g} at {math.degrees(phi):.6g} degrees carries {carried:.8g}"
     if solution.converged and not found:
         solution.outcome, solution.message = Outcome.LOAD_NOT_CARRIED, f"{table.load:g} asked for; the nearest: {answer}"
@@ -71,6 +85,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         "carried": carried,
         "iterations": count,
         "solves": solves,
+        "work": work,
     }
     solution.settings |= {
         "balance": record,
@@ -80,88 +95,126 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     return solution
 
 
-def half_film_eccentricity(scene: GroovedJournalScene, load: float) -> float:
+def _coarse(scene: GroovedJournalScene, s: float) -> list[tuple[int, ...]]:
+    """Grids from coarse to fine, the coarsest with a few points on the stretch where the film is thin at s."""
+    around = max(COARSEST[0], 12 * len(scene.grooves_deg), 2.0 * math.pi / (SEEN * math.sqrt(2.0 * (1.0 - s))))
+    shapes = [scene.shape]
+    while shapes[0][0] >= 2 * around:
+        nx, ny = shapes[0]
+        shapes.insert(0, (nx // 2, ny // 2 | 1 if ny >= 2 * COARSEST[1] else ny))
+    return shapes
+
+
+def touching(scene: GroovedJournalScene, phi: float) -> float:
+    """The eccentricity at which a journal displaced towards phi touches its bore, at most 1."""
+    bore, turning = scene.model_copy(update={"eccentricity": 0.0}).gap, scene.turning
+    x = (phi + DIRECTIONS - turning.start) * turning.R
+    room = bore(x[None, :], np.linspace(0.0, turning.B, 5)[:, None]) / (turning.c * np.cos(DIRECTIONS))
+    return float(min(1.0, max(room.min(), 1e-6)))
+
+
+def eccentricity(scene: GroovedJournalScene, t: float, phi: float) -> float:
+    return touching(scene, phi) / (1.0 + math.exp(-t))
+
+
+def half_film_eccentricity(turning: Turning, mu: float, load: float, long: bool = False) -> float:
     """The eccentricity at which a journal with half a film carries the load, as a start.
 
     1/W = 1/W_short + 1/W_long, of Ocvirk's short and Sommerfeld's long bearing: between them for every L/D, and near both.
+    long : the long one alone, load in N/m.
     """
     e = 1.0 / (1.0 + np.exp(-np.linspace(-0.5 * WIDEST, 0.5 * WIDEST, 561)))
-    round_, ratio = 1.0 - e * e, 4.0 * scene.L_over_D**2  # (B/R)^2
-    short = 0.25 * ratio * e / round_**2 * np.sqrt(16.0 * e * e + np.pi**2 * round_)
-    long = 6.0 * e / ((2.0 + e * e) * round_) * np.sqrt(4.0 * e * e + np.pi**2 * round_)
-    turning = scene.turning
-    unit = scene.mu_0 * turning.omega * turning.R * turning.B * (turning.R / turning.c) ** 2
-    return float(np.interp(math.log(load / unit), -np.log(1.0 / short + 1.0 / long), e))
+    round_, ratio = 1.0 - e * e, math.inf if long else (turning.B / turning.R) ** 2
+    over_short = 1.0 / (0.25 * ratio * e / round_**2 * np.sqrt(16.0 * e * e + np.pi**2 * round_))
+    over_long = (2.0 + e * e) * round_ / (6.0 * e * np.sqrt(4.0 * e * e + np.pi**2 * round_))
+    unit = mu * turning.omega * turning.R * turning.B * (turning.R / turning.c) ** 2
+    return float(np.interp(math.log(load / unit), -np.log(over_short + over_long), e))
 
 
 def _on_grid(
-    scene: Any, ask: Ask, inner: Inner, t: float, phi: float, load: float, tol: float
-) -> tuple[Solution, float, float, int, bool]:
-    """Newton's method on one grid: solution, t, attitude, number of solves, whether the place was found. Collective."""
-    chain = Chain(ask, inner)
-    inverse, before = None, None  # of effects: the place's secant method, and (residual, step) before
-    for count in range(1, MOST_SOLVES + 1):
-        e = 1.0 / (1.0 + math.exp(-t))
-        at = scene.model_copy(update={"eccentricity": e, "attitude_deg": math.degrees(phi)})
+    scene: Any, ask: Ask, inner: Inner, t: float, phi: float, load: float, tol: float, most: int
+) -> tuple[Solution, Array, int, bool]:
+    """Newton's method on one grid: solution, t and attitude, number of solves, whether the place was found. Collective.
+
+    A step that makes residuals larger is taken again, half as long.
+    """
+    chain, given = Chain(ask, inner), scene.attitude_deg is not None
+    q, inverse, before = np.array([t, phi]), None, None  # before : place, residual and step
+    for count in range(1, most + 1):
+        t, phi = map(float, q)
+        at = scene.model_copy(update={"eccentricity": eccentricity(scene, t, phi), "attitude_deg": math.degrees(phi)})
         solution = chain.solve(at)
         if not solution.converged:
-            return solution, t, phi, count, False
+            return solution, q, count, False
         force = np.array(solution.problem.quantities(solution.fields)["force"])
         W = float(np.hypot(*force))
         off = math.atan2(-force[1], -force[0])
-        short = math.log(W / load) if W > 0 else -math.inf
-        if abs(short) <= tol and abs(off) <= tol:
-            return solution, t, phi, count, True
-        if count == MOST_SOLVES or (abs(t) >= WIDEST and short * t < 0):
-            return solution, t, phi, count, False
+        left = np.array([math.log(W / load) if W > 0 else -math.inf, 0.0 if given else off])
+        if np.abs(left).max() <= tol:
+            return solution, q, count, True
+        if count == most or (abs(t) >= WIDEST and left[0] * t < 0):
+            return solution, q, count, False
         if not W > 0:
             step = np.array([LONGEST[0], 0.0])
-        elif not at.model.effects:
-            step = _newton(at, solution, force, (short, off), e, phi)
+        elif before is not None and np.abs(left).sum() > np.abs(before[1]).sum():
+            q, left, step = before[0], before[1], 0.5 * before[2]
+            if np.abs(step).max() < SHORTEST:
+                return solution, q + 2.0 * step, count, False
         else:
-            inverse = (
-                _secant(inverse, before, np.array([short, off]))
-                if before is not None
-                else _first(at, solution, force, off, e, phi)
-            )
-            step = -inverse @ [short, off]
-        step = np.clip(step, [-LONGEST[0], -LONGEST[1]], LONGEST)
-        before = (np.array([short, off]), step)
-        t = min(max(t + float(step[0]), -WIDEST), WIDEST)
-        phi += float(step[1])
+            if inverse is None or not at.model.effects:
+                K = _stiffness(at, solution, off)
+                if abs(left[1]) > AWRY:
+                    q, before = _across(scene, t, phi, K, np.array([force[0] + load, force[1]])), None
+                    continue
+                change = -K @ _moves(scene, t, phi)
+                jacobian = np.stack([force @ change, force[0] * change[1] - force[1] * change[0]]) / W**2
+                if given:
+                    jacobian[:, 1], jacobian[1] = 0.0, [0.0, 1.0]
+                inverse = _inverse(jacobian)
+            elif before is not None:
+                inverse = _secant(inverse, before[2], left - before[1])
+            step = np.clip(-inverse @ left, [-LONGEST[0], -LONGEST[1]], LONGEST)
+        before = (q, left, step)
+        q = q + step
+        q[0] = min(max(q[0], -WIDEST), WIDEST)
     raise AssertionError("the loop returns")
 
 
-def _first(at: Any, solution: Solution, force: Any, off: float, e: float, phi: float) -> Any:
-    """The inverse derivative where effects act, to begin with: that of the film without them. Collective."""
-    jacobian = _jacobian(without(at, named(at)), solution, force, off, e, phi)
-    return np.linalg.inv(jacobian) if abs(np.linalg.det(jacobian)) > 1e-12 else np.diag([1.0 / max(1.0 + e, 1.0), 1.0])
+def _across(scene: Any, t: float, phi: float, K: Array, left: Array) -> Array:
+    """Where the journal's place goes on if forces (N) change in a line, as they do about the place without load."""
+    step = np.linalg.lstsq(K * scene.clearance, left, rcond=None)[0]
+    at = eccentricity(scene, t, phi) * np.array([math.cos(phi), math.sin(phi)])
+    at += step * min(1.0, ACROSS / float(np.hypot(*step)))
+    phi, s = math.atan2(at[1], at[0]), 1.0 / (1.0 + math.exp(-t))
+    s = min(max(float(np.hypot(*at)) / touching(scene, phi), 1e-3), 0.5 * (s + 1.0))  # at most half the way to the bore
+    return np.array([math.log(s / (1.0 - s)), phi])
 
 
-def _secant(inverse: Any, before: Any, residual: Any) -> Any:
-    """Broyden's update of the inverse derivative with what the last step changed."""
-    old, step = before
-    moved = inverse @ (residual - old)
+def _moves(scene: Any, t: float, phi: float) -> Array:
+    """How the journal moves (m) with t and with the attitude: columns."""
+
+    def place(t: float, phi: float) -> Array:
+        return scene.clearance * eccentricity(scene, t, phi) * np.array([math.cos(phi), math.sin(phi)])
+
+    d = 1e-5
+    ends = (place(t + d, phi) - place(t - d, phi), place(t, phi + d) - place(t, phi - d))
+    return np.stack(ends, axis=1) / (2.0 * d)
+
+
+def _stiffness(at: Any, solution: Solution, along: float) -> Array:
+    """K in the axes of the load, where effects act that of the film without them. Collective."""
+    (one,) = coefficients(without(at, named(at)) if at.model.effects else at, solution)
+    turn = np.array([[math.cos(along), -math.sin(along)], [math.sin(along), math.cos(along)]])
+    return turn @ one.K @ turn.T  # type: ignore[no-any-return]
+
+
+def _inverse(jacobian: Array) -> Array:
+    """Of the derivatives of log W and of the force's angle in t and in the attitude; where there is none, that of a line."""
+    return np.linalg.inv(jacobian) if abs(np.linalg.det(jacobian)) > 1e-12 else np.diag([0.5, 1.0])
+
+
+def _secant(inverse: Array, step: Array, change: Array) -> Array:
+    """Broyden's update of the inverse derivative with what a step changed."""
+    moved = inverse @ change
     along = step @ moved
     return inverse if not abs(along) > 1e-30 else inverse + np.outer(step - moved, step @ inverse) / along
-
-
-def _newton(at: Any, solution: Solution, force: Any, residual: tuple[float, float], e: float, phi: float) -> Any:
-    """Steps in t and in the attitude, from the exact derivative of the force. Collective."""
-    try:
-        return np.linalg.solve(_jacobian(at, solution, force, residual[1], e, phi), [-residual[0], -residual[1]])
-    except np.linalg.LinAlgError:
-        return np.array([math.copysign(0.5, -residual[0]), 0.0])
-
-
-def _jacobian(at: Any, solution: Solution, force: Any, along: float, e: float, phi: float) -> Any:
-    """Derivatives of log W and of the force's angle (its rows) in t and in the attitude. Collective."""
-    (one,) = coefficients(at, solution)
-    turn = np.array([[math.cos(along), -math.sin(along)], [math.sin(along), math.cos(along)]])
-    K = turn @ one.K @ turn.T  # back from the axes along the force
-    c = at.clearance
-    towards, across = np.array([math.cos(phi), math.sin(phi)]), np.array([-math.sin(phi), math.cos(phi)])
-    moves = np.stack([c * e * (1.0 - e) * towards, c * e * across], axis=1)  # of the journal with t and with the attitude
-    change = -K @ moves
-    square = float(force @ force)
-    return np.stack([force @ change, force[0] * change[1] - force[1] * change[0]]) / square

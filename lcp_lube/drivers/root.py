@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 from itertools import pairwise
-from math import isfinite
+from math import inf, isfinite
 
 LONGEST_STEP = 2.5  # while there is no bracket
 FLATTEST = 0.05  # slope below which a step is taken as if it were this
@@ -12,7 +12,7 @@ PATIENCE = 8  # points without a bracket, after which secant steps are left
 
 @dataclass
 class Search:
-    """A root of g between low and high: secant steps, kept inside the bracket once there is one.
+    """A root of g between low and high: Newton's steps where slopes are known, else secants, in the bracket once there is one.
 
     Where secant steps lead nowhere, as they may if g is not monotone, the ends are tried, the one towards which g should grow
     first, and then the widest gaps between what is known. g may be -inf where all that is known is that it is too small.
@@ -28,14 +28,17 @@ class Search:
     slope: float
     explore: bool = True
     points: list[tuple[float, float]] = field(default_factory=list)  # t, g(t), in the order of their evaluation
+    slopes: dict[float, float] = field(default_factory=dict)  # of g where they are known, by t
     widths: list[float] = field(default_factory=list)  # of the bracket, after each point since there is one
 
     def __post_init__(self) -> None:
         self.ends = [self.low, self.high] if self.slope < 0 else [self.high, self.low]
 
-    def add(self, t: float, g: float) -> None:
-        """Take up a value of g."""
+    def add(self, t: float, g: float, slope: float | None = None) -> None:
+        """Take up a value of g, and its slope if that is known."""
         self.points.append((t, g))
+        if slope is not None and isfinite(slope):
+            self.slopes[t] = slope
         known = [point for point in self.points if isfinite(point[1])][-2:]
         if len(known) == 2 and known[1][1] != known[0][1]:
             self.slope = (known[1][1] - known[0][1]) / (known[1][0] - known[0][0])
@@ -59,7 +62,7 @@ class Search:
         """Where to evaluate next; None where there is nothing left to be tried."""
         up = 1.0 if self.slope >= 0 else -1.0
         t, g = min(self.points, key=lambda point: (abs(point[1]), -up * point[0]))
-        step = -g / (up * max(abs(self.slope), FLATTEST))
+        step = self._newton(t, g, -g / (up * max(abs(self.slope), FLATTEST)))
         if (bracket := self.bracket) is None:
             target = min(max(t + min(max(step, -LONGEST_STEP), LONGEST_STEP), self.low), self.high)
             return self._elsewhere() if self._known(target) or len(self.points) >= PATIENCE else target
@@ -68,6 +71,20 @@ class Search:
             return None
         slow = len(self.widths) > 3 and self.widths[-1] > 0.5 * self.widths[-4]
         return t + step if a < t + step < b and not slow else 0.5 * (a + b)
+
+    def _newton(self, t: float, g: float, step: float) -> float:
+        """The step from the best point by its own slope, bent as that of the next best one tells; else the one given."""
+        if not abs(self.slopes.get(t, 0.0)) > FLATTEST:
+            return step
+        to, others = 1.0 / self.slopes[t], [p for p in self.points if p[0] in self.slopes and p[1] != g]
+        step = -g * to
+        if others:  # the inverse function's cubic through both, with both slopes
+            t_2, g_2 = min(others, key=lambda point: abs(point[1]))
+            d, mean, to_2 = g_2 - g, (t_2 - t) / (g_2 - g), 1.0 / (self.slopes[t_2] or inf)
+            bend = (3.0 * mean - 2.0 * to - to_2) / d
+            bent = step + g * g * (bend - g * (to + to_2 - 2.0 * mean) / d**2)
+            step = bent if 0.5 < bent / step < 2.0 else step
+        return step
 
     def _known(self, t: float) -> bool:
         return any(abs(t - point[0]) <= 1e-9 * (self.high - self.low) for point in self.points)

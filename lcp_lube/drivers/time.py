@@ -13,7 +13,7 @@ from ..scenes.moving import Moving, motion_of
 from ..scenes.scene import Solvable
 from .ask import Ask
 from .compose import Inner
-from .marching import Run
+from .marching import Run, iterations_of
 
 
 def applies(scene: Solvable, ask: Ask) -> bool:
@@ -62,7 +62,7 @@ def answer(run: Run) -> Solution:
     count = len(run.history)
     if run.outcome is Outcome.CONVERGED:
         solves = f"{run.solves / max(count, 1):.1f} solves each, " if run.solves > count else ""
-        run.message = f"{count} time steps, {solves}{len(run.steps) / max(run.solves, 1):.1f} iterations a solve"
+        run.message = f"{count} time steps, {solves}{iterations_of(run.steps) / max(run.solves, 1):.1f} iterations a solve"
         run.message += f"; {march.defect:.1e} of the oil lost"
     if run.seen is not None:
         problem = run.seen.answer(problem)
@@ -73,7 +73,7 @@ def answer(run: Run) -> Solution:
         "step_min": run.lengths[0] if count else None,
         "step_max": run.lengths[1] if count else None,
         "solves_per_step": run.solves / max(count, 1),
-        "iterations_per_step": len(run.steps) / max(run.solves, 1),
+        "iterations_per_step": iterations_of(run.steps) / max(run.solves, 1),
         "mass_defect_run": march.defect,
     }
     if run.rotor is not None or run.course is not None:

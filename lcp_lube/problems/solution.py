@@ -95,7 +95,8 @@ class Step:
     """One step of the outer loop: the letters of the paper.
 
     norm is ||F|| after the step, step_norm ||alpha d||; centrality and backtracking count halvings of alpha; enough: the
-    method's own stopping rule holds, whatever eps1 and eps2 say.
+    method's own stopping rule holds, whatever eps1 and eps2 say; beside: of a film between grooves, while another one took
+    more steps.
     """
 
     norm: float
@@ -107,6 +108,7 @@ class Step:
     sigma: float = 0.0
     rtol: float = 0.0
     enough: bool = False
+    beside: bool = False
 
 
 @dataclass(frozen=True)

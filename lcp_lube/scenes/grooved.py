@@ -13,8 +13,6 @@ from ..problems.film.supplies import Patch, Supply
 from .balance import BalanceTable
 from .effects.table import WithEffects
 from .film import FilmPart
-from .motion import MotionTable
-from .moving import Models
 from .scene import Finite, NotNegative
 from .shaft import ShaftScene
 from .supply import Place, SupplyTable, supplies_of
@@ -50,7 +48,6 @@ class GroovedJournalScene(ShaftScene, WithEffects):
     film: list[FilmPart] = Field([], description="shapes that are added to the film; x from the first groove's edge")
     supply: list[SupplyTable] = Field([], description="supplies inside the film, beside the grooves; pressures are absolute")
     balance: BalanceTable | None = Field(None, description="load to carry; eccentricity and attitude are found for it")
-    motion: MotionTable | None = Field(None, description="how the journal moves in time")
 
     def check(self) -> None:
         super().check()
@@ -58,13 +55,11 @@ class GroovedJournalScene(ShaftScene, WithEffects):
         gaps = [(b - a) % 360.0 or 360.0 for a, b in zip(places, [*places[1:], *places[:1]], strict=True)]
         if places and min(gaps) <= self.groove_deg:
             raise ValueError(f"grooves_deg = {self.grooves_deg}: grooves of {self.groove_deg:g} degrees overlap there")
-        if self.balance is not None and (self.attitude_deg is not None or self.balance.vary not in (None, "eccentricity")):
-            raise ValueError("balance: eccentricity and attitude follow from the load: neither attitude_deg nor another vary")
+        if self.balance is not None and self.balance.vary not in (None, "eccentricity"):
+            raise ValueError(f"balance.vary = {self.balance.vary}: eccentricity is allowed, which follows from the load")
         for k, table in enumerate(self.film, start=1):
             if table.changes:
                 raise ValueError(f"film.{k}: shapes of this family do not change with time; family = bearing has such")
-        if self.motion is not None and self.balance is not None:
-            raise ValueError("balance and motion are both given: one of them; a load in time is that of motion.free")
         if self.motion is not None and self.attitude_deg is None and not self.motion.moves_journal:
             raise ValueError("motion: attitude_deg, or where the journal is (motion.journal, file or free), is needed")
         if self.preload and len(places) < 2:
@@ -94,22 +89,6 @@ class GroovedJournalScene(ShaftScene, WithEffects):
     def start(self) -> float:
         """The first groove's first edge."""
         return math.radians((self.grooves_deg or [180.0])[0] - 0.5 * (self.groove_deg if self.grooves_deg else 0.0))
-
-    @property
-    def place(self) -> tuple[float, float]:
-        """[X, Y] of the journal, in parts of the clearance."""
-        phi = math.radians(self.attitude_deg or 0.0)
-        return self.eccentricity * math.cos(phi), self.eccentricity * math.sin(phi)
-
-    def models(self) -> Models:
-        """The film with the journal at [X, Y] of its clearance; nothing else of it moves."""
-
-        def at(t: float, journal: tuple[float, float] | None) -> Model:
-            x, y = journal if journal is not None else self.place
-            found = {"eccentricity": math.hypot(x, y), "attitude_deg": math.degrees(math.atan2(y, x))}
-            return self.model_copy(update=found).model
-
-        return at
 
     @property
     def gap(self) -> Bore:

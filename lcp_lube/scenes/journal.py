@@ -14,6 +14,8 @@ from ..problems.film.supplies import Supply
 from ..problems.film.turning import Turning
 from ..problems.grid import Places
 from .film_scene import Sides
+from .motion import MotionTable
+from .moving import Models
 from .published import LubricationScene
 from .scene import Positive
 from .supply import Place, SupplyTable, supplies_of
@@ -41,6 +43,7 @@ class JournalScene(LubricationScene):
     omega: Positive = measured("rad/s", 100.0, "angular velocity")
     mu: Positive = 0.02
     supply: list[SupplyTable] = Field([], description="supplies inside the film; pressures are absolute")
+    motion: MotionTable | None = Field(None, description="how the journal moves in time")
     L: Positive = Field(1.0, description="follows from D")
     U: Positive = Field(1.0, description="follows from D and omega")
 
@@ -69,8 +72,10 @@ class JournalScene(LubricationScene):
                 raise ValueError(f"{found}: without a groove (round = periodic) the ends feed the film: 2D, p_side > 0")
             if self.p_a or self.p_b:
                 raise ValueError(f"p_a = {self.p_a:g}, p_b = {self.p_b:g}: there is no groove (round = periodic)")
-        if self.graded and (self.dimension == 1 or self.round == "periodic"):
-            raise ValueError("graded = true: lines are graded in 2D, from the groove at the widest gap (round = groove)")
+        if self.graded and (self.dimension == 1 or self.round == "periodic" or self.motion is not None):
+            raise ValueError("graded = true: lines are graded in 2D, from a groove at the widest gap (round = groove), at rest")
+        if self.motion is not None and self.balance is not None:
+            raise ValueError("balance and motion are both given: one of them; a load in time is that of motion.free")
         self._supplies()
 
     def _supplies(self) -> tuple[Supply, ...]:
@@ -93,6 +98,23 @@ class JournalScene(LubricationScene):
 
     def _parts(self) -> Sequence[Shape]:
         return [Journal(0.5 * self.psi * self.D, self.eccentricity, self.L)]
+
+    @property
+    def place(self) -> tuple[float, float]:
+        """[X, Y] of the journal, in parts of the clearance: away from the widest gap."""
+        return -self.eccentricity, 0.0
+
+    def models(self) -> Models:
+        """The film with the journal at [X, Y] of its clearance; angles are counted from the groove."""
+        still, c = self.model, self.turning.c
+
+        def at(t: float, journal: tuple[float, float] | None) -> Model:
+            x, y = journal if journal is not None else self.place
+            widest = math.atan2(y, x) + math.pi
+            gap = self.sum_of([Journal(c, math.hypot(x, y), self.L, 0.5 * self.D * widest)])
+            return replace(still, gap=gap, shaft=replace(self.turning, widest=widest if x or y else None))
+
+        return at
 
     def _model(self) -> Model:
         return replace(super()._model(), shaft=self.turning, places=self._places, extras=self.bearing_numbers)

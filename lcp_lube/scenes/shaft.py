@@ -10,7 +10,10 @@ from ..problems.film.grooves import Groove
 from ..problems.film.model import Model, Side
 from ..problems.film.reynolds import Film
 from ..problems.film.turning import Turning
+from .balance import BalanceTable
 from .film_scene import FilmScene
+from .motion import MotionTable
+from .moving import Models
 from .scene import Count, Finite, NotNegative, Positive
 from .units import measured, metres
 
@@ -32,6 +35,13 @@ class ShaftScene(FilmScene):
     n: Count = Field(360, description="points around, and an odd number near a sixteenth of them across")
     nx: Count | None = Field(None, description="points around; default n")
     ny: Count | None = Field(None, description="points across; default as n says")
+    balance: BalanceTable | None
+    motion: MotionTable | None = Field(None, description="how the journal moves in time")
+
+    def check(self) -> None:
+        super().check()
+        if self.motion is not None and self.balance is not None:
+            raise ValueError("balance and motion are both given: one of them; a load in time is that of motion.free")
 
     @field_validator("scheme")
     @classmethod
@@ -64,6 +74,22 @@ class ShaftScene(FilmScene):
         start = self.start - math.pi / self.shape[0]
         widest = math.radians(self.attitude_deg or 0.0) + math.pi if self.eccentricity else None
         return Turning(0.5 * self.D, start, widest, c=self.clearance, B=self.L_over_D * self.D, omega=self.omega)
+
+    @property
+    def place(self) -> tuple[float, float]:
+        """[X, Y] of the journal, in parts of the clearance."""
+        phi = math.radians(self.attitude_deg or 0.0)
+        return self.eccentricity * math.cos(phi), self.eccentricity * math.sin(phi)
+
+    def models(self) -> Models:
+        """The film with the journal at [X, Y] of its clearance; nothing else of it moves."""
+
+        def at(t: float, journal: tuple[float, float] | None) -> Model:
+            x, y = journal if journal is not None else self.place
+            found = {"eccentricity": math.hypot(x, y), "attitude_deg": math.degrees(math.atan2(y, x))}
+            return self.model_copy(update=found).model
+
+        return at
 
     @property
     def gap(self) -> Film:

@@ -18,7 +18,8 @@ class TiltingPadScene(ShaftScene, WithEffects):
     """A journal in pads that tilt about their pivots; 2D. Angles are counted from the load, in the sense of rotation.
 
     The pads' tilts are found at which no moment acts about any pivot, and with balance.load the journal's place at which the
-    films carry the load. clearance is that of the assembled bearing: between the journal in the middle and a pad at its pivot.
+    films carry the load. With [motion] the pads are held in the `tilts` given.
+    clearance is that of the assembled bearing: between the journal in the middle and a pad at its pivot.
     preload m makes the pads' own bore wider, clearance/(1 - m). Between pads p_groove holds. With `tilts` given they are fixed.
     """
 
@@ -51,6 +52,8 @@ class TiltingPadScene(ShaftScene, WithEffects):
         if self.pad_deg / 360.0 * self.shape[0] < 8:
             needed = math.ceil(2880 / self.pad_deg)
             raise ValueError(f"nx = {self.shape[0]}: pads of {self.pad_deg:g} degrees need {needed} points around")
+        if self.motion is not None and self.tilts is None:
+            raise ValueError("motion: pads do not follow in time; their tilts are needed, in which they are held")
         if self.balance is not None and self.balance.vary not in (None, "eccentricity"):
             raise ValueError(f"balance.vary = {self.balance.vary}: the journal's place follows from the load: eccentricity")
 

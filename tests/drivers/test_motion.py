@@ -190,6 +190,39 @@ def test_a_journal_moves_by_formulas_and_by_a_file(tmp_path):
     assert one.history[-1]["journal_x"] == one.journal[0]
 
 
+@pytest.mark.parametrize("round_", ["groove", "periodic"])
+def test_the_family_journal_moves(round_):
+    """As the same film in a scene of shapes does; at rest it stays at its steady answer."""
+    motion = {"t_end": 0.02, "steps": 10, "journal": ["0.2*sin(100*t)-0.4", "0.1*sin(200*t)"]}
+    small = {"nx": 24, "ny": 5, "round": round_, "p_side": 1e5}
+    one = march("journal", **small, motion=motion)
+    journal = load_scene("journal", small)
+    shape = {"shape": "journal", "c": journal.turning.c, "eccentricity": journal.eccentricity}
+    around = {"west": "periodic", "east": "periodic"} if round_ == "periodic" else {"west": 0.0, "east": 0.0}
+    keys = {"L": journal.L, "U": journal.U, "width": journal.width, "fluid": {"mu": journal.mu, "p_supply": 1e5}}
+    two = march(RING | keys | {"nx": 24, "film": shape, "sides": around, "motion": motion})
+    assert one.load == pytest.approx(two.load, rel=1e-9) and one.journal == two.journal
+    still, steady = march("journal", **small, motion={"t_end": 0.02, "steps": 4}), march("journal", **small)
+    assert still.load == pytest.approx(steady.load, rel=1e-9)
+
+
+def test_a_journal_moves_in_pads_that_are_held():
+    """A journal at rest has the steady film; a free one comes to where the pads, held, carry it."""
+    held = {"nx": 90, "ny": 5, "tilts": [1e-4] * 5, "balance": None}
+    steady = march("tilting_pad_journal", **held, eccentricity=0.3)
+    still = march("tilting_pad_journal", **held, motion={"t_end": 0.01, "steps": 4, "journal": [0.3, 0.0]})
+    assert still.load == pytest.approx(steady.load, rel=1e-9)
+    free = {"t_end": 0.2, "tol": 3e-2, "free": True, "mass": 5.0, "load": [3000.0, 0.0]}
+    assert march("tilting_pad_journal", **held, motion=free).force == pytest.approx([-3000.0, 0.0], abs=1.0)
+
+
+def test_newton_steps_of_films_between_grooves_are_counted_side_by_side():
+    """At most two a time step, on smooth motion of 40 steps a turn."""
+    motion = {"t_end": 0.02, "steps": 40, "journal": ["0.5+0.1*cos(314.159*t)", "0.3+0.1*sin(314.159*t)"]}
+    for name in ("two_groove_journal", "ring_journal"):
+        assert march(name, nx=90, ny=7, motion=motion).iterations_per_step <= 2.0
+
+
 def test_a_free_journal_comes_to_where_the_load_holds_it():
     """The limit of a static load is the static answer, in a ring and between grooves."""
     small = {"nx": 48, "ny": 5}
@@ -349,6 +382,9 @@ def test_bad_input(cli, tmp_path):
         ("moving_texture", {"balance.load": 3.0}, "balance and motion"),
         ("dynamic_journal", {"motion.load": ["log(0-1)", "0"]}, "no number at t ="),
         ("pocketed_pad", {"film.pocket.moves": True}, r"a table \[motion\] is needed"),
+        ("journal", {"motion.t_end": 1.0, "balance.load": 3.0}, "balance and motion"),
+        ("journal", {"motion.t_end": 1.0, "graded": True}, "graded = true"),
+        ("tilting_pad_journal", {"motion.t_end": 1.0, "balance": None}, "pads do not follow in time"),
         ("moving_texture", {"temperature.beta": 0.03}, "the heat that the oil stores"),
     ],
 )

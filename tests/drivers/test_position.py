@@ -1,0 +1,62 @@
+"""Where a journal lies under a load: cold starts, lobes, dams, tilted axes, with the attitude given or open."""
+
+import math
+
+import pytest
+
+from lcp_lube import load_scene, solve
+from lcp_lube.drivers.position import touching
+from lcp_lube.problems.solution import Outcome
+
+SMALL = {"nx": 144, "ny": 11}
+
+
+@pytest.mark.parametrize("eccentricity", [0.1, 0.5, 0.97])
+@pytest.mark.parametrize("name", ["two_groove_journal", "ring_journal"])
+def test_a_load_is_carried_where_newton_puts_the_journal(name, eccentricity):
+    """The place from which a load was computed is found from the load, in a handful of solves from a cold start."""
+    scene = load_scene(name, **SMALL, eccentricity=eccentricity)
+    there = solve(scene)
+    values = there.problem.quantities(there.fields)
+    there.destroy()
+    solution = solve(load_scene(name, **SMALL, balance={"load": values["load"]}))
+    found = solution.settings["balance"]
+    assert solution.converged and found["carried"] == pytest.approx(values["load"], rel=2e-6)
+    assert found["value"] == pytest.approx(eccentricity, rel=1e-5)
+    assert solution.settings["attitude_deg"] == pytest.approx(values["attitude_deg"], abs=1e-3)
+    assert found["iterations"] <= 4
+    warm = solve(load_scene(name, **SMALL, balance={"load": 1.02 * values["load"]}), start=solution)
+    assert warm.converged and warm.settings["balance"]["iterations"] <= 4
+    warm.destroy()
+    solution.destroy()
+
+
+@pytest.mark.parametrize(
+    "name, changes",
+    [
+        ("lemon_journal", {"eccentricity": 0.97 * touching(load_scene("lemon_journal"), math.radians(40.0))}),
+        ("three_lobe_journal", {"eccentricity": 0.1, "L_over_D": 2.0}),
+        ("misaligned_journal", {"eccentricity": 0.7}),
+        ("dam_journal", {"eccentricity": 0.3, "attitude_deg": None}),  # near the place where it carries nothing
+        ("two_groove_journal", {"eccentricity": 0.97, "L_over_D": 1.3}),
+    ],
+)
+def test_four_solves_find_a_place_with_the_attitude_given_or_open(name, changes):
+    """On the grid asked for, from a cold start; lobes and a tilted axis are touched at an eccentricity below 1."""
+    changes = {"nx": 108, "ny": 15, "attitude_deg": 40.0, **changes}
+    there = solve(load_scene(name, changes))
+    values = there.problem.quantities(there.fields)
+    there.destroy()
+    changes["eccentricity"] = 0.5
+    solution = solve(load_scene(name, changes, balance={"load": values["load"]}))
+    found = solution.settings["balance"]
+    solution.destroy()
+    assert solution.converged and found["carried"] == pytest.approx(values["load"], rel=2e-6)
+    assert found["value"] == pytest.approx(values["eccentricity"], rel=1e-4)
+    assert found["iterations"] <= 4 and found["work"] <= 6
+
+
+def test_a_load_beyond_what_a_tilted_journal_carries_until_it_touches():
+    solution = solve(load_scene("misaligned_journal", {"nx": 108, "ny": 7, "L_over_D": 1.0, "balance.load": 1e7}))
+    assert solution.outcome is Outcome.LOAD_NOT_CARRIED and solution.settings["balance"]["solves"] < 40
+    solution.destroy()
