@@ -8,7 +8,7 @@ what arrives from the west is concave, what arrives from the others convex. Repl
 the cell to the west is not known to be cavitated, d z where it is (the policy X): as f_w is the smaller one, the solution of
 this model is a supersolution of G, and every cell where it is negative is cavitated in the solution itself. So X only grows,
 at most n times, and where it does not the model is G. The model is a convex problem: Newton's method (Howard's policy
-iteration) solves it in finitely many steps, from below. Proofs: docs/guaranteed_bounds.md. Neither a line search nor a good
+iteration) solves it in finitely many steps, from below. Proofs: docs/theory/monotone.md. Neither a line search nor a good
 start is needed; sweeps of nonlinear Gauss-Seidel keep supersolutions and carry the void downstream, which saves steps.
 """
 

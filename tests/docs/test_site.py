@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 from test_readme import environment, run
 
+from lcp_lube.registry import METHODS
+
 __all__ = ["environment"]
 
 ROOT = Path(__file__).parents[2]
@@ -31,6 +33,19 @@ def test_every_page_has_its_place_once() -> None:
     assert there - {"docs/index"} <= set(places)
     for names in NAVIGATION["SECTIONS"].values():
         assert all(name.endswith("*") or (ROOT / f"{name}.md").is_file() for name in names)
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_every_method_has_a_page_of_its_own(name: str) -> None:
+    """With its equations; its name stands in the title, and the guide's table leads there."""
+    titles = {path: path.read_text(encoding="utf-8").partition("\n")[0] for path in SOURCES}
+    (page,) = (path for path, title in titles.items() if title.startswith("# ") and f"`{name}`" in title)
+    assert re.findall(r"`(.*?)`", titles[page]) == [name]
+    assert re.search(r"^(\$\$|    \w.*=)", page.read_text(encoding="utf-8"), re.M)
+    guide = ROOT / "docs" / "guide" / "methods.md"
+    (target,) = set(re.findall(rf"\[`{name}`\]\((.*?)\)", guide.read_text(encoding="utf-8")))
+    assert (guide.parent / target).resolve() == page
+    assert page.relative_to(ROOT).with_suffix("").as_posix() in NAVIGATION["sections"]()["Theory"]
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
