@@ -37,7 +37,7 @@ from .loop import held
 MOST_SOLVES = 80
 MOMENTS = 1e-8  # of the load times the lever, about a pivot
 THINNER, THICKER = 0.7, 3.0  # parts of a film anywhere by which a step may change it
-THINNEST = 1e-6  # film over the clearance, below which no load is looked for
+THINNEST = 1e-5  # film over the clearance, below which no load is looked for: a difference quotient's step is a tenth of it
 NUDGES, NUDGE = 8, 0.5  # of a pad without stiffness: how often its inlet is opened, and by how much of its size of tilt
 
 
@@ -232,6 +232,9 @@ def _from(bearing: Bearing, q: Array, scene: Solvable, ask: Ask, inner: Inner) -
             break
         films = list(bearing.films(at, solution))
         off, counts = bearing.misfit(solution, films)
+        if min(float(np.min(one.problem.film(*_places(one)))) for one in films) < THINNEST * bearing.sizes[0]:
+            _free(films)
+            break
         K = _stiffness(films, q.size)
         for k in bearing.pitches:
             opens = bearing.free[k] and not K[k, k] > 0 and nudges[k] < NUDGES
@@ -243,14 +246,24 @@ def _from(bearing: Bearing, q: Array, scene: Solvable, ask: Ask, inner: Inner) -
             nudge = np.where(nudges >= NUDGES, NUDGE * bearing.sizes, 0.0)
             nudges, found, again = np.zeros_like(nudges), False, True
         step = _step(bearing, films, K, off, counts, nudge, bearing.free & (nudge == 0) & (nudges < NUDGES))
-        thin = min(film.problem.reduce.min(film.problem.scheme.h) for film in films) < THINNEST * bearing.sizes[0]
-        for film in films:
-            film.problem.destroy()
-        if found or thin or count == MOST_SOLVES:
+        _free(films)
+        if found or count == MOST_SOLVES:
             break
         q = q + step
     _tell(scene, bearing, solution, q, found, count)
     return solution
+
+
+def _places(film: PadFilm) -> tuple[Array, Array]:
+    """x, y of all points of the film, its sides among them, on every rank."""
+    grid = film.problem.grid
+    return grid.with_neighbours(0)[None, :], grid.with_neighbours(1)[:, None]
+
+
+def _free(films: Sequence[PadFilm]) -> None:
+    """Collective."""
+    for film in films:
+        film.problem.destroy()
 
 
 def _stiffness(films: Sequence[PadFilm], size: int) -> Array:
@@ -271,10 +284,9 @@ def _step(
     step[free] = bearing.sizes[free] * np.linalg.lstsq(scaled, -off[free] / counts[free], rcond=1e-13)[0]
     share = 1.0
     for film in films:
-        problem = film.problem
-        x, y = problem.grid.with_neighbours(0)[None, :], problem.grid.with_neighbours(1)[:, None]  # sides included
+        x, y = _places(film)
         moved = sum(step[k] * mode(x, y) for k, mode in zip(film.numbers, film.modes, strict=True))
-        change = moved / problem.film(x, y)
+        change = moved / film.problem.film(x, y)
         falls, grows = float(np.max(-change)), float(np.max(change))
         share = min(share, THINNER / max(falls, THINNER), THICKER / max(grows, THICKER))
     return share * step

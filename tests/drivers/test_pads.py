@@ -77,9 +77,16 @@ def test_a_pad_without_preload_idles():
         assert values["force"] == pytest.approx([-5e3, 0.0], abs=1e-2)
 
 
-@pytest.mark.parametrize(("name", "size"), [("tilting_pad_journal", SMALL), ("tilting_pad_thrust", FLAT)])
-def test_a_load_that_no_place_carries(name, size):
-    with solve(load_scene(name, {**size, "balance.load": 1e20})) as solution:
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("tilting_pad_journal", {**SMALL, "balance.load": 1e20}),
+        ("tilting_pad_thrust", {**FLAT, "balance.load": 1e20}),
+        ("tilting_pad_thrust", {**FLAT, "D_inner_mm": 84}),  # its pivot so near the inner edge that a corner touches
+    ],
+)
+def test_a_load_that_no_place_carries(name, changes):
+    with solve(load_scene(name, changes)) as solution:
         assert solution.outcome == "load_not_carried" and "no balance was found" in solution.message
 
 
