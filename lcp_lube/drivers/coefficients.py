@@ -27,7 +27,7 @@ from ..scenes.tilting import TiltingPadScene
 from .coupled_response import CoupledResponse
 from .grooves import films_of
 from .impedance import impedance
-from .pads import Bearing, JournalPads, ThrustPads, bearing_of
+from .pad_coordinates import Bearing, JournalPads, ThrustPads, bearing_of
 from .response import Change, Moved, Response
 
 FASTEST = 1e100  # rad/s: beyond it a factorisation overflows, and K and C are long those of void that has no time to change

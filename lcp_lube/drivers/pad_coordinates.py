@@ -1,0 +1,186 @@
+"""Bearings of pads that tilt as coordinates: the place of what they carry, and their tilts (`pads` finds them)."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.parallel import Array
+from ..problems.film.forces import ambient, integral
+from ..problems.film.lubrication import LubricationProblem
+from ..problems.film.model import Model
+from ..problems.solution import Fields, Solution
+from ..scenes.scene import Scene, Solvable
+from ..scenes.thrust import ThrustScene
+from ..scenes.tilting import TiltingPadScene
+from .grooves import films_of
+from .impedance import Mode, displacements
+from .loop import held
+
+MOMENTS = 1e-8  # of the load times the lever, about a pivot
+
+
+@dataclass(frozen=True)
+class PadFilm:
+    """A film with its modes and the numbers of the coordinates that they belong to."""
+
+    problem: LubricationProblem
+    model: Model
+    fields: Fields
+    modes: Sequence[Mode]
+    numbers: Sequence[int]
+
+    def pushes(self, mode: Mode) -> float:
+        """Integral of (p - ambient) g. Collective."""
+        return integral(self.problem, self.fields["p"] * self.problem.p_unit, ambient(self.problem), mode)
+
+
+class Bearing(Protocol):
+    """A scene seen as coordinates. sizes : what counts as a change of each; free : those that are to be found; pitches : the
+    tilts that open an inlet."""
+
+    sizes: Array
+    free: NDArray[np.bool_]
+
+    @property
+    def pitches(self) -> Sequence[int]: ...
+
+    def start(self) -> Array: ...
+
+    def at(self, q: Array) -> Scene: ...
+
+    def films(self, scene: Scene, solution: Solution) -> Iterator[PadFilm]: ...
+
+    def misfit(self, solution: Solution, films: Sequence[PadFilm]) -> tuple[Array, Array]:
+        """What is left of each equation, and what it counts by."""
+        ...
+
+    def told(self, solution: Solution, q: Array) -> dict[str, Any]: ...
+
+
+@dataclass
+class JournalPads:
+    """Coordinates: the journal's displacement along the load and ahead of it (m), and a tilt (rad) a pad."""
+
+    scene: TiltingPadScene
+    sizes: Array = field(init=False)
+    free: NDArray[np.bool_] = field(init=False)
+
+    def __post_init__(self) -> None:
+        scene, n = self.scene, len(self.scene.pivots_deg)
+        self.sizes = np.array([scene.clearance] * 2 + [2.0 * scene.clearance / scene.D] * n)
+        self.free = np.array([scene.balance is not None] * 2 + [scene.tilts is None] * n)
+
+    @property
+    def pitches(self) -> Sequence[int]:
+        return range(2, self.sizes.size)
+
+    def start(self) -> Array:
+        scene = self.scene
+        angle = math.radians(scene.attitude_deg)
+        e = scene.clearance * scene.eccentricity * np.array([math.cos(angle), math.sin(angle)])
+        # Pads that follow the journal, each inlet open by a part of the film at its pivot: no film is below 0 that need not be.
+        towards = np.radians(scene.pivots_deg) - angle
+        film = np.maximum(1.0 - scene.eccentricity * np.cos(towards), 0.0)
+        tilts = self.sizes[2:] * (scene.eccentricity * np.sin(towards) + film / math.radians(scene.pad_deg))
+        return np.array([*e, *(scene.tilts if scene.tilts is not None else tilts)])
+
+    def at(self, q: Array) -> Scene:
+        e = {
+            "eccentricity": float(np.hypot(*q[:2])) / self.scene.clearance,
+            "attitude_deg": math.degrees(math.atan2(q[1], q[0])),
+        }
+        return self.scene.model_copy(update={**e, "tilts": [float(tilt) for tilt in q[2:]], "balance": None})
+
+    def films(self, scene: Scene, solution: Solution) -> Iterator[PadFilm]:
+        turning = self.scene.turning
+        for problem, film, fields, first in films_of(held(scene, solution), solution.problem, solution.fields):  # type: ignore[arg-type]
+            middle = math.degrees(float(turning.theta(np.array(first + 0.5 * problem.grid.lengths[0]))))
+            off = [
+                abs(math.remainder(middle - at - (0.5 - self.scene.pivot_part) * self.scene.pad_deg, 360.0))
+                for at in self.scene.pivots_deg
+            ]
+            k = int(np.argmin(off))
+            pivot = math.radians(self.scene.pivots_deg[k])
+
+            def tilt(x: Array, y: Array, first: float = first, pivot: float = pivot) -> Array:
+                return -turning.R * np.sin(turning.theta(x + first) - pivot) + 0.0 * y
+
+            yield PadFilm(problem, film.model, fields, [*displacements(turning, first), tilt], [0, 1, 2 + k])
+
+    def misfit(self, solution: Solution, films: Sequence[PadFilm]) -> tuple[Array, Array]:
+        fx, fy = solution.problem.quantities(solution.fields)["force"]
+        load = self.scene.balance.load if self.scene.balance is not None else math.hypot(fx, fy)
+        moments = np.zeros(len(self.scene.pivots_deg))
+        for film in films:
+            moments[film.numbers[-1] - 2] = film.pushes(film.modes[-1])
+        tol = self.scene.balance.tol if self.scene.balance is not None else 1.0
+        lever = _moments(self.scene) * (load or 1.0) * 0.5 * self.scene.D
+        return np.array([fx + load, fy, *moments]), np.array([tol * load] * 2 + [lever] * moments.size)
+
+    def told(self, solution: Solution, q: Array) -> dict[str, Any]:
+        value = float(np.hypot(*q[:2])) / self.scene.clearance
+        return {"vary": "eccentricity", "value": value, "attitude_deg": math.degrees(math.atan2(q[1], q[0])), "tilts": q[2:]}
+
+
+@dataclass
+class ThrustPads:
+    """Coordinates: the film at the pivot (m), and a pad's pitch and, on a point, roll (rad)."""
+
+    scene: ThrustScene
+    sizes: Array = field(init=False)
+    free: NDArray[np.bool_] = field(init=False)
+
+    def __post_init__(self) -> None:
+        scene = self.scene
+        slope = scene.h_min / scene.side_lengths[0]
+        self.sizes = np.array([scene.h_min, slope, slope])
+        self.free = np.array(
+            [scene.balance is not None, scene.pitch is None, scene.roll is None and scene.pivot_radius is not None]
+        )
+
+    @property
+    def pitches(self) -> Sequence[int]:
+        return (1,)
+
+    def start(self) -> Array:
+        scene = self.scene
+        return np.array([scene.h_min, self.sizes[1] if scene.pitch is None else scene.pitch, scene.roll or 0.0])
+
+    def at(self, q: Array) -> Scene:
+        found = dict(zip(("h_min", "pitch", "roll"), map(float, q), strict=True))
+        return self.scene.model_copy(update={**found, "balance": None})
+
+    def films(self, scene: Scene, solution: Solution) -> Iterator[PadFilm]:
+        assert isinstance(scene, ThrustScene) and isinstance(solution.problem, LubricationProblem)
+        modes = [lambda x, y: 1.0 + 0.0 * (x + y), *scene.tilt_modes]
+        film = held(scene, solution)
+        yield PadFilm(film.build(solution.problem.grid.petsc_comm), film.model, solution.fields, modes, [0, 1, 2])
+
+    def misfit(self, solution: Solution, films: Sequence[PadFilm]) -> tuple[Array, Array]:
+        (film,) = films
+        pushes = np.array([film.pushes(mode) for mode in film.modes])
+        table = self.scene.balance
+        load = table.load / self.scene.pads if table is not None else pushes[0]
+        lever = _moments(self.scene) * abs(load or 1.0) * self.scene.side_lengths[0]
+        return pushes - np.array([load, 0.0, 0.0]), np.array([(table.tol if table else 1.0) * abs(load or 1.0), lever, lever])
+
+    def told(self, solution: Solution, q: Array) -> dict[str, Any]:
+        return {"vary": "h_min", "value": float(q[0]), "tilts": q[1:]}
+
+
+def _moments(scene: Any) -> float:
+    """What may be left of a moment: less than of the load, if that need not be met to the last digits."""
+    return max(MOMENTS, 0.01 * scene.balance.tol) if scene.balance is not None else MOMENTS
+
+
+def bearing_of(scene: Solvable) -> Bearing | None:
+    """The scene as coordinates, where it has some that are to be found."""
+    if isinstance(scene, TiltingPadScene) and (scene.balance is not None or scene.tilts is None):
+        return JournalPads(scene)
+    if isinstance(scene, ThrustScene) and scene.pivot_part is not None:
+        return ThrustPads(scene)
+    return None
