@@ -205,7 +205,8 @@ class Answers:
         if (balance := getattr(scene, "balance", None)) is not None and balance.tol < QUICK:
             scene = load_scene(scene, {"balance.tol": QUICK})  # type: ignore[arg-type]
         stopping = self.ask.stopping or {"eps1": QUICK}
-        return scene.with_shape(shape), replace(self.ask, stopping=stopping, start=self._near)
+        # So few points are solved in less time than it takes to see that half of them would do.
+        return scene.with_shape(shape), replace(self.ask, stopping=stopping, start=self._near, reduction=False)
 
     def _adapt(self, seconds: float, shape: tuple[int, ...], solution: Solution) -> None:
         """Fewer points on the first grid, and a start, where the machine cannot keep up with the sliders; more where it can."""
