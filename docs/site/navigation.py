@@ -33,7 +33,14 @@ SECTIONS: dict[str, list[str]] = {
         "docs/model",
         "docs/extrapolation",
     ],
-    "Reference": ["docs/reference/commands", "docs/guide/scenes", "docs/reference/api", "docs/numbers", "docs/guide/words", "docs/guide/versions"],
+    "Reference": [
+        "docs/reference/commands",
+        "docs/guide/scenes",
+        "docs/reference/api",
+        "docs/numbers",
+        "docs/guide/words",
+        "docs/guide/versions",
+    ],
     "Measured": ["docs/results", "benchmarks/README", "benchmarks/results/CHARTS", "docs/comparison", "docs/processors"],
     "Project": ["CONTRIBUTING", "docs/architecture", "docs/stability", "CHANGELOG"],
 }
