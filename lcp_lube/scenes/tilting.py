@@ -42,16 +42,17 @@ class TiltingPadScene(ShaftScene, WithEffects):
         super().check()
         if sorted(self.pivots_deg) != self.pivots_deg or self.pivots_deg[-1] - self.pivots_deg[0] >= 360.0:
             raise ValueError(f"pivots_deg = {self.pivots_deg}: ascending angles within a turn are needed")
-        turn = [*self.pivots_deg[1:], self.pivots_deg[0] + 360.0]
-        least = min(b - a for a, b in zip(self.pivots_deg, turn, strict=True))
-        if least - self.pad_deg < 360.0 / self.shape[0] * (1 - 1e-9):
-            most = least - 360.0 / self.shape[0]
-            raise ValueError(f"pad_deg = {self.pad_deg:g}: pads {least:g} degrees apart overlap; at most {most:g} is allowed")
-        if self.tilts is not None and len(self.tilts) != len(self.pivots_deg):
-            raise ValueError(f"tilts = {self.tilts}: {len(self.pivots_deg)} values are needed, one a pad")
         if self.pad_deg / 360.0 * self.shape[0] < 8:
             needed = math.ceil(2880 / self.pad_deg)
             raise ValueError(f"nx = {self.shape[0]}: pads of {self.pad_deg:g} degrees need {needed} points around")
+        turn = [*self.pivots_deg[1:], self.pivots_deg[0] + 360.0]
+        least = min(b - a for a, b in zip(self.pivots_deg, turn, strict=True))
+        if least - self.pad_deg < 360.0 / self.shape[0] * (1 - 1e-9):
+            most, mesh = least - 360.0 / self.shape[0], f" with nx = {self.shape[0]}, whose mesh is wider than the gap"
+            apart = f"pads {least:g} degrees apart " + ("overlap" if self.pad_deg >= least else f"touch{mesh}")
+            raise ValueError(f"pad_deg = {self.pad_deg:g}: {apart}; at most {most:g} is allowed")
+        if self.tilts is not None and len(self.tilts) != len(self.pivots_deg):
+            raise ValueError(f"tilts = {self.tilts}: {len(self.pivots_deg)} values are needed, one a pad")
         if self.motion is not None and self.tilts is None:
             raise ValueError("motion: pads do not follow in time; their tilts are needed, in which they are held")
         if self.balance is not None and self.balance.vary not in (None, "eccentricity"):
