@@ -15,7 +15,7 @@ export PRTE_MCA_rmaps_default_mapping_policy := :oversubscribe
 # The ranks are the parallelism; threads inside each would only compete.
 export OMP_NUM_THREADS := 1
 
-.PHONY: help setup demo test coverage test-rounding test-petsc-new boundscheck mutations lint format charts pictures docs links man dist clean
+.PHONY: help setup demo test coverage test-rounding test-petsc-new boundscheck mutations lint format charts pictures docs links man paper dist clean
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | expand -t 16
@@ -84,6 +84,10 @@ man: .venv/.docs ## a man page, build/lcp-lube.1
 	mkdir -p build
 	$(BIN)/argparse-manpage --module lcp_lube.cli.arguments --function parser_of_all --prog lcp-lube --project-name lcp_lube \
 	  --description "cavitation in lubricated bearings as a complementarity problem" --output build/lcp-lube.1
+
+paper: $(READY) ## the article, build/paper.pdf
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check pypandoc_binary typst
+	$(BIN)/python tools/paper.py
 
 dist: $(READY) ## a source archive and a wheel in dist/, and the wheel tried in an environment of its own
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dist]'
