@@ -27,6 +27,7 @@ from .coefficients import placed
 from .equations import MISFIT, Equations, cavity_of, check_film, fields_of, right_side, unknowns
 from .halved import Halved
 from .linearised import Linear
+from .near_films import NearFilms
 
 CANCELLED = 1e-10
 DIRECT = {"load", "friction", "p_max"}  # numbers that are made of no others in a film without a shaft
@@ -91,8 +92,17 @@ class Adjoint:
         return {name: own[name] + dot(np.abs(one), terms) for name, one in self.lambdas.items()}
 
     @cached_property
+    def near(self) -> NearFilms:
+        return NearFilms(self.equations, self.p, self.r, self.lambdas, self.parts, self.numbers)
+
+    @cached_property
     def _here(self) -> Array:
         return self.lagrangians(self.scene)
+
+    def _at(self, quick: bool) -> Array:
+        """L as `near` has it, or as it is: one differs from the other by rounding, which differences would see."""
+        found = self.near.lagrangians(self.scene) if quick else None
+        return self._here if found is None else found
 
     def _solve(self, rows: list[Array]) -> list[Array]:
         eq = self.equations
@@ -157,8 +167,15 @@ class Adjoint:
         else:
             scale = abs(value) or self.scale(key)
 
+            quick = [False]
+
             def near(a: float) -> Array:
-                return self._here if a == value else self.lagrangians(with_values(self.scene, {key: a}))
+                if a == value:
+                    return self._at(quick[0])
+                scene = with_values(self.scene, {key: a})
+                found = self.near.lagrangians(scene)
+                quick[0] = found is not None
+                return self.lagrangians(scene) if found is None else found
 
             slope, jump = differences(near, value, scale, sizes)
         return dict(zip(names, slope, strict=True)), dict(zip(names, jump, strict=True))

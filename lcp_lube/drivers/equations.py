@@ -16,9 +16,9 @@ from petsc4py import PETSc
 from ..base.parallel import Array
 from ..errors import InputError, nearest
 from ..problems.film import slopes
-from ..problems.film.cavity import VOID, cavity_sign
+from ..problems.film.cavity import VOID, cavitated
 from ..problems.film.edges import jumps_of
-from ..problems.film.forces import attitude
+from ..problems.film.forces import attitude, weights
 from ..problems.film.grooves import GroovedProblem
 from ..problems.film.line import known_fields
 from ..problems.film.lubrication import LubricationProblem
@@ -77,15 +77,15 @@ class Equations:
         model = film.model
         self.law, self._p_sides = model.law, tuple(side.p if side.kind == "open" else 0.0 for side in model.sides)
         film = Frozen(film, self.law) if self.law else film
-        self._model: Model = film.constant if self.law else model
-        places = None if near is None or near.grid.even else followed(near.grid, near._model, self._model)
+        self.model: Model = film.constant if self.law else model
+        places = None if near is None or near.grid.even else followed(near.grid, near.model, self.model)
         self._lent = type(solved) is LubricationProblem and not (self.turned or self.law or solved.held)
         if self._lent:
             self.constant: LubricationProblem = solved
         elif near is None or places is None:
             self.constant = film.build(comm)
         else:
-            self.constant = replace(self._model, places=places).build(near.grid.shape, comm)
+            self.constant = replace(self.model, places=places).build(near.grid.shape, comm)
         if dry is not None and self.constant.coefficients_for is not None and not self._lent:
             self.constant = self.constant.revised(dry)
         self.grid: Grid = self.constant.grid
@@ -152,7 +152,8 @@ class Equations:
         """dQ/dp (p in p_unit) and dQ/dr of one of `numbers` (`slopes.slope`). Collective."""
         problem = self.problem(p)
         name = FLIPPED.get(name, name) if self.turned else name
-        found = slopes.slope(problem, self.tangent(p, r), p / problem.p_unit, r, name, last)
+        tangent = None if name in weights(problem) else self.tangent(p, r)
+        found = slopes.slope(problem, tangent, p / problem.p_unit, r, name, last)
         return slopes.Slope(-found.p, -found.r) if self.turned and name in DRAGS else found
 
     def report(self, numbers: dict[str, float]) -> dict[str, float]:
@@ -273,9 +274,9 @@ def fields_of(solution: Solution) -> tuple[Array, Array]:
 def cavity_of(equations: Equations, p: Array, r: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Whether a point is cavitated, and whether it is about to change: p and r both vanish there. Collective."""
     reduce = equations.grid.reduce
-    cavity = cavity_sign(reduce, p, r) < 0
-    p_max = reduce.max(np.abs(p))
-    switching = (np.abs(p) <= VOID * p_max) & (np.abs(r) <= VOID)
+    cavity = cavitated(reduce, p, r)
+    small = VOID * reduce.largest(p)
+    switching = (p <= small) & (p >= -small) & (r <= VOID) & (r >= -VOID)
     if equations.given is not None:
         switching &= ~equations.given
         cavity &= ~equations.given
@@ -289,5 +290,9 @@ def unknowns(cavity: NDArray[np.bool_], p: Array, r: Array, p_unit: float) -> Ar
 
 def right_side(slopes_of: Mapping[str, slopes.Slope], weights: Mapping[str, float], cavity: NDArray[np.bool_]) -> Array:
     """dQ/dz of the adjoint equation, of a number that is made of parts with these weights."""
-    none = np.zeros(cavity.size)
-    return sum((w * np.where(cavity, -slopes_of[part].r, slopes_of[part].p) for part, w in weights.items()), none)
+    total: Array | None = None
+    for part, w in weights.items():
+        one = np.where(cavity, -slopes_of[part].r, slopes_of[part].p)
+        one *= w
+        total = one if total is None else total + one
+    return np.zeros(cavity.size) if total is None else total

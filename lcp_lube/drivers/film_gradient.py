@@ -7,6 +7,7 @@ discrete equations, whose numbers differ from those told by the grid's error (`p
 """
 
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,9 @@ from ..problems.film.slopes import giving
 from ..problems.film.strip import line_weights
 from ..problems.film.tangent import effective
 from ..problems.film.turned import TurnedProblem
+from ..problems.film.weighed import Weighed, can
 from ..problems.grid import Grid
+from ..registry import SMALL
 from .adjoint import Adjoint, Implicit
 from .equations import DRAGS, FLIPPED
 from .loop import Frozen
@@ -46,17 +49,21 @@ class FilmGradient:
         film: Any = Mirrored(adjoint.scene) if eq.turned else adjoint.scene
         model = Frozen(film, eq.law).constant if eq.law else film.model
         self.problem = eq.problem(adjoint.p)
-        slopes = model.film_slopes(eq.constant)
-        if eq.law is not None:
-            changed = LubricationProblem(
-                eq.grid, slopes, mu=1.0, U=0.0, p_unit=eq.constant.p_unit, p_sides=eq.constant.p_sides, p_c=0.0,
-                film=eq.constant.film,
-            )  # fmt: skip
-            slopes = effective(changed, eq.law, adjoint.p, eq._p_sides).scheme  # type: ignore[arg-type]
-        self.slopes: BoxScheme = slopes
+        self.model = model
         self.at_faces = model.scheme == "face", model.scheme != "upwind"  # whether void and Couette flow are those of faces
         self.mean_cubes = model.mean_cubes
         self.implicit = Implicit.of(adjoint)
+
+    @cached_property
+    def slopes(self) -> BoxScheme:
+        """Of the coefficients by the film."""
+        eq = self.adjoint.equations
+        slopes = self.model.film_slopes(eq.constant)
+        if eq.law is None:
+            return slopes
+        known = {name: getattr(eq.constant, name) for name in ("p_unit", "p_sides", "film")}
+        changed = LubricationProblem(eq.grid, slopes, mu=1.0, U=0.0, p_c=0.0, **known)
+        return effective(changed, eq.law, self.adjoint.p, eq._p_sides).scheme  # type: ignore[arg-type]
 
     def field(self, quantity: str) -> Array:
         """dQ/dh at the owned points of the solution's grid, unit of Q per m and m2 (1D: per m and m).
@@ -101,6 +108,10 @@ class FilmGradient:
 
     def _balance(self, rows: Array) -> Array:
         """rows' dG/dh, dealt to the points."""
+        constant = self.adjoint.equations.constant
+        if self.adjoint.equations.law is None and can(constant, self.model, SMALL):
+            weighed, unit = Weighed(constant, self.model.scheme, self.adjoint.p, self.adjoint.r, []), constant.scheme.flow_unit
+            return weighed.by_film(self.model.gap, rows / unit, constant.mu, constant.U, constant.p_sides)
         grid, s, adjoint = self.problem.grid, self.slopes, self.adjoint
         w = rows.reshape(grid.box)
         frame_p, frame_r = (grid.ghosted(a, outside=0.0) for a in (adjoint.p / self.problem.p_unit, adjoint.r))

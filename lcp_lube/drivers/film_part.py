@@ -86,6 +86,11 @@ class Part(Derived):
         lengths = (model.lengths[0], 0.5 * model.lengths[1])
         return replace(model, lengths=lengths, sides=half, exact=None, places=(x, y)), (nx, (ny + 1) // 2)
 
+    def grid(self, comm: PETSc.Comm | None = None) -> Grid:
+        """The part's points."""
+        model, shape = self._model()
+        return model.grid(shape, comm)
+
     def facts(self, comm: PETSc.Comm | None = None) -> Facts:
         model, shape = self._model()
         return model.facts(shape, comm)

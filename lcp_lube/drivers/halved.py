@@ -5,6 +5,7 @@ symmetric is J_half u = P' b/2 with z = P u, and J' alike.
 """
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from functools import cached_property
 from typing import Any
 
@@ -27,12 +28,30 @@ class Halved:
     def __init__(self, problem: LubricationProblem, cavity: Any, film: Solvable, M: Array | None = None):
         grid, part = problem.grid, Part(film, "mirror")
         self.problem, self.cavity, self.M = problem, cavity, M
-        half = part.build(grid.petsc_comm)
+        half = self._cut(part) or part.build(grid.petsc_comm)
         self._take, self._spread = Pick(grid, half.grid, *numbers(half.grid)), Pick(half.grid, grid, *part.places(grid))
         self.half = half if problem.dry is None or half.coefficients_for is None else half.revised(self._take(problem.dry))
         self._share = np.broadcast_to(np.where(sides(half.grid, ("mirror",))[3], 0.5, 1.0), half.grid.box).ravel()
         of_half = None if M is None else self._share * self._take(M)
         self._small = Linear(self.half, self._take(cavity.astype(float)) > 0.5, M=of_half)
+
+    def _cut(self, part: Part) -> LubricationProblem | None:
+        """Half of the problem's own coefficients, on one rank."""
+        whole, s = self.problem, self.problem.scheme
+        if whole.grid.comm.size > 1 or whole.dry is not None or s.storage is not None or s.held is not None:
+            return None
+        half = copy(whole)
+        half.grid = part.grid(whole.grid.petsc_comm)
+        half.__dict__.pop("_at_sides", None)  # the whole's
+        n = half.grid.box[0]
+        names = ("k_W", "k_E", "k_S", "k_N", "couette_W", "couette_E", "b_C", "b_W")
+        some = {name: np.array(getattr(s.rows(slice(0, n)), name)) for name in names}
+        some["k_N"][-1] = 0.0
+        if whole.grid.shape[1] % 2:  # the line on the mirror
+            for name in set(names) - {"k_S", "k_N"}:
+                some[name][-1] *= 0.5
+        half.scheme, half.held, half.shares_grid = s.changed(**some, c=s.c[:n], h=s.h[:n]), None, False
+        return half
 
     @cached_property
     def _whole(self) -> Linear:

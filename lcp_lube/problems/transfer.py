@@ -138,8 +138,11 @@ class Pick:
     """Values at the points of one grid taken from numbered points of another: line j, column i. Collective."""
 
     def __init__(self, source: Grid, target: Grid, j: NDArray[np.int64], i: NDArray[np.int64]):
-        self.source, self.target, self._at = source, target, (j, i)
+        self.source, self.target = source, target
+        self._at: tuple[NDArray[np.int64], ...] = (j, i)
         if target.comm.size == 1:
+            if np.array_equal(i, np.arange(source.shape[0])[None, :]) and j.shape[1] == 1:
+                self._at = (j[:, 0],)  # whole lines
             return
         natural = np.broadcast_to(j * source.shape[0] + i, target.box).ravel().astype(PETSc.IntType)
         self._from = PETSc.IS().createGeneral(source.dm.getAO().app2petsc(natural), comm=target.petsc_comm)

@@ -82,3 +82,58 @@ def loop_drag(
         east, push = face(choose, h[j, i], resting[j, i], moving[j, i], couette[j, i], b[j, i], r[j, i], p[j, i], beyond[j])
         total[i] += lines[j] * columns[i] * east + scale[j] * push
     return total.sum()
+
+
+@kernel
+def loop_weighed(weights: Array, p: Array, r: Array, k_x: Array, k_y: Array, wall: Array, void: Array, out: Array) -> None:
+    """Add to `out`, shape (weights, 2, columns), sums of weights times what the pressure and what the wall makes leave cells.
+
+    weights : shape (several, lines, columns). p, r : with a frame of neighbours. The others : at the faces.
+    """
+    ny, nx = weights.shape[1:]
+    flow, dragged = np.zeros(nx), np.zeros(nx)
+    for j in range(ny):
+        for i in range(nx):
+            here = p[j + 1, i + 1]
+            flow[i] = (k_x[j, i + 1] * (here - p[j + 1, i + 2]) - k_x[j, i] * (p[j + 1, i] - here)) + (
+                k_y[j + 1, i] * (here - p[j + 2, i + 1]) - k_y[j, i] * (p[j, i + 1] - here)
+            )
+            dragged[i] = (wall[j, i + 1] - void[j, i + 1] * r[j + 1, i + 1]) - (wall[j, i] - void[j, i] * r[j + 1, i])
+        for n in range(weights.shape[0]):
+            for i in range(nx):
+                out[n, 0, i] += weights[n, j, i] * flow[i]
+                out[n, 1, i] += weights[n, j, i] * dragged[i]
+
+
+@kernel
+def loop_by_film(
+    w: Array, p: Array, r: Array, k_x: Array, k_y: Array, wall: Array, void: Array,
+    along: Array, across: Array, of_wall: Array, of_void: Array, out: Array,
+) -> None:  # fmt: skip
+    """Into `out` what the sum of w times the cells' balances changes by with the film at each point, by its parts of the faces.
+
+    w, p, r : with a frame of neighbours. k_x, k_y, wall, void : derivatives by the film at the faces. along, of_wall, of_void :
+    parts of a column's west and east face that are the point's, shape (2, columns); across : of a line's south and north face.
+    """
+    ny, nx = out.shape
+    for j in range(ny):
+        for i in range(nx):
+            a, b = w[j + 1, i + 1], p[j + 1, i + 1]
+            west, east = w[j + 1, i] - a, a - w[j + 1, i + 2]
+            pressed = along[0, i] * west * k_x[j, i] * (p[j + 1, i] - b)
+            pressed += along[1, i] * east * k_x[j, i + 1] * (b - p[j + 1, i + 2])
+            pressed += across[0, j] * (w[j, i + 1] - a) * k_y[j, i] * (p[j, i + 1] - b)
+            pressed += across[1, j] * (a - w[j + 2, i + 1]) * k_y[j + 1, i] * (b - p[j + 2, i + 1])
+            dragged = of_wall[0, i] * west * wall[j, i] + of_wall[1, i] * east * wall[j, i + 1]
+            carried = of_void[0, i] * west * void[j, i] * r[j + 1, i] + of_void[1, i] * east * void[j, i + 1] * r[j + 1, i + 1]
+            out[j, i] = pressed + (dragged - carried)
+
+
+@kernel
+def loop_cubes(h: Array, columns: Array, lines: Array, slopes: bool) -> Array:
+    """h^3, or 3 h^2, times what belongs to each column and line."""
+    out = np.empty_like(h)
+    for j in range(h.shape[0]):
+        for i in range(h.shape[1]):
+            out[j, i] = (columns[i] * lines[j]) * (3.0 * h[j, i] ** 2 if slopes else h[j, i] * h[j, i] ** 2)
+    return out

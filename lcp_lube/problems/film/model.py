@@ -138,6 +138,11 @@ class Model:
         kinds = [[side.kind for side in self.sides[2 * k : 2 * k + 2]] for k in (0, 1)]
         return list(zip(self.lengths, kinds, edges, strict=True))
 
+    def grid(self, shape: Sequence[int], comm: PETSc.Comm | None = None) -> Grid:
+        """(nx,) or (nx, ny) points. Collective."""
+        ends = tuple((self.sides[k].kind, self.sides[k + 1].kind) for k in (0, 2))
+        return Grid(shape, self.lengths, comm, ends=ends, places=self.lines(shape), polar=self.polar)  # type: ignore[arg-type]
+
     def fewest_meshes(self) -> tuple[int, ...]:
         """Meshes a side from which a line of points lies on each straight edge."""
         if self.grooves or self.places is not None:
@@ -157,9 +162,8 @@ class Model:
         kind = GroovedProblem if self.grooves else LubricationProblem
         if self.U < 0:
             return TurnedProblem(self.mirrored.build(shape, comm), self.exact)
-        west, east, south, north = self.sides
-        shared, ends = grid is not None, ((west.kind, east.kind), (south.kind, north.kind))
-        grid = grid or Grid(shape, self.lengths, comm, ends=ends, places=self.lines(shape), polar=self.polar)
+        west = self.sides[0]
+        shared, grid = grid is not None, grid or self.grid(shape, comm)
         p_sides = tuple(side.p if side.kind == "open" else 0.0 for side in self.sides)
         film = self.film
         exact = self.integrals and grid.dim == 1 and self.scheme == "face" and not self.mean_cubes and not self.stored

@@ -73,28 +73,30 @@ def giving(problem: LubricationProblem, name: str) -> NDArray[np.bool_]:
     return (problem.held.owner == which - 1).ravel()
 
 
-def slope(problem: LubricationProblem, tangent: Tangent, p: Array, r: Array, name: str, last: bool = False) -> Slope:
+def slope(problem: LubricationProblem, tangent: Tangent | None, p: Array, r: Array, name: str, last: bool = False) -> Slope:
     """dQ/dp and dQ/dr of one of `numbers`. Collective.
 
     Parameters
     ----------
-    tangent : the film's equations linearised in p, which know how a fluid's coefficients change with it.
+    tangent : the film's equations linearised in p, which know how a fluid's coefficients change with it; integrals of the
+        pressure (`forces.weights`) need none.
     last : of points that tie for the largest pressure the last one has it, not the first.
     """
-    if name in ("friction", "friction_torque"):
-        lever = problem.grid.polar[0] + problem.grid.y if name == "friction_torque" and problem.grid.polar else 1.0
-        return _friction(problem, tangent, p, r, lever)
+    if (weight := weights(problem).get(name)) is not None:
+        grid = problem.grid
+        w = np.broadcast_to(weight(grid.x, grid.y), grid.box).ravel() * point_weights(grid)
+        return Slope(w * grid.cell * problem.p_unit, np.zeros(w.size))
     if name == "p_max":
         return _largest(problem, p, last)
     if name == "min_h":
         return Slope(np.zeros(p.size), np.zeros(p.size))
+    assert tangent is not None  # as these need it
+    if name in ("friction", "friction_torque"):
+        lever = problem.grid.polar[0] + problem.grid.y if name == "friction_torque" and problem.grid.polar else 1.0
+        return _friction(problem, tangent, p, r, lever)
     if name.startswith("flow_"):
         return _flow(problem, tangent, name.removeprefix("flow_"))
-    if name.startswith(("groove_flow_", "supply_flow_")):
-        return _given(problem, tangent, giving(problem, name))
-    grid = problem.grid
-    w = np.broadcast_to(weights(problem)[name](grid.x, grid.y), grid.box).ravel() * point_weights(grid)
-    return Slope(w * grid.cell * problem.p_unit, np.zeros(w.size))
+    return _given(problem, tangent, giving(problem, name))
 
 
 def _friction(problem: LubricationProblem, tangent: Tangent, p: Array, r: Array, lever: Any) -> Slope:

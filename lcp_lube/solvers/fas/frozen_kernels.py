@@ -124,13 +124,21 @@ def transposed_residual(
     """c - J' l at all of the rank's points; none where a pressure is held."""
     for n in range(l.shape[0]):
         for m in range(1, l.shape[1] - 1):
-            for i in range(1, l.shape[2] - 1):
-                here, east = l[n, m, i], l[n, m, i + 1]
-                flows = (kx[m, i] * (here - l[n, m, i - 1]) + kx[m, i + 1] * (here - east)) + (
-                    ky[m, i] * (here - l[n, m - 1, i]) + ky[m + 1, i] * (here - l[n, m + 1, i])
-                )
-                passed = east if carry is None else carry[m, i] * east
-                rest = c[n, m, i] - (flows if full[m, i] else here - passed)
-                if free is not None:
-                    rest = rest if free[m, i] else 0.0
-                out[n, m, i] = rest
+            transposed_row(l[n], full, free, kx, ky, c[n], carry, m, out[n, m])
+
+
+@kernel
+def transposed_row(
+    l: Array, full: Mask, free: Mask | None, kx: Array, ky: Array, c: Array, carry: Array | None, m: int, out: Array
+) -> None:
+    """The same of one row and right-hand side."""
+    for i in range(1, l.shape[1] - 1):
+        here, east = l[m, i], l[m, i + 1]
+        flows = (kx[m, i] * (here - l[m, i - 1]) + kx[m, i + 1] * (here - east)) + (
+            ky[m, i] * (here - l[m - 1, i]) + ky[m + 1, i] * (here - l[m + 1, i])
+        )
+        passed = east if carry is None else carry[m, i] * east
+        rest = c[m, i] - (flows if full[m, i] else here - passed)
+        if free is not None:
+            rest = rest if free[m, i] else 0.0
+        out[i] = rest

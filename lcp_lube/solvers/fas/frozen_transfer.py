@@ -6,7 +6,7 @@ import numpy as np
 from ...base.compiled import kernel
 from ...base.parallel import Array
 from .fronts import reforms
-from .frozen_kernels import Mask
+from .frozen_kernels import Mask, transposed_row
 from .transfer import coarse_rows, interpolate_row, mix, restrict_row, share, west_shares
 
 
@@ -54,15 +54,16 @@ def correct(z: Array, full: Mask, coarse: Array, kx: Array, ky: Array, y0: int, 
 
 
 @kernel
-def restrict(r: Array, full: Mask, kx: Array, ky: Array, out: Array, y0: int, by_x: bool, by_y: bool, ring: bool) -> None:
-    """Add to `out` what the residual r of the full points gives to the coarse ones: `correct` with fronts, transposed.
-
-    r is lost.
-    """
-    nx, size = r.shape[1] - 2, out.shape[1]
+def restrict(
+    l: Array, full: Mask, free: Mask | None, kx: Array, ky: Array, c: Array, carry: Array | None,
+    out: Array, y0: int, by_x: bool, by_y: bool, ring: bool,
+) -> None:  # fmt: skip
+    """Add to `out` what c - J' l of the full points gives to the coarse ones: `correct` with fronts, transposed."""
+    nx, size = l.shape[1] - 2, out.shape[1]
     w, line, part, v = np.zeros(size - 1), np.zeros(size), np.zeros(nx + 2), np.zeros(nx + 2)
-    for m in range(1, r.shape[0] - 1):
-        here = r[m]
+    here = np.zeros(nx + 2)
+    for m in range(1, l.shape[0] - 1):
+        transposed_row(l, full, free, kx, ky, c, carry, m, here)
         for i in range(1, nx + 1):
             if not full[m, i]:
                 here[i] = 0.0
