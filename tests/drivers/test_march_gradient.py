@@ -78,3 +78,18 @@ def test_what_has_no_derivative_in_time_is_said(changes):
 def test_the_films_own_derivative_is_refused_before_the_solve(name, what):
     with pytest.raises(InputError, match=f"not known {what}"):
         check(load_scene(name), film=True)
+
+
+def test_by_the_speed_of_a_texture_the_mean_of_both_sides_is_the_limit_of_differences():
+    """At the end its edges lie on points of the grid: a kink, by which central differences err in proportion to their step."""
+    scene, names = load_scene("moving_texture", n=60, motion={"t_end": 0.01, "steps": 12}), ["load", "mean_load", "friction"]
+    trace = Trace()
+    with solve(scene, watch=trace) as solution:
+        found = gradients(scene, solution, names, ["U"], trace)
+    U, errors = values_of(scene)["U"], []
+    for step in (1e-5, 1e-6):
+        low, high = (marched(with_values(scene, {"U": U * (1 + way * step)}), names) for way in (-1, 1))
+        slopes = (high - low) / (2 * U * step)
+        errors.append(np.array([abs(one.gradient["U"] / slope - 1) for one, slope in zip(found, slopes, strict=True)]))
+    assert found[0].one_sided["U"] > 1e-2 * abs(found[0].gradient["U"])
+    assert errors[0].max() > 1e-5 > errors[1].max()  # a kink is found by differences of L, to some 1e-6
