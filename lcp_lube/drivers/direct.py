@@ -182,7 +182,8 @@ class Run:
             # An interior method begins anew; another may take up what was reached, if it is not zero everywhere.
             anything = self.problem.reduce.max(np.concatenate([np.abs(values) for values in reached.values()]))
             start = None if entry.interior or anything == 0.0 else reached
-            if entry.nested and not entry.interior and self.facts.periodic[0] and self.facts.dim == 2:
+            ring = self.facts.periodic[0] and self.facts.dim == 2 and not self.facts.moving
+            if entry.nested and not entry.interior and ring:
                 start = self._from_coarse(name)
             with recipe(inner) as self.recipe:
                 method = entry.load()(Job(self.problem, self.stages, system, {}, self.stopping, start))

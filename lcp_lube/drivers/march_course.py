@@ -52,6 +52,7 @@ def check_march(scene: Scene) -> None:
         (any(one.open for one in model.supplies), "supplies whose pressures follow"),
         (model.U < 0, "a wall that moves to smaller x (give the mirror image, with -U)"),
         (hasattr(scene, "observer"), "events"),
+        ((getattr(scene, "motion", None) and scene.motion.fill) not in (None, 1.0), "a film that begins partly filled"),  # type: ignore[attr-defined]
     ):
         if found:
             raise InputError(f"scene {scene.name}: [motion]: no derivatives in time through {what}")

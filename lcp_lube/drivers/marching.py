@@ -22,7 +22,7 @@ from .march import March
 from .march_file import MarchFile
 from .plan import plan
 from .rotor import Rotor
-from .step import TimeStep, check_content, contents
+from .step import TimeStep, check_content, check_room, contents
 
 SOME = 0.37  # of t_end: when edges are looked at that may have moved
 FIRST = 1e-3  # of t_end: the first step, where an error estimate says how long the others are
@@ -105,9 +105,14 @@ class Run:
 
     def _begin(self, model: Any, ask: Ask) -> None:
         """The film at t = 0."""
-        if self.table.start == "full":
-            self.march.begin(contents(self.march.grid, model, None), None)
+        fill = self.table.fill or (1.0 if self.table.start == "full" else None)
+        if fill is not None:
+            full, none = contents(self.march.grid, model, None), np.zeros(self.march.grid.local_size)
+            self.march.begin(fill * full, None if fill == 1 else {"p": none, "r": none + 1.0 - fill})
             return
+        if model.sealed or not model.fed:
+            why = "no side has a pressure" if model.sealed else "nothing feeds the film"
+            raise InputError(f"{self.scene.name}: {why}: that at t = 0 is not determined; give motion.fill")
         solution = self.inner(TimeStep(self.scene, model, self.march.grid), ask)
         if not solution.converged:
             raise InputError(f"{self.scene.name}: no steady film at t = 0: {solution.message}; motion.start = full needs none")
@@ -190,12 +195,17 @@ class Run:
         def film_at(e: Any) -> Solution:
             model = self.models(t, None if e is None else (float(e[0]), float(e[1])))
             self.model = replace(model, stored=term, places=march.grid.places)
+            if model.sealed:
+                check_room(march.grid, self.model, t, self.scene.name)
             found = near if not solves else solves[-1].fields
             problem = self.last.problem if self.last is not None else None
             known = self.last.settings if self.last is not None else {}
-            start = Start(problem, found, known) if problem is not None and found is not None else None
             step = TimeStep(self.scene, self.model, march.grid)
+            own = None if problem is not None or found is None else self._at(t, lambda: step.build(self.ask.comm))
+            start = None if found is None else Start(problem or own, found, known)  # type: ignore[arg-type]
             solves.append(self._at(t, lambda: self.inner(step, replace(self.ask, start=start))))
+            if own is not None:
+                own.destroy()
             return solves[-1]
 
         def stiffness(solution: Solution) -> Any:
@@ -251,7 +261,8 @@ class Run:
     def worst(self) -> Certificate:
         """Of all steps."""
         found = self.certificates
-        measures = {name: max((c.measures[name] for c in found), key=_badness) for name in found[0].measures}
+        names = dict.fromkeys(name for c in found for name in c.measures)
+        measures = {name: max((c.measures.get(name, 0.0) for c in found), key=_badness) for name in names}
         lowest = {name: min(c.extremes[name] for c in found) for name in found[0].extremes}
         return Certificate(measures, found[0].tol, lowest)
 

@@ -9,6 +9,7 @@ from petsc4py import PETSc
 from ..base.parallel import Array
 from ..errors import InputError
 from ..problems.facts import Facts
+from ..problems.film.flows import point_weights
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.stored import mean_film
@@ -16,7 +17,8 @@ from ..problems.grid import Grid
 from ..problems.solution import Fields
 from ..scenes.scene import Derived
 
-FULLEST = 1.0 + 1e-9  # void fraction beyond which a cell's content is negative
+LEAST_ROOM = 1e-9  # of a sealed film, for void
+FULLEST = 1.0 + 1e-5  # void fraction beyond which a cell's content is negative, by more than a cycle may leave
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,22 @@ def contents(grid: Grid, model: Model, fields: Fields | None, problem: Any = Non
     return (h + cells.get("lift", 0.0)) * (1.0 - fields["r"]) * cells.get("density", 1.0)
 
 
+def check_room(grid: Grid, model: Model, t: float, name: str) -> None:
+    """Raise InputError where a sealed film of constant density has no room for its oil, and none to spare. Collective.
+
+    With void in it the step's equations have one solution. Full it has none, or one for every level of the pressure.
+    """
+    assert model.stored is not None  # as a time step has
+    room = model.stored.weight * mean_film(grid, model.film).ravel()
+    weights = point_weights(grid)
+    left, whole = grid.reduce.sum(weights * (room - model.stored.old)), grid.reduce.sum(weights * room)
+    if left <= LEAST_ROOM * whole:
+        raise InputError(
+            f"{name}: t = {t:g} s: no side has a pressure, and the film has no room for its oil ({-left / whole:.2g} of it too "
+            "little): full of a fluid that does not give way it has no pressure, or any; less motion.fill"
+        )
+
+
 def check_content(grid: Grid, r: Array, t: float, dt: float, name: str) -> None:
     """Raise InputError, with time and place, where a cell's content is negative. Collective."""
     largest = grid.reduce.max(r)
@@ -66,5 +84,5 @@ def check_content(grid: Grid, r: Array, t: float, dt: float, name: str) -> None:
     where = f"x = {x:g}" + (f", y = {y:g}" if grid.dim == 2 else "")
     raise InputError(
         f"{name}: t = {t:g} s: the content at {where} m is negative ({1 - largest:.2g} of the film): the step of {dt:g} s is "
-        "too large; take more steps, or motion.tol"
+        "too large; take more steps, motion.tol, or motion.scheme = euler, which empties no cell below nothing"
     )

@@ -176,6 +176,7 @@ class RectangleScene(FilmScene):
             scheme=self.scheme,
             mean_cubes=self.mean_cubes,
             exact=self.exact,
+            in_time=getattr(self, "motion", None) is not None,
             supplies=self._supplies(),  # at once: they may be all that sets the pressure
         )
 

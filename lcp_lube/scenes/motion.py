@@ -33,6 +33,9 @@ class MotionTable(Measured):
     )
     scheme: Literal["bdf2", "euler"] = Field("bdf2", description="two-step backward difference, or implicit Euler")
     start: Literal["steady", "full"] = Field("steady", description="at t = 0 the film's steady answer, or a film without void")
+    fill: Annotated[Finite, Field(gt=0, le=1)] | None = Field(
+        None, description="at t = 0 this part of the film is oil, everywhere, in place of `start`"
+    )
     journal: Pair | None = Field(None, description="where the journal is: [X, Y], formulas of t")
     file: str | None = Field(None, description="where the journal is: a .csv with rows t, X, Y, a cubic spline between them")
     free: bool = Field(False, description="the journal goes where load, film and its mass take it")

@@ -29,7 +29,8 @@ def open_pressures(problem: LubricationProblem) -> list[float | None]:
 def ambient(problem: LubricationProblem) -> float:
     """The smallest pressure at a side, or of a supply where no side has one, Pa above p_c."""
     at_sides = [p for p in open_pressures(problem) if p is not None]
-    return min(at_sides or [supply.p for supply in problem.held.supplies])  # type: ignore[union-attr]
+    held = problem.held.supplies if problem.held is not None else []
+    return min(at_sides or [supply.p for supply in held] or [0.0])  # p_c of a film that nothing opens
 
 
 def forces(problem: LubricationProblem, p_pa: Array, known: Known | None = None) -> dict[str, Any]:

@@ -78,6 +78,7 @@ class Model:
     places: Places | None = None  # of the lines of points; None: on the film's straight edges, if it has any
     effects: tuple[Effect, ...] = ()  # what else makes its coefficients depend on the answer; `build` leaves them out
     stored: Stored | None = None  # by the cells, in a time step
+    in_time: bool = False  # what its cells store goes on: then it may be sealed
     extras: Callable[[dict[str, Any]], dict[str, Any]] | None = None  # the bearing's own numbers, made of the film's
 
     def __post_init__(self) -> None:
@@ -88,11 +89,21 @@ class Model:
             inlet = "west" if self.U >= 0 else "east"
             if side.r and (name != inlet or side.p):
                 raise InputError(f"sides.{name}.r = {side.r:g}: void enters by the {inlet} side alone, and there at p = p_c")
-        pressures = [side.p for side in used.values() if side.kind == "open"] + [s.p_s or s.p or 1.0 for s in self.supplies]
-        if not pressures:
+        if self.sealed and not self.in_time:
             raise InputError("no side has a pressure: without one the level of p is open; give at least one side a p")
         if self.U < 0 and self.grooves:
             raise InputError(f"U = {self.U:g}: a film with axial grooves moves to larger x; turn it round")
+
+    @property
+    def sealed(self) -> bool:
+        """Whether nothing holds a pressure anywhere: then what the film stores must leave it some void."""
+        return not self.supplies and not self.grooves and all(s.kind != "open" for s in self.sides[: 2 * len(self.lengths)])
+
+    @property
+    def fed(self) -> bool:
+        """Whether oil comes in where the film goes round, or none has to."""
+        fed = bool(self.grooves or self.supplies) or any(side.kind == "open" and side.p > 0 for side in self.sides)
+        return fed or not self.U or self.sides[0].kind != "periodic"
 
     @property
     def film(self) -> Film:
@@ -156,8 +167,7 @@ class Model:
         ------
         InputError : more ranks than the grid can be dealt to, a film that is not positive, one that nothing feeds.
         """
-        fed = self.grooves or self.stored or self.supplies or any(side.kind == "open" and side.p > 0 for side in self.sides)
-        if self.U and self.sides[0].kind == "periodic" and not fed:
+        if not self.fed and not self.in_time:
             raise InputError("periodic along the flow, and no side above the cavitation pressure: nothing feeds the film")
         kind = GroovedProblem if self.grooves else LubricationProblem
         if self.U < 0:

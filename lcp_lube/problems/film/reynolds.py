@@ -244,11 +244,11 @@ def coefficients(
     last = None
     west, east, south, north = (mask.any() for mask in sides(grid, ("closed", "mirror")))
     # Column sums stay >= 0, those of A and B are 0 in the cells away from open sides. b_C stays at a closed east side: in
-    # every solution with flow r is 0 there, as what arrives must be pressed back.
+    # every steady solution with flow r is 0 there, as what arrives must be pressed back; what is stored needs no such help.
     if west:
         k_W[:, 0] = wall[:, 0] = 0.0
     if east:
-        last = None if nodal else void[:, -1].copy()
+        last = 0.0 * void[:, -1] if stored else None if nodal else void[:, -1].copy()
         k_E[:, -1] = wall[:, -1] = 0.0
     if south:
         k_S[0] = 0.0
