@@ -29,6 +29,7 @@ FIRST = 1e-3  # of t_end: the first step, where an error estimate says how long 
 LEAST = 1e-9  # of t_end: the shortest step
 RECENT, MANY, SWEEPS = 10, 2.0, 16  # steps that are looked at, iterations a solve that are many, sweeps that then come first
 REST = 0.05  # of multigrid's residual in a step's guess may be left: that is far below the error of the step's formula
+EPS1 = 1e-9  # of multigrid: its root bounds what the certificate lets a step leave (other methods' is 1e-4)
 SHARE = 0.01  # of t_end: in shorter steps an error of the rates counts by its part of that time
 REPEAT = 2.0  # times the tolerance: the error beyond which a step is taken again
 TOLD = ("load", "force", "moment", "p_max", "min_h", "cavitated_fraction", "friction")  # of a step, for the history
@@ -72,8 +73,9 @@ class Run:
             self.may_sweep = "sweeps" not in ask.options
             ask = replace(ask, options={"sweeps": 0, **ask.options})
         coupled = first.effects or (first.law is not None and first.law.dowson_higginson)
-        if chosen.method == "fas" and self.rotor is None and not coupled:  # those want an answer to the last digit
-            ask = replace(ask, options={"rest": REST, **ask.options})
+        loose = chosen.method == "fas" and self.rotor is None and not coupled  # those want an answer to the last digit
+        if loose and ask.options.get("rest", REST):
+            ask = replace(ask, options={"rest": REST, **ask.options}, stopping=ask.stopping or {"eps1": EPS1})
         self.ask = replace(ask, method=chosen.method, implied=not named)
         self.steps: list[Step] = []
         self.certificates: list[Certificate] = []
