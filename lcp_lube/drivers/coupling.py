@@ -30,6 +30,7 @@ from .levels import level_shapes
 from .loop import SETTLED, Loop
 
 ROUNDED = 2.0**-50  # relative error of p made of q, at most
+IN_TIME = (1e-2, 5e-5)  # of what a time step changes, and at most: change of its coefficients at which they count as found
 NESTED_ABOVE = 2_000  # points from which the fields are first found on coarser grids
 
 
@@ -74,7 +75,7 @@ def _settled_on(scene: Solvable, ask: Ask, inner: Inner, file: CouplingFile) -> 
             coarse = _coarser(scene, inside, inner, loop, file)
             known = _taken(loop, coarse.problem) if coarse is not None else None
         begin = loop.vector(known or neutral(loop.effects, loop.h.size))
-    loop.settle(begin, _settled(ask), lambda: file.save(loop))
+    loop.settle(begin, _settled(ask, loop), lambda: file.save(loop))
     if loop.solution is None or (ask.certify and loop.answer is not None):  # all of its films were taken from the file
         loop.again(ask.certify)
     if coarse is not None:
@@ -94,7 +95,8 @@ def _reduced(ask: Ask, law: Law | None) -> Ask:
 def _known(loop: Loop) -> Cells | None:
     """The fields that a neighbour's answer was solved with, on this grid."""
     near = loop.ask.start
-    return None if near is None else _taken(loop, near.problem)
+    known = None if near is None else _taken(loop, near.problem)
+    return loop.foreseen(known, near) if known is not None and loop.model.stored is not None else known  # type: ignore[arg-type]
 
 
 def _taken(loop: Loop, problem: object) -> Cells | None:
@@ -129,9 +131,15 @@ def _coarser(scene: Solvable, ask: Ask, inner: Inner, loop: Loop, file: Coupling
     return found
 
 
-def _settled(ask: Ask) -> float:
-    """Relative change of the coefficients at which they count as found: by the eps1 asked for, not by a method's own."""
-    return SETTLED * ask.stopping_for((1e-8, 1e-8)).eps1
+def _settled(ask: Ask, loop: Loop) -> float:
+    """Relative change of the coefficients at which they count as found: by the eps1 asked for, not by a method's own.
+
+    In a time step as far as its formula's error makes sense of it, a part of what the step changes: nothing is lost by that, as
+    what cells store has the very density that flows.
+    """
+    stored, settled = loop.model.stored, SETTLED * ask.stopping_for((1e-8, 1e-8)).eps1
+    in_time = stored is not None and not stored.exact and ask.stopping is None
+    return max(settled, min(IN_TIME[0] * loop.moved, IN_TIME[1])) if in_time else settled
 
 
 def _loose(ask: Ask) -> dict:
@@ -164,9 +172,9 @@ def _told(ask: Ask, loop: Loop) -> Solution:
                 problem.more_measures |= told.measures
                 failure = failure or told.failure
         problem.more_measures["coupling"] = loop.change
-        if failure and loop.change <= _settled(ask):
+        if failure and loop.change <= _settled(ask, loop):
             outcome, message = Outcome.NO_SOLUTION, failure
-        elif solution.converged and not loop.change <= _settled(ask):
+        elif solution.converged and not loop.change <= _settled(ask, loop):
             outcome = Outcome.MAX_ITERATIONS
             message = f"the coefficients still change by {loop.change:.1e} after {loop.solves} films ({', '.join(loop.names)})"
         elif not solution.converged:

@@ -92,6 +92,7 @@ class Loop:
         self.times: dict[str, float] = {}
         self.rescued: Solution | None = None
         self.solves, self.work, self.change = 0, 0, np.inf
+        self.moved = 0.0  # how far a time step is expected to change the fields, as a vector
         self.answer: Answer | None = None
         self.beyond = False  # whether no pressure carries the last film's flow
         self.start: Solution | Start | None = ask.start
@@ -158,6 +159,15 @@ class Loop:
         with np.errstate(all="ignore"):
             self.answer = answer(self.base, self.law, cells, by, p, new.fields["r"], self.p_sides)
         return bool(np.isfinite(self.base.reduce.max(p)))
+
+    def foreseen(self, cells: Cells, near: Any) -> Cells:
+        """What the effects make of the fields that a time step is expected to end with; cells: of the step before."""
+        p = self.law.pressure(near.fields["p"] * near.problem.p_unit)
+        with np.errstate(all="ignore"):
+            self.answer = answer(self.base, self.law, cells, self.by(cells), p, near.fields["r"], self.p_sides)
+            found, self.answer = self.made(), None
+        self.moved = self.base.reduce.max(np.abs(self.vector(found) - self.vector(cells)))
+        return found
 
     def made(self) -> Cells:
         """The fields that the effects make of the last answer."""

@@ -191,7 +191,7 @@ class Run:
     def _step(self, t: float, dt: float) -> tuple[Solution, Any, str, list[list[Step]]]:
         """The film at the step's end, where the journal is, why it has no place, and each solve's steps. Collective."""
         march, formula = self.march, self.march.formula(dt)
-        term, near = march.term(formula), march.guess(dt)
+        term, near = replace(march.term(formula), exact=self.rotor is not None), march.guess(dt)
         solves: list[Solution] = []
 
         def film_at(e: Any) -> Solution:

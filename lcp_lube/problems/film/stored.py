@@ -30,6 +30,7 @@ class Stored:
     weight : of the contents sought, 1/s.
     old : m/s, at this rank's points of `grid`, that of the whole march.
     first, step : the film that is solved is a part of that one: its column i is column first + step i there, counted round.
+    exact : what hangs on the step's answer needs its last digit.
     """
 
     weight: float
@@ -37,6 +38,7 @@ class Stored:
     grid: Grid
     first: int = 0
     step: int = 1
+    exact: bool = False
 
     def on(self, grid: Grid) -> Array:
         """`old` at the owned points of the film's own grid, shape `grid.box`. Collective."""
