@@ -47,7 +47,7 @@ class GroovedJournalScene(ShaftScene, WithEffects):
     dam_width: Annotated[float, Field(gt=0, le=1)] = Field(0.75, description="width of the dam over the bearing's")
     film: list[FilmPart] = Field([], description="shapes that are added to the film; x from the first groove's edge")
     supply: list[SupplyTable] = Field([], description="supplies inside the film, beside the grooves; pressures are absolute")
-    balance: BalanceTable | None = Field(None, description="load to carry; eccentricity and attitude are found for it")
+    balance: BalanceTable | None = Field(None, description="load to carry; eccentricity and open attitude follow")
 
     def check(self) -> None:
         super().check()
