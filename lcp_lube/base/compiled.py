@@ -1,5 +1,6 @@
 """Loops that cannot be array arithmetic: compiled by numba where it is installed, the same Python where it is not."""
 
+import sys
 from collections.abc import Callable
 from functools import cache
 from importlib.util import find_spec
@@ -38,7 +39,27 @@ def _machine_code(function: Kernel, **how: Any) -> Kernel:
         from numba import njit
     except ImportError:
         return function
+    _announce()
     try:
         return cast(Kernel, njit(cache=True, **how)(function))
     except RuntimeError:  # numba found no directory for its cache
         return cast(Kernel, njit(**how)(function))
+
+
+@cache
+def _announce() -> None:
+    """Have a terminal told once when loops are compiled that no cache has: some 20 s, once for an installation."""
+    from numba.core import event
+
+    class Told(event.Listener):
+        yet = False
+
+        def on_start(self, event: Any) -> None:
+            if not self.yet and sys.stderr.isatty():
+                print("lcp-lube: loops are compiled, once for this installation; about 20 s", file=sys.stderr, flush=True)
+            self.yet = True
+
+        def on_end(self, event: Any) -> None:
+            """Nothing more."""
+
+    event.register("numba:compile", Told())

@@ -161,3 +161,21 @@ def test_output_of_a_pipe_has_no_trace_of_it(tmp_path: Path) -> None:
     os.close(theirs)
     os.close(ours)
     assert done.returncode == 0 and b"\x1b" not in done.stdout and b"converged" in done.stdout
+
+
+def test_compilation_is_told_on_a_terminal_once(tmp_path: Path) -> None:
+    """With an empty cache, and not again from a full one."""
+    pytest.importorskip("numba")
+    program = (
+        "from lcp_lube.base.compiled import compiled; from kernels import one, two; compiled(one)(1.0); compiled(two)(1.0)"
+    )
+    (tmp_path / "kernels.py").write_text("def one(x):\n    return x + 1.0\n\n\ndef two(x):\n    return x + 2.0\n")
+    for times in (1, 0):
+        ours, theirs = pty.openpty()
+        environment = {**ENVIRONMENT, "PYTHONPATH": f"{ENVIRONMENT.get('PYTHONPATH', '')}{os.pathsep}{tmp_path}"}
+        done = subprocess.run([sys.executable, "-c", program], cwd=Path(__file__).parents[2], env=environment, stderr=theirs)
+        os.write(theirs, b"end")
+        shown = os.read(ours, 4096)
+        os.close(theirs)
+        os.close(ours)
+        assert done.returncode == 0 and shown.count(b"loops are compiled") == times, shown
