@@ -16,8 +16,7 @@ from .ask import Ask
 # the last digits at any film ratio. The rule looks at the points alone, not at what the process has loaded: a scene is always
 # solved in the same way.
 FEW = 10_000
-SMALL_RING = 200_000  # the same for a film that is periodic along the flow
-LARGE_RING = 60_000  # points from which such a film is solved by multigrid, in as many cycles as an open one and three more
+SMALL_RING = 200_000  # points up to which the active set's system is solved directly in a film that is periodic along the flow
 DIN_ONLY = {"r0", "mu", "conditions"}  # flags that only an interior method has a use for
 
 
@@ -99,7 +98,7 @@ def _suits_multigrid(facts: Facts) -> bool:
     """Whether nonlinear multigrid is the fastest: in 2D, its loops compiled, nobody having asked for an inner solver."""
     plane = facts.kind == "lubrication" and facts.dim == 2
     # A ring's coarser grids need even numbers of points; one that is hardly fed stalls at once and is handed over.
-    ring = facts.periodic == (True, False) and facts.size > LARGE_RING and facts.shape[0] % 8 == 0
+    ring = facts.periodic == (True, False) and facts.shape[0] % 8 == 0
     suits = plane and (ring or not any(facts.periodic))
     return suits and has_numba() and not wants_ksp()
 

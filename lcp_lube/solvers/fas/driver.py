@@ -68,6 +68,9 @@ class Fas(Cycles):
         self._harmonic, self._truncation = options.weights == "harmonic", TRUNCATIONS[options.truncation]
         with self.stages("assembly"):
             self._levels = levels.hierarchy(finest.finest(problem), self._harmonic)
+        # A corrected pressure counts beside a corrected flow of void as the flow that it drives: units of pressure are any.
+        driven = 2.0 * (problem.reduce.sum(problem.scheme.k_W) + problem.reduce.sum(problem.scheme.k_S)) / problem.size
+        self._unit = 1.0 / driven if driven > 0.0 else 1.0
         self._begin(start is not None)
         self._c_norm = problem.reduce.norm(problem.scheme.c) if problem.held is None else self._norms()[0]
         h = problem.scheme.h
@@ -250,7 +253,8 @@ class Fas(Cycles):
         new, old = (coarse.part(self._seen(coarse, z)) for z in (coarse.z, coarse.old))
         fine = (level.z, new, old, level.kx, level.ky)
         at_supplies = None if level.held is None else level.z[level.held]
-        self._correction = self._transfer.correct(*fine, *where, self._harmonic, self._truncation)  # type: ignore[arg-type]
+        rules = (self._harmonic, self._truncation, level.periodic[0], self._unit)
+        self._correction = self._transfer.correct(*fine, *where, *rules)  # type: ignore[arg-type]
         if level.held is not None:
             level.z[level.held] = at_supplies
         level.share(level.z)
@@ -262,10 +266,10 @@ class Fas(Cycles):
         """Sweeps near the fronts; in a time step, in which these have moved by some cells, twice as many twice as far."""
         front, width = ((1 if level.carry is None else 2) * n for n in (self.options.front, self.options.width))
         # What lies beyond a periodic side, or is another rank's, must be new at each sweep: else fronts that cross it wander.
-        parts = front if any(level.periodic) or level.split else 1
+        ring, parts = level.periodic[0], front if level.periodic[1] or level.split else 1
         for count in (front // parts + (n < front % parts) for n in range(parts)):
             arrays = (level.z, level.kx, level.ky, level.c)
-            level.work += self._fronts.relax_front(*arrays, count, width, level.carry, level.held, level.slips)
+            level.work += self._fronts.relax_front(*arrays, count, width, level.carry, level.held, level.slips, ring)
             level.share(level.z)
 
     def _relax(self, level: Any, sweeps: int, down: bool) -> None:
@@ -274,19 +278,21 @@ class Fas(Cycles):
         That makes up for what these did not hear of: the factor is that of one rank, where without it it doubles.
         """
         arrays = (level.z, level.kx, level.ky, level.c)
-        for count in [1] * sweeps if level.periodic[0] or level.held is not None else [sweeps] * bool(sweeps):
-            if level.held is not None:
-                self._tools.held.sweep(*arrays, level.spans, 1, level.z.shape[0], down, level.carry)
-            else:
-                self._kernels.sweep(*arrays, count, down, level.carry)
+        ring = level.periodic[0]
+        if level.held is not None:
+            for _ in range(sweeps):
+                self._tools.held.sweep(*arrays, level.spans, 1, level.z.shape[0], down, level.carry, ring)
+                level.share(level.z)
+        elif sweeps:
+            self._kernels.sweep(*arrays, sweeps, down, level.carry, ring)
             level.share(level.z)
         if sweeps and level.split:
             for first in (0, level.z.shape[0] - BORDER - 2):
                 if level.held is not None:
-                    self._tools.held.sweep(*arrays, level.spans, first + 1, first + BORDER, down, level.carry)
+                    self._tools.held.sweep(*arrays, level.spans, first + 1, first + BORDER, down, level.carry, ring)
                     continue
                 rows, faces = slice(first, first + BORDER + 2), slice(first, first + BORDER + 3)
                 carry = None if level.carry is None else level.carry[rows]
-                self._kernels.sweep(level.z[rows], level.kx[rows], level.ky[faces], level.c[rows], 1, down, carry)
+                self._kernels.sweep(level.z[rows], level.kx[rows], level.ky[faces], level.c[rows], 1, down, carry, ring)
             level.share(level.z)
         level.work += sweeps * level.nx * (level.z.shape[0] - 2)

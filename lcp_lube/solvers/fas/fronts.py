@@ -10,12 +10,15 @@ REACH = 8  # cells within which a cavity ends, if it does so at the front that i
 
 
 @kernel
-def relax_pairs(z: Array, kx: Array, ky: Array, c: Array, m: int, start: int, end: int, carry: Array | None = None) -> None:
+def relax_pairs(
+    z: Array, kx: Array, ky: Array, c: Array, m: int, start: int, end: int, carry: Array | None = None, ring: bool = False
+) -> None:
     """`relax`, but a point of full film behind a cavitated one is solved for together with that one.
 
     What flows back from it into the cavity returns as void: in a deep dimple that is much more than what flows on, and the
     point by itself, which takes the void for given, would hardly move.
     """
+    nx = z.shape[1] - 2
     west = z[m, start - 1]
     for i in range(start, end):
         here = z[m, i]
@@ -23,15 +26,17 @@ def relax_pairs(z: Array, kx: Array, ky: Array, c: Array, m: int, start: int, en
         t = c[m, i] + k_E * max(z[m, i + 1], 0.0) + k_S * max(z[m - 1, i], 0.0) + k_N * max(z[m + 1, i], 0.0)
         passed = 1.0 if carry is None else carry[m, i - 1]
         t += k_W * west if west > 0.0 else passed * west
-        if here > 0.0 and west <= 0.0 and i > start:
+        if here > 0.0 and west <= 0.0 and (i > start or (ring and i == 1)):
             over = k_E + k_S + k_N if carry is None else k_E + k_S + k_N + (1.0 - passed) * k_W
             p = (t - passed * k_W * here) / over if over > 0.0 else 0.0
             before = west + k_W * (p - here)
             if p > 0.0 and before <= 0.0:
-                z[m, i - 1], z[m, i], west = before, p, p
+                z[m, i - 1 if i > 1 else nx], z[m, i], west = before, p, p
                 continue
         west = t / (k_W + k_E + k_S + k_N) if t > 0.0 else t
         z[m, i] = west
+    if ring and (start == 1 or end == nx + 1):
+        z[m, 0], z[m, nx + 1] = z[m, nx], z[m, 1]
 
 
 @kernel
@@ -45,18 +50,21 @@ def relax_front(
     carry: Array | None = None,
     held: NDArray[np.bool_] | None = None,
     slips: NDArray[np.bool_] | None = None,
+    ring: bool = False,
 ) -> int:
     """`count` sweeps, to and fro, over the points within `width` cells of a front; returns how many points were relaxed.
 
-    held : points that are left out; slips : those of them about which points are swept as they are at fronts.
+    held : points that are left out; slips : those of them about which points are swept as they are at fronts; ring : the
+    ends of a line are neighbours, and kept so.
 
     Where fronts are rare, and twice as wide a strip takes in less than a tenth of the points, it is that, swept twice as often.
     """
+    nx = z.shape[1] - 2
     seen = z if slips is None else np.where(slips, -1.0, z)
-    spans, found = front_spans(seen, 2 * width)
+    spans, found = front_spans(seen, 2 * width, ring)
     points = (spans[:found, 2] - spans[:found, 1]).sum()
-    if points > 0.1 * (z.shape[0] - 2) * (z.shape[1] - 2):
-        spans, found = front_spans(seen, width)
+    if points > 0.1 * (z.shape[0] - 2) * nx:
+        spans, found = front_spans(seen, width, ring)
         points = (spans[:found, 2] - spans[:found, 1]).sum()
     else:
         count *= 2
@@ -65,7 +73,7 @@ def relax_front(
     for s in range(count):
         for k in range(found):
             at = found - 1 - k if s % 2 == 1 else k
-            relax_pairs(z, kx, ky, c, spans[at, 0], spans[at, 1], spans[at, 2], carry)
+            relax_pairs(z, kx, ky, c, spans[at, 0], spans[at, 1], spans[at, 2], carry, ring)
     return count * points
 
 
@@ -89,12 +97,15 @@ def without(spans: NDArray[np.int32], found: int, held: NDArray[np.bool_]) -> tu
 
 
 @kernel
-def front_spans(z: Array, width: int) -> tuple[NDArray[np.int32], int]:
-    """Row, first column and last column + 1 of the runs of points within `width` cells of a front, and their number."""
+def front_spans(z: Array, width: int, ring: bool = False) -> tuple[NDArray[np.int32], int]:
+    """Row, first column and last column + 1 of the runs of points within `width` cells of a front, and their number.
+
+    ring : the first and the last column are neighbours.
+    """
     ny, nx = z.shape[0] - 2, z.shape[1] - 2
     rows, pad = 2 * width + 2, 2 * width + 8  # in the masks column i stands at i + pad
     # Fronts to the east or north of the points of the last rows, and the first and last column that they take up.
-    ring = np.zeros((rows, nx + 2 * pad), dtype=np.uint8)
+    marks = np.zeros((rows, nx + 2 * pad), dtype=np.uint8)
     low, high = np.full(rows, nx + 1), np.zeros(rows, dtype=np.int64)
     full, full_north = np.zeros(nx + 2, dtype=np.uint8), np.zeros(nx + 2, dtype=np.uint8)
     crossed, near = np.zeros(nx + 2 * pad, dtype=np.uint8), np.zeros(nx + 2 * pad, dtype=np.uint8)
@@ -105,8 +116,8 @@ def front_spans(z: Array, width: int) -> tuple[NDArray[np.int32], int]:
         low[new], high[new] = nx + 1, 0
         if m <= ny:
             positive(z[min(m + 1, ny)], full_north)
-            if mark_changes(full, full_north, ring[new, pad:], nx):
-                low[new], high[new] = extent(ring[new, pad:], nx)
+            if mark_changes(full, full_north, marks[new, pad:], nx, ring):
+                low[new], high[new] = extent(marks[new, pad:], nx)
             full, full_north = full_north, full
         row, first, last = m - width, low.min(), high.max()
         if row < 1 or first > last:
@@ -115,13 +126,19 @@ def front_spans(z: Array, width: int) -> tuple[NDArray[np.int32], int]:
         crossed[start - width : end + width] = 0
         for r in range(rows):
             if low[r] <= high[r]:
-                merge(ring[r, low[r] + pad : high[r] + pad + 1], crossed[low[r] + pad : high[r] + pad + 1])
+                merge(marks[r, low[r] + pad : high[r] + pad + 1], crossed[low[r] + pad : high[r] + pad + 1])
         near[start:end] = 0
         for shift in range(-width, width + 2):
             merge(crossed[start - shift : end - shift], near[start:end])
+        first, last = max(first - width, 1), min(last + width + 1, nx)
+        if ring and (start <= pad or end > nx + pad + 1):
+            near[:start], near[end:] = 0, 0
+            merge(near[: pad + 1], near[nx : nx + pad + 1])
+            merge(near[nx + pad + 1 :], near[pad + 1 :])
+            first, last = 1, nx
         if found + nx // 2 + 1 > spans.shape[0]:
             spans = np.concatenate((spans, np.empty((spans.shape[0] + nx, 3), dtype=np.int32)))
-        i, stop = max(first - width, 1), min(last + width + 1, nx)
+        i, stop = first, last
         while i <= stop:
             if near[i + pad] == 0:
                 i += 1
@@ -142,13 +159,15 @@ def positive(row: Array, out: NDArray[np.uint8]) -> None:
 
 
 @kernel
-def mark_changes(full: NDArray[np.uint8], north: NDArray[np.uint8], out: NDArray[np.uint8], nx: int) -> int:
+def mark_changes(full: NDArray[np.uint8], north: NDArray[np.uint8], out: NDArray[np.uint8], nx: int, ring: bool) -> int:
     """Mark the points with a front to the east or north of them; returns their number."""
     total = 0
     for i in range(1, nx):
         out[i] = (full[i] ^ full[i + 1]) | (full[i] ^ north[i])
         total += out[i]
     out[nx] = full[nx] ^ north[nx]
+    if ring:
+        out[nx] |= full[nx] ^ full[nx + 1]
     return total + out[nx]
 
 
@@ -171,9 +190,10 @@ def merge(mask: NDArray[np.uint8], into: NDArray[np.uint8]) -> None:
 
 
 @kernel
-def reforms(z: Array, m: int, i: int) -> bool:
+def reforms(z: Array, m: int, i: int, ring: bool) -> bool:
     """Whether the film is full again soon to the east of point i of row m."""
-    east, last = i + 1, min(i + REACH, z.shape[1] - 2)
-    while east <= last and z[m, east] <= 0.0:
-        east += 1
-    return east <= last
+    nx = z.shape[1] - 2
+    for east in range(i + 1, min(i + REACH, i + nx if ring else nx) + 1):
+        if z[m, east if east <= nx else east - nx] > 0.0:
+            return True
+    return False

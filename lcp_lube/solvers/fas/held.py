@@ -99,13 +99,17 @@ def sweep(
     last: int,
     down: bool,
     carry: Array | None,
+    ring: bool,
 ) -> None:
     """A sweep over the free points of rows first to last, as `kernels.sweep`."""
-    n = spans.shape[0]
+    n, nx = spans.shape[0], z.shape[1] - 2
     for s in range(n):
         k = n - 1 - s if down else s
         if first <= spans[k, 0] <= last:
-            relax(z, kx, ky, c, spans[k, 0], spans[k, 1], spans[k, 2], carry)
+            m = spans[k, 0]
+            relax(z, kx, ky, c, m, spans[k, 1], spans[k, 2], carry)
+            if ring:
+                z[m, 0], z[m, nx + 1] = z[m, nx], z[m, 1]
 
 
 @kernel

@@ -18,11 +18,14 @@ from ...base.parallel import Array
 
 
 @kernel
-def sweep(z: Array, kx: Array, ky: Array, c: Array, count: int, down: bool, carry: Array | None = None) -> None:
+def sweep(
+    z: Array, kx: Array, ky: Array, c: Array, count: int, down: bool, carry: Array | None = None, ring: bool = False
+) -> None:
     """`count` nonlinear Gauss-Seidel sweeps in place, every x line along the flow, lines upwards or down.
 
     Three at a time: the second one follows the first two lines behind, the third one the second. The values are those of
-    sweeps one after the other, but memory is passed over once, and three chains of dependent operations overlap.
+    sweeps one after the other, but memory is passed over once, and three chains of dependent operations overlap. ring: the
+    ends of a line are neighbours, and each line that is done brings its frame up to date.
     """
     ny, nx = z.shape[0] - 2, z.shape[1] - 2
     step, first = (-1, ny) if down else (1, 1)
@@ -41,7 +44,7 @@ def sweep(z: Array, kx: Array, ky: Array, c: Array, count: int, down: bool, carr
                 pass_on(t[0], t[1], t[2], g[s % 5], g[(s - 2) % 5], g[(s - 4) % 5])
             for k in range(fused):
                 if 0 <= s - 2 * k < ny:
-                    settle(t[k], over[(s - 2 * k) % 5], z[first + step * (s - 2 * k)])
+                    settle(t[k], over[(s - 2 * k) % 5], z[first + step * (s - 2 * k)], ring)
 
 
 @kernel
@@ -87,10 +90,12 @@ def pass_on_part(t: Array, g: Array, carry: Array) -> None:
 
 
 @kernel
-def settle(t: Array, over: Array, z: Array) -> None:
+def settle(t: Array, over: Array, z: Array, ring: bool) -> None:
     """Each point's balance solved: a pressure where something arrives, else the flow of void."""
     for i in range(t.size):
         z[i + 1] = t[i] * (over[i] if t[i] > 0.0 else 1.0)
+    if ring:
+        z[0], z[t.size + 1] = z[t.size], z[1]
 
 
 @kernel

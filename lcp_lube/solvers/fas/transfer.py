@@ -101,7 +101,18 @@ def inject(z: Array, out: Array, y0: int, by_x: bool, by_y: bool) -> None:
 
 @kernel
 def correct(
-    z: Array, new: Array, old: Array, kx: Array, ky: Array, y0: int, by_x: bool, by_y: bool, harmonic: bool, truncation: int
+    z: Array,
+    new: Array,
+    old: Array,
+    kx: Array,
+    ky: Array,
+    y0: int,
+    by_x: bool,
+    by_y: bool,
+    harmonic: bool,
+    truncation: int,
+    ring: bool = False,
+    unit: float = 1.0,
 ) -> float:
     """Add the interpolated new - old of the coarse grid; returns the sum of squares of what was added.
 
@@ -109,6 +120,8 @@ def correct(
     corrected as the latter, not by a part of it.
     truncation: 0 none; 1 that, and a point that would cross its front stops there; 2 no correction at all at points that
     would, or that have a coarse neighbour that lies, or lay, on the other side.
+    unit: the pressure that counts as a flow of void of 1, where a neighbour's correction is of the one and the point's of the
+    other.
     """
     nx, size = z.shape[1] - 2, new.shape[1]
     w, d = np.zeros(size - 1), np.zeros(size)
@@ -118,19 +131,19 @@ def correct(
         if by_x:
             west_shares(kx[m], harmonic, w)
         for k in range(size):
-            d[k] = new[row, k] - old[row, k]
+            d[k] = alike(new[row, k], unit) - alike(old[row, k], unit)
         interpolate_row(d, w, by_x, south)
         if last > row:
             for k in range(size):
-                d[k] = new[last, k] - old[last, k]
+                d[k] = alike(new[last, k], unit) - alike(old[last, k], unit)
             interpolate_row(d, w, by_x, north)
             mix(south, north, ky[m], ky[m + 1], harmonic, e)
             if truncation == 1 and differ(z[m - 1], z[m + 1]):
                 for i in range(1, nx + 1):
                     if z[m, i] > 0.0:
-                        if z[m - 1, i] <= 0.0 and z[m + 1, i] > 0.0 and reforms(z, m - 1, i):
+                        if z[m - 1, i] <= 0.0 and z[m + 1, i] > 0.0 and reforms(z, m - 1, i, ring):
                             e[i] = north[i]
-                        elif z[m + 1, i] <= 0.0 and z[m - 1, i] > 0.0 and reforms(z, m + 1, i):
+                        elif z[m + 1, i] <= 0.0 and z[m - 1, i] > 0.0 and reforms(z, m + 1, i, ring):
                             e[i] = south[i]
         else:
             e[:] = south
@@ -148,12 +161,18 @@ def correct(
                             e[i] = 0.0
         for i in range(1, nx + 1):
             here = z[m, i]
-            moved = here + e[i]
+            moved = here + (e[i] if here > 0.0 else e[i] / unit)
             if truncation > 0 and (moved > 0.0) != (here > 0.0):
                 moved = here if truncation == 2 else 1e-300 if here > 0.0 else 0.0
             z[m, i] = moved
             added[i] += (moved - here) ** 2
     return added.sum()
+
+
+@kernel
+def alike(z: float, unit: float) -> float:
+    """z, of which flows of void are told as pressures."""
+    return z if z > 0.0 else unit * z
 
 
 @kernel
