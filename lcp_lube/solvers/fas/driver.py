@@ -69,7 +69,8 @@ class Fas(Cycles):
         with self.stages("assembly"):
             self._levels = levels.hierarchy(finest.finest(problem), self._harmonic)
         # A corrected pressure counts beside a corrected flow of void as the flow that it drives: units of pressure are any.
-        driven = 2.0 * (problem.reduce.sum(problem.scheme.k_W) + problem.reduce.sum(problem.scheme.k_S)) / problem.size
+        first = self._levels[0]
+        driven = 2.0 * problem.reduce.max(np.array([float(k[1:-1, 1:-1].mean()) for k in (first.kx, first.ky)]))
         self._unit = 1.0 / driven if driven > 0.0 else 1.0
         self._begin(start is not None)
         self._c_norm = problem.reduce.norm(problem.scheme.c) if problem.held is None else self._norms()[0]
