@@ -60,7 +60,6 @@ CANNOT = (
     ("grooves", "resume", "its films are solved one by one"),
     ("supplies", "checkpoint", "its many solves make one answer; give the pressures that were found for one solve"),
     ("supplies", "resume", "its many solves make one answer; give the pressures that were found for one solve"),
-    ("supplies", "certify", "a band is proved at given pressures of supplies; give those that were found"),
     ("turned", "checkpoint", "U < 0 is solved as its mirror image; give that, with -U"),
     ("turned", "resume", "U < 0 is solved as its mirror image; give that, with -U"),
 )

@@ -23,12 +23,13 @@ from ..problems.film.cavity import cavity_sign
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.supplies import Supply, supply_defects, supply_flows
-from ..problems.solution import Outcome, Solution
+from ..problems.solution import Enclosure, Outcome, Solution
 from ..scenes.scene import Derived, Scene, Solvable
 from .ask import Ask
 from .chain import Chain
 from .compose import Inner
 from .linearised import Feed, Linear
+from .supply_band import enclose_fed
 
 MOST_SOLVES = 40
 TOLERANCE = 1e-10  # of the largest flow: by how much what a source gives may differ from what the film takes
@@ -93,7 +94,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     P = np.array([supplies[0].p_s]) if known_before else P
     other = np.full(2, np.nan)  # of one supply: the last pressure that was too low, and too high
     last: tuple[Array, Array] | None = None  # pressures and flows
-    chain = Chain(ask, inner)
+    chain = Chain(replace(ask, certify=False, reduction=ask.reduction and not ask.certify), inner)  # one band, at the end
     resting, least, enough = 0, np.inf, ENOUGH if known_before else TOLERANCE
     for count in range(1, MOST_SOLVES + 1):
         held = tuple(Supply(one.region, float(p)) for one, p in zip(supplies, P, strict=True))
@@ -143,6 +144,12 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     solution.steps = chain.steps
     problem.hold_at([replace(one, p=float(p)) for one, p in zip(supplies, P, strict=True)])
     solution.certificate = problem.certify(solution.fields, solution.settings["eps1"])
+    if ask.certify:
+        solution.enclosure = (
+            Enclosure(False, "no band: supplies' pressures and the film's coefficients follow together; give the pressures found")
+            if model.effects or model.law
+            else enclose_fed(problem, solution.fields)
+        )
     found = ", ".join(f"{p + model.p_c:.6g}" for p in P)
     solution.settings["supply_pressures"] = [float(p) for p in P]
     solution.because(f"supplies: pressures {found} Pa, found in {count} solves")

@@ -61,7 +61,8 @@ def conditions(problem: LubricationProblem) -> str:
 
     Compared number by number, without rounding: A's and -B's off-diagonal entries are nonpositive, no column hands on more
     than its diagonal has, every cell hands both p and r on to the next one along x, and every x line has an end. Then every
-    blend of their columns is a nonsingular M-matrix. The assembled equations must be these and no others.
+    blend of their columns is a nonsingular M-matrix. Lines that close have no end: of these `way_out` tells afterwards. The
+    assembled equations must be these and no others.
     """
     grid, s = problem.grid, problem.scheme
     inside = grid.ghosted(np.ones(grid.local_size), outside=0.0) > 0
@@ -84,7 +85,8 @@ def conditions(problem: LubricationProblem) -> str:
     if bad := count(~fine):
         return f"{bad} columns of A or B do not have an M-matrix's signs and dominance"
     hands_on = np.where(east, (k_next > 0) & (b_next > 0), s.k_E > 0)
-    if count(~hands_on) or count(~east) != (grid.shape[1] if grid.dim == 2 else 1):
+    lines = 0 if grid.periodic[0] else grid.shape[1] if grid.dim == 2 else 1
+    if count(~hands_on) or count(~east) != lines:
         return "the theorem needs an open side to the east, at the end of every line"
     # Nothing but these terms: the matrices and the face flows agree on a vector without symmetries.
     number = grid.first + np.arange(grid.local_size)
@@ -99,6 +101,28 @@ def conditions(problem: LubricationProblem) -> str:
     return "" if count(~same) == 0 else "its equations have terms that the theorem does not know"
 
 
+def way_out(problem: LubricationProblem, lower: Fields) -> str:
+    """Why columns need not end at an open side, where lines close; empty if they do: see the page's last theorem. Collective.
+
+    A line has a cell that is full for certain. Its column hands p on to both lines beside it, and so on to an open side.
+    """
+    grid, s = problem.grid, problem.scheme
+    if not grid.periodic[0]:
+        return ""
+    if grid.dim == 1 or not any(kind == "open" for kind in grid.ends[1]):
+        return "no band: the film goes round, and no side across it is open"
+    south = s.k_S[grid.y_start == 0 and grid.ends[1][0] != "open" :]
+    north = s.k_N[: -1 if grid.y_end == grid.shape[1] and grid.ends[1][1] != "open" else None]
+    if not problem.reduce.min(np.array([k.min(initial=np.inf) for k in (south, north)])) > 0:
+        return "no band: the film goes round, and nothing flows across some of its faces"
+    full = np.zeros(grid.shape[1])
+    rows = slice(grid.y_start, grid.y_end)
+    full[rows] = (lower["p"].reshape(grid.box) > 0).any(axis=1)
+    if not (grid.comm.allreduce(full) > 0).all():
+        return "no band: the film goes round, and a line may be cavitated all the way"
+    return ""
+
+
 def enclose(problem: LubricationProblem, fields: Fields, system: str, stages: Stages) -> Enclosure:
     """A band around the fields p and r that provably contains the discrete solution, or the reason why not. Collective.
 
@@ -111,17 +135,23 @@ def enclose(problem: LubricationProblem, fields: Fields, system: str, stages: St
     """
     if broken := conditions(problem):
         return Enclosure(False, f"no band: {broken}")
-    band = _Band(problem, fields)
+    band = Band(problem, fields)
     if not np.isfinite(problem.reduce.sum(band.z)):
         return Enclosure(False, "no band: the answer is not finite")
     try:
         e = band.width(system, stages)
     except LinearSolverError as error:
         return Enclosure(False, f"no band: {error}")
-    lower, upper = band.prove(e, -1.0), band.prove(e, 1.0)
+    return concluded(problem, fields, band.prove(e, -1.0), band.prove(e, 1.0))
+
+
+def concluded(problem: LubricationProblem, fields: Fields, lower: Fields | None, upper: Fields | None) -> Enclosure:
+    """What two pairs of fields prove, of which the one below and the one above have the signs, or None. Collective."""
     if lower is None or upper is None:
         where = "below" if lower is None else "above"
         return Enclosure(False, f"no band: the flow balance does not have the needed sign {where} the answer; is it poor?")
+    if closed := way_out(problem, lower):
+        return Enclosure(False, closed)
     bounds = bounds_of(problem, fields, lower, upper)
     largest = max(problem.reduce.max(np.abs(fields["p"])) * problem.p_unit, *problem.p_sides, 1e-9 * problem.p_unit)
     if not bounds["band_p"] <= WIDEST * largest:
@@ -130,7 +160,7 @@ def enclose(problem: LubricationProblem, fields: Fields, system: str, stages: St
     return Enclosure(True, message, lower, upper, bounds)
 
 
-class _Band:
+class Band:
     """z, the price of a change in it, and the sign tests."""
 
     def __init__(self, problem: LubricationProblem, fields: Fields):
@@ -158,19 +188,20 @@ class _Band:
             made.destroy()
         return np.maximum(np.where(full, dp, -dr / self.form.s), 0.0)
 
-    def prove(self, e: Array, sign: float) -> Fields | None:
+    def prove(self, e: Array, sign: float, at: Array | None = None) -> Fields | None:
         """The pair of z + sign e, its e enlarged where needed, if G has that sign there; None if this cannot be shown.
 
         Where the sign fails, the cell's own e is raised by what is lacking; that only takes from its neighbours, so the rest
         stays proved or is repaired in the next round (a Gauss-Seidel step, for an M-function). By no more than that, as a
-        cavitated cell hands all of it on downstream.
+        cavitated cell hands all of it on downstream. at : pressures of cells whose balance is not tested, NaN elsewhere.
         """
         most = 16 * self.problem.reduce.max(e)
         for _ in range(REPAIRS):
-            pair = self.form.fields(self.z + sign * e)  # this is tested: s has no part in the proof
+            z = self.z + sign * e if at is None else np.where(np.isnan(at), self.z + sign * e, at)
+            pair = self.form.fields(z)  # this is tested: s has no part in the proof
             F, rounding = balance(self.problem, pair)
             lacking = rounding - sign * F  # NaN is lacking too
-            fails = ~(lacking <= 0)
+            fails = ~(lacking <= 0) if at is None else ~(lacking <= 0) & np.isnan(at)
             if not self.problem.reduce.sum(fails.astype(float)):
                 return pair
             e = np.where(fails, e + (lacking + self.slack) / self.form.diagonal, e)

@@ -223,7 +223,7 @@ ENDS = {  # ends in x, in y: what stands in docs/guaranteed_bounds.md
     "west": ((("closed", "open"), ("open", "open")), True),
     "round": ((("open", "open"), ("periodic", "periodic")), True),
     "east": ((("open", "closed"), ("open", "open")), False),
-    "endless": ((("periodic", "periodic"), ("open", "open")), False),
+    "endless": ((("periodic", "periodic"), ("open", "open")), True),
 }
 
 

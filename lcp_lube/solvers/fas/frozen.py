@@ -184,7 +184,7 @@ class Frozen:
             self._run(k + 1, "V")
         for n, found in enumerate(self.z[k + 1]):
             seen = coarse.part(found if self.transposed else found * self.full[k + 1])
-            frozen_transfer.correct(z[n], full, seen, level.kx, level.ky, *where, not self.transposed)
+            frozen_transfer.correct(z[n], full, seen, level.kx, level.ky, *where, level.periodic[0], not self.transposed)
             if level.held is not None:
                 z[n][level.held] = 0.0
             level.share(z[n])

@@ -11,7 +11,7 @@ from .transfer import coarse_rows, interpolate_row, mix, restrict_row, share, we
 
 
 @kernel
-def sides_of(ky: Array, full: Mask, m: int, out: Array) -> None:
+def sides_of(ky: Array, full: Mask, m: int, out: Array, ring: bool) -> None:
     """Weights of the coarse line south of row m at its points.
 
     Where the film reforms, what flows back into the cavity returns: a point between that and a coarse point in the full film
@@ -20,14 +20,16 @@ def sides_of(ky: Array, full: Mask, m: int, out: Array) -> None:
     for i in range(1, out.size - 1):
         out[i] = share(ky[m, i], ky[m + 1, i], True)
         if full[m, i]:
-            if not full[m - 1, i] and full[m + 1, i] and reforms(full, m - 1, i):  # type: ignore[arg-type]
+            if not full[m - 1, i] and full[m + 1, i] and reforms(full, m - 1, i, ring):  # type: ignore[arg-type]
                 out[i] = 0.0
-            elif not full[m + 1, i] and full[m - 1, i] and reforms(full, m + 1, i):  # type: ignore[arg-type]
+            elif not full[m + 1, i] and full[m - 1, i] and reforms(full, m + 1, i, ring):  # type: ignore[arg-type]
                 out[i] = 1.0
 
 
 @kernel
-def correct(z: Array, full: Mask, coarse: Array, kx: Array, ky: Array, y0: int, by_x: bool, by_y: bool, fronts: bool) -> None:
+def correct(
+    z: Array, full: Mask, coarse: Array, kx: Array, ky: Array, y0: int, by_x: bool, by_y: bool, ring: bool, fronts: bool
+) -> None:
     """Add the interpolated coarse grid's answer; with fronts at the full points alone, as `sides_of` says."""
     nx, size = z.shape[1] - 2, coarse.shape[1]
     w, v, south, north = np.zeros(size - 1), np.zeros(nx + 2), np.zeros(nx + 2), np.zeros(nx + 2)
@@ -39,7 +41,7 @@ def correct(z: Array, full: Mask, coarse: Array, kx: Array, ky: Array, y0: int, 
         if last > row:
             interpolate_row(coarse[last], w, by_x, north)
             if fronts:
-                sides_of(ky, full, m, v)
+                sides_of(ky, full, m, v, ring)
                 for i in range(1, nx + 1):
                     south[i] = v[i] * south[i] + (1.0 - v[i]) * north[i]
             else:
@@ -75,7 +77,7 @@ def restrict(
                     here[i] = 0.0
         row, last = coarse_rows(y0 + m - 1, y0, m, by_y)
         if last > row:
-            sides_of(ky, full, m, v)
+            sides_of(ky, full, m, v, ring)
             for i in range(1, nx + 1):
                 part[i] = v[i] * here[i]
                 here[i] -= part[i]
