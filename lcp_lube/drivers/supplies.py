@@ -145,11 +145,9 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     problem.hold_at([replace(one, p=float(p)) for one, p in zip(supplies, P, strict=True)])
     solution.certificate = problem.certify(solution.fields, solution.settings["eps1"])
     if ask.certify:
-        solution.enclosure = (
-            Enclosure(False, "no band: supplies' pressures and the film's coefficients follow together; give the pressures found")
-            if model.effects or model.law
-            else enclose_fed(problem, solution.fields)
-        )
+        none = "no band: supplies' pressures and the film's coefficients follow together; give the pressures that were found"
+        varies = model.effects or model.law
+        solution.enclosure = Enclosure(False, none) if varies else enclose_fed(problem, solution.fields)
     found = ", ".join(f"{p + model.p_c:.6g}" for p in P)
     solution.settings["supply_pressures"] = [float(p) for p in P]
     solution.because(f"supplies: pressures {found} Pa, found in {count} solves")
