@@ -4,6 +4,8 @@ from dataclasses import replace
 from math import exp, isfinite, log1p, prod
 from typing import Any
 
+import numpy as np
+
 from ..errors import InputError
 from ..problems.solution import Solution
 from ..registry import RUNGS, SMALL
@@ -23,9 +25,11 @@ INFINITE = 1e30  # where the place of the walls is found, every effect acts on a
 ACTING, DOUBT = 0.2, 0.5  # of the product of two effects' sizes: what one may change by acting on the other; of the rigid film
 FIRST, SHARE_FIRST = 600, 0.05  # points of the film that is looked at, at least, and in parts of the fine grid
 SHARE = 0.10  # of the fine solve's work that coarse ones may take, by points: films differ in number, 0.15 is promised
+SHARE_TIME = 0.13  # the same of a march in time, by its steps
 LEAST = {1: 15, 2: 6}  # points a side of a coarse grid, at least
 FREE = {"barus"}  # a change of the unknown: it costs nothing, and is always kept
 COARSE_EPS1 = 1e-7
+FEWEST = 5  # steps of a march that is looked at, at least
 
 
 def coarse_shape(shape: tuple[int, ...], solves: int) -> tuple[int, ...] | None:
@@ -35,6 +39,16 @@ def coarse_shape(shape: tuple[int, ...], solves: int) -> tuple[int, ...] | None:
     if len(shape) == 2 and coarse[1] < LEAST[2] <= shape[1]:  # few lines: keep them, take the points along
         coarse = (int(SHARE / solves * prod(shape) / LEAST[2]), LEAST[2])
     return coarse if min(coarse) >= LEAST[len(shape)] and coarse[0] >= 2 * LEAST[2] else None
+
+
+def looked(names: list[str]) -> list[str]:
+    """The effects that may be left out."""
+    return [name for name in names if name not in FREE]
+
+
+def few_steps(motion: Any, solves: int) -> int:
+    """The steps of a march that is looked at, up to the same end: so many marches cost `SHARE_TIME` of the whole one's."""
+    return FEWEST if motion.step is None else int(SHARE_TIME * motion.t_end / motion.step / solves)
 
 
 class Look:
@@ -69,9 +83,15 @@ class Look:
 
     def decide(self) -> None:
         """By first order; where there are no derivatives, by solving without each."""
-        if set(self.names) <= FREE or motion_of(self.scene) is not None:
-            alone = set(self.names) <= FREE
-            self.record = {"reason": "alone it costs nothing" if alone else "in time an effect is another at every step"}
+        if set(self.names) <= FREE:
+            self.record = {"reason": "alone it costs nothing"}
+            return
+        motion = motion_of(self.scene)
+        if motion is not None:
+            if few_steps(motion, len(looked(self.names)) + 2) < FEWEST:
+                self.record = {"reason": "the march has so few steps that all are solved for"}
+            else:
+                self.kept, self.effects, self.record, self.work = _by_solving(self.scene, self.names, self.ask, self.inner)
             return
         if coarse_shape(self.scene.shape, len(self.names) + 1) is None:
             self.record = {"reason": "the grid is so small that all are solved for"}
@@ -161,8 +181,8 @@ class Look:
 
 def quick(ask: Ask) -> Ask:
     """For a film that is looked at, and thrown away."""
-    none = dict.fromkeys(("accuracy", "quantity", "finest", "start", "monitor", "checkpoint", "resume"))
-    return replace(ask, **none, certify=False, stopping={"eps1": COARSE_EPS1})  # type: ignore[arg-type]
+    none = dict.fromkeys(("accuracy", "quantity", "finest", "start", "monitor", "checkpoint", "resume", "watch", "progress"))
+    return replace(ask, **none, times=(), certify=False, stopping={"eps1": COARSE_EPS1})  # type: ignore[arg-type]
 
 
 def first_shape(shape: tuple[int, ...]) -> tuple[int, ...]:
@@ -182,17 +202,22 @@ def _by_solving(
 ) -> tuple[list[str], dict[str, float], dict[str, Any], float]:
     """Effects to keep, what each changes on a coarse grid, how that was found, and the work. Collective."""
     tol = ask.accuracy or TOLERANCE
-    shape = coarse_shape(scene.shape, len(names) + 1)
+    motion = motion_of(scene)
+    shape = coarse_shape(scene.shape, len(names) + 1) if motion is None else first_shape(scene.shape)
     assert shape is not None  # for the type checker: `decide` has looked
-    coarse = scene.with_shape(shape)
+    coarse, in_time = scene.with_shape(shape), ""
+    if motion is not None:
+        steps = few_steps(motion, len(looked(names)) + 2)
+        in_time = f" in {steps} steps"
+        coarse = coarse.model_copy(update={"motion": motion.model_copy(update={"steps": steps, "dt": None, "tol": None})})
     try:
         full = inner(coarse, quick(ask))
     except InputError:
-        return names, {}, {"reason": f"no film on the coarse grid {shape}"}, 0.0
+        return names, {}, {"reason": f"no film on the coarse grid {shape}{in_time}"}, 0.0
     work, effects = total_work(full), {}
     try:
         if not full.converged:
-            return names, {}, {"reason": f"no answer on the coarse grid {shape}: {full.message}"}, 0.0
+            return names, {}, {"reason": f"no answer on the coarse grid {shape}{in_time}: {full.message}"}, 0.0
         value, quantity = _quantity(full, ask.quantity, scene)
 
         def effect(gone: list[str]) -> float | None:
@@ -201,15 +226,23 @@ def _by_solving(
             bare = without(coarse, gone)
             if not named(bare):  # a line's numbers are exact without effects, and the others have the grid's error
                 bare = bare.model_copy(update={"viscosity": RUNGS["viscosity"].load()(factor="1")})
-            other = inner(bare, replace(quick(ask), start=full))
+            try:
+                other = inner(bare, replace(quick(ask), start=full))
+            except InputError:
+                return None
             work += total_work(other)
             reference = _quantity(other, quantity, scene)[0] if other.converged else None
+            history = other.history
             other.destroy()
-            if reference is None or value is None or reference == 0.0 or not isfinite(value / reference):
+            if reference is None or value is None:
                 return None
-            return value / reference - 1.0
+            if full.history and quantity in history[0]:
+                return _over_time(full.history, history, quantity)
+            return value / reference - 1.0 if reference and isfinite(value / reference) else None
 
-        effects = {name: found for name in names if (found := effect([name])) is not None}
+        effects = {
+            name: found for name in (names if motion is None else looked(names)) if (found := effect([name])) is not None
+        }
         kept = [name for name in names if not abs(effects.get(name, 1.0)) < PART * tol]
         gone = sorted((name for name in names if name not in kept), key=lambda name: abs(effects[name]))
         together = effect(gone) if len(gone) > 1 else 0.0
@@ -218,7 +251,15 @@ def _by_solving(
             together = effect(gone) if len(gone) > 1 else 0.0
     finally:
         full.destroy()
+    work *= 1.0 if motion is None or motion.step is None else steps * motion.step / motion.t_end
     return kept, effects, {"quantity": quantity, "tolerance": tol, "grid": list(shape)}, work
+
+
+def _over_time(rows: list[dict[str, Any]], others: list[dict[str, Any]], quantity: str) -> float | None:
+    """The largest difference of two marches' quantity, with its sign, in parts of the largest value of the second."""
+    (t, values), (times, known) = ([np.array([row[name] for row in one]) for name in ("t", quantity)] for one in (rows, others))
+    off, size = values - np.interp(t, times, known), np.max(np.abs(known))
+    return float(off[np.argmax(np.abs(off))] / size) if size > 0.0 and np.all(np.isfinite(off)) else None
 
 
 def _quantity(solution: Solution, quantity: str | None, scene: Any) -> tuple[float | None, str]:
@@ -227,7 +268,9 @@ def _quantity(solution: Solution, quantity: str | None, scene: Any) -> tuple[flo
     balance = solution.settings.get("balance")
     if balance:
         found = {balance["vary"]: balance["value"], **found}
-    name = quantity or (balance["vary"] if balance else next((one for one in DEFAULT_QUANTITY if one in found), ""))
+    motion = motion_of(scene)
+    usual = ("min_h",) if motion is not None and motion.free else DEFAULT_QUANTITY  # a free journal's load is given
+    name = quantity or (balance["vary"] if balance else next((one for one in usual if one in found), ""))
     if quantity is not None and name not in found:
         return None, name
     return find_value(found, name, scene), name

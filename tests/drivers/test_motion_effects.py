@@ -73,3 +73,20 @@ def test_heat_is_refused():
     oil = {"fluid": {"mu": 0.01, "p_supply": 1e5}, "temperature": {"beta": 0.03}}
     with pytest.raises(InputError, match="the heat that the oil stores"):
         solve(load_scene(WEDGE | oil))
+
+
+def test_the_decision_in_time():
+    """What a march in few steps finds small over the whole time is left out, and is: of a long march. A short one has all."""
+    film = {"shape": "formula", "h": "1.4e-5*(1+0.4*sin(62.8*x))*(1+0.1*sin(600*t))"}
+    data = {"family": "bearing", "L": 0.1, "U": 0.5, "n": 40, "film": film, "fluid": {"mu": 0.01}}
+    data |= {"shear": {"law": "eyring", "tau_0": 1e6}, "motion": {"t_end": 0.02, "steps": 120}}
+    runs = {}
+    for model in ("auto", "full"):
+        with solve(data, model=model) as s:
+            assert s.converged, s.message
+            runs[model] = np.array([row["load"] for row in s.history]), s.settings["model"]
+    (load, told), (full, _) = runs["auto"], runs["full"]
+    off = np.max(np.abs(load - full)) / np.max(full)
+    assert 0.1 * off < abs(told["left_out"]["shear"]) < 10.0 * off < told["tolerance"]  # few steps miss the load's peaks
+    with solve(data | {"motion": {"t_end": 0.002, "steps": 8}}) as s:
+        assert not s.settings["model"]["left_out"] and "so few steps" in s.settings["model"]["reason"]
