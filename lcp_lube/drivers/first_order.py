@@ -15,7 +15,7 @@ import numpy as np
 
 from ..base.parallel import Array
 from ..errors import InputError
-from ..problems.film.effects import Answer, Cells, Compressible, Effect, answer, factors, neutral
+from ..problems.film.effects import CHANNELS, Answer, Cells, Compressible, Effect, answer, factors, neutral
 from ..problems.film.fluid import Law
 from ..problems.solution import Solution
 from ..scenes.effects.named import named, without
@@ -99,8 +99,12 @@ class FirstOrder:
         return expm1(sign * total / self.value), size
 
     def made(self, names: Sequence[str]) -> Cells:
-        """The fields that effects make of this answer: a start for the loop that solves for them."""
-        return {name: values for name, values in self._made(names).items() if name in neutral(self._physics(names)[1], 0)}
+        """The fields that effects make of this answer, each by itself: a start for the loop that solves for them."""
+        out = neutral(self._physics(names)[1], self.h.size)
+        for one in (self._made([*self.kept, name]) for name in names if name not in self.kept):
+            for key in out:
+                out[key] = out[key] * one[key] if CHANNELS[key] else out[key] + one[key]
+        return out
 
     def _physics(self, names: Sequence[str]) -> tuple[Law, tuple[Effect, ...]]:
         """The law of pressure and the effects, in the order in which the loop has them, of these names."""

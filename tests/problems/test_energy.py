@@ -154,6 +154,7 @@ def h_of(Y):
         *((9.0, 0.05794, 10.5156, -28.240), (12.0, 0.26665, 6.7015, -10.810), (15.0, 0.20073, 8.4658, -22.490)),
         *((18.0, 0.28889, 5.9741, -4.930), (22.0, 0.24504, 7.4160, -16.730), (28.0, 0.20323, 9.1267, -34.230)),
         *((40.0, 0.18411, 10.1015, -46.750), (55.0, 0.17029, 11.4866, -80.620)),
+        (np.inf, 0.1684, 11.85, -97.0),
     )
     _, a, b, c = next(row for row in ranges if row[0] >= Y)
     return a * Y * Y + b * Y + c
@@ -169,6 +170,7 @@ def test_laws_pass_through_their_points():
     "table, message",
     [
         ({"oil": "ISO VG 33"}, "no oil of that name .did you mean ISO VG 32.."),
+        ({"oil": "ISO VG 3"}, "a viscosity index begins at 2 mm2/s"),
         ({"oil": "SAE 30"}, "no oil of that name"),
         ({}, "one of oil, law .with T and mu. and beta is needed"),
         ({"beta": 0.03, "T_in": 40}, "temperature.T_in = 40: allowed is greater than or equal to 200"),

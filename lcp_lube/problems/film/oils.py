@@ -6,7 +6,8 @@
     Roelands     log(mu) + 9.67 = a (T - 138)^-s,  mu in Pa s (the part of T in Roelands' equation)
 
 Kinematic viscosities at 40 degrees C are the middles of ISO 3448's grades; those at 100 degrees C belong to a viscosity index
-of 100, by the equations of ASTM D2270. Density and specific heat of a mineral oil are typical values, not the grade's.
+of 100, by the equations of ASTM D2270, which begin at 2 mm2/s: for grades 2, 3 and 5 they say nothing. Density and specific
+heat of a mineral oil are typical values, not the grade's.
 """
 
 from collections.abc import Callable, Sequence
@@ -24,6 +25,7 @@ ROELANDS_T, ROELANDS_MU, ROELANDS_P = 138.0, 9.67, 1.96e8  # K, of log(mu/(Pa s)
 DENSITY, SPECIFIC_HEAT = 870.0, 2000.0  # kg/m3, J/(kg K): typical of mineral oils
 # Grade: mm2/s at 40 and at 100 degrees C.
 GRADES = {
+    7: (7.0, 2.121),
     10: (10.0, 2.659),
     15: (15.0, 3.410),
     22: (22.0, 4.294),
@@ -36,7 +38,12 @@ GRADES = {
     320: (320.0, 24.951),
     460: (460.0, 31.769),
     680: (680.0, 41.134),
+    1000: (1000.0, 52.765),
+    1500: (1500.0, 68.333),
+    2200: (2200.0, 86.792),
+    3200: (3200.0, 109.094),
 }
+THIN = (2, 3, 5)  # grades of ISO 3448 without a viscosity index
 NAMES = [f"ISO VG {grade}" for grade in GRADES]
 
 
@@ -141,6 +148,10 @@ def named(name: str, rho: float = DENSITY) -> Walther:
     words = name.upper().replace("ISO", "").replace("VG", "").replace("-", " ").split()
     grade = int(words[0]) if len(words) == 1 and words[0].isdigit() and "VG" in name.upper() else -1
     if grade not in GRADES:
+        if grade in THIN:
+            raise InputError(
+                f"{name}: a viscosity index begins at 2 mm2/s at 100 degrees C, which it has not; give law, T and mu"
+            )
         close = min(GRADES, key=lambda one: abs(log(one / grade))) if grade > 0 else None
         near = f" (did you mean ISO VG {close}?)" if close else nearest(name, NAMES)
         raise InputError(f"{name}: no oil of that name{near}; allowed are {', '.join(NAMES)}")
