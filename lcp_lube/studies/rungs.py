@@ -106,7 +106,7 @@ def _draw(rows: Sequence[Row]) -> Figure:
     figure = new_figure(
         5.6,
         "Each line goes from the film without effects, by the largest first, to the one with all, whose error is none (at "
-        f"{NO_ERROR:g}). Star: what the decision takes, its own work included. Lines at 1 % (dashed) and a tenth of that.",
+        f"{NO_ERROR:g}). Star: what the decision takes, its own time included. Lines at 1 % (dashed) and a tenth of that.",
     )
     names = list(dict.fromkeys(row["scene"] for row in rows))
     axes = figure.subplots(2, 3, sharey=True).ravel()
