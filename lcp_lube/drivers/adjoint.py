@@ -30,6 +30,7 @@ from .linearised import Linear
 from .near_films import NearFilms
 
 CANCELLED = 1e-10
+FEWER = 2_000  # points from which multigrid solves for an answer that multigrid gave: its loops are loaded
 DIRECT = {"load", "friction", "p_max"}  # numbers that are made of no others in a film without a shaft
 SUPPLY = "supply.{}.p"  # the key of a supply's pressure, Pa above p_c
 
@@ -59,6 +60,7 @@ class Adjoint:
         self.equations = Equations(self.scene, comm, self.pressures, dry=self.dry, solved=solution.problem)
         if self.equations.grid.shape != solution.problem.grid.shape:
             raise InputError(f"{scene.name}: the solution is on another grid than the scene")
+        self._least = FEWER if solution.settings.get("method") == "fas" else SMALL
         self._reduction = solution.settings.get("details", {}).get("reduction")
         self.found, self.conditions = conditions_of(scene, solution)
         supplies = self.equations.constant.held.supplies if self.equations.constant.held else ()
@@ -108,10 +110,10 @@ class Adjoint:
         eq = self.equations
         problem = eq.problem(self.p)
         if self._halved:
-            linear: Linear | Halved = Halved(problem, self.cavity, self.scene)
+            linear: Linear | Halved = Halved(problem, self.cavity, self.scene, least=self._least)
         else:
             entries = None if eq.law is None else eq.tangent(self.p, self.r).entries(problem.scheme)
-            linear = Linear(problem, self.cavity, entries, eq.held)
+            linear = Linear(problem, self.cavity, entries, eq.held, least=self._least)
         try:
             return linear.solve_transposed(rows, unknowns(self.cavity, self.p, self.r, eq.constant.p_unit))
         finally:
@@ -122,7 +124,7 @@ class Adjoint:
         """Whether the film was solved on half its width, and nothing stands in the way of doing so again."""
         eq = self.equations
         plain = eq.law is None and not eq.turned and eq.constant.held is None and eq.held is None
-        return plain and self.reported.grid.size > SMALL and self._reduction == "mirror"
+        return plain and self.reported.grid.size > self._least and self._reduction == "mirror"
 
     def lagrangians(self, scene: Scene, pressures: Sequence[float] | None = None) -> Array:
         """L of every quantity and condition at a scene near by, the fields held. Collective.

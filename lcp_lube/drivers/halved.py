@@ -25,15 +25,15 @@ EVEN = 1e-9  # relative difference that rounding leaves between both halves of w
 class Halved:
     """As `linearised.Linear`, of a problem whose scene is symmetric. Collective, as its methods."""
 
-    def __init__(self, problem: LubricationProblem, cavity: Any, film: Solvable, M: Array | None = None):
+    def __init__(self, problem: LubricationProblem, cavity: Any, film: Solvable, M: Array | None = None, least: int = 0):
         grid, part = problem.grid, Part(film, "mirror")
-        self.problem, self.cavity, self.M = problem, cavity, M
+        self.problem, self.cavity, self.M, self.least = problem, cavity, M, least
         half = self._cut(part) or part.build(grid.petsc_comm)
         self._take, self._spread = Pick(grid, half.grid, *numbers(half.grid)), Pick(half.grid, grid, *part.places(grid))
         self.half = half if problem.dry is None or half.coefficients_for is None else half.revised(self._take(problem.dry))
         self._share = np.broadcast_to(np.where(sides(half.grid, ("mirror",))[3], 0.5, 1.0), half.grid.box).ravel()
         of_half = None if M is None else self._share * self._take(M)
-        self._small = Linear(self.half, self._take(cavity.astype(float)) > 0.5, M=of_half)
+        self._small = Linear(self.half, self._take(cavity.astype(float)) > 0.5, M=of_half, least=least)
 
     def _cut(self, part: Part) -> LubricationProblem | None:
         """Half of the problem's own coefficients, on one rank."""
@@ -55,7 +55,7 @@ class Halved:
 
     @cached_property
     def _whole(self) -> Linear:
-        return Linear(self.problem, self.cavity, M=self.M)
+        return Linear(self.problem, self.cavity, M=self.M, least=self.least)
 
     def _of(self, change: Callable[[Array], Array], a: Any) -> Any:
         return change(a.real) + 1j * change(a.imag) if np.iscomplexobj(a) else change(a)

@@ -37,13 +37,15 @@ class Linear:
         given: Any = None,
         M: Array | None = None,
         factored: bool = False,
+        least: int = 0,
     ):
         """entries : of dG/dp, where that is not A (of a fluid with a law). given : points in a groove, whose rows are those of
-        the identity. M : the diagonal of what void is stored (`at`). factored : it is solved with so often that factors pay."""
+        the identity. M : the diagonal of what void is stored (`at`). factored : it is solved with so often that factors pay.
+        least : points from which multigrid does; default SMALL."""
         self.problem, self.cavity, self.entries, self.given, self.M = problem, cavity, entries, given, M
         grid, self.frozen = problem.grid, None
         apart = entries is None and not factored and (given is None or problem.held is None)
-        if apart and grid.dim == 2 and grid.size > SMALL and has_numba():
+        if apart and grid.dim == 2 and grid.size > (least or SMALL) and has_numba():
             from ..solvers.fas.frozen import Frozen  # here: numba starts with it
 
             self.frozen = Frozen(problem, cavity, M, given)

@@ -286,7 +286,7 @@ def test_ranks(cli, ranks, name, changes, keys):
     words = (word for key, value in changes.items() for word in ("--set", f"{key}={value}"))
     together = cli("sensitivity", name, *words, "--by", keys, "--quantity", "load,friction", "--json", ranks=ranks)
     assert together.status == 0, together.err
-    assert together.json["gradient"] == pytest.approx(alone, rel=1e-7)
+    assert together.json["gradient"] == pytest.approx(alone, rel=5e-7)  # each lambda is found to 1e-7
 
 
 def run_here(*words):
@@ -360,6 +360,7 @@ def test_large_films_have_the_same_adjoint(monkeypatch, name, halved):
     for least in (10**9, 100):
         monkeypatch.setattr(linearised, "SMALL", least)
         monkeypatch.setattr(adjoint_module, "SMALL", least)
+        monkeypatch.setattr(adjoint_module, "FEWER", least)
         adjoint = Adjoint(scene, solution, ["load", "friction", "flow_east", "flow_south"])
         found.append(dict(adjoint.lambdas))
         adjoint.destroy()
