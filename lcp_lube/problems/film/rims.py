@@ -3,12 +3,10 @@
 Between two points the film is told by lines side by side, SIDE_BY_SIDE of them across the width of a face, each with
 resistances in series (`edges`). That is right where the film is full. Where a dimple is cavitated its rim is where the pressure
 ends: only the film before it resists, and carries, and what lies behind would be a length that varies with the rim's place in
-the cell, an error of first order. There the rim's place on the line of points counts, as in the symmetric scheme of second
-order by Gibou, Fedkiw, Cheng and Kang (2002); a mean over the face's width would favour lines that end near the point. A fixed
-coefficient cannot know where cavities are; the answer does. So a problem with such faces is solved, its cavities are looked at,
-and it is solved once more, from the answer on, with the cut faces made for them (`LubricationProblem.revised`). Either problem
-is of the one form, with positive conductances that both cells share and Couette flows that leave one cell and enter the next:
-its solution is unique, and certificate and bands hold as ever (docs/accuracy.md).
+the cell, an error of first order. A fixed coefficient cannot know; the answer does. So a problem with such faces is solved, its
+cavities are looked at, and it is solved once more, from the answer on, with the cut faces made for them
+(`LubricationProblem.revised`). Either problem is of the one form, with positive conductances that both cells share and Couette
+flows that leave one cell and enter the next: its solution is unique, and certificate and bands hold as ever (docs/accuracy.md).
 """
 
 from collections.abc import Callable, Sequence
@@ -66,7 +64,6 @@ def cut_faces(
     dry_first, dry_last = cavity[j, i], cavity[j, i + 1]
     void = np.where(first == last, dry_first & dry_last, np.where(last, dry_last, dry_first & np.bool_(not along_flow)))
     cubes, films = np.zeros(i.size), np.zeros(i.size)
-    looks = np.where(void & (first != last), lines[j], looks)  # the pressure ends at the rim: its place on the line of points
     for s in looks:
         h = film(t, s[:, None])  # complex, where its derivative is asked for
         thin = np.real(h) <= between[:, None]
