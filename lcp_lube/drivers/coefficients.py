@@ -4,7 +4,7 @@
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -25,7 +25,7 @@ from ..scenes.scene import Scene, Solvable
 from ..scenes.thrust import ThrustScene
 from ..scenes.tilting import TiltingPadScene
 from .coupled_response import CoupledResponse
-from .grooves import films_of
+from .grooves import SolvedFilm, films_of
 from .impedance import impedance
 from .pad_coordinates import Bearing, JournalPads, ThrustPads, bearing_of
 from .response import Change, Moved, Response
@@ -104,23 +104,20 @@ def coefficients(
         along = math.atan2(-fy, -fx)
     motions = motions_of(turning, tilt, 0.5 * model.lengths[-1], along)
     names = FLAT if turning is None else TILTED if tilt else JOURNAL
-    total = np.zeros((len(frequencies), len(motions), len(motions)), dtype=complex)
     symmetric = solution.settings.get("details", {}).get("reduction") == "mirror"
     with_effects = model.law is not None or bool(model.effects)
-    found: Iterator[Any] = iter(())
     if isinstance(scene, TiltingPadScene) or pads is not None:
         turn = np.array([[math.cos(along), -math.sin(along)], [math.sin(along), math.cos(along)]])
         follow = np.zeros(0, dtype=bool) if pads is None else pads.free
-        own = _of_pads(scene, solution, frequencies, follow, with_effects)
-        total += turn.T @ own @ turn if turning is not None else own
-    elif with_effects:
-        found = _with_effects(scene, solution, [partial(_moved, model.gap, motion) for motion in motions])
+        own = _of_pads(scene, solution, frequencies, follow, with_effects, stored)
+        total = turn.T @ own @ turn if turning is not None else own
+    elif with_effects:  # as a whole: a ring's films share their oil
+        gaps = [partial(_moved, model.gap, motion) for motion in motions]
+        total = impedance(CoupledResponse(scene, solution, gaps), frequencies, stored)
     else:
-        found = responses(scene, model, ring, solution.fields, motions, symmetric)
-    for response in found:
-        for k, nu in enumerate(frequencies):
-            total[k] += response.at(nu, stored) if nu else response.stiffness() + 1j * response.damping()
-    total *= scene.pads if isinstance(scene, ThrustScene) else 1  # one of which was solved
+        of = partial(impedance, frequencies=frequencies, stored=stored)
+        total = summed(of, scene, model, ring, solution.fields, motions, symmetric)
+    total = total * (scene.pads if isinstance(scene, ThrustScene) else 1)  # one of which was solved
     return [
         Coefficients(nu, one.real, one.imag / nu if nu > 0 else one.imag, names)
         for nu, one in zip(frequencies, total, strict=True)
@@ -131,30 +128,19 @@ def _moved(gap: Any, motion: Change, e: float) -> Moved:
     return Moved(gap, motion, e, 0.0)
 
 
-def _with_effects(scene: Scene, solution: Solution, gaps: list[Any]) -> Iterator[CoupledResponse]:
-    """Of a film whose coefficients depend on its answer, as a whole: a ring's films share their oil. Collective."""
-    response = CoupledResponse(scene, solution, gaps)
-    yield response
-    response.destroy()
-
-
-def _of_pads(scene: Any, solution: Solution, frequencies: Sequence[float], free: Any, with_effects: bool) -> Array:
+def _of_pads(
+    scene: Any, solution: Solution, frequencies: Sequence[float], free: Any, with_effects: bool, stored: bool
+) -> Array:
     """K + i nu C (at nu = 0: K + i C) of what pads carry, with massless pads that follow where they are free. Collective."""
     bearing: Bearing = JournalPads(scene) if isinstance(scene, TiltingPadScene) else ThrustPads(scene)
     n, felt = bearing.sizes.size, 2 if isinstance(scene, TiltingPadScene) else 1
-    total = np.zeros((len(frequencies), n, n), dtype=complex)
     if with_effects:
         q, each = bearing.start(), np.eye(n)
         gaps = [lambda e, one=one: bearing.at(q + e * one).gap for one in each]  # type: ignore[attr-defined]
-        for response in _with_effects(scene, solution, gaps):
-            for k, nu in enumerate(frequencies):
-                total[k] = response.at(nu) if nu else response.stiffness() + 1j * response.damping()
+        total = impedance(CoupledResponse(scene, solution, gaps), frequencies, stored)
     else:
-        for film in bearing.films(scene, solution):
-            found = impedance(film.problem, film.model, film.fields, film.modes, frequencies)
-            film.problem.destroy()
-            rows, columns = np.ix_(film.numbers, film.numbers)
-            total[:, rows, columns] += found
+        with bearing.films(scene, solution) as films:
+            total = films.sum(lambda film: film.spread(impedance(film.response(), frequencies, stored), n))
     return np.array(
         [_reduced(Z, nu, felt, np.flatnonzero(free[felt:]) + felt) for Z, nu in zip(total, frequencies, strict=True)]
     )
@@ -196,26 +182,27 @@ def supplied(model: Model, solution: Solution) -> Model:
     return replace(model, supplies=tuple(replace(one, p=p) for one, p in zip(model.supplies, found, strict=True)))
 
 
-def responses(
-    scene: Solvable, model: Model, ring: LubricationProblem, fields: Fields, motions: Sequence[Change], symmetric: bool = False
-) -> Iterator[Response]:
-    """Of the problems that were solved, films between grooves or the whole; each is freed when the next one is asked for.
+def summed(
+    of: Callable[[Response], Any],
+    scene: Solvable,
+    model: Model,
+    ring: LubricationProblem,
+    fields: Fields,
+    motions: Sequence[Change],
+    symmetric: bool = False,
+) -> Any:
+    """What `of` finds, and frees, of the problem that was solved, or of the films between its grooves side by side.
 
-    None of tilting pads: see `_of_pads`. symmetric : they were solved on half their width. Collective.
+    Not of tilting pads: see `_of_pads`. symmetric : they were solved on half their width. Collective.
     """
-    if isinstance(scene, TiltingPadScene):
-        return
     if not isinstance(ring, GroovedProblem):
-        yield from _freed(Response(ring, model, fields, motions, film=scene if symmetric else None))
-        return
-    for problem, film, own, first in films_of(scene, ring, fields):
-        yield from _freed(Response(problem, film.model, own, motions, first, film=film if symmetric else None))
-        problem.destroy()
+        return of(Response(ring, model, fields, motions, film=scene if symmetric else None))
+    with films_of(scene, ring, fields) as films:
+        return films.sum(lambda one: of(_response(one, motions, symmetric)))
 
 
-def _freed(response: Response) -> Iterator[Response]:
-    yield response
-    response.destroy()
+def _response(one: SolvedFilm, motions: Sequence[Change], symmetric: bool) -> Response:
+    return Response(one.problem, one.film.model, one.fields, motions, one.first, film=one.film if symmetric else None)
 
 
 def stability(K: Array, C: Array) -> tuple[float | None, float | None]:

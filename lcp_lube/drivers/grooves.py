@@ -1,15 +1,17 @@
 """A ring with axial grooves: the films between them are solved by themselves, their fields put together and certified."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..base.parallel import Array
-from ..base.together import on_all_ranks
+from ..base.together import EXPECTED, on_all_ranks
+from ..linear.krylov import LinearSolverError
 from ..problems.facts import Facts
 from ..problems.film.effects import FaceFactors
 from ..problems.film.grooves import GroovedProblem, Pad
@@ -17,7 +19,7 @@ from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.grid import Grid
 from ..problems.solution import Enclosure, Fields, Outcome, Solution
-from ..problems.transfer import Pick, fetch, numbers
+from ..problems.transfer import fetch, numbers
 from ..scenes.scene import Derived, Solvable
 from ..solvers.enclosure import bounds_of
 from .ask import Ask, Start
@@ -55,6 +57,34 @@ class PadFilm(Derived):
 
 
 Films = list[tuple[Pad, PadFilm]]
+Film = TypeVar("Film")
+
+
+class SolvedFilm(NamedTuple):
+    """One of the films of a solved ring; first : x of the ring where its own x is 0, m."""
+
+    problem: LubricationProblem
+    film: PadFilm
+    fields: Fields
+    first: float
+
+
+@dataclass(frozen=True)
+class SideBySide(Generic[Film]):
+    """Films dealt out to groups of ranks: those of this rank's group. Its methods are collective on all ranks."""
+
+    comm: MPI.Comm
+    group: MPI.Comm
+    mine: Sequence[Film]
+
+    def sum(self, of: Callable[[Film], Array]) -> Array:
+        """Over the films of all groups, of what is collective on one group; a failure in one is raised on all ranks."""
+        with on_all_ranks(self.comm, caught=(*EXPECTED, LinearSolverError)):
+            found = sum(of(film) for film in self.mine)
+        return self.comm.allreduce(found if self.group.rank == 0 else 0.0)  # type: ignore[return-value]
+
+    def min(self, of: Callable[[Film], float]) -> float:
+        return self.comm.allreduce(min(map(of, self.mine)), MPI.MIN)
 
 
 def applies(scene: Solvable, ask: Ask) -> bool:
@@ -68,19 +98,29 @@ def pad_films(scene: Solvable) -> Films:
     return [(pad, PadFilm(scene, film, (pad.n, *scene.shape[1:]), pad.first)) for pad, film in model.pads(scene.shape)]
 
 
-def films_of(
-    scene: Solvable, ring: LubricationProblem, fields: Fields
-) -> Iterator[tuple[LubricationProblem, PadFilm, Fields, float]]:
-    """The films between the grooves of a solved ring, with their fields and the x where each begins. Collective.
+def _dealt(scene: Solvable, films: Films, comm: MPI.Comm) -> tuple[int, MPI.Comm, list[int]]:
+    """How many groups of ranks work side by side; this rank's, to be freed if there are several; its films. Collective."""
+    # Factors of effects lie on the whole ring, and every rank takes part in handing them out.
+    apart = not hasattr(scene, "by") and not scene.facts().moving
+    groups = min(comm.size, len(films)) if apart else 1
+    some = comm.Split(comm.rank % groups, comm.rank) if groups > 1 else comm
+    return groups, some, [k for k, group in enumerate(_group(films, groups)) if group == comm.rank % groups]
 
-    The problems are the caller's to free.
-    """
-    for pad, film in pad_films(scene):
-        problem = film.build(ring.grid.petsc_comm)
-        take = pick_pad(ring.grid, problem.grid, pad.first)
-        taken = {name: take(values) for name, values in fields.items()}
-        take.destroy()
-        yield problem, film, taken, (pad.first - 0.5) * ring.grid.lengths[0] / ring.grid.shape[0]
+
+@contextmanager
+def films_of(scene: Solvable, ring: LubricationProblem, fields: Fields) -> Iterator[SideBySide[SolvedFilm]]:
+    """The films between the grooves of a solved ring, side by side as `solve` has them. Collective."""
+    comm, films = ring.grid.comm, pad_films(scene)
+    groups, some, mine = _dealt(scene, films, comm)
+    taken = _taken(ring.grid, fields, films, mine, PETSc.Comm(some), comm)
+    dx = ring.grid.lengths[0] / ring.grid.shape[0]
+    yield SideBySide(
+        comm, some, [SolvedFilm(at, films[k][1], own, (films[k][0].first - 0.5) * dx) for k, (at, own) in taken.items()]
+    )
+    for problem, _ in taken.values():
+        problem.destroy()
+    if groups > 1:
+        some.Free()
 
 
 def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
@@ -91,13 +131,11 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     ring = scene.build(ask.comm)
     assert isinstance(ring, GroovedProblem)  # as `applies` found
     comm, films = ask.mpi, pad_films(scene)
-    # Factors of effects lie on the whole ring, and every rank takes part in handing them out.
-    apart = not hasattr(scene, "by") and not scene.facts(ask.comm).moving
-    groups = min(comm.size, len(films)) if apart else 1
-    some = comm.Split(comm.rank % groups, comm.rank) if groups > 1 else comm
-    mine = [k for k, group in enumerate(_group(films, groups)) if group == comm.rank % groups]
-    ask = replace(ask, comm=some) if groups > 1 else ask
-    starts = _starts(ring, films, mine, ask, comm)
+    groups, some, mine = _dealt(scene, films, comm)
+    ask, near, starts = replace(ask, comm=some) if groups > 1 else ask, ask.start, {}
+    if near is not None and near.problem.grid.shape == ring.grid.shape:
+        taken = _taken(near.problem.grid, near.fields, films, mine, ask.comm, comm)
+        starts = {k: Start(*one, near.settings) for k, one in taken.items()}
     done: dict[int, Solution] = {}
     with on_all_ranks(comm):
         for k in mine:
@@ -159,23 +197,20 @@ def _group(films: Films, groups: int) -> list[int]:
     return out
 
 
-def _starts(ring: LubricationProblem, films: Films, mine: list[int], ask: Ask, comm: MPI.Comm) -> dict[int, Start]:
-    """Fields of an answer on the same ring for each of this rank's films, if there is one. Collective."""
-    near = ask.start
-    if near is None or near.problem.grid.shape != ring.grid.shape:
-        return {}
-    at = {k: films[k][1].build(ask.comm) for k in mine}
+def _taken(
+    ring: Grid, fields: Fields, films: Films, mine: list[int], group: PETSc.Comm | None, comm: MPI.Comm
+) -> dict[int, tuple[LubricationProblem, Fields]]:
+    """The problem of each of this rank's films, and its part of a ring's fields. Collective."""
+    with on_all_ranks(comm):
+        at = {k: films[k][1].build(group) for k in mine}
     boxes = {k: np.broadcast_arrays(*numbers(problem.grid)) for k, problem in at.items()}
     j = [boxes[k][0].ravel() for k in mine]
-    i = [(films[k][0].first + boxes[k][1].ravel()) % ring.grid.shape[0] for k in mine]
-    have = [(0, near.problem.grid, np.array(list(near.fields.values())))]
+    i = [(films[k][0].first + boxes[k][1].ravel()) % ring.shape[0] for k in mine]
+    have = [(0, ring, np.array(list(fields.values())))]
     none = np.zeros(0, dtype=np.int64)
     values = fetch(comm, have, 0 * np.concatenate([*j, none]), np.concatenate([*j, none]), np.concatenate([*i, none]))
-    ends = np.cumsum([one.size for one in j])
-    parts = np.split(values, ends[:-1], axis=1) if mine else []
-    return {
-        k: Start(at[k], dict(zip(near.fields, part, strict=True)), near.settings) for k, part in zip(mine, parts, strict=True)
-    }
+    parts = np.split(values, np.cumsum([one.size for one in j])[:-1], axis=1) if mine else []
+    return {k: (at[k], dict(zip(fields, part, strict=True))) for k, part in zip(mine, parts, strict=True)}
 
 
 def _spread(ring: GroovedProblem, films: Films, done: dict[int, tuple[Any, Fields]], comm: MPI.Comm) -> tuple[Fields, Array]:
@@ -194,9 +229,3 @@ def _spread(ring: GroovedProblem, films: Films, done: dict[int, tuple[Any, Field
     for inside, groove in zip(ring.columns, ring.grooves, strict=True):
         p[inside] = groove.p / ring.p_unit
     return {"p": p, "r": r}, dry
-
-
-def pick_pad(ring: Grid, pad: Grid, first: int) -> Pick:
-    """Takes a film's values from the ring's grid."""
-    j, i = numbers(pad)
-    return Pick(ring, pad, j, (first + i) % ring.shape[0])

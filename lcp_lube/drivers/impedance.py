@@ -6,10 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from ..problems.film.lubrication import LubricationProblem
-from ..problems.film.model import Model
 from ..problems.film.turning import Turning
-from ..problems.solution import Fields
+from .coupled_response import CoupledResponse
 from .response import Change, Response
 
 Mode = Change  # dh of a rigid motion of a wall, by its coordinate, of x and y (m)
@@ -24,15 +22,18 @@ def displacements(turning: Turning, first: float) -> list[Mode]:
     return [towards(0.0), towards(0.5 * math.pi)]
 
 
-def impedance(
-    problem: LubricationProblem, model: Model, fields: Fields, modes: Sequence[Mode], frequencies: Sequence[float]
-) -> Any:
-    """-d(integral of p g_i)/de_j of one film for motions exp(i nu t) of its modes g, i.e. K + i nu C. Collective.
+def impedance(response: Response | CoupledResponse, frequencies: Sequence[float], stored: bool = True) -> Any:
+    """K + i nu C of a film for motions exp(i nu t); the response is freed. Collective.
 
-    Returns an array of shape (frequencies, modes, modes); at nu = 0 (the limit of slow motion) it is K + i C.
+    Returns an array of shape (frequencies, motions, motions); at nu = 0 (the limit of slow motion) it is K + i C.
     """
-    response = Response(problem, model, fields, modes)
-    try:
-        return np.array([response.at(nu) if nu else response.stiffness() + 1j * response.damping() for nu in frequencies])
-    finally:
-        response.destroy()
+    found = [response.at(nu, stored) if nu else response.stiffness() + 1j * response.damping() for nu in frequencies]
+    response.destroy()
+    return np.array(found)
+
+
+def stiffness(response: Response) -> Any:
+    """K, shape (motions, motions); the response is freed. Collective."""
+    K = response.stiffness()
+    response.destroy()
+    return K

@@ -16,8 +16,9 @@ from ..problems.solution import Outcome, Solution, Step
 from ..scenes.motion import MotionTable
 from ..scenes.moving import motion_of
 from .ask import Ask, Start
-from .coefficients import motions_of, responses, supplied
+from .coefficients import motions_of, summed, supplied
 from .compose import Inner
+from .impedance import stiffness
 from .march import March
 from .march_file import MarchFile
 from .plan import plan
@@ -210,19 +211,18 @@ class Run:
                 own.destroy()
             return solves[-1]
 
-        def stiffness(solution: Solution) -> Any:
+        def stiffness_of(solution: Solution) -> Any:
             whole = TimeStep(self.scene, self.model, march.grid)
             ring: Any = solution.problem
             motions = motions_of(self.scene.turning, False, 0.0)
-            found = responses(whole, supplied(whole.model, solution), ring, solution.fields, motions)
-            return sum((response.stiffness() for response in found), np.zeros((2, 2)))
+            return summed(stiffness, whole, supplied(whole.model, solution), ring, solution.fields, motions)
 
         if self.rotor is None:
             place, why = self._at(t, lambda: self._given(t)), ""
             solution = film_at(place)
         else:
             guess = self.rotor.guess(dt, march.dts)
-            solution, place, why = self.rotor.settle(t, formula, guess, film_at, stiffness)
+            solution, place, why = self.rotor.settle(t, formula, guess, film_at, stiffness_of)
         return solution, place, why, [one.steps for one in solves]
 
     def _keep(self, solution: Solution, solves: list[list[Step]]) -> None:

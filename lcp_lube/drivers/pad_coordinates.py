@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -16,9 +17,10 @@ from ..problems.solution import Fields, Solution
 from ..scenes.scene import Scene, Solvable
 from ..scenes.thrust import ThrustScene
 from ..scenes.tilting import TiltingPadScene
-from .grooves import films_of
+from .grooves import SideBySide, SolvedFilm, films_of
 from .impedance import Mode, displacements
 from .loop import held
+from .response import Response
 
 MOMENTS = 1e-8  # of the load times the lever, about a pivot
 
@@ -37,6 +39,19 @@ class PadFilm:
         """Integral of (p - ambient) g. Collective."""
         return integral(self.problem, self.fields["p"] * self.problem.p_unit, ambient(self.problem), mode)
 
+    def response(self) -> Response:
+        """To its modes. Collective."""
+        return Response(self.problem, self.model, self.fields, self.modes)
+
+    def spread(self, found: Any, n: int) -> Any:
+        """What was found of its modes, shape (..., modes, modes), at their places among n coordinates."""
+        out = np.zeros((*found.shape[:-2], n, n), dtype=found.dtype)
+        out[..., *np.ix_(self.numbers, self.numbers)] = found
+        return out
+
+
+Films = SideBySide[PadFilm]
+
 
 class Bearing(Protocol):
     """A scene seen as coordinates. sizes : what counts as a change of each; free : those that are to be found; pitches : the
@@ -52,9 +67,9 @@ class Bearing(Protocol):
 
     def at(self, q: Array) -> Scene: ...
 
-    def films(self, scene: Scene, solution: Solution) -> Iterator[PadFilm]: ...
+    def films(self, scene: Scene, solution: Solution) -> AbstractContextManager[Films]: ...
 
-    def misfit(self, solution: Solution, films: Sequence[PadFilm]) -> tuple[Array, Array]:
+    def misfit(self, solution: Solution, films: Films) -> tuple[Array, Array]:
         """What is left of each equation, and what it counts by."""
         ...
 
@@ -95,28 +110,31 @@ class JournalPads:
         }
         return self.scene.model_copy(update={**e, "tilts": [float(tilt) for tilt in q[2:]], "balance": None})
 
-    def films(self, scene: Scene, solution: Solution) -> Iterator[PadFilm]:
-        turning = self.scene.turning
-        for problem, film, fields, first in films_of(held(scene, solution), solution.problem, solution.fields):  # type: ignore[arg-type]
-            middle = math.degrees(float(turning.theta(np.array(first + 0.5 * problem.grid.lengths[0]))))
-            off = [
-                abs(math.remainder(middle - at - (0.5 - self.scene.pivot_part) * self.scene.pad_deg, 360.0))
-                for at in self.scene.pivots_deg
-            ]
-            k = int(np.argmin(off))
-            pivot = math.radians(self.scene.pivots_deg[k])
+    @contextmanager
+    def films(self, scene: Scene, solution: Solution) -> Iterator[Films]:
+        with films_of(held(scene, solution), solution.problem, solution.fields) as films:  # type: ignore[arg-type]
+            yield replace(films, mine=[self._pad(one) for one in films.mine])  # type: ignore[misc]
 
-            def tilt(x: Array, y: Array, first: float = first, pivot: float = pivot) -> Array:
-                return -turning.R * np.sin(turning.theta(x + first) - pivot) + 0.0 * y
+    def _pad(self, one: SolvedFilm) -> PadFilm:
+        turning, first = self.scene.turning, one.first
+        middle = math.degrees(float(turning.theta(np.array(first + 0.5 * one.problem.grid.lengths[0]))))
+        off = [
+            abs(math.remainder(middle - at - (0.5 - self.scene.pivot_part) * self.scene.pad_deg, 360.0))
+            for at in self.scene.pivots_deg
+        ]
+        k = int(np.argmin(off))
+        pivot = math.radians(self.scene.pivots_deg[k])
 
-            yield PadFilm(problem, film.model, fields, [*displacements(turning, first), tilt], [0, 1, 2 + k])
+        def tilt(x: Array, y: Array) -> Array:
+            return -turning.R * np.sin(turning.theta(x + first) - pivot) + 0.0 * y
 
-    def misfit(self, solution: Solution, films: Sequence[PadFilm]) -> tuple[Array, Array]:
+        return PadFilm(one.problem, one.film.model, one.fields, [*displacements(turning, first), tilt], [0, 1, 2 + k])
+
+    def misfit(self, solution: Solution, films: Films) -> tuple[Array, Array]:
         fx, fy = solution.problem.quantities(solution.fields)["force"]
         load = self.scene.balance.load if self.scene.balance is not None else math.hypot(fx, fy)
-        moments = np.zeros(len(self.scene.pivots_deg))
-        for film in films:
-            moments[film.numbers[-1] - 2] = film.pushes(film.modes[-1])
+        places = np.eye(len(self.scene.pivots_deg))
+        moments = films.sum(lambda film: film.pushes(film.modes[-1]) * places[film.numbers[-1] - 2])
         tol = self.scene.balance.tol if self.scene.balance is not None else 1.0
         lever = _moments(self.scene) * (load or 1.0) * 0.5 * self.scene.D
         return np.array([fx + load, fy, *moments]), np.array([tol * load] * 2 + [lever] * moments.size)
@@ -154,15 +172,17 @@ class ThrustPads:
         found = dict(zip(("h_min", "pitch", "roll"), map(float, q), strict=True))
         return self.scene.model_copy(update={**found, "balance": None})
 
-    def films(self, scene: Scene, solution: Solution) -> Iterator[PadFilm]:
+    @contextmanager
+    def films(self, scene: Scene, solution: Solution) -> Iterator[Films]:
         assert isinstance(scene, ThrustScene) and isinstance(solution.problem, LubricationProblem)
         modes = [lambda x, y: 1.0 + 0.0 * (x + y), *scene.tilt_modes]
-        film = held(scene, solution)
-        yield PadFilm(film.build(solution.problem.grid.petsc_comm), film.model, solution.fields, modes, [0, 1, 2])
+        film, grid = held(scene, solution), solution.problem.grid
+        problem = film.build(grid.petsc_comm)
+        yield SideBySide(grid.comm, grid.comm, [PadFilm(problem, film.model, solution.fields, modes, [0, 1, 2])])
+        problem.destroy()
 
-    def misfit(self, solution: Solution, films: Sequence[PadFilm]) -> tuple[Array, Array]:
-        (film,) = films
-        pushes = np.array([film.pushes(mode) for mode in film.modes])
+    def misfit(self, solution: Solution, films: Films) -> tuple[Array, Array]:
+        pushes = films.sum(lambda film: np.array([film.pushes(mode) for mode in film.modes]))
         table = self.scene.balance
         load = table.load / self.scene.pads if table is not None else pushes[0]
         lever = _moments(self.scene) * abs(load or 1.0) * self.scene.side_lengths[0]

@@ -9,7 +9,6 @@ tilting, and are not what a bearing runs at: their inlets are opened, step by st
 which the journal has moved so far that it finds no place with stiffness idles: its inlet is closed until it has no pressure.
 """
 
-from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any
@@ -24,8 +23,8 @@ from ..scenes.scene import Solvable
 from .ask import Ask
 from .chain import Chain
 from .compose import Inner
-from .pad_coordinates import Bearing, PadFilm, bearing_of
-from .response import Response
+from .impedance import stiffness
+from .pad_coordinates import Bearing, Films, PadFilm, bearing_of
 
 MOST_SOLVES = 80
 THINNER, THICKER = 0.7, 3.0  # parts of a film anywhere by which a step may change it
@@ -65,28 +64,26 @@ def _from(bearing: Bearing, q: Array, scene: Solvable, ask: Ask, inner: Inner) -
         solution = chain.solve(at)
         if not solution.converged:
             break
-        films = list(bearing.films(at, solution))
-        off, counts = bearing.misfit(solution, films)
-        if min(float(np.min(one.problem.film(*_places(one)))) for one in films) < THINNEST * bearing.sizes[0]:
-            _free(films)
-            break
-        met = bool(np.all(np.abs(off[bearing.free]) <= counts[bearing.free]))
-        if met and stiff and not nudges.any():
-            found = True
-            _free(films)
-            break
-        K = _stiffness(films, q.size)
-        for k in bearing.pitches:
-            opens = bearing.free[k] and not K[k, k] > 0 and nudges[k] < NUDGES
-            closes = bearing.free[k] and nudges[k] >= NUDGES and abs(off[k]) > counts[k]
-            nudge[k] = NUDGE * bearing.sizes[k] * (opens - 1.0 * closes)
-        nudges += nudge > 0
-        found = met and not nudge.any()
-        if found and not again and (nudges >= NUDGES).any():  # from the place that was found, a pad that idles may find its own
-            nudge = np.where(nudges >= NUDGES, NUDGE * bearing.sizes, 0.0)
-            nudges, found, again = np.zeros_like(nudges), False, True
-        step = _step(bearing, films, K, off, counts, nudge, bearing.free & (nudge == 0) & (nudges < NUDGES))
-        _free(films)
+        with bearing.films(at, solution) as films:
+            off, counts = bearing.misfit(solution, films)
+            if films.min(lambda one: float(np.min(one.problem.film(*_places(one))))) < THINNEST * bearing.sizes[0]:
+                break
+            met = bool(np.all(np.abs(off[bearing.free]) <= counts[bearing.free]))
+            if met and stiff and not nudges.any():
+                found = True
+                break
+            K = films.sum(lambda one: one.spread(stiffness(one.response()), q.size))  # noqa: B023
+            for k in bearing.pitches:
+                opens = bearing.free[k] and not K[k, k] > 0 and nudges[k] < NUDGES
+                closes = bearing.free[k] and nudges[k] >= NUDGES and abs(off[k]) > counts[k]
+                nudge[k] = NUDGE * bearing.sizes[k] * (opens - 1.0 * closes)
+            nudges += nudge > 0
+            found = met and not nudge.any()
+            if found and not again and (nudges >= NUDGES).any():
+                # From the place that was found, a pad that idles may find its own.
+                nudge = np.where(nudges >= NUDGES, NUDGE * bearing.sizes, 0.0)
+                nudges, found, again = np.zeros_like(nudges), False, True
+            step = _step(bearing, films, K, off, counts, nudge, bearing.free & (nudge == 0) & (nudges < NUDGES))
         if found or count == MOST_SOLVES:
             break
         # A place so near has stiffness too: it need not be found once more to know that the pads are stable there.
@@ -104,37 +101,20 @@ def _places(film: PadFilm) -> tuple[Array, Array]:
     return grid.with_neighbours(0)[None, :], grid.with_neighbours(1)[:, None]
 
 
-def _free(films: Sequence[PadFilm]) -> None:
-    """Collective."""
-    for film in films:
-        film.problem.destroy()
-
-
-def _stiffness(films: Sequence[PadFilm], size: int) -> Array:
-    """-d(integral of p g_i)/dq_j of all films together. Collective."""
-    K = np.zeros((size, size))
-    for film in films:
-        response = Response(film.problem, film.model, film.fields, film.modes)
-        K[np.ix_(film.numbers, film.numbers)] += response.stiffness()
-        response.destroy()
-    return K
-
-
-def _step(
-    bearing: Bearing, films: Sequence[PadFilm], K: Array, off: Array, counts: Array, nudge: Array, moves: NDArray[np.bool_]
-) -> Array:
+def _step(bearing: Bearing, films: Films, K: Array, off: Array, counts: Array, nudge: Array, moves: NDArray[np.bool_]) -> Array:
     """Newton's step of what moves, and the nudges, shortened where it would change a film by too much. Collective."""
     free, step = np.flatnonzero(moves), nudge.copy()
     scaled = -K[np.ix_(free, free)] * bearing.sizes[free] / counts[free, None]
     step[free] = bearing.sizes[free] * np.linalg.lstsq(scaled, -off[free] / counts[free], rcond=1e-13)[0]
-    share = 1.0
-    for film in films:
+
+    def share(film: PadFilm) -> float:
         x, y = _places(film)
         moved = sum(step[k] * mode(x, y) for k, mode in zip(film.numbers, film.modes, strict=True))
         change = moved / film.problem.film(x, y)
         falls, grows = float(np.max(-change)), float(np.max(change))
-        share = min(share, THINNER / max(falls, THINNER), THICKER / max(grows, THICKER))
-    return share * step
+        return min(THINNER / max(falls, THINNER), THICKER / max(grows, THICKER))
+
+    return films.min(share) * step
 
 
 def _tell(scene: Any, bearing: Bearing, solution: Solution, q: Array, found: bool, count: int) -> None:

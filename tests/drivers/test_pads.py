@@ -1,5 +1,6 @@
 """Pads that tilt: equilibrium, symmetry, stiffness against differences, no cross-coupling, pads that idle, bad input."""
 
+import json
 import math
 
 import numpy as np
@@ -25,11 +26,9 @@ def test_journal_in_balance(load, preload, pivot):
         assert abs(math.radians(solution.settings["attitude_deg"])) < 1e-4  # pivots on both sides of the load
         bearing = JournalPads(scene)
         q = np.array(solution.settings["coordinates"])
-        films = list(bearing.films(bearing.at(q), solution))
-        off, _ = bearing.misfit(solution, films)
+        with bearing.films(bearing.at(q), solution) as films:
+            off, _ = bearing.misfit(solution, films)
         assert np.abs(off[2:]).max() < 1e-7 * load * 0.05
-        for film in films:
-            film.problem.destroy()
         shift = q[0] * np.sin(np.radians(scene.pivots_deg)) / 0.05  # what the journal's displacement makes of equal gaps
         tilts = np.array(values["pad_tilts"]) - shift
         assert tilts[[0, 1]] == pytest.approx(tilts[[4, 3]], abs=1e-3 * np.abs(tilts).max())
@@ -136,3 +135,17 @@ def test_bad_input(name, keys, words):
     with pytest.raises(InputError) as error:
         solve(name, **keys)
     assert words in str(error.value) and "\n" not in str(error.value)
+
+
+def test_films_are_linearised_side_by_side(script):
+    """Groups of ranks have the films that they solve; K and C are one rank's, and a failure in one group is raised on all."""
+    alone, found = (json.loads(script("mpi_pads.py", ranks=ranks).out) for ranks in (1, 3))
+    journal, two, own = "tilting_pad_journal", "two_groove_journal", [2, 2, 1]
+    assert alone[journal]["films"][1] == [5] and alone[two]["films"][1] == [2] and alone.pop("failed") == ["as asked"]
+    solves = alone[journal]["films"][0][0] // 5
+    assert found[journal]["films"] == [[solves * n for n in own], own] and found["fixed pads"]["films"][1] == own
+    assert found[two]["films"][1] == [1, 1, 1] and found["failed"] == ["as asked"] * 3  # two ranks share one film
+    for name, one in alone.items():
+        assert one["converged"] and found[name]["converged"], name
+        for a, b in zip(one["matrices"], found[name]["matrices"], strict=True):
+            assert np.array(b) == pytest.approx(np.array(a), abs=1e-9 * np.abs(a).max()), name
