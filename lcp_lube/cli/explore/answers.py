@@ -32,7 +32,7 @@ from .controls import controls
 COARSE = {1: 400, 2: 3000}  # points of the first grid at most
 FOLLOWS = 0.12  # seconds that it may take: half of the delay that one notices, the rest is the browser's
 PATIENCE = 2.0  # seconds that a finer grid may take
-QUICK = 1e-3  # where the first answer is slow: its eps1, and what may be left of a load: less than its grid's error
+QUICK = 3e-3  # where the first answer is slow: its eps1, and what may be left of a load: less than its grid's error
 JSON = "application/json"
 GRIDS = 7.0  # times a march that an estimate of its error takes: three grids
 SHOWN = {1: 1200, 2: 160}  # points a side that are sent
