@@ -18,13 +18,10 @@ from ..problems.film.model import Model
 from ..problems.solution import Outcome, Solution
 from ..scenes.balance import BalanceTable
 from ..scenes.scene import Scene, Solvable, as_scene
-from ..scenes.thrust import ThrustScene
 from .ask import Ask
 from .chain import added
-from .coefficients import coefficients
 from .compose import Inner
 from .levels import level_shapes
-from .position import half_film_eccentricity
 from .root import Search
 
 MOST_SOLVES = 30  # on a grid
@@ -75,6 +72,8 @@ def variable(scene: Scene, table: BalanceTable, begin: float | None) -> Variable
         to_t, to_value, upper = _logit, lambda t: 1.0 / (1.0 + exp(-t)), 1.0
         turning = getattr(scene, "turning", None)
         if turning is not None and begin is None:
+            from .position import half_film_eccentricity  # here: with it come stiffness, and families of scenes
+
             value = half_film_eccentricity(turning, scene.mu_0, table.load, len(scene.shape) == 1)  # type: ignore[attr-defined]
         value = 0.5 if value is None else min(max(value, 1e-3), 0.999)
     elif key == "h_offset":
@@ -175,6 +174,9 @@ def exact_slope(scene: Any, solution: Solution, unknown: Variable, t: float) -> 
     model, turning = getattr(scene, "model", None), getattr(scene, "turning", None)
     if not isinstance(model, Model) or model.effects or model.law is not None or model.U < 0:
         return None
+    from ..scenes.thrust import ThrustScene  # here, as above
+    from .coefficients import coefficients
+
     W, key = carried(solution.problem.quantities(solution.fields)), unknown.key.rpartition(".")[2]
     if key == "eccentricity" and turning is not None and turning.widest is not None:
         (one,) = coefficients(scene, solution)

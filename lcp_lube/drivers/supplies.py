@@ -29,7 +29,6 @@ from .ask import Ask
 from .chain import Chain
 from .compose import Inner
 from .linearised import Feed, Linear
-from .supply_band import enclose_fed
 
 MOST_SOLVES = 40
 TOLERANCE = 1e-10  # of the largest flow: by how much what a source gives may differ from what the film takes
@@ -145,6 +144,8 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     problem.hold_at([replace(one, p=float(p)) for one, p in zip(supplies, P, strict=True)])
     solution.certificate = problem.certify(solution.fields, solution.settings["eps1"])
     if ask.certify:
+        from .supply_band import enclose_fed  # here: seldom asked for
+
         none = "no band: supplies' pressures and the film's coefficients follow together; give the pressures that were found"
         varies = model.effects or model.law
         solution.enclosure = Enclosure(False, none) if varies else enclose_fed(problem, solution.fields)
