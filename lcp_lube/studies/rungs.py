@@ -11,6 +11,7 @@ from statistics import median
 from time import process_time
 from typing import Any
 
+import numpy as np
 from mpi4py import MPI
 
 from ..api import solve
@@ -47,6 +48,7 @@ SCENES: dict[str, tuple[Any, int, int]] = {
 REPEATS = 5  # runs of which the median counts
 KEY = ("scene", "n", "model")
 NO_ERROR = 1e-8  # where an error that is none is drawn
+APART = 0.5  # decades between labels
 COLUMNS = (*KEY, "outcome", "quantity", "value", "error", "work", "share_of_work", "seconds")
 
 
@@ -115,19 +117,26 @@ def _draw(rows: Sequence[Row]) -> Figure:
         x, y = zip(*(_place(row) for row in steps), strict=True)
         ax.plot(x, y, **look(number))
         before: list[str] = []
-        for k, row in enumerate(steps):
+        height = np.inf  # of the label above, whose place the next one leaves free
+        for row in steps:
             models = [] if row["model"] == "least" else row["model"].split(",")
             new = ["all"] if row["model"] == "full" else [RUNGS[one].line for one in models if one not in before]
-            left = k % 2 == 1
-            place = {"xytext": (-5 if left else 5, 3), "ha": "right" if left else "left", "textcoords": "offset points"}
-            ax.annotate(", ".join(new) or "none", _place(row), **place, fontsize=6.5)
+            height = min(np.log10(_place(row)[1]), height - APART)
+            ax.annotate(
+                ", ".join(new) or "none",
+                _place(row),
+                (2.2 * max(x), 10.0**height),
+                va="center",
+                fontsize=6.5,
+                arrowprops={"arrowstyle": "-", "color": "0.6", "linewidth": 0.5},
+            )
             before = models if row["model"] != "full" else before
         star = {**look(number), "marker": "*", "markersize": 10, "linestyle": "none", "markeredgecolor": "black"}
         ax.plot(*([one] for one in _place(auto)), **star)
         ax.axhline(1e-2, color="0.5", linestyle="--", linewidth=0.7)
         ax.axhline(1e-3, color="0.5", linewidth=0.7)
-        ax.set(xscale="log", yscale="log", title=f"{name}: {steps[0]['quantity']}", xlabel="seconds of processor time")
-        ax.set_xlim(0.15 * min(x), 15.0 * max(x))
+        ax.set(xscale="log", yscale="log", title=f"{name}\n{steps[0]['quantity']}", xlabel="seconds of processor time")
+        ax.set_xlim(0.4 * min(x), 300.0 * max(x))
     for ax in axes[:: axes.size // 2]:
         ax.set_ylabel("error")
     for ax in axes[len(names) :]:
