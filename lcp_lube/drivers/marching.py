@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from .march_file import MarchFile
 from .plan import plan
 from .rotor import Rotor
 from .step import TimeStep, check_content, check_room, contents
+from .supplies import check_backflow
 
 SOME = 0.37  # of t_end: when edges are looked at that may have moved
 FIRST = 1e-3  # of t_end: the first step, where an error estimate says how long the others are
@@ -172,6 +174,7 @@ class Run:
                     solution.destroy()
                     continue
             check_content(march.grid, solution.fields["r"], t, dt, self.scene.name)
+            self._at(t, partial(check_backflow, solution))
             break
         formula = march.formula(dt)
         if self.rotor is not None:

@@ -187,9 +187,10 @@ def check_backflow(solution: Solution) -> None:
     held = getattr(solution.problem, "held", None)
     for number, one in enumerate(held.supplies if held is not None and solution.converged else (), start=1):
         if one.law and not one.backflow and one.p > one.p_s:
+            p_s, p = (value + solution.problem.p_c for value in (one.p_s, one.p))  # type: ignore[attr-defined]
             raise InputError(
-                f"{solution.settings['scene']}: supply.{number}.p_s is {one.p_s:g} Pa above p_c, the film's pressure there "
-                f"would be {one.p:g}, and oil flow back through the restrictor; a larger p_s is needed, or backflow = true"
+                f"{solution.settings['scene']}: supply.{number}.p_s = {p_s:g}: less than the film's pressure there, {p:g} Pa: "
+                f"oil would flow back through the restrictor; a larger p_s is needed, or supply.{number}.backflow = true"
             )
 
 

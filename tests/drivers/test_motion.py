@@ -344,6 +344,17 @@ def test_what_is_kept_of_a_march(cli, tmp_path):
         assert image.n_frames == 4
 
 
+def test_oil_that_flows_back_through_a_restrictor_is_refused_at_any_step():
+    """At the last step it does not: the texture's crests have gone by."""
+    supply = {"x_mm": [12, 14], "restrictor": "capillary", "K": 1e-11, "p_s": 3.2e6}
+    dimples = {"shape": "dimples", "moves": True, "depth_um": 6.0, "size_mm": 2.0, "columns": 5, "form": "dome"}
+    film = [{"shape": "linear", "h_start_um": 12, "h_end_um": 6.0}, dimples]
+    scene = load_scene("moving_texture", {"n": 99, "film": film, "supply": [supply], "motion.steps": 20})
+    with pytest.raises(InputError, match=r"t = 0.0005 s: supply.1.p_s = 3.2e\+06: less than the film's pressure there"):
+        solve(scene)
+    solve(scene, **{"supply.1.backflow": True}).destroy()
+
+
 def test_bad_input(cli, tmp_path):
     ring = tmp_path / "ring.toml"
     text = """

@@ -224,7 +224,7 @@ def test_stiffness_of_a_hybrid_bearing_against_differences(effects):
         ([{**RECESS, "p": 1e5}, {**RECESS, "p": 2e5}], "supply 1 and supply 2 overlap"),
         ([{"x_mm": [90, 120], "y_mm": [20, 40], "p": 1e5}], "x = 0.09 to 0.12 m lies outside the film"),
         ([{**RECESS, "restrictor": "capillary", "K": 1e-11, "p_s": 1e4}], "more than the film's least pressure"),
-        ([{**RECESS, "restrictor": "capillary", "K": 1e-6, "p_s": 1.1e5}], "oil flow back through the restrictor"),
+        ([{**RECESS, "restrictor": "capillary", "K": 1e-6, "p_s": 1.1e5}], "p_s = 110000: less than the film's pressure there"),
         ([{**RECESS}], "one of p, flow, restrictor is needed"),
         ([{**RECESS, "p": 1e5, "flow": 1.0}], "one of p, flow, restrictor is needed"),
         ([{**RECESS, "p": -1.0}], "at least the cavitation pressure"),
