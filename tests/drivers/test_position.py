@@ -60,3 +60,14 @@ def test_a_load_beyond_what_a_tilted_journal_carries_until_it_touches():
     solution = solve(load_scene("misaligned_journal", {"nx": 108, "ny": 7, "L_over_D": 1.0, "balance.load": 1e7}))
     assert solution.outcome is Outcome.LOAD_NOT_CARRIED and solution.settings["balance"]["solves"] < 40
     solution.destroy()
+
+
+def test_with_effects_from_far_away():
+    """A start in oil of 147 degrees, whose thin film has the stiffness of another bearing: along secants it was given up."""
+    grid = {"nx": 90, "ny": 5, "balance.tol": 1e-3}
+    with (
+        solve(load_scene("adiabatic_journal", {**grid, "temperature.T_in": 419.9})) as hot,
+        solve(load_scene("adiabatic_journal", grid), start=hot, stopping={"eps1": 1e-3}) as found,
+    ):
+        assert hot.converged and found.converged, found.message
+        assert found.load == pytest.approx(112814.907, rel=1e-3)
