@@ -31,7 +31,7 @@ SEEN = 0.5  # a mesh in parts of the stretch sqrt(2 (1 - s)) on which the film i
 MOST_COARSE = 8  # solves on a grid that is not the last
 LONGEST = (2.0, 0.4)  # of a step in t and in the attitude (rad)
 SHORTEST = 1e-4  # of a step that was halved
-SLOW = 0.5  # of the residuals may be left by a step along secants: they mislead then, and the stiffness is found anew
+FAR = 0.1  # a step along secants, which are too long to be trusted if it makes residuals larger
 WIDEST = 14.0  # of t: s from 1e-6 to 1 - 1e-6
 AWRY = 0.7  # rad from the load's line: then the force goes on in a line, not its logarithm
 ACROSS = 0.4  # of such a step, clearances
@@ -137,8 +137,8 @@ def _on_grid(
 ) -> tuple[Solution, Array, int, bool]:
     """Newton's method on one grid: solution, t and attitude, number of solves, whether the place was found. Collective.
 
-    A step that makes residuals larger is taken again, half as long; where effects act, whose part in the stiffness is unknown,
-    in the direction that secants tell.
+    A step that makes residuals larger is taken again, half as long. Where effects act, whose part in the stiffness is unknown,
+    Broyden's method goes on from there, and begins anew where such a step was long.
     """
     chain, given = Chain(ask, inner), scene.attitude_deg is not None
     q, inverse, before = np.array([t, phi]), None, None  # before : place, residual and step
@@ -158,18 +158,13 @@ def _on_grid(
             return solution, q, count, False
         if not W > 0:
             step = np.array([LONGEST[0], 0.0])
-        elif before is not None and np.abs(left).sum() > np.abs(before[1]).sum():
-            change = left - before[1]
+        elif before is not None and not at.model.effects and np.abs(left).sum() > np.abs(before[1]).sum():
             q, left, step = before[0], before[1], 0.5 * before[2]
-            if at.model.effects and inverse is not None and np.isfinite(change).all():
-                inverse = _secant(inverse, before[2], change)  # the stiffness is another film's: what it led to tells more
-                learned = -inverse @ left
-                step = learned * min(1.0, float(np.abs(step).max() / (np.abs(learned).max() or 1.0)))
             if np.abs(step).max() < SHORTEST:
                 return solution, q + 2.0 * step, count, False
         else:
-            slow = before is not None and np.abs(left).sum() > SLOW * np.abs(before[1]).sum()
-            if inverse is None or not at.model.effects or slow:
+            astray = before is not None and np.abs(before[2]).max() > FAR and np.abs(left).sum() > np.abs(before[1]).sum()
+            if inverse is None or not at.model.effects or astray:
                 K = _stiffness(at, solution, off)
                 if abs(left[1]) > AWRY:
                     q, before = _across(scene, t, phi, K, np.array([force[0] + load, force[1]])), None
