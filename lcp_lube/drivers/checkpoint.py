@@ -147,12 +147,14 @@ class Checkpointer:
             return iterate(run, stopping, watch, before)
 
     def after_step(self, save: Callable[[], None], last: bool = False) -> None:
-        """Save if it is the last step, if that is due, or if the run is told to end.
+        """Save if it is the last step, if that is due, or if the run is told to end; nothing without a file.
 
         Raises
         ------
-        KeyboardInterrupt, SystemExit : SIGINT or SIGTERM came.
+        KeyboardInterrupt, SystemExit : SIGINT or SIGTERM came. And what `write` raises.
         """
+        if not self.active:
+            return
         self._since += 1
         told = self.comm.allreduce(self.told, MPI.MAX)
         if told or last or self._since >= self.every:
@@ -165,8 +167,8 @@ class Checkpointer:
 
     @contextmanager
     def listening(self) -> Iterator[None]:
-        """SIGINT, and SIGTERM as batch systems send it ahead of time, let the step end and be saved; a second one does not."""
-        if threading.current_thread() is not threading.main_thread():
+        """SIGINT and SIGTERM let the step end and be saved, if there is a file; a second one ends all."""
+        if not self.active or threading.current_thread() is not threading.main_thread():
             yield
             return
 

@@ -9,7 +9,6 @@ where other effects vary the viscosity as well. The certificate of the answer ha
 that it was solved with, `coupling`, the largest relative change that the effects still make of these, and the effects' own.
 """
 
-from contextlib import nullcontext
 from dataclasses import replace
 from math import prod
 from typing import Any
@@ -59,7 +58,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         loop.change = 0.0
         return _told(ask, loop)
     file = CouplingFile(scene, ask)
-    with file.keeper.listening() if file.keeper.active else nullcontext():
+    with file.keeper.listening():
         return _settled_on(scene, file.ask, inner, file)
 
 

@@ -53,15 +53,8 @@ class CouplingFile:
         return self.saved is not None and self.saved.shape == loop.base.grid.shape
 
     def save(self, loop: Loop) -> None:
-        """A film was solved: write the file if it is due, or if the run was told to end.
-
-        Raises
-        ------
-        InputError : it cannot be written; the last one is still there then.
-        KeyboardInterrupt, SystemExit : SIGINT or SIGTERM came.
-        """
-        if self.keeper.active:
-            self.keeper.after_step(lambda: self._write(loop))
+        """A film was solved; raises as `Checkpointer.after_step`."""
+        self.keeper.after_step(lambda: self._write(loop))
 
     def _write(self, loop: Loop) -> None:
         parts = [("first", loop.begun), ("last", loop.last), *((f"made.{k}", one) for k, one in enumerate(loop.log))]

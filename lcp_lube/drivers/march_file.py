@@ -1,7 +1,5 @@
 """Checkpoints of a march in time: what its next step starts from, written after every so many steps (`checkpoint_file`)."""
 
-from contextlib import AbstractContextManager, nullcontext
-from dataclasses import astuple
 from pathlib import Path
 from typing import Any
 
@@ -36,20 +34,9 @@ class MarchFile:
         self.scene.get("motion", {}).pop("t_end", None)  # a march may go on beyond its first end
         self.comm = ask.mpi
 
-    def listening(self) -> AbstractContextManager[None]:
-        """SIGINT and SIGTERM let the step end and be saved, where there is a file."""
-        return self.keeper.listening() if self.keeper.active else nullcontext()
-
     def after(self, run: Any) -> None:
-        """A step was taken: write the file if it is due, or if the run was told to end.
-
-        Raises
-        ------
-        InputError : it cannot be written; the last one is still there then.
-        KeyboardInterrupt, SystemExit : SIGINT or SIGTERM came.
-        """
-        if self.keeper.active:
-            self.keeper.after_step(lambda: self._write(run), run.done)
+        """A step was taken; raises as `Checkpointer.after_step`."""
+        self.keeper.after_step(lambda: self._write(run), run.done)
 
     def _write(self, run: Any) -> None:
         march, rotor = run.march, run.rotor
@@ -59,7 +46,6 @@ class MarchFile:
         arrays += [(f"seen.{k}", a) for k, a in enumerate(more)]
         worst = run.worst()
         header = {
-            "version": __version__,
             "scene": self.scene,
             "march": {name: getattr(march, name) for name in NUMBERS},
             "rotor": None if rotor is None else {
@@ -68,14 +54,10 @@ class MarchFile:
                 "size": rotor.size,
             },
             "worst": [worst.measures, worst.tol, worst.extremes],
-            "steps": [astuple(step) for step in run.steps],
             "seen": seen,
             "run": {name: getattr(run, name) for name in RUN},
         }  # fmt: skip
-        try:
-            checkpoint_file.write(self.keeper.path, march.grid, header, arrays)
-        except OSError as error:
-            raise InputError(f"--checkpoint {self.keeper.path}: could not be written: {error}") from None
+        self.keeper.write(march.grid, header, arrays, run.steps)
 
     def restore(self, run: Any, grid: Grid) -> bool:
         """Put the run where the file has it; False without one.

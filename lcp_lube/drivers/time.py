@@ -41,7 +41,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     for kept in filter(None, (getattr(effect, "keeps", "") for effect in getattr(model, "effects", ()))):
         raise InputError(f"scene {scene.name}: [motion]: {kept}: only effects whose law is local in time go on in time")
     run = Run(scene, ask, inner)
-    with run.file.listening():
+    with run.file.keeper.listening():
         while run.outcome is Outcome.CONVERGED and not run.done:
             run.advance()
             t, end = run.march.t, run.table.t_end
