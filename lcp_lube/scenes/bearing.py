@@ -123,8 +123,6 @@ class BearingScene(RectangleScene, WithEffects):
                 raise ValueError(f"film.{k}.moves: a journal's place is motion.journal, motion.file or motion.free")
         if self.motion is None:
             return
-        if self.balance is not None:
-            raise ValueError("balance and motion are both given: one of them; a load in time is that of motion.free")
         if self.motion.moves_journal and (count := len(self._journals)) != 1:
             raise ValueError(f"motion: its journal is the shape 'journal' of [[film]]; there are {count}, 1 is needed")
 

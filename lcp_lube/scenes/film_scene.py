@@ -52,6 +52,8 @@ class FilmScene(Scene):
         mu = getattr(self, "mu", None)
         if field is not None and temperature is not None and temperature.own_mu and mu != field.default:
             raise ValueError(f"mu = {mu:g} and the viscosities of [temperature] are both given: one of them")
+        if getattr(self, "motion", None) is not None and getattr(self, "balance", None) is not None:
+            raise ValueError("balance and motion are both given: one of them; a load in time is that of motion.free")
 
     @property
     def mu_0(self) -> float:

@@ -74,8 +74,6 @@ class JournalScene(LubricationScene):
                 raise ValueError(f"p_a = {self.p_a:g}, p_b = {self.p_b:g}: there is no groove (round = periodic)")
         if self.graded and (self.dimension == 1 or self.round == "periodic" or self.motion is not None):
             raise ValueError("graded = true: lines are graded in 2D, from a groove at the widest gap (round = groove), at rest")
-        if self.motion is not None and self.balance is not None:
-            raise ValueError("balance and motion are both given: one of them; a load in time is that of motion.free")
         self._supplies()
 
     def _supplies(self) -> tuple[Supply, ...]:

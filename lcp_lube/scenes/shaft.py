@@ -38,11 +38,6 @@ class ShaftScene(FilmScene):
     balance: BalanceTable | None
     motion: MotionTable | None = Field(None, description="how the journal moves in time")
 
-    def check(self) -> None:
-        super().check()
-        if self.motion is not None and self.balance is not None:
-            raise ValueError("balance and motion are both given: one of them; a load in time is that of motion.free")
-
     @field_validator("scheme")
     @classmethod
     def _face(cls, scheme: str | None) -> str | None:
