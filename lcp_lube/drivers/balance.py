@@ -137,11 +137,11 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         search = Search(unknown.low, unknown.high, slope, explore=not found)
         tol = table.tol if shape == shapes[-1] else max(table.tol, COARSE_TOL)
 
-        def solve_at(t: float, near: Any, shape: tuple[int, ...] = shape) -> tuple[Solution, Callable[[], float | None]]:
+        def solve_at(t: float, near: Any, shape: tuple[int, ...] = shape) -> tuple[Solution, Callable[[float], float | None]]:
             trial = as_scene(scene, {unknown.key: unknown.to_value(t)}).with_shape(shape).model_copy(update={"balance": None})
             solution = inner(trial, replace(ask, start=near))
             times.update(added(times, solution.times))
-            return solution, lambda: exact_slope(trial, solution, unknown, t)
+            return solution, lambda W: exact_slope(trial, solution, unknown, t, W)
 
         solution, t, count, found = _on_grid(solve_at, search, t, start, table.load, tol)
         work += count * prod(shape) / prod(scene.shape)
@@ -169,15 +169,15 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     return solution
 
 
-def exact_slope(scene: Any, solution: Solution, unknown: Variable, t: float) -> float | None:
-    """d log W/dt by the film's stiffness, where t displaces a wall of a film without effects; else None. Collective."""
+def exact_slope(scene: Any, solution: Solution, unknown: Variable, t: float, W: float) -> float | None:
+    """d log W/dt by the stiffness of a film that carries W, if t displaces a wall and no effects act; else None. Collective."""
     model, turning = getattr(scene, "model", None), getattr(scene, "turning", None)
     if not isinstance(model, Model) or model.effects or model.law is not None or model.U < 0:
         return None
     from ..scenes.thrust import ThrustScene  # here, as above
     from .coefficients import coefficients
 
-    W, key = carried(solution.problem.quantities(solution.fields)), unknown.key.rpartition(".")[2]
+    key = unknown.key.rpartition(".")[2]
     if key == "eccentricity" and turning is not None and turning.widest is not None:
         (one,) = coefficients(scene, solution)
         fx, fy = turning.force(solution.problem, solution.fields["p"])
@@ -191,7 +191,7 @@ def exact_slope(scene: Any, solution: Solution, unknown: Variable, t: float) -> 
 
 
 def _on_grid(
-    solve_at: Callable[[float, Any], tuple[Solution, Callable[[], float | None]]],
+    solve_at: Callable[[float, Any], tuple[Solution, Callable[[float], float | None]]],
     search: Search,
     t: float,
     near: Any,
@@ -210,9 +210,9 @@ def _on_grid(
             search.leave(t)
             t = 0.5 * (t + best_t)  # back towards what could be solved
             continue
-        ratio = carried(solution.problem.quantities(solution.fields)) / load
-        g = log(ratio) if ratio > 0 else -inf
-        search.add(t, g, None if abs(g) <= tol or g == -inf else slope())
+        W = carried(solution.problem.quantities(solution.fields))
+        g = log(W / load) if W / load > 0 else -inf
+        search.add(t, g, None if abs(g) <= tol or g == -inf else slope(W))
         if best is None or abs(g) < abs(best_g):
             best, solution, best_t, best_g = solution, best, t, g
         if solution is not None:

@@ -27,13 +27,16 @@ def impedance(response: Response | CoupledResponse, frequencies: Sequence[float]
 
     Returns an array of shape (frequencies, motions, motions); at nu = 0 (the limit of slow motion) it is K + i C.
     """
-    found = [response.at(nu, stored) if nu else response.stiffness() + 1j * response.damping() for nu in frequencies]
-    response.destroy()
+    try:
+        found = [response.at(nu, stored) if nu else response.stiffness() + 1j * response.damping() for nu in frequencies]
+    finally:
+        response.destroy()
     return np.array(found)
 
 
 def stiffness(response: Response) -> Any:
     """K, shape (motions, motions); the response is freed. Collective."""
-    K = response.stiffness()
-    response.destroy()
-    return K
+    try:
+        return response.stiffness()
+    finally:
+        response.destroy()
