@@ -6,6 +6,7 @@ Imports no PETSc. A package from outside adds lines by an entry point of the gro
 import os
 import sys
 from dataclasses import dataclass, field
+from functools import cache
 from importlib import import_module
 from math import inf
 from pathlib import Path
@@ -311,11 +312,17 @@ def read_recipe(name: str) -> dict[str, str]:
     if Path(name).name != name or not (RECIPE_DIR / f"{name}.opts").is_file():
         raise InputError(f"--recipe {name}: no such recipe{nearest(name, recipe_names())}; see 'lcp-lube list'")
     options = {}
-    for line in (RECIPE_DIR / f"{name}.opts").read_text().splitlines():
+    for line in own_text(RECIPE_DIR / f"{name}.opts").splitlines():
         words = line.partition("#")[0].split(maxsplit=1)
         if words:
             options[words[0].lstrip("-")] = words[1].strip() if len(words) > 1 else ""
     return options
+
+
+@cache
+def own_text(path: Path) -> str:
+    """What a file of the package says: it is read once."""
+    return path.read_text(encoding="utf-8")
 
 
 # First a search for the name: the module that parses these files takes longer to import than all the rest.

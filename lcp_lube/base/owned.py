@@ -56,8 +56,8 @@ class made(cached_property):
 
 
 def collect(comm: PETSc.Comm) -> None:
-    """Free what all ranks have dropped. Collective."""
-    if hasattr(PETSc, "garbage_cleanup"):
+    """Free what all ranks have dropped; one rank does so at once. Collective."""
+    if comm.getSize() > 1 and hasattr(PETSc, "garbage_cleanup"):
         PETSc.garbage_cleanup(comm)
 
 

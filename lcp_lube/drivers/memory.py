@@ -81,7 +81,7 @@ class Estimate:
 def resident() -> int:
     """Bytes that this process holds in memory now."""
     try:
-        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+        return int(_of_this_process("statm").split()[1]) * os.sysconf("SC_PAGE_SIZE")
     except (OSError, ValueError, IndexError):
         return 100 * MB
 
@@ -89,10 +89,14 @@ def resident() -> int:
 def peak() -> int:
     """Most bytes that this process has held. Not `ru_maxrss`, which begins with what the parent process held at the fork."""
     try:
-        lines = dict(line.split(":") for line in Path("/proc/self/status").read_text().splitlines())
-        return int(lines["VmHWM"].split()[0]) * 1024
-    except (OSError, ValueError, KeyError):
+        return int(_of_this_process("status").partition(b"VmHWM:")[2].split(maxsplit=1)[0]) * 1024
+    except (OSError, ValueError, IndexError):
         return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+
+
+def _of_this_process(name: str) -> bytes:
+    with open(f"/proc/self/{name}", "rb", buffering=0) as file:
+        return file.read()
 
 
 def available() -> int:

@@ -14,9 +14,8 @@ import numpy as np
 
 from ..base.parallel import Array
 from ..base.stages import Stages
-from ..problems.film.assembly import assemble
+from ..problems.film.assembly import csr, matrix
 from ..problems.film.lubrication import LubricationProblem
-from ..problems.grid import Grid
 from .krylov import Krylov
 from .system import System
 
@@ -33,16 +32,15 @@ class ReducedSystem(System):
         super().__init__(problem, stages)
         grid, scheme = problem.grid, problem.scheme
         ny, nx = grid.box
-        place = np.arange((ny + 2.0) * (nx + 2)).reshape(ny + 2, nx + 2)
+        place = np.arange((ny + 2) * (nx + 2)).reshape(ny + 2, nx + 2)
         pressure = scheme.pressure_entries()
         void = {(dj, di): value for dj, di, value in scheme.void_entries()}
         with self.stages("assembly"):
             # In CSR order: the entries of A and, in A's sparsity, of B, and where their column stands in an array with ghosts.
-            self.mat = self._own(assemble(grid, pressure))
-            self._pointers, self._columns, self._a = self.mat.getValuesCSR()
-            self._b_entries = _values(grid, [(dj, di, void.get((dj, di), np.zeros(1))) for dj, di, _ in pressure])
-            places = [(dj, di, place[1 + dj : 1 + dj + ny, 1 + di : 1 + di + nx]) for dj, di, _ in pressure]
-            self._neighbour = _values(grid, places).astype(int)
+            b = [void.get((dj, di), np.zeros(1)) for dj, di, _ in pressure]
+            beside = [place[1 + dj : 1 + dj + ny, 1 + di : 1 + di + nx] for dj, di, _ in pressure]
+            self._pointers, self._columns, self._a, self._b_entries, self._neighbour = csr(grid, pressure, b, beside)
+            self.mat = self._own(matrix(grid, self._pointers, self._columns, self._a.copy()))
             self._diagonal_A = scheme.diagonal.ravel()
             self._diagonal_B = -scheme.b_C.ravel()
             self._x, self._b = map(self._own, self.mat.createVecs())
@@ -78,11 +76,3 @@ class ReducedSystem(System):
             iterations = self.krylov.solve(self._b, self._x, rtol)
         y = self._scaling * self._x.array_r
         return theta * y + g, -(1.0 - theta) * y + g, iterations
-
-
-def _values(grid: Grid, entries: list[tuple[int, int, Array]]) -> Array:
-    """Stencil entries in CSR order. Collective."""
-    mat = assemble(grid, entries)
-    values = mat.getValuesCSR()[2]
-    mat.destroy()
-    return values

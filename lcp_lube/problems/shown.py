@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..base.parallel import Array
+from ..base.parallel import Array, overflow_is_no_warning
 from ..errors import InputError, nearest
 from ..registry import OUTPUT
 from .frame import Frame
@@ -23,8 +23,9 @@ class Shown:
     fields: "Fields"
 
     @cached_property
+    @overflow_is_no_warning
     def numbers(self) -> dict[str, Any]:
-        """`Problem.quantities` of the fields; taken once. Collective the first time, which `solve` sees to."""
+        """`Problem.quantities` of the fields; taken once. Collective the first time, which `solve` sees to on several ranks."""
         return self.problem.quantities(self.fields)
 
     @property

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from petsc4py import PETSc
-from pydantic import Field
+from pydantic import Field, PrivateAttr
 
 from ..errors import InputError
 from ..problems.facts import Facts
@@ -47,6 +47,8 @@ class Extent:
 class FilmScene(Scene):
     """A scene that is a film; a family says which, in `_model`."""
 
+    _made: tuple[dict[str, Any], Path | None, Model] | None = PrivateAttr(None)  # `model`, and what it was made of
+
     def check(self) -> None:
         temperature, field = getattr(self, "temperature", None), type(self).model_fields.get("mu")
         mu = getattr(self, "mu", None)
@@ -81,10 +83,21 @@ class FilmScene(Scene):
         ------
         InputError : sides that contradict one another, a profile that cannot be read.
         """
-        try:
-            return replace(self._model(), effects=self.effects)
-        except InputError as error:
-            raise self._named(error) from None
+        if self._made is None or self._made[1] != self._folder or self._made[0] != vars(self):  # a copy may have changed
+            try:
+                model, effects = self._model(), self.effects
+            except InputError as error:
+                raise self._named(error) from None
+            self._made = dict(vars(self)), self._folder, replace(model, effects=effects) if effects else model
+        return self._made[2]
+
+    def __getstate__(self) -> dict[Any, Any]:
+        state = super().__getstate__()
+        return {**state, "__pydantic_private__": {**(state["__pydantic_private__"] or {}), "_made": None}}
+
+    def __deepcopy__(self, memo: dict[int, Any] | None = None) -> "FilmScene":
+        self._made = None
+        return super().__deepcopy__(memo)
 
     @property
     def side_lengths(self) -> tuple[float, ...]:

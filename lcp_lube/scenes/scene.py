@@ -3,6 +3,7 @@
 import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Protocol
 
@@ -12,7 +13,7 @@ from pydantic import Field, PrivateAttr, ValidationError
 from ..errors import InputError, nearest
 from ..problems.facts import Facts
 from ..problems.solution import Problem
-from ..registry import FAMILIES, SCENE_DIR, is_scene, scene_names
+from ..registry import FAMILIES, SCENE_DIR, is_scene, own_text, scene_names
 from .changes import changed, plain
 from .faults import first_fault, known_keys
 from .units import Measured, stem, units_of
@@ -191,13 +192,19 @@ def read_scene(source: str | Path) -> tuple[dict[str, Any], Path, str]:
             f"scene {source}: neither a .toml file nor a built-in name{nearest(source, scene_names())}; see 'lcp-lube list'"
         )
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        data = plain(_parsed(path)) if path.parent == SCENE_DIR else tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:  # ValueError: no UTF-8, no TOML, a number too long for Python
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise InputError(f"{source}: {reason}") from None
     if not data:
         raise InputError(f"{source}: the file sets nothing; 'family' and the data of a bearing are needed")
     return data, path, name
+
+
+@cache
+def _parsed(path: Path) -> dict[str, Any]:
+    """A built-in scene's data: each file is read once."""
+    return tomllib.loads(own_text(path))
 
 
 def family_of(source: str | Path, family: Any) -> Any:

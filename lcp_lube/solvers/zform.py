@@ -26,7 +26,9 @@ class ZForm:
     def __init__(self, problem: LubricationProblem):
         self.problem, scheme = problem, problem.scheme
         self.diagonal = scheme.diagonal.ravel()
-        self.s = self.diagonal / -scheme.b_C.ravel()
+        b_C = scheme.b_C.ravel()
+        self.s = self.diagonal / -b_C
+        self._dragged, self._driven = (problem.reduce.norm(a) for a in (b_C, problem.c))
 
     def z(self, fields: Fields) -> Array:
         return fields["p"] - fields["r"] / self.s
@@ -43,10 +45,8 @@ class ZForm:
         """||G|| / ||c||; where rounding in G's sums alone exceeds eps1, on very fine grids, relative to that. Collective."""
         reduce, c = self.problem.reduce, self.problem.c
         # c is a difference of the wall's flows, and knows no more than they do.
-        rounding = max(
-            16 * EPS * reduce.norm(self.diagonal * np.abs(z) + np.abs(c)), EPS * reduce.norm(self.problem.scheme.b_C.ravel())
-        )
-        driven = reduce.norm(c) or reduce.norm(self.diagonal)  # nothing drives the film: p is measured by its unit
+        rounding = max(16 * EPS * reduce.norm(self.diagonal * np.abs(z) + np.abs(c)), EPS * self._dragged)
+        driven = self._driven or reduce.norm(self.diagonal)  # nothing drives the film: p is measured by its unit
         return reduce.norm(G) / max(driven, rounding / eps1)
 
     def refine(self, z: Array, full: NDArray[np.bool_], solve_again: Callable[[Array], Array]) -> Array:

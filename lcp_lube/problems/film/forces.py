@@ -145,12 +145,13 @@ def integrals(problem: LubricationProblem, p_pa: Array, asked: Sequence[tuple[fl
         x, y, along, lines = part.x, part.y, part.widths(0), stream_weights(part)[:, 0]
         for k, (above, weight) in enumerate(asked):
             w, own = np.atleast_2d(weight(x, y)), p[rows] - above if above else p[rows]
+            # Columns first: row by row the product takes ten times as long.
             if w.shape[1] == 1:  # of y alone
-                inside[k] += (lines * w[:, 0]) @ (own @ along)
+                inside[k] += ((lines * w[:, 0]) @ own) @ along
             elif w.shape[0] == 1:
-                inside[k] += lines @ (own @ (w[0] * along))
+                inside[k] += (lines @ own) @ (w[0] * along)
             else:
-                inside[k] += lines @ ((own * w) @ along)
+                inside[k] += (lines @ (own * w)) @ along
     return [
         float(grid.cell * (problem.reduce.sum(np.array([part])) + _in_rims(problem, above, weight)))
         for part, (above, weight) in zip(inside, asked, strict=True)

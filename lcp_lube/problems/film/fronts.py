@@ -118,7 +118,7 @@ def cavitated_area(problem: LubricationProblem, found: Fronts | None, p: Array, 
     frames = [ghosted(grid, field, 0.0) for field in (cavity, p)] if found is not None and grid.dim == 2 else []
     for rows in in_strips(grid):
         part = places_of(grid, rows)
-        area += float(stream_weights(part)[:, 0] @ (cavity[rows] @ part.widths(0)))
+        area += float((stream_weights(part)[:, 0] @ cavity[rows].astype(float)) @ part.widths(0))
         if found is None:
             continue
         stretch, dy = part.stretch(part.y), grid.spacing[1] if grid.dim == 2 else 1.0

@@ -82,7 +82,8 @@ class BoxScheme:
 
     def in_strips(self, grid: Grid) -> Iterator[tuple[slice, "BoxScheme"]]:
         """This rank's lines strip by strip, and their coefficients."""
-        return ((rows, self.rows(rows)) for rows in in_strips(grid))
+        whole = grid.box[0]
+        return ((rows, self if rows.stop - rows.start == whole else self.rows(rows)) for rows in in_strips(grid))
 
     def changed(self, **changes: Any) -> "BoxScheme":
         """With other fields; what is made when it is asked for stays so, which `dataclasses.replace` would make and keep."""
