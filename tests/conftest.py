@@ -1,5 +1,6 @@
 """Fixtures of all tests: clean PETSc options, the command line, jobs under mpiexec."""
 
+import atexit
 import json
 import os
 import re
@@ -7,8 +8,11 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -67,16 +71,57 @@ def without_notices(text: str) -> list[str]:
     return lines
 
 
+@cache
+def python() -> list[str]:
+    """How a test begins a command: forked from a standing process, one for each process of tests (see standing.py).
+
+    `sys.executable` instead where the start itself is what is tested.
+    """
+    if not hasattr(os, "pidfd_open"):
+        return [sys.executable]
+    path = str(Path(tempfile.mkdtemp(prefix="lcp-lube-")) / "socket")
+    pipe = subprocess.PIPE
+    server = subprocess.Popen(
+        [sys.executable, str(TESTS / "standing.py"), "--serve", path], env=ENVIRONMENT, stdin=pipe, stdout=pipe, text=True
+    )
+    assert server.stdin is not None and server.stdout is not None
+    atexit.register(shutil.rmtree, Path(path).parent)
+    atexit.register(server.communicate)
+    assert server.stdout.readline() == "ready\n"
+    return [sys.executable, "-I", "-S", str(TESTS / "standing.py"), path]
+
+
+def job(arguments: list[str], ranks: int) -> list[str]:
+    """The command of a Python process, or of an MPI job of several."""
+    command = [*python(), *arguments]
+    if ranks == 1:
+        return command
+    mpiexec = shutil.which("mpiexec")
+    if mpiexec is None:
+        pytest.skip("no mpiexec")
+    return [mpiexec, "-n", str(ranks), *command]
+
+
 def start(arguments: list[str], ranks: int, cwd: Path, timeout: float) -> Run:
     """A Python process, or an MPI job of several, with a time limit."""
-    command = [sys.executable, *arguments]
-    if ranks > 1:
-        mpiexec = shutil.which("mpiexec")
-        if mpiexec is None:
-            pytest.skip("no mpiexec")
-        command = [mpiexec, "-n", str(ranks), *command]
-    done = subprocess.run(command, cwd=cwd, env=ENVIRONMENT, capture_output=True, text=True, timeout=timeout)
+    done = subprocess.run(job(arguments, ranks), cwd=cwd, env=ENVIRONMENT, capture_output=True, text=True, timeout=timeout)
     return Run(done.returncode, done.stdout, done.stderr)
+
+
+def alive(pid: int) -> bool:
+    """Whether a process runs; a zombie, which its parent has not asked about yet, does not."""
+    try:
+        return "\nState:\tZ" not in Path(f"/proc/{pid}/status").read_text()
+    except OSError:
+        return False
+
+
+def gone(pids: list[int], seconds: float) -> bool:
+    """Whether none of these processes runs, after some seconds at most."""
+    end = time.monotonic() + seconds
+    while any(map(alive, pids)) and time.monotonic() < end:
+        time.sleep(0.05)
+    return not any(map(alive, pids))
 
 
 @pytest.fixture
@@ -149,8 +194,8 @@ def mpi_job(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int], dict[st
     def run(ranks: int) -> dict[str, Any]:
         if ranks not in done:
             folder = tmp_path_factory.mktemp(f"ranks{ranks}")
-            job = start([str(TESTS / "mpi_job.py"), str(folder)], ranks, folder, timeout=400)
-            assert job.status == 0, job.err
+            end = start([str(TESTS / "mpi_job.py"), str(folder)], ranks, folder, timeout=400)
+            assert end.status == 0, end.err
             with np.load(folder / "fields.npz") as fields:
                 done[ranks] = {**json.loads((folder / "record.json").read_text()), "fields": dict(fields)}
         return done[ranks]

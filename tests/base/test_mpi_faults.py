@@ -7,10 +7,9 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import pytest
-from conftest import ENVIRONMENT, TESTS, without_notices
+from conftest import ENVIRONMENT, TESTS, gone, without_notices
 
 WORDS = "solve problem1 --n 30 --method din --system full --recipe mumps".split()  # noqa: SIM905
 RANKS = 3
@@ -20,21 +19,6 @@ PIDS = re.compile(r"pid (\d+)")
 def limit():
     """10 s on a machine that is free."""
     return 10.0 * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
-
-
-def alive(pid):
-    """Whether a process runs; a zombie, which its parent has not asked about yet, does not."""
-    try:
-        return "\nState:\tZ" not in Path(f"/proc/{pid}/status").read_text()
-    except OSError:
-        return False
-
-
-def gone(pids, seconds):
-    end = time.monotonic() + seconds
-    while any(map(alive, pids)) and time.monotonic() < end:
-        time.sleep(0.05)
-    return not any(map(alive, pids))
 
 
 class Job:

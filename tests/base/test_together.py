@@ -1,11 +1,7 @@
 """What fails on one rank is told on all of them, without a hang and without an abort."""
 
-import shutil
-import subprocess
-import sys
-
 import pytest
-from conftest import ENVIRONMENT, TESTS
+from conftest import TESTS, start
 
 
 @pytest.mark.parametrize(
@@ -28,11 +24,7 @@ from conftest import ENVIRONMENT, TESTS
     ],
 )
 def test_every_rank_is_told(tmp_path, case, reason, ranks):
-    mpiexec = shutil.which("mpiexec")
-    if mpiexec is None:
-        pytest.skip("no mpiexec")
-    command = [mpiexec, "-n", str(ranks), sys.executable, str(TESTS / "mpi_together.py"), case]
-    done = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, timeout=120, check=False)
-    assert done.returncode == 2 and done.stdout == "" and "Traceback" not in done.stderr
-    assert done.stderr.count(f"told {reason}") == done.stderr.count("told ") == ranks
+    done = start([str(TESTS / "mpi_together.py"), case], ranks, tmp_path, timeout=120)
+    assert done.status == 2 and done.out == "" and "Traceback" not in done.err
+    assert done.err.count(f"told {reason}") == done.err.count("told ") == ranks
     assert list(tmp_path.iterdir()) == []

@@ -7,7 +7,6 @@ import os
 import shutil
 import signal
 import subprocess
-import sys
 import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator
@@ -18,7 +17,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import ENVIRONMENT
+from conftest import ENVIRONMENT, python
 
 from lcp_lube import load_scene
 from lcp_lube.cli.explore.controls import controls, slider
@@ -52,7 +51,7 @@ class Page:
 
 
 def served(*words: str) -> Page:
-    command = [sys.executable, "-m", "lcp_lube", "explore", *words, "--no-browser"]
+    command = [*python(), "-m", "lcp_lube", "explore", *words, "--no-browser"]
     process = subprocess.Popen(command, env=ENVIRONMENT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stdout is not None
     return Page(process.stdout.readline().split()[-1], process)

@@ -8,7 +8,6 @@ import re
 import shlex
 import shutil
 import subprocess
-import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -46,11 +45,11 @@ def examples() -> list[Example]:
 
 
 def run(example: Example, folder: Path) -> subprocess.CompletedProcess[str]:
-    from conftest import ENVIRONMENT
+    from conftest import ENVIRONMENT, python
 
     for name, content in example.files.items():
         (folder / name).write_text(content, encoding="utf-8")
-    words = [sys.executable, "-m", "lcp_lube", *shlex.split(example.command)[1:]]
+    words = [*python(), "-m", "lcp_lube", *shlex.split(example.command)[1:]]
     return subprocess.run(words, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, timeout=240, check=False)
 
 

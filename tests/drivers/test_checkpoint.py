@@ -7,12 +7,11 @@ import resource
 import shutil
 import signal
 import subprocess
-import sys
 import time
 
 import numpy as np
 import pytest
-from conftest import ENVIRONMENT, Run
+from conftest import ENVIRONMENT, Run, job
 
 from lcp_lube import load_scene, solve
 from lcp_lube.drivers import checkpoint
@@ -34,10 +33,8 @@ NESTED = [
 
 def start(words, folder, ranks=1, **more):
     """A run whose stderr can be watched."""
-    command = [sys.executable, "-m", "lcp_lube", *map(str, words)]
-    if ranks > 1:
-        command = ["mpiexec", "-n", str(ranks), *command]
     pipe = subprocess.PIPE
+    command = job(["-m", "lcp_lube", *map(str, words)], ranks)
     return subprocess.Popen(command, cwd=folder, env=ENVIRONMENT, stdout=pipe, stderr=pipe, text=True, **more)
 
 
@@ -107,7 +104,7 @@ def test_killed_and_resumed(tmp_path, whole, every, after, delay):
 
 def test_other_ranks_go_on(tmp_path, whole):
     """Two ranks are stopped, three and then one go on; rounding and the inner solver's tolerance are all that differs."""
-    killed = stop([*NESTED, "--checkpoint", "c"], tmp_path, 4, signal.SIGTERM, ranks=2)
+    killed = stop([*NESTED, "--checkpoint", "c"], tmp_path, 2, signal.SIGTERM, ranks=2)
     assert killed.status != 0
     kept = (tmp_path / "c").read_bytes()
     for ranks in (3, 1):
@@ -117,9 +114,24 @@ def test_other_ranks_go_on(tmp_path, whole):
 
 @pytest.mark.parametrize("number, status", [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_leaves_a_checkpoint(tmp_path, whole, number, status):
-    """Saved at the end of the step that it met, whatever --every says."""
-    stopped = stop([*NESTED, "--checkpoint", "c", "--every", 1000], tmp_path, 3, number)
-    assert stopped.status == status and "Traceback" not in stopped.err
+    """Saved at the end of the step that it met, whatever --every says. It comes where the third step is told."""
+    (tmp_path / "signalled.py").write_text(f"""
+import os, sys
+from lcp_lube.__main__ import main
+write, told = sys.stderr.write, []
+def watched(text):
+    told.extend(["||F||"] * text.count("||F||"))
+    if len(told) == 3 and "||F||" in text:
+        os.kill(os.getpid(), {int(number)})
+    return write(text)
+sys.stderr.write = watched
+sys.exit(main())
+""")
+    words = [*NESTED, "--checkpoint", "c", "--every", "1000", "--monitor"]
+    command = job([str(tmp_path / "signalled.py"), *words], 1)
+    end = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, timeout=120)
+    stopped = Run(end.returncode, end.stdout, end.stderr)
+    assert stopped.status == status and "Traceback" not in stopped.err and len(steps(stopped)) == 3
     if number == signal.SIGINT:
         assert stopped.lines[-1] == "lcp-lube: interrupted; --resume c goes on"
     check_same(finish(RESUME, tmp_path), tmp_path, whole, 1e-12)

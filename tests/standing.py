@@ -1,0 +1,182 @@
+"""Commands by fork: a standing process that has imported the package, but not started MPI and PETSc, has a child for each.
+
+    python standing.py --serve SOCKET                      the standing process; ends with its standard input
+    python standing.py SOCKET -m lcp_lube solve problem1   as `python -m lcp_lube solve problem1`, without the imports' 0.35 s
+    mpiexec -n 2 python standing.py SOCKET FILE WORDS      a rank is forked where it runs, and starts MPI by itself
+
+The child has the command's words, folder, streams and the launcher's variables; it ends as a new process does, and the command
+with its status or by its signal. Where any other variable of the environment differs from those of the standing process, which
+has read them, a new process is started instead.
+"""
+
+import _signal
+import _socket
+import marshal
+import os
+import sys
+
+# Of a launcher of MPI jobs, read when MPI starts; and what has no meaning for a command.
+LAUNCHER = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "ORTE_", "PRRTE_", "HFI_", "IPATH_", "PWD", "OLDPWD", "PYTEST_", "_", "SHLVL")
+FORWARDED = (_signal.SIGINT, _signal.SIGTERM, _signal.SIGHUP, _signal.SIGQUIT, _signal.SIGUSR1, _signal.SIGUSR2)
+
+
+def ask(path: str, words: list[str]) -> None:
+    """The command's side: hand everything over, pass signals on, end as the child ends. Without `socket`, which takes 10 ms."""
+    connection = _socket.socket(_socket.AF_UNIX, _socket.SOCK_SEQPACKET)
+    connection.connect(path)
+    passed = [(_socket.SOL_SOCKET, _socket.SCM_RIGHTS, b"".join(fd.to_bytes(4, sys.byteorder) for fd in (0, 1, 2)))]
+    connection.sendmsg([marshal.dumps((words, os.getcwd(), dict(os.environ)))], passed)
+    child = told(connection)
+    if child == 0:
+        os.execv(sys.executable, [sys.executable, *words])
+    for number in FORWARDED:
+        _signal.signal(number, lambda number, _: os.kill(child, number))
+    status = told(connection)
+    if status < 0:
+        if -status in FORWARDED:
+            _signal.signal(-status, _signal.SIG_DFL)
+        os.kill(os.getpid(), -status)
+    os._exit(status)
+
+
+def told(connection: "_socket.socket") -> int:
+    """A number from the standing process; its end is no status 0."""
+    answer = connection.recv(4)
+    if not answer:
+        sys.exit("the standing process has ended")
+    return int.from_bytes(answer, "big", signed=True)
+
+
+def preload() -> None:
+    """Import what a command may import, MPI and PETSc without starting them, and leave these two to be found when they are."""
+    import gc
+    import importlib.abc
+    import importlib.machinery
+    import pkgutil
+
+    import mpi4py
+
+    mpi4py.rc(initialize=False, finalize=True, thread_level="funneled")
+    import petsc4py.lib
+    from mpi4py import MPI
+
+    import lcp_lube
+
+    PETSc = petsc4py.lib.ImportPETSc()
+    for module in pkgutil.walk_packages(lcp_lube.__path__, "lcp_lube."):
+        if not module.name.endswith("__main__"):
+            importlib.import_module(module.name)
+    if MPI.Is_initialized() or PETSc.Sys.isInitialized():
+        raise RuntimeError("an import has started MPI or PETSc")
+
+    class Start(importlib.abc.MetaPathFinder, importlib.abc.Loader):
+        """Starts each of the two where a new process would: at its first import."""
+
+        def find_spec(self, name, path, target=None):  # type: ignore[no-untyped-def]
+            return importlib.machinery.ModuleSpec(name, self) if name in ("mpi4py.MPI", "petsc4py.PETSc") else None
+
+        def exec_module(self, module) -> None:  # type: ignore[no-untyped-def]
+            if module.__name__ == "mpi4py.MPI":
+                sys.modules[module.__name__] = MPI
+                MPI.Init_thread(MPI.THREAD_FUNNELED)
+            else:
+                petsc4py.lib.ImportPETSc()._initialize()
+
+    def imported(arch: str | None = None) -> object:
+        sys.modules["petsc4py.PETSc"] = petsc4py.PETSc = PETSc
+        return PETSc
+
+    petsc4py.lib.ImportPETSc = imported
+    for package, name in ((mpi4py, "MPI"), (petsc4py, "PETSc")):
+        del sys.modules[f"{package.__name__}.{name}"]
+        delattr(package, name)
+    sys.meta_path.insert(0, Start())
+    gc.collect()
+    gc.freeze()  # what is shared is not gone through when a child ends
+
+
+def serve(path: str) -> list[str]:
+    """Fork until standard input ends, which ends this process; returns in each child, with the words of its command."""
+    import select
+    import socket
+
+    own = dict(os.environ)
+    known = {name: value for name, value in own.items() if not name.startswith(LAUNCHER)}
+    preload()
+    listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    listener.bind(path)
+    listener.listen(64)
+    children: dict[int, tuple[int, int, socket.socket]] = {}  # by the descriptor that tells of a child's end
+    waiting = select.poll()
+    for stream in (0, listener.fileno()):
+        waiting.register(stream, select.POLLIN)
+    print("ready", flush=True)
+    while True:
+        for found, _ in waiting.poll():
+            if found == 0:
+                for _, pid, _ in children.values():
+                    os.kill(pid, _signal.SIGKILL)
+                os.unlink(path)
+                os._exit(0)
+            if found != listener.fileno():
+                end, pid, connection = children.pop(found)
+                waiting.unregister(end)
+                waiting.unregister(connection)
+                if found != end:  # the command was killed, and can pass nothing on
+                    os.kill(pid, _signal.SIGKILL)
+                status = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+                children.pop(connection.fileno() if found == end else end)
+                if found == end:
+                    connection.send(status.to_bytes(4, "big", signed=True))
+                os.close(end)
+                connection.close()
+                break  # the other of the two may be among those found
+            connection, _ = listener.accept()
+            data, streams, _, _ = socket.recv_fds(connection, 1 << 20, 3)
+            words, folder, environment = marshal.loads(data)
+            plain = {name: value for name, value in environment.items() if not name.startswith(LAUNCHER)}
+            pid = os.fork() if plain == known else 0
+            if plain == known and pid == 0:
+                listener.close()
+                for _, _, other in children.values():
+                    other.close()
+                connection.close()
+                for number, stream in enumerate(streams):
+                    os.dup2(stream, number)
+                os.chdir(folder)
+                os.environ.clear()
+                os.environ.update(environment)
+                return words
+            for stream in streams:
+                os.close(stream)
+            connection.send(pid.to_bytes(4, "big", signed=True))
+            if pid == 0:
+                connection.close()
+                continue
+            end = os.pidfd_open(pid)
+            for stream in (end, connection.fileno()):
+                waiting.register(stream, select.POLLIN)
+                children[stream] = end, pid, connection
+
+
+def run(words: list[str]) -> None:
+    """As `python WORDS`: `-m MODULE ...` or `FILE ...`."""
+    import runpy
+
+    import numpy as np
+
+    np.random.seed()  # noqa: NPY002  not the one that all children would share
+    sys.stdout.reconfigure(line_buffering=os.isatty(1))  # type: ignore[union-attr]
+    if words[0] == "-m":
+        sys.argv, sys.path[0] = words[1:], os.getcwd()
+        runpy.run_module(words[1], run_name="__main__", alter_sys=True)
+    else:
+        sys.argv, sys.path[0] = words, os.path.dirname(words[0])
+        runpy.run_path(words[0], run_name="__main__")
+
+
+if __name__ == "__main__":
+    if sys.argv[1] == "--serve":
+        run(serve(sys.argv[2]))
+    else:
+        ask(sys.argv[1], sys.argv[2:])
