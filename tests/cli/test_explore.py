@@ -2,17 +2,22 @@
 
 import base64
 import http.client
+import io
 import json
 import os
 import shutil
 import signal
+import socket
 import subprocess
+import threading
+import time
 import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,6 +26,7 @@ from conftest import ENVIRONMENT, python
 
 from lcp_lube import load_scene
 from lcp_lube.cli.explore.controls import controls, slider
+from lcp_lube.cli.explore.server import Handler, Job
 from lcp_lube.registry import scene_names
 from lcp_lube.scenes.scene import parse_changes
 from lcp_lube.scenes.written import toml_of
@@ -157,6 +163,27 @@ def test_a_film_in_time_is_shown_on_its_way_and_given_up_when_the_hand_moves() -
     finally:
         found.process.kill()
         found.process.communicate()
+
+
+def test_a_stream_ends_with_its_answer_however_long_it_takes() -> None:
+    """The connection's end is the stream's; while it was left open, a page waited a minute for it."""
+    ours, theirs = socket.socketpair()
+    handler = Handler.__new__(Handler)
+    handler.connection, handler.wfile, handler.close_connection = theirs, io.BytesIO(), False
+    handler.request_version, handler.requestline, handler.command = "HTTP/1.1", "POST /solve HTTP/1.1", "POST"
+    handler.server_of_page = SimpleNamespace(ask=lambda job: asked.append(job))  # type: ignore[assignment]
+    asked: list[Job] = []
+    answering = threading.Thread(target=handler._ask, args=("solve", {}))
+    answering.start()
+    while not asked:
+        time.sleep(0.01)
+    asked[0].replies.put(b"{}")
+    time.sleep(0.35)  # longer than it waits at a time
+    asked[0].replies.put((b"{}", "application/json"))
+    answering.join(20)
+    assert handler.close_connection and handler.wfile.getvalue().endswith(b"{}\n{}")
+    ours.close()
+    theirs.close()
 
 
 def test_exports(page: Page, tmp_path: Path) -> None:

@@ -176,8 +176,8 @@ class Handler(BaseHTTPRequestHandler):
             try:
                 reply = job.replies.get(timeout=0.1)
             except queue.Empty:
-                job.gone = self.close_connection = self._left()
-                if job.gone:
+                if self._left():
+                    job.gone = self.close_connection = True
                     return
                 continue
             if isinstance(reply, bytes):  # a film on its way in time: a line each, and the connection's end is the answer's
