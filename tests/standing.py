@@ -160,7 +160,7 @@ def serve(path: str) -> list[str]:
 
 
 def run(words: list[str]) -> None:
-    """As `python WORDS`: `-m MODULE ...` or `FILE ...`."""
+    """As `python WORDS`: `-m MODULE ...`, `-c PROGRAM ...` or `FILE ...`."""
     import runpy
 
     import numpy as np
@@ -170,6 +170,9 @@ def run(words: list[str]) -> None:
     if words[0] == "-m":
         sys.argv, sys.path[0] = words[1:], os.getcwd()
         runpy.run_module(words[1], run_name="__main__", alter_sys=True)
+    elif words[0] == "-c":
+        sys.argv, sys.path[0] = ["-c", *words[2:]], ""
+        exec(words[1], {"__name__": "__main__"})
     else:
         sys.argv, sys.path[0] = words, os.path.dirname(words[0])
         runpy.run_path(words[0], run_name="__main__")

@@ -32,6 +32,7 @@ CHECKS: dict[str, dict[str, Any]] = {"problem1": {"n": 400, "scheme": "face"}, "
 LOAD_TOL = 1e-4  # of problem 1 against its exact solution; its discretisation error is 1.2e-5
 RANKS_TOL = 1e-6  # of a load on two ranks against that on one
 LIMIT = 90.0  # seconds for the job of two ranks, which takes two on a machine that is free
+GRACE = 10.0  # seconds that it has to end its ranks
 ALONE = 20.0  # seconds that a rank which failed waits for the others
 # What a job started from here needs: root may start it, and two ranks may share a core (Open MPI 4 and 5).
 MAY_START = {
@@ -178,7 +179,7 @@ def two_ranks() -> list[dict[str, Any]]:
     except subprocess.TimeoutExpired:
         job.terminate()  # mpiexec ends its ranks
         try:
-            job.communicate(timeout=10)
+            job.communicate(timeout=GRACE)
         except subprocess.TimeoutExpired:
             os.killpg(job.pid, signal.SIGKILL)
             job.communicate()

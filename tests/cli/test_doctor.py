@@ -70,6 +70,7 @@ def test_a_broken_mpiexec_is_told(tmp_path, monkeypatch, body, message):
     fake.chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
     monkeypatch.setattr(doctor, "LIMIT", 1.0)
+    monkeypatch.setattr(doctor, "GRACE", 0.5)
     (check,) = doctor.two_ranks()
     assert not check["passed"] and message in check["message"]
 

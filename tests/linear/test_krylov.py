@@ -1,8 +1,11 @@
 """The KSP behind every step: configured by options alone, and its failures reported."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
-from conftest import start
+from conftest import ENVIRONMENT
 from films import FilmScene, Knots, make_problem
 from petsc4py import PETSc
 
@@ -199,5 +202,5 @@ main()
 
 def test_a_cycle_that_holds_a_pc_is_no_crash(tmp_path):
     """As numba leaves them: PETSc, freeing the PC at its own end, calls a Python that is gone."""
-    done = start(["-c", CYCLE], 1, tmp_path, timeout=60)
-    assert done.status == 0, done.err
+    done = subprocess.run([sys.executable, "-c", CYCLE], cwd=tmp_path, env=ENVIRONMENT, capture_output=True, timeout=60)
+    assert done.returncode == 0, done.stderr
