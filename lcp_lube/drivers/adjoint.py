@@ -28,8 +28,10 @@ from .equations import MISFIT, Equations, cavity_of, check_film, fields_of, righ
 from .halved import Halved
 from .linearised import Linear
 from .near_films import NearFilms
+from .pad_coordinates import bearing_of
 
 CANCELLED = 1e-10
+ROUNDED = 1e-8  # of what is small of what was found: a 0 that rounding has moved, the attitude of pads about the load
 FEWER = 2_000  # points from which multigrid solves for an answer that multigrid gave: its loops are loaded
 DIRECT = {"load", "friction", "p_max"}  # numbers that are made of no others in a film without a shaft
 SUPPLY = "supply.{}.p"  # the key of a supply's pressure, Pa above p_c
@@ -141,7 +143,7 @@ class Adjoint:
             if eq.grid.shape != self.equations.grid.shape:
                 raise InputError("the grid has another number of points")
             wanted = {part for weights in self.parts.values() for part in weights}
-            numbers = self.numbers if same else eq.numbers(self.p, self.r, wanted)
+            numbers = self.numbers if same else eq.numbers(self.p, self.r, wanted, self.numbers)
             report = eq.report(numbers)
             G = eq.scaled(self.p, self.r, self.flow_unit)
             return np.array([report[name] - eq.grid.reduce.dot(one, G) for name, one in self.lambdas.items()])
@@ -167,8 +169,7 @@ class Adjoint:
 
             slope, jump = differences(at, value, max(abs(value), 1e-3 * unit), sizes)
         else:
-            scale = abs(value) or self.scale(key)
-
+            scale = self.scale(key)
             quick = [False]
 
             def near(a: float) -> Array:
@@ -192,8 +193,9 @@ class Adjoint:
         return known[key] if key in known else self.pressures[self._supplies.index(key)]
 
     def scale(self, key: str) -> float:
+        """A change of a number that is not small."""
         problem = self.equations.constant
-        return scale_of(self.scene, key, problem, self.p / problem.p_unit)
+        return scale_of(self.scene, key, problem, self.p / problem.p_unit, key in self.found)
 
     @property
     def report(self) -> dict[str, float]:
@@ -204,17 +206,28 @@ class Adjoint:
         self.equations.destroy()
 
 
-def scale_of(scene: Scene, key: str, problem: LubricationProblem, p: Array) -> float:
-    """What a change of a number that is zero is small against; p : the film's, p_unit. Collective."""
+def scale_of(scene: Scene, key: str, problem: LubricationProblem, p: Array, found: bool = False) -> float:
+    """The size of a number, of one that is zero what its change is small against; p : the film's, p_unit. Collective.
+
+    found : it was found, and may be zero but for rounding.
+    """
+    value = abs(values_of(scene)[key])
+    if value and not found:
+        return value
     units = scene.data_units()
     unit = units.get(key, units.get(key.rpartition(".")[0], ""))
     p_max = max(problem.reduce.max(p) * problem.p_unit, *map(abs, problem.p_sides)) or problem.p_unit
     thinnest = problem.reduce.min(problem.scheme.h)
-    return {"Pa": p_max, "1/Pa": 1.0 / p_max, "m": thinnest, "rad": thinnest / max(problem.grid.lengths)}.get(unit, 1e-2)
+    small = {"Pa": p_max, "1/Pa": 1.0 / p_max, "m": thinnest, "rad": thinnest / max(problem.grid.lengths)}.get(unit, 1e-2)
+    return value if value > ROUNDED * small else small
 
 
 def conditions_of(scene: Scene, solution: Solution) -> tuple[list[str], dict[str, float]]:
     """The keys whose values were found, and the conditions that they meet: a number and the value that it has."""
+    if (pads := bearing_of(scene)) is not None:
+        met = zip(pads.keys, pads.conditions.items(), pads.free, strict=True)
+        found = [(key, condition) for key, condition, free in met if free]
+        return [key for key, _ in found], dict(condition for _, condition in found)
     if isinstance(scene, GroovedJournalScene):
         if scene.balance is not None:
             return ["eccentricity", "attitude_deg"], {"load": scene.balance.load, "force_y": 0.0}
@@ -239,8 +252,9 @@ class Implicit:
         slopes = [adjoint.slopes(key)[0] for key in adjoint.found]
         conditions = list(adjoint.conditions)
         C_v = np.array([[one[name] for one in slopes] for name in conditions]).reshape(len(conditions), len(slopes))
+        C_v += np.diag(~C_v.any(axis=0) & ~C_v.any(axis=1))  # pads that idle keep their tilts: any will do
         try:
-            inverse = np.linalg.inv(C_v) if slopes else np.zeros((0, 0))
+            inverse = np.linalg.inv(C_v)
         except np.linalg.LinAlgError:
             raise InputError(f"{', '.join(conditions)} do not depend on {', '.join(adjoint.found)}: no derivatives") from None
         by_found = {name: np.array([one[name] for one in slopes]) for name in adjoint.lambdas}
@@ -261,4 +275,4 @@ class Implicit:
 def _sum(parts: Sequence[float]) -> float:
     """Their sum; 0 where rounding is all that is left of it."""
     total = float(sum(parts))
-    return total if abs(total) > CANCELLED * sum(map(abs, parts)) else 0.0
+    return 0.0 if abs(total) <= CANCELLED * sum(map(abs, parts)) else total

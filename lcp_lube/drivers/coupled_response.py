@@ -127,8 +127,9 @@ class CoupledResponse:
         t = STEP / size
         return _slopes([self._system(k * t * z, self.x + k * t * x, self.loop.base) for k in (1.0, -1.0)], 2.0 * t)
 
-    def _settled(self, b: Array, own: Any, nu: float, stored: bool = True) -> Any:
-        """The answer to b with the supplies' pressures that follow; own : what b's cause makes them give by itself, m3/s."""
+    def _settled(self, b: Array, own: Any, nu: float, stored: bool = True, off: Any = 0.0) -> Any:
+        """The answer to b with the supplies' pressures that follow; own : what b's cause makes them give by itself, m3/s;
+        off : by how much it makes sources and film disagree."""
         y = self._solve(b, nu, stored)
         if not self.free:
             return y
@@ -136,7 +137,7 @@ class CoupledResponse:
             self._answers[nu, stored] = [self._solve(one + 0.0j if nu else one, nu, stored) for one in self._pushes]
         answers = self._answers[nu, stored]
         slopes = np.stack([self._given(one, nu) for one in answers], axis=1)
-        P = following(slopes, self._given(y, nu) + own, self._sources[self.free])
+        P = following(slopes, self._given(y, nu) + own, self._sources[self.free], off)
         return y + sum(p * one for p, one in zip(P, answers, strict=True))
 
     def _given(self, y: Any, nu: float) -> Any:

@@ -36,7 +36,7 @@ from .turned import Mirrored
 
 FLIPPED = {"flow_west": "flow_east", "flow_east": "flow_west"}
 # What is found around a film that derivatives know of; of what is coupled, a fluid's law alone.
-THROUGH = {"decision", "accuracy", "balance", "position", "attitude", "turned", "supplies", "warm", "coupling"}
+THROUGH = {"decision", "accuracy", "pads", "balance", "position", "attitude", "turned", "supplies", "warm", "coupling"}
 THROUGH |= {"grooves", "symmetry", "direct"}
 DRAGS = ("friction", "friction_torque")
 MISFIT = "supply_misfit_"  # by which a supply's source and film disagree, 0 at the solution
@@ -134,15 +134,18 @@ class Equations:
         k = s.diagonal.ravel() * p / problem.p_unit
         return (np.abs(k) + np.abs(s.couette_W).ravel() + np.abs(s.couette_E).ravel()) * s.flow_unit
 
-    def numbers(self, p: Array, r: Array, wanted: Collection[str] | None = None) -> dict[str, float]:
-        """`slopes.numbers` as the scene has them. Collective."""
+    def numbers(
+        self, p: Array, r: Array, wanted: Collection[str] | None = None, rest: Mapping[str, float] | None = None
+    ) -> dict[str, float]:
+        """`slopes.numbers` as the scene has them; rest : the values of those that are not wanted. Collective."""
         wanted = {FLIPPED.get(name, name) for name in wanted} if wanted is not None and self.turned else wanted
         problem = self.problem(p)
         found = slopes.numbers(problem, p / problem.p_unit, r, wanted)
         if (fields := known_fields(problem)) is not None:  # a line's numbers are free of the grid's error (`film.line`)
             told, discrete = _flat(problem.quantities(fields)), slopes.numbers(problem, fields["p"], fields["r"])
             found = {name: value + (told.get(name, discrete[name]) - discrete[name]) for name, value in found.items()}
-        return self._flipped(found) if self.turned else found
+        found = self._flipped(found) if self.turned else found
+        return {name: (rest or found)[name] if value != value else value for name, value in found.items()}
 
     def _flipped(self, found: dict[str, float]) -> dict[str, float]:
         out = {FLIPPED.get(name, name): value for name, value in found.items()}

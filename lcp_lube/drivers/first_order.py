@@ -74,7 +74,7 @@ class FirstOrder:
         self._film(self.cells)
         self.at = Answer(eq.constant, self.p, self.r, self.cells, self.law, self.base)
         names = [name for name in dict.fromkeys([quantity, *found.conditions]) if name not in found.found]
-        numbers = eq.numbers(self.p, self.r, None if self.quantity != "load" else ("load", "force_x", "force_y"))
+        self.numbers = numbers = eq.numbers(self.p, self.r, None if self.quantity != "load" else ("load", "force_x", "force_y"))
         self.parts = {name: eq.partials(numbers, name) for name in names}
         self.value = eq.report(numbers).get(quantity)
         if quantity in found.found:
@@ -176,7 +176,7 @@ class FirstOrder:
     def _lagrangians(self, cells: Cells, t: float = 0.0) -> Array:
         eq, p, r = self.equations, self.p, self.r
         self._film(cells, t)
-        report = eq.report(eq.numbers(p, r, {part for weights in self.parts.values() for part in weights}))
+        report = eq.report(eq.numbers(p, r, {part for weights in self.parts.values() for part in weights}, self.numbers))
         G = eq.balance(p, r) / self.base.scheme.flow_unit
         G = G if eq.held is None else np.where(eq.held, 0.0, G)
         return np.array([report[name] - eq.grid.reduce.dot(one, G) for name, one in self.lambdas.items()])

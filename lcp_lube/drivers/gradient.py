@@ -18,6 +18,7 @@ from ..problems.solution import Solution
 from ..scenes.grooved import GroovedJournalScene
 from ..scenes.moving import motion_of
 from ..scenes.scene import Scene
+from ..scenes.tilting import TiltingPadScene
 from ..scenes.values import key_of, values_of
 from .adjoint import Adjoint, Implicit
 from .coefficients import placed
@@ -27,7 +28,7 @@ from .march_course import Trace, check_march
 from .march_gradient import MarchGradient
 
 STEPWISE = "the edges of grooves lie on points of the grid: the answer changes by steps"
-FOUND = "it was found for the load"
+FOUND = "it was found, and follows the other numbers"
 
 
 @dataclass(frozen=True)
@@ -124,6 +125,13 @@ def check(scene: Scene, film: bool = False) -> None:
         raise InputError(f"scene {scene.name}: dQ/dh at every point is not known {what}: leave --plot and --output out")
 
 
+def _stepwise(scene: Any) -> tuple[str, ...]:
+    """What the keys begin with that move grooves."""
+    if isinstance(scene, TiltingPadScene):
+        return "pivot", "pad_deg"
+    return ("groove",) if isinstance(scene, GroovedJournalScene) and scene.grooves_deg else ()
+
+
 def _coupled(scene: Any) -> bool:
     return bool(getattr(getattr(scene, "model", None), "effects", ()))
 
@@ -156,7 +164,7 @@ def _gradients(
         for key in dict.fromkeys(asked):
             if key in adjoint.found:
                 held[key] = FOUND
-            elif isinstance(scene, GroovedJournalScene) and key.startswith("groove") and scene.grooves_deg:
+            elif key.startswith(_stepwise(scene)):
                 held[key] = STEPWISE
             elif key == "balance.load":
                 slopes[key], jumps[key] = dict.fromkeys(adjoint.lambdas, 0.0), {}

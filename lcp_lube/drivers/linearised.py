@@ -184,7 +184,10 @@ class Feed:
         self._B.destroy()
 
 
-def following(slopes: Any, taken: Any, sources: Array) -> Any:
-    """P of `Feed`'s equation, of the supplies that are free: their slopes, what they would give at P = 0, their a and b."""
+def following(slopes: Any, taken: Any, sources: Array, off: Any = 0.0) -> Any:
+    """P of `Feed`'s equation, of the supplies that are free: their slopes, what they would give at P = 0, their a and b.
+
+    off : what else their misfits change by.
+    """
     by_p, by_flow = sources.T
-    return np.linalg.solve(by_flow[:, None] * slopes + np.diag(by_p), -by_flow * taken)
+    return np.linalg.solve(by_flow[:, None] * slopes + np.diag(by_p), -by_flow * taken - off)

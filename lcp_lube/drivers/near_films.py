@@ -21,7 +21,7 @@ from ..scenes.scene import Scene
 from .equations import Equations
 from .turned import Mirrored
 
-FREE = {"gap", "mu", "U", "p_unit", "p_c", "sides", "exact", "extras", "shaft", "places"}  # what may differ
+FREE = {"gap", "mu", "U", "p_unit", "p_c", "sides", "exact", "extras", "shaft", "levers", "places"}  # what may differ
 
 
 class NearFilms:
@@ -71,9 +71,10 @@ class NearFilms:
         p_sides = tuple(side.p if side.kind == "open" else 0.0 for side in model.sides)
         near.mu, near.U, near.p_c, near.p_sides = model.mu, model.U, model.p_c, p_sides  # type: ignore[assignment]
         near.shaft, near.extras, near.film, lean.constant = model.shaft, model.extras, model.film, near
-        before = (eq.constant.p_sides, eq.constant.p_c, own.shaft)
-        same = before[:2] == (near.p_sides, near.p_c) and _same(before[2], near.shaft)
-        report = lean.report(self.numbers if same else lean.numbers(self.p, self.r, self.wanted))
+        near.levers = model.levers
+        before = (eq.constant.p_sides, eq.constant.p_c, (own.shaft, own.levers))
+        same = before[:2] == (near.p_sides, near.p_c) and _same(before[2], (near.shaft, near.levers))
+        report = lean.report(self.numbers if same else lean.numbers(self.p, self.r, self.wanted, self.numbers))
         G = ((sums[:, 0] + sums[:, 2:] @ np.array(p_sides)) / model.mu + model.U * sums[:, 1]) / eq.constant.scheme.flow_unit
         return np.array([report[name] for name in self.lambdas]) - G
 

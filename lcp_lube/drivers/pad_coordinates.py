@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.parallel import Array
-from ..problems.film.forces import ambient, integral
+from ..problems.film.forces import PIVOT, totals
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.solution import Fields, Solution
@@ -34,10 +34,6 @@ class PadFilm:
     fields: Fields
     modes: Sequence[Mode]
     numbers: Sequence[int]
-
-    def pushes(self, mode: Mode) -> float:
-        """Integral of (p - ambient) g. Collective."""
-        return integral(self.problem, self.fields["p"] * self.problem.p_unit, ambient(self.problem), mode)
 
     def response(self) -> Response:
         """To its modes. Collective."""
@@ -69,7 +65,17 @@ class Bearing(Protocol):
 
     def films(self, scene: Scene, solution: Solution) -> AbstractContextManager[Films]: ...
 
-    def misfit(self, solution: Solution, films: Films) -> tuple[Array, Array]:
+    @property
+    def keys(self) -> Sequence[str]:
+        """The scene's, of the coordinates."""
+        ...
+
+    @property
+    def conditions(self) -> dict[str, float]:
+        """The numbers of the results that are met by what is found, and their values: in the order of the coordinates."""
+        ...
+
+    def misfit(self, solution: Solution) -> tuple[Array, Array]:
         """What is left of each equation, and what it counts by."""
         ...
 
@@ -130,14 +136,27 @@ class JournalPads:
 
         return PadFilm(one.problem, one.film.model, one.fields, [*displacements(turning, first), tilt], [0, 1, 2 + k])
 
-    def misfit(self, solution: Solution, films: Films) -> tuple[Array, Array]:
-        fx, fy = solution.problem.quantities(solution.fields)["force"]
+    @property
+    def keys(self) -> Sequence[str]:
+        return ["eccentricity", "attitude_deg", *(f"tilts.{k + 1}" for k in self._pads)]
+
+    @property
+    def conditions(self) -> dict[str, float]:
+        load = self.scene.balance.load if self.scene.balance is not None else 0.0
+        return {"load": load, "force_y": 0.0} | {f"{PIVOT}{k + 1}": 0.0 for k in self._pads}
+
+    @property
+    def _pads(self) -> range:
+        return range(len(self.scene.pivots_deg))
+
+    def misfit(self, solution: Solution) -> tuple[Array, Array]:
+        told = _integrals(solution)
+        fx, fy = told["force_x"], told["force_y"]
         load = self.scene.balance.load if self.scene.balance is not None else math.hypot(fx, fy)
-        places = np.eye(len(self.scene.pivots_deg))
-        moments = films.sum(lambda film: film.pushes(film.modes[-1]) * places[film.numbers[-1] - 2])
+        moments = [told[f"{PIVOT}{k + 1}"] for k in self._pads]
         tol = self.scene.balance.tol if self.scene.balance is not None else 1.0
         lever = _moments(self.scene) * (load or 1.0) * 0.5 * self.scene.D
-        return np.array([fx + load, fy, *moments]), np.array([tol * load] * 2 + [lever] * moments.size)
+        return np.array([fx + load, fy, *moments]), np.array([tol * load] * 2 + [lever] * len(moments))
 
     def told(self, solution: Solution, q: Array) -> dict[str, Any]:
         value = float(np.hypot(*q[:2])) / self.scene.clearance
@@ -181,8 +200,18 @@ class ThrustPads:
         yield SideBySide(grid.comm, grid.comm, [PadFilm(problem, film.model, solution.fields, modes, [0, 1, 2])])
         problem.destroy()
 
-    def misfit(self, solution: Solution, films: Films) -> tuple[Array, Array]:
-        pushes = films.sum(lambda film: np.array([film.pushes(mode) for mode in film.modes]))
+    @property
+    def keys(self) -> Sequence[str]:
+        return "h_min", "pitch", "roll"
+
+    @property
+    def conditions(self) -> dict[str, float]:
+        table = self.scene.balance
+        return {"load": table.load if table is not None else 0.0, f"{PIVOT}1": 0.0, f"{PIVOT}2": 0.0}
+
+    def misfit(self, solution: Solution) -> tuple[Array, Array]:
+        told = _integrals(solution)
+        pushes = np.array([told["load"], told[f"{PIVOT}1"], told[f"{PIVOT}2"]])
         table = self.scene.balance
         load = table.load / self.scene.pads if table is not None else pushes[0]
         lever = _moments(self.scene) * abs(load or 1.0) * self.scene.side_lengths[0]
@@ -190,6 +219,12 @@ class ThrustPads:
 
     def told(self, solution: Solution, q: Array) -> dict[str, Any]:
         return {"vary": "h_min", "value": float(q[0]), "tilts": q[1:]}
+
+
+def _integrals(solution: Solution) -> dict[str, float]:
+    """Of the pressure: forces and moments. Collective."""
+    problem: Any = solution.problem
+    return totals(problem, solution.fields["p"] * problem.p_unit)
 
 
 def _moments(scene: Any) -> float:

@@ -65,7 +65,7 @@ def _from(bearing: Bearing, q: Array, scene: Solvable, ask: Ask, inner: Inner) -
         if not solution.converged:
             break
         with bearing.films(at, solution) as films:
-            off, counts = bearing.misfit(solution, films)
+            off, counts = bearing.misfit(solution)
             if films.min(lambda one: float(np.min(one.problem.film(*_places(one))))) < THINNEST * bearing.sizes[0]:
                 break
             met = bool(np.all(np.abs(off[bearing.free]) <= counts[bearing.free]))

@@ -171,6 +171,7 @@ class ThrustScene(WithEffects):
             scheme="face",
             extras=self.bearing_numbers,
             polar=self.radii,
+            levers=() if self.pivot_part is None else self.tilt_modes,
             supplies=self._supplies(),
         )
 

@@ -1,12 +1,14 @@
 """Journal bearings of separate pads, fixed or tilting about pivots, under a load of given direction."""
 
 import math
+from dataclasses import replace
 from typing import Annotated
 
 from pydantic import Field
 
-from ..problems.film.bore import PadBore
+from ..problems.film.bore import PadBore, PadLever
 from ..problems.film.grooves import Groove
+from ..problems.film.model import Model
 from .balance import BalanceTable
 from .effects.table import WithEffects
 from .scene import Finite, NotNegative, Positive
@@ -77,6 +79,15 @@ class TiltingPadScene(ShaftScene, WithEffects):
             tuple(map(math.radians, self.pivots_deg)),
             tuple(self.tilts or [0.0] * len(self.pivots_deg)),
         )
+
+    def _model(self) -> Model:
+        """With the levers of the pads' moments."""
+        nx, above, levers = self.shape[0], min(self.p_groove, self.p_end), []
+        for k, (pivot, behind) in enumerate(zip(self.pivots_deg, self.grooves, strict=True)):
+            before = self.grooves[k - 1]
+            first = before.first + before.count
+            levers.append(PadLever(self.turning, math.radians(pivot), first, (behind.first - first) % nx, nx, above))
+        return replace(super()._model(), levers=tuple(levers))
 
     @property
     def edges_deg(self) -> list[float]:

@@ -8,6 +8,13 @@ from lcp_lube.drivers.gradient import gradients
 from lcp_lube.scenes.values import values_of, with_values
 
 TIGHT = {"eps1": 1e-11, "max_it": 200}
+# No two alike, and no edge on a point.
+PLACES = zip((43.0, 137.0, 224.0, 316.0), (51.0, 47.0, 44.0, 53.0), (61e-3, 57e-3, 53e-3, 67e-3), strict=True)
+RECESSES = {
+    f"supply.{k}.{key}": value
+    for k, place in enumerate(PLACES, start=1)
+    for key, value in zip(("angle_deg", "extent_deg", "length"), place, strict=True)
+}
 
 
 def answer(scene, near=None):
@@ -94,3 +101,36 @@ def test_the_command_on_ranks_and_bad_input(cli):
         assert told["gradient"] == pytest.approx(one.gradient, rel=1e-6)
     refused = cli("sensitivity", "lined_pad", "--n", "40", "--quantity", "temperature_least")
     assert refused.status == 2 and len(refused.lines) == 1 and "no derivative" in refused.lines[0]
+
+
+def test_supplies_whose_pressures_follow():
+    """Behind capillaries and by flow, with heat: the sources' own numbers too."""
+    heat = {"oil": "ISO VG 32", "T_in": 313.0}
+    scene = load_scene("hybrid_journal", {**RECESSES, "nx": 37, "ny": 7, "attitude_deg": 20.0, "temperature": heat})
+    with answer(scene) as solution:
+        quantities = ["load", "temperature_max", "supply_flow_2", "supply_p_1"]
+        found = gradients(scene, solution, quantities, ["supply.1.K", "supply.2.p_s", "clearance"])
+        for key, slopes in found[0].gradient.items():
+            a, told = values_of(scene)[key], []
+            for k in (-2, -1, 1, 2):
+                with answer(with_values(scene, {key: a * (1 + 1e-4 * k)}), solution) as other:
+                    n = other.numbers
+                    told.append(np.array([n["load"], n["temperature_max"], n["supply_flow"][1], n["supply_p"][0]]))
+            slopes = (8.0 * (told[2] - told[1]) - (told[3] - told[0])) / (12e-4 * a)
+            least = 2e-6 * np.abs(told[0] / a)  # sources and film agree to 1e-10 of a flow
+            for one, slope, small in zip(found, slopes, least, strict=True):
+                assert one.gradient[key] == pytest.approx(slope, rel=1e-6, abs=small), (one.quantity, key)
+
+
+def test_a_number_that_is_zero_has_a_step_that_is_seen(cli):
+    """1 K more by exchange is 1e-12 of the load: its derivative is not that of rounding; what has no effect has none."""
+    words = ("sensitivity", "lined_pad", "--n", "40", "--by", "temperature.exchange,shear.least", "--json")
+    one, three = (cli(*words, ranks=ranks).json["gradient"] for ranks in (1, 3))
+    assert three["temperature.exchange"] == pytest.approx(one["temperature.exchange"], rel=1e-8)
+    assert one["shear.least"] == three["shear.least"] == 0.0
+    loads = {}
+    for exchange in (0.0, 50.0, 100.0):
+        with answer(load_scene("lined_pad", {"n": 40, "temperature.exchange": exchange})) as solution:
+            loads[exchange] = solution.load
+    slope = (4.0 * loads[50.0] - loads[100.0] - 3.0 * loads[0.0]) / 100.0
+    assert one["temperature.exchange"] == pytest.approx(slope, rel=1e-4)

@@ -317,7 +317,6 @@ def test_the_command(tmp_path, monkeypatch, capsys):
         (("pocketed_pad", "--quantity", "fricton"), "nearest is friction"),
         (("bratu",), "gradients are of films"),
         (("squeeze",), "no derivatives in time through events"),
-        (("tilting_pad_thrust",), "do not go through its 'pads' yet"),
         (("pocketed_pad", "--plot", "a.npz"), "--plot"),
         (("pocketed_pad", "--errors", "a.npz"), "a.npz"),
         (("pocketed_pad", "--errors", "a.png"), "films in the plane"),

@@ -111,3 +111,24 @@ class PadBore:
         h = h + 2.0 * (self.c_pad - turning.c) * np.sin(0.5 * from_pivot) ** 2
         h = h - np.array(self.tilts)[pad] * turning.R * np.sin(from_pivot)
         return np.array(np.broadcast_to(h, np.broadcast_shapes(x.shape, np.shape(0.0 if y is None else y))))
+
+
+@dataclass(frozen=True)
+class PadLever:
+    """Rise of the film by a pad's tilt about its pivot (rad), for its moment: on the pad alone, half at the points beside it.
+
+    The pad has n columns of the ring's nx from `first` on; the columns beside it are in the grooves. above : the pressure on
+    the back of the pad, Pa above p_c.
+    """
+
+    turning: Turning
+    pivot: float
+    first: int
+    n: int
+    nx: int
+    above: float
+
+    def __call__(self, x: Array, y: Array) -> Array:
+        column = (np.floor(x * (self.nx / self.turning.length)) - self.first) % self.nx
+        share = np.where(column < self.n, 1.0, np.where((column == self.n) | (column == self.nx - 1), 0.5, 0.0))
+        return -share * self.turning.R * np.sin(self.turning.theta(x) - self.pivot)

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from .lubrication import LubricationProblem
 
 Weight = Callable[[Array, Array], Array]
+PIVOT = "pivot_moment_"
 
 
 def open_pressures(problem: LubricationProblem) -> list[float | None]:
@@ -75,7 +76,7 @@ def totals(
     """
     every, contact = weights(problem), problem.contact
     by = {name: weight for name, weight in every.items() if wanted is None or name in wanted}
-    asked = [(0.0 if name == "pressure_integral" else ambient(problem), weight) for name, weight in by.items()]
+    asked = [(_above(problem, name, weight), weight) for name, weight in by.items()]
     out = dict.fromkeys(every, np.nan) | dict(zip(by, integrals(problem, p_pa, asked), strict=True))
     for name, weight in by.items() if contact is not None else ():
         if name != "pressure_integral":
@@ -88,14 +89,21 @@ def totals(
     return out
 
 
+def _above(problem: LubricationProblem, name: str, weight: Weight) -> float:
+    """The pressure above which an integral counts, Pa above p_c."""
+    return 0.0 if name == "pressure_integral" else weight.above if hasattr(weight, "above") else ambient(problem)
+
+
 def weights(problem: LubricationProblem) -> dict[str, Weight]:
     """By what the pressure is multiplied in its integrals, functions of x and y.
 
-    Moments of a sector are about its centre, x along the edge where it begins, y a quarter of a turn ahead.
+    Moments of a sector are about its centre, x along the edge where it begins, y a quarter of a turn ahead; those about the
+    pivots of pads are `pivot_moment_1` and so on.
     """
     grid, shaft = problem.grid, problem.shaft
     middle = [start + 0.5 * length for start, length in zip(grid.origin, grid.lengths, strict=False)]
     found: dict[str, Weight] = {"pressure_integral": lambda x, y: np.ones(1)}
+    found |= {f"{PIVOT}{k}": lever for k, lever in enumerate(problem.levers, start=1)}
     if shaft is not None:
         phi = shaft.theta
         found |= {"force_x": lambda x, y: -np.cos(phi(x)), "force_y": lambda x, y: -np.sin(phi(x))}

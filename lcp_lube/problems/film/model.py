@@ -71,6 +71,7 @@ class Model:
     exact: Callable[[], ExactSolution | None] | None = None
     grooves: tuple[Groove, ...] = ()  # of a film that is periodic in x
     shaft: Shaft | None = None  # of a film that is wrapped round one
+    levers: tuple[Film, ...] = ()  # by what the pressure is multiplied in the moments about the pivots of pads, m
     supplies: tuple[Supply, ...] = ()
     law: Law | None = None  # a fluid that depends on the pressure; `build` makes the problem of the constant one
     polar: Polar | None = None  # of a sector (`Grid.polar`)
@@ -196,7 +197,7 @@ class Model:
             held=held,
             integrals=integrals,
         )
-        problem.shares_grid, problem.extras = shared, self.extras
+        problem.shares_grid, problem.extras, problem.levers = shared, self.extras, self.levers
         problem.edged = not self.mean_cubes
         problem.tops = self.scheme == "face" and problem.edged
         if isinstance(problem, GroovedProblem):
@@ -237,6 +238,7 @@ class Model:
             # Its x = 0 is the last column of the groove before it.
             gap = FromHere(self.gap, (pad.first - 0.5) * dx, self.lengths[0])
             stored = self.stored.starting(pad.first) if self.stored else None
-            film = replace(self, lengths=lengths, sides=sides, gap=gap, exact=None, grooves=(), places=places, stored=stored)
+            changed: dict[str, Any] = {"grooves": (), "levers": (), "places": places, "stored": stored}
+            film = replace(self, lengths=lengths, sides=sides, gap=gap, exact=None, **changed)
             films.append((pad, film))
         return films
