@@ -5,8 +5,9 @@ order on its answer (`first_order`): one transposed solve for all of them. Those
 of the tolerance (`accuracy`, else 1 %), and could not by acting on the others, are left out; where that is not sure it is taken
 again on the answer with those kept. On its own grid the film without effects is the answer, or the loop's first film.
 
-What goes on in time, or has no derivatives, is solved on a coarse grid with all its effects, and once without each: at most as many coarse films as `SHARE` of the work allows; small grids have all effects. In time the largest
-change over the whole march counts, in parts of the largest value.
+What goes on in time, or has no derivatives, is solved on a coarse grid with all its effects, and once without each: at most as
+many coarse films as `SHARE` of the work allows; small grids have all effects. In time the largest change over the whole march
+counts, in parts of the largest value.
 """
 
 from dataclasses import replace
