@@ -36,7 +36,8 @@ from .turned import Mirrored
 
 FLIPPED = {"flow_west": "flow_east", "flow_east": "flow_west"}
 # What is found around a film that derivatives know of; of what is coupled, a fluid's law alone.
-THROUGH = set("decision accuracy pads balance position attitude turned supplies warm coupling grooves symmetry direct".split())
+THROUGH = {"decision", "accuracy", "pads", "balance", "position", "attitude", "turned", "supplies", "warm", "coupling"}
+THROUGH |= {"grooves", "symmetry", "direct"}
 DRAGS = ("friction", "friction_torque")
 MISFIT = "supply_misfit_"  # by which a supply's source and film disagree, 0 at the solution
 STEP = 1e-3  # relative, of the numbers that another one is made of: five values give its derivatives to rounding
@@ -133,9 +134,7 @@ class Equations:
         k = s.diagonal.ravel() * p / problem.p_unit
         return (np.abs(k) + np.abs(s.couette_W).ravel() + np.abs(s.couette_E).ravel()) * s.flow_unit
 
-    def numbers(
-        self, p: Array, r: Array, wanted: Collection[str] | None = None, rest: Mapping[str, float] | None = None
-    ) -> dict[str, float]:
+    def numbers(self, p: Array, r: Array, wanted: Collection[str] | None = None, rest: Any = None) -> dict[str, float]:
         """`slopes.numbers` as the scene has them; rest : the values of those that are not wanted. Collective."""
         wanted = {FLIPPED.get(name, name) for name in wanted} if wanted is not None and self.turned else wanted
         problem = self.problem(p)
