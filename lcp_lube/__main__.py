@@ -25,6 +25,10 @@ def main(argv: list[str] | None = None) -> int:
             args.words = words  # PETSc's among them
             if (ranks := getattr(args, "ranks", None)) is not None:
                 return run_on(ranks, words)
+            if (threads := getattr(args, "threads", None)) is not None:
+                if threads < 1:
+                    raise InputError(f"--threads {threads}: at least 1 is needed")
+                os.environ["NUMBA_NUM_THREADS"] = str(threads)  # what `base/crew` reads
     except InputError as error:
         return _refuse(error)
     if getattr(args, "json", False) or getattr(args, "worker", False):

@@ -31,7 +31,7 @@ def kernel(function: Kernel) -> Kernel:
     Division by zero gives inf or NaN, as in NumPy, and products may be added without rounding in between: loops like these
     are only then turned into vector instructions.
     """
-    return _machine_code(function, error_model="numpy", fastmath={"contract", "nsz"})
+    return _machine_code(function, error_model="numpy", fastmath={"contract", "nsz"}, nogil=True)
 
 
 def _machine_code(function: Kernel, **how: Any) -> Kernel:

@@ -1,10 +1,12 @@
 """Lines of a grid taken together, a few at a time: what is made of them and not kept fits the cache, and takes no memory."""
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.crew import FEWEST, crew
 from .grid import Grid
 
 STRIP = 16_384  # points
@@ -16,6 +18,14 @@ def in_strips(grid: Grid) -> Iterator[slice]:
     ny, nx = grid.box
     lines = max(1, STRIP // nx)
     return (slice(j, min(j + lines, ny)) for j in range(0, ny, lines))
+
+
+def each_strip(grid: Grid, task: Callable[[slice], Any]) -> list[Any]:
+    """What a task returns for each of them, in their order; several threads work on a large grid's."""
+    strips = list(in_strips(grid))
+    if grid.local_size < FEWEST:
+        return [task(rows) for rows in strips]
+    return crew().run(lambda k: task(strips[k]), len(strips))
 
 
 def places_of(grid: Grid, rows: slice) -> Grid:

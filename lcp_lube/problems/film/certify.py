@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ...base.compiled import has_numba
 from ...base.parallel import Array
 from ..certificate import Certificate, certificate_tol
-from ..strips import MANY, ghosted
+from ..strips import MANY, each_strip, ghosted
 from .graded import GradedJacobian, Pivots, within_reach
 from .reynolds import side_points
 from .stored import storing
@@ -91,13 +91,18 @@ def slack(problem: "LubricationProblem", p: Array, r: Array) -> bool:
 
 def rounding_may_dominate(problem: "LubricationProblem", p_max: float) -> bool:
     """Whether rounding of the largest flows, in every cell, may move pressures behind the weakest film by FINE of p_max."""
-    s, reduce, ends = problem.scheme, problem.reduce, problem.grid.ends
-    along, across = (s.k_W, s.k_E), (s.k_S, s.k_N)
-    ways = along if "open" in ends[0] or not across[0].any() else along + across
-    weakest = reduce.min(np.array([np.min(k, where=k > 0, initial=np.inf) for k in ways]))
-    wall = np.array([-np.min(part.b_C) for _, part in problem.scheme.in_strips(problem.grid)])
-    largest = max(reduce.max(k) for k in along + across) * p_max + reduce.max(wall)
-    return not UNIT * problem.size * largest <= FINE * weakest * p_max
+    reduce, grid = problem.reduce, problem.grid
+    ways = 2 if "open" in grid.ends[0] or not problem.scheme.k_S.any() else 4
+
+    def look_at(rows: slice) -> tuple[Any, ...]:
+        s = problem.scheme.rows(rows)
+        k = s.k_W, s.k_E, s.k_S, s.k_N
+        weakest = np.min([np.where(one > 0, one, np.inf).min() for one in k[:ways]])
+        return weakest, np.max([np.max(one) for one in k[: 2 * grid.dim]]), -np.min(s.b_C)
+
+    weakest, most, dragged = (np.array(found) for found in zip(*each_strip(grid, look_at), strict=True))
+    largest = reduce.max(most) * p_max + reduce.max(dragged)
+    return not UNIT * problem.size * largest <= FINE * reduce.min(weakest) * p_max
 
 
 def p_error(problem: "LubricationProblem", p: Array, r: Array) -> float:
@@ -137,13 +142,20 @@ def misfits(problem: "LubricationProblem", p: Array, r: Array, p_max: float, abo
 
         look = loop_misfits
     sums, most, least = np.zeros(6), np.zeros(2), np.inf
-    for rows, s in problem.scheme.in_strips(grid):  # so that what lies between is no more than the cache holds
+
+    def look_at(rows: slice) -> tuple[Any, list[tuple[Array, Array]]]:
+        s = problem.scheme.rows(rows)
         frames, b_C = [frame(rows) for frame in framed], s.b_C
-        least = np.minimum(least, -np.max(b_C if s.storage is None else b_C + s.storage))
         owned = (s.k_W, s.k_E, s.k_S, s.k_N, b_C, s.entering, s.c, nothing if s.held is None else s.held)
+        found = []
         for i in range(0, grid.box[1], BLOCK):
             arrays = [*(a[:, i : i + BLOCK + 2] for a in frames), *(a[:, i : i + BLOCK] for a in owned)]
-            own, largest = look(*arrays, p_max, above)  # type: ignore[arg-type, call-arg]
+            found.append(look(*arrays, p_max, above))  # type: ignore[arg-type, call-arg]
+        return -np.max(b_C if s.storage is None else b_C + s.storage), found
+
+    for low, found in each_strip(grid, look_at):  # so that what lies between is no more than the cache holds
+        least = np.minimum(least, low)
+        for own, largest in found:
             sums, most = sums + own, np.maximum(most, largest)  # NaN stays NaN
     *squares, inside = (reduce.sum(np.array([part])) for part in sums)
     worst, gap = (reduce.max(np.array([part])) for part in most)

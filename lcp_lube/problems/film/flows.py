@@ -10,7 +10,7 @@ import numpy as np
 from ...base.compiled import has_numba
 from ...base.parallel import Array
 from ..grid import Grid
-from ..strips import MANY, in_strips, places_of
+from ..strips import MANY, each_strip, places_of
 from .cavity import cavitated
 from .edges import Around, strips
 from .reynolds import BoxScheme, sides
@@ -77,19 +77,21 @@ def friction(problem: LubricationProblem, p_pa: Array, r: Array, lever: Array | 
     ----------
     p_pa : pressure in Pa above the cavitation pressure, r : void fraction; owned points. lever : of each line, for a torque, m.
     """
-    grid, s, of_film = problem.grid, problem.scheme, 0.0
+    grid, s = problem.grid, problem.scheme
     p_pa, r = p_pa.reshape(grid.box), r.reshape(grid.box)
     # What happens in a line of one rank is its own business, but where walls ask what is cavitated, or effects have been.
     alone = grid.comm.size == 1 and "closed" not in grid.ends[0] and problem.plain
-    for rows in in_strips(grid) if alone else [slice(0, grid.box[0])]:
+
+    def add_up(rows: slice) -> float:
         part = copy(problem)
         if alone:
             part.grid, part.scheme = places_of(grid, rows), s.rows(rows)
         along = lever[rows] if isinstance(lever, np.ndarray) else lever
         if alone and grid.size >= MANY and has_numba():
-            of_film += _drag_sum(part, p_pa[rows], r[rows], along)
-        else:
-            of_film += float(np.sum(sum(drag(part, part.scheme, p_pa[rows].ravel(), r[rows].ravel())) * along))  # type: ignore[arg-type]
+            return _drag_sum(part, p_pa[rows], r[rows], along)
+        return float(np.sum(sum(drag(part, part.scheme, p_pa[rows].ravel(), r[rows].ravel())) * along))  # type: ignore[arg-type]
+
+    of_film = sum(each_strip(grid, add_up)) if alone else add_up(slice(0, grid.box[0]))
     of_film = problem.reduce.sum(np.array([of_film]))
     return of_film if problem.contact is None else of_film + problem.contact.drag(problem, lever)
 

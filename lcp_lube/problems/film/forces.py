@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...base.parallel import Array
-from ..strips import in_strips, places_of
+from ..strips import each_strip, places_of
 from .reynolds import sides
 from .strip import line_weights, stream_weights
 
@@ -147,9 +147,10 @@ def integrals(problem: LubricationProblem, p_pa: Array, asked: Sequence[tuple[fl
     """Integrals of (p - above) weight(x, y), in one pass: trapezoidal to the open sides, a corner having the mean of its two;
     cells end at the others. Collective."""
     grid = problem.grid
-    inside, p = np.zeros(len(asked)), p_pa.reshape(grid.box)
-    for rows in in_strips(grid):
-        part = places_of(grid, rows)
+    p = p_pa.reshape(grid.box)
+
+    def add_up(rows: slice) -> Array:
+        part, inside = places_of(grid, rows), np.zeros(len(asked))
         x, y, along, lines = part.x, part.y, part.widths(0), stream_weights(part)[:, 0]
         for k, (above, weight) in enumerate(asked):
             w, own = np.atleast_2d(weight(x, y)), p[rows] - above if above else p[rows]
@@ -160,6 +161,9 @@ def integrals(problem: LubricationProblem, p_pa: Array, asked: Sequence[tuple[fl
                 inside[k] += (lines @ own) @ (w[0] * along)
             else:
                 inside[k] += (lines @ (own * w)) @ along
+        return inside
+
+    inside: Array = sum(each_strip(grid, add_up))
     return [
         float(grid.cell * (problem.reduce.sum(np.array([part])) + _in_rims(problem, above, weight)))
         for part, (above, weight) in zip(inside, asked, strict=True)

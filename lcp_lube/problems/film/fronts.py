@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...base.parallel import Array
 from ..grid import Grid
-from ..strips import ghosted, in_strips, places_of
+from ..strips import each_strip, ghosted, places_of
 from .cavity import cavitated
 from .reynolds import Film, sides
 from .strip import line_weights, stream_weights
@@ -114,13 +114,13 @@ def cavitated_area(problem: LubricationProblem, found: Fronts | None, p: Array, 
     """
     grid = problem.grid
     cavity = cavitated(problem.reduce, p, r).reshape(grid.box)
-    area, more = 0.0, 0.0
     frames = [ghosted(grid, field, 0.0) for field in (cavity, p)] if found is not None and grid.dim == 2 else []
-    for rows in in_strips(grid):
+
+    def add_up(rows: slice) -> tuple[float, float]:
         part = places_of(grid, rows)
-        area += float((stream_weights(part)[:, 0] @ cavity[rows].astype(float)) @ part.widths(0))
+        area, more = float((stream_weights(part)[:, 0] @ cavity[rows].astype(float)) @ part.widths(0)), 0.0
         if found is None:
-            continue
+            return area, more
         stretch, dy = part.stretch(part.y), grid.spacing[1] if grid.dim == 2 else 1.0
         more += float(np.sum(found.shift[rows, None] * line_weights(part) * stretch)) * dy
         if grid.dim == 2:
@@ -132,6 +132,9 @@ def cavitated_area(problem: LubricationProblem, found: Fronts | None, p: Array, 
             for end, rim, p_side in zip(sides(part)[2:], grid.rims(1), problem.p_sides[2:], strict=True):
                 if p_side == 0.0 and end.any():  # the cavity reaches up to it
                     more += float(np.sum(np.where(end, 0.5 * rim * dy * width, 0.0) * cavity[rows]))
+        return area, more
+
+    area, more = (sum(parts) for parts in zip(*each_strip(grid, add_up), strict=True))
     area, more = (problem.reduce.sum(np.array([part])) for part in (area * grid.cell, more))
     return area if found is None else max(area + more, 0.0)  # of a cavity of one point the two fronts may cross
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...base.parallel import Array
 from ...errors import InputError
 from ..grid import Grid
-from ..strips import in_strips, places_of
+from ..strips import each_strip, in_strips, places_of
 from .edges import Around
 from .integrals import LineIntegrals, check_film
 from .stored import Stored
@@ -72,6 +72,8 @@ class BoxScheme:
 
     def rows(self, rows: slice) -> "BoxScheme":
         """Those of some lines of points."""
+        if rows.stop - rows.start == len(self.h):
+            return self
 
         def cut(value: Any) -> Any:
             if isinstance(value, partial):
@@ -82,8 +84,7 @@ class BoxScheme:
 
     def in_strips(self, grid: Grid) -> Iterator[tuple[slice, "BoxScheme"]]:
         """This rank's lines strip by strip, and their coefficients."""
-        whole = grid.box[0]
-        return ((rows, self if rows.stop - rows.start == whole else self.rows(rows)) for rows in in_strips(grid))
+        return ((rows, self.rows(rows)) for rows in in_strips(grid))
 
     def changed(self, **changes: Any) -> "BoxScheme":
         """With other fields; what is made when it is asked for stays so, which `dataclasses.replace` would make and keep."""
@@ -219,18 +220,24 @@ def coefficients(
     rims = [] if mean_cubes or scheme != "face" or grid.dim == 1 else getattr(film, "rims", [])
     # The void is dragged as the film at the points, or as what the wall drags through the faces, which are stored anyway.
     nodal, weight = scheme != "face" and U != 0.0, None
-    for rows in [slice(0, ny)] if rims else in_strips(grid):
+    # With a frame of neighbours, as sweeps want them (`solvers.fas.levels`).
+    frames = ((ny + 2, nx + 3), (ny + 3, nx + 2), (ny + 2, nx + 2), (ny, nx + 1), (ny, nx + 1))
+    kind = np.asarray(film(grid.x[:, :1], grid.y[:1])).dtype
+    kx, ky, c_frame, wall, films = (np.zeros(shape, dtype=kind) for shape in frames)
+    void = films if nodal else wall if U else np.zeros_like(wall)
+
+    def make(rows: slice) -> None:
         strip = grid if rims else places_of(grid, rows)
         parts = coefficients_of(strip, film, p_unit / (6.0 * mu), U or 1.0, scheme, mean_cubes, rims, cavity, integrals)
-        if rows.start == 0:
-            # With a frame of neighbours, as sweeps want them (`solvers.fas.levels`).
-            frames = ((ny + 2, nx + 3), (ny + 3, nx + 2), (ny + 2, nx + 2), (ny, nx + 1), (ny, nx + 1))
-            kx, ky, c_frame, wall, films = (np.zeros(shape, dtype=parts[2].dtype) for shape in frames)
-            void = films if nodal else wall if U else np.zeros_like(wall)
         kx[1:-1, 1:-1][rows], films[rows] = parts[0], parts[2]
         if grid.dim == 2:
             ky[1:-1, 1:-1][rows.start : rows.stop + 1] = parts[1]
         (wall if U else void)[rows] = parts[3 if U else 4]
+
+    if rims:
+        make(slice(0, ny))
+    else:
+        each_strip(grid, make)
     h = films[:, 1:]
     if nodal:
         weight = stream_weights(grid) * np.ones((ny, 1))

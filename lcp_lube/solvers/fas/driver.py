@@ -19,7 +19,6 @@ from ...base.parallel import Array
 from ...problems.film.lubrication import LubricationProblem
 from ...problems.film.stored import storing
 from ...problems.solution import Fields, Step
-from ...problems.strips import in_strips
 from ..job import Job
 from ..method_options import one_of, option
 from ..newton import StalledError
@@ -62,9 +61,9 @@ class Fas(Cycles):
         super().__init__(job)
         problem, options, start = self.problem, self.options, job.start
         # numba starts with this import, 0.4 s: only where the method is used.
-        from . import finest, fronts, kernels, levels, transfer
+        from . import finest, fronts, kernels, levels, loops
 
-        self._kernels, self._fronts, self._transfer, self._tools, self._finest = kernels, fronts, transfer, levels, finest
+        self._kernels, self._fronts, self._loops, self._tools, self._finest = kernels, fronts, loops, levels, finest
         self._harmonic, self._truncation = options.weights == "harmonic", TRUNCATIONS[options.truncation]
         with self.stages("assembly"):
             self._levels = levels.hierarchy(finest.finest(problem), self._harmonic)
@@ -104,17 +103,14 @@ class Fas(Cycles):
 
     @property
     def fields(self) -> Fields:
-        z, scheme = self._own(), self.problem.scheme
-        p, r = np.empty(z.shape), np.empty(z.shape)
-        for rows in in_strips(self.problem.grid):
-            p[rows], r[rows] = self._kernels.pressure_and_void(z[rows], scheme.rows(rows).b_C)
+        p, r = self._loops.pressure_and_void(self._own(), self.problem.scheme, self.problem.grid)
         return {"p": p.ravel(), "r": r.ravel()}
 
     def _norms(self) -> tuple[float, float]:
         """||G|| and the size of its terms; before the first step of a film with supplies, what sides and supplies drive."""
         level = self._levels[0]
         self._tools.held.settle(level)
-        sums = np.array(self._kernels.norms(level.z, level.kx, level.ky, level.c, level.carry))
+        sums = np.array(self._loops.norms(level.z, level.kx, level.ky, level.c, level.carry))
         if level.comm is not None:
             level.comm.Allreduce(sums.copy(), sums)
         residual, terms = np.sqrt(sums)
@@ -218,7 +214,7 @@ class Fas(Cycles):
         if k + 1 < self._depth:
             coarse = self._levels[k + 1]
             where = (level.first, level.by_x, level.by_y, self._harmonic)
-            self._transfer.interpolate(level.z, coarse.part(self._seen(coarse, coarse.z)), level.kx, level.ky, *where)
+            self._loops.interpolate(level.z, coarse.part(self._seen(coarse, coarse.z)), level.kx, level.ky, *where)
             level.share(level.z)
         if level.held is not None:
             level.z[level.held] = level.given
@@ -241,12 +237,12 @@ class Fas(Cycles):
         self._relax(level, self.options.pre, False)
         self._tools.held.settle(level)
         self._tools.restrict(level, coarse, coarse.c, self._harmonic)
-        self._transfer.inject(level.z, coarse.part(coarse.old), level.first, level.by_x, level.by_y)
+        self._loops.inject(level.z, coarse.part(coarse.old), level.first, level.by_x, level.by_y)
         coarse.gather(coarse.old)
         if coarse.scale is not None:
             np.multiply(coarse.old, coarse.scale, out=coarse.old, where=coarse.old < 0.0)
         coarse.z[:] = coarse.old
-        self._kernels.add_balance(coarse.old, coarse.kx, coarse.ky, coarse.c, coarse.carry)
+        self._loops.add_balance(coarse.old, coarse.kx, coarse.ky, coarse.c, coarse.carry)
 
     def _ascend(self, k: int) -> None:
         o, level, coarse = self.options, self._levels[k], self._levels[k + 1]
@@ -255,7 +251,7 @@ class Fas(Cycles):
         fine = (level.z, new, old, level.kx, level.ky)
         at_supplies = None if level.held is None else level.z[level.held]
         rules = (self._harmonic, self._truncation, level.periodic[0], self._unit)
-        self._correction = self._transfer.correct(*fine, *where, *rules)  # type: ignore[arg-type]
+        self._correction = self._loops.correct(*fine, *where, *rules)
         if level.held is not None:
             level.z[level.held] = at_supplies
         level.share(level.z)
@@ -285,7 +281,7 @@ class Fas(Cycles):
                 self._tools.held.sweep(*arrays, level.spans, 1, level.z.shape[0], down, level.carry, ring)
                 level.share(level.z)
         elif sweeps:
-            self._kernels.sweep(*arrays, sweeps, down, level.carry, ring)
+            self._loops.sweep(*arrays, sweeps, down, level.carry, ring)
             level.share(level.z)
         if sweeps and level.split:
             for first in (0, level.z.shape[0] - BORDER - 2):

@@ -15,36 +15,62 @@ import numpy as np
 
 from ...base.compiled import kernel
 from ...base.parallel import Array
+from .waiting import await_part, write
 
 
 @kernel
 def sweep(
-    z: Array, kx: Array, ky: Array, c: Array, count: int, down: bool, carry: Array | None = None, ring: bool = False
+    z: Array,
+    kx: Array,
+    ky: Array,
+    c: Array,
+    count: int,
+    down: bool,
+    carry: Array | None = None,
+    ring: bool = False,
+    part: int = 0,
+    done: Array | None = None,
+    west: Array | None = None,
 ) -> None:
     """`count` nonlinear Gauss-Seidel sweeps in place, every x line along the flow, lines upwards or down.
 
     Three at a time: the second one follows the first two lines behind, the third one the second. The values are those of
     sweeps one after the other, but memory is passed over once, and three chains of dependent operations overlap. ring: the
-    ends of a line are neighbours, and each line that is done brings its frame up to date.
+    ends of a line are neighbours, and each line that is done brings its frame up to date. part, done, west : of several threads
+    (`crew`) which columns are this one's, the lines that each has done, and what arrives from the last columns of each.
     """
     ny, nx = z.shape[0] - 2, z.shape[1] - 2
     step, first = (-1, ny) if down else (1, 1)
-    t, over, g = np.zeros((3, nx)), np.zeros((5, nx)), np.zeros((5, nx))
-    for done in range(0, count, 3):
-        fused = min(count - done, 3)
+    parts = 1 if done is None else done.shape[0]
+    own = 1 if part else 0  # column 0 of what follows is the last one of the part before
+    at, taken = nx * part // parts - own, 0
+    n = nx * (part + 1) // parts - at
+    t, over, g = np.zeros((3, n)), np.zeros((5, n)), np.zeros((5, n))
+    for before in range(0, count, 3):
+        fused = min(count - before, 3)
         for s in range(ny + 2 * (fused - 1)):
             if s < ny:
-                diagonals(kx[first + step * s], ky[first + step * s], ky[first + step * s + 1], over[s % 5], g[s % 5])
+                m = first + step * s
+                diagonals(kx[m, at:], ky[m, at:], ky[m + 1, at:], over[s % 5], g[s % 5])
+            if done is not None:
+                await_part(done, part + 1, taken - 1)
+                await_part(done, part - 1, taken + 1)
             for k in range(fused):
                 if 0 <= s - 2 * k < ny:
-                    arriving(z, kx, ky, c, first + step * (s - 2 * k), t[k], carry)
+                    arriving(z, kx, ky, c, first + step * (s - 2 * k), t[k], at, carry)
+                    if west is not None and part:
+                        t[k, 0] = west[part - 1, taken % west.shape[1], k]
                     if carry is not None:
                         pass_on_part(t[k], g[(s - 2 * k) % 5], carry[first + step * (s - 2 * k)])
             if carry is None:
                 pass_on(t[0], t[1], t[2], g[s % 5], g[(s - 2) % 5], g[(s - 4) % 5])
             for k in range(fused):
                 if 0 <= s - 2 * k < ny:
-                    settle(t[k], over[(s - 2 * k) % 5], z[first + step * (s - 2 * k)], ring)
+                    settle(t[k, own:], over[(s - 2 * k) % 5, own:], z[first + step * (s - 2 * k), at + own :], ring)
+            if done is not None and west is not None:
+                west[part, taken % west.shape[1], :3] = t[:, -1]
+                taken += 1
+                write(done, part, taken)
 
 
 @kernel
@@ -57,13 +83,15 @@ def diagonals(k_x: Array, k_S: Array, k_N: Array, over: Array, g: Array) -> None
 
 
 @kernel
-def arriving(z: Array, kx: Array, ky: Array, c: Array, m: int, t: Array, carry: Array | None = None) -> None:
-    """What arrives at the points of row m, from all sides but west; at the first one from there too."""
+def arriving(z: Array, kx: Array, ky: Array, c: Array, m: int, t: Array, at: int, carry: Array | None = None) -> None:
+    """What arrives at the points of row m from column `at` on, from all sides but west; at the first one from there too."""
+    k_x, source, z_S, here, z_N = kx[m, at:], c[m, at:], z[m - 1, at:], z[m, at:], z[m + 1, at:]
+    k_S, k_N = ky[m, at:], ky[m + 1, at:]
     for i in range(t.size):
-        t[i] = (c[m, i + 1] + kx[m, i + 2] * max(z[m, i + 2], 0.0)) + (
-            ky[m, i + 1] * max(z[m - 1, i + 1], 0.0) + ky[m + 1, i + 1] * max(z[m + 1, i + 1], 0.0)
+        t[i] = (source[i + 1] + k_x[i + 2] * max(here[i + 2], 0.0)) + (
+            k_S[i + 1] * max(z_S[i + 1], 0.0) + k_N[i + 1] * max(z_N[i + 1], 0.0)
         )
-    t[0] += z[m, 0] * (kx[m, 1] if z[m, 0] > 0.0 else 1.0 if carry is None else carry[m, 0])
+    t[0] += z[m, at] * (kx[m, at + 1] if z[m, at] > 0.0 else 1.0 if carry is None else carry[m, at])
 
 
 @kernel
@@ -125,11 +153,11 @@ def balance_row(z: Array, kx: Array, ky: Array, m: int, out: Array, carry: Array
 
 
 @kernel
-def norms(z: Array, kx: Array, ky: Array, c: Array, carry: Array | None = None) -> tuple[float, float]:
-    """Sums of squares over the rank's points: of the residual c - G, and of the size of its largest terms."""
-    ny, nx = z.shape[0] - 2, z.shape[1] - 2
+def norms(z: Array, kx: Array, ky: Array, c: Array, carry: Array | None, start: int, end: int) -> tuple[float, float]:
+    """Sums of squares over rows start to end - 1: of the residual c - G, and of the size of its largest terms."""
+    nx = z.shape[1] - 2
     G, residual, terms = np.zeros(nx + 2), np.zeros(nx + 2), np.zeros(nx + 2)  # sums column by column: vector instructions
-    for m in range(1, ny + 1):
+    for m in range(start, end):
         balance_row(z, kx, ky, m, G, carry)
         for i in range(1, nx + 1):
             residual[i] += (c[m, i] - G[i]) ** 2
@@ -140,10 +168,10 @@ def norms(z: Array, kx: Array, ky: Array, c: Array, carry: Array | None = None) 
 
 
 @kernel
-def add_balance(z: Array, kx: Array, ky: Array, c: Array, carry: Array | None = None) -> None:
-    """c += G(z): the right-hand side whose solution z would be if the residual, which c holds, were zero."""
+def add_balance(z: Array, kx: Array, ky: Array, c: Array, carry: Array | None, start: int, end: int) -> None:
+    """c += G(z) in rows start to end - 1: then z solves the equations of which c held the residual."""
     G = np.zeros(z.shape[1])
-    for m in range(1, z.shape[0] - 1):
+    for m in range(start, end):
         balance_row(z, kx, ky, m, G, carry)
         for i in range(1, z.shape[1] - 1):
             c[m, i] += G[i]

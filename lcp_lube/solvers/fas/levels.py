@@ -9,7 +9,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ...base.parallel import Array
-from . import exact, held, transfer
+from . import coarsen, exact, held, loops, transfer
 
 FEWEST = 3  # points a side of the coarsest grid, at least
 FEWEST_LINES = 16  # of a rank; grids with fewer are held whole by every rank. With 8 a dimpled pad stalls on three
@@ -185,8 +185,8 @@ def _coarser(fine: Level, harmonic: bool) -> Level | None:
     beyond_y = by_y and fine.ny % 2 == 0 and not fine.periodic[1] and last
     flags = (fine.first, by_x, by_y, harmonic)
     kx, ky = (fine.kx, fine.ky) if fine.held is None else held.marked(fine)
-    transfer.coarsen_x_faces(kx, fine.ky, coarse.part(coarse.kx), *flags, beyond_x)
-    transfer.coarsen_y_faces(fine.kx, ky, coarse.part(coarse.ky), *flags, beyond_y)
+    coarsen.coarsen_x_faces(kx, fine.ky, coarse.part(coarse.kx), *flags, beyond_x)
+    coarsen.coarsen_y_faces(fine.kx, ky, coarse.part(coarse.ky), *flags, beyond_y)
     for a in (coarse.kx, coarse.ky):
         coarse.gather(a)
     if fine.held is not None:
@@ -238,5 +238,5 @@ def restrict(fine: Level, coarse: Level, out: Array, harmonic: bool, given: Arra
     out[:] = 0.0
     where = (fine.first, fine.by_x, fine.by_y, harmonic, fine.periodic[0], given is None)
     c = fine.c if given is None else given
-    transfer.restrict(fine.z, fine.kx, fine.ky, c, coarse.part(out), *where, fine.carry)  # type: ignore[arg-type]
+    loops.restrict(fine.z, fine.kx, fine.ky, c, coarse.part(out), *where, fine.carry)
     coarse.collect(out)

@@ -1,4 +1,4 @@
-"""Between a grid and the next coarser one: residuals, corrections, starts and conductances; arrays as in `kernels`."""
+"""Between a grid and the next coarser one: residuals, corrections and starts; arrays as in `kernels`."""
 
 import numpy as np
 
@@ -37,17 +37,20 @@ def restrict(
     wrap: bool,
     residual: bool,
     carry: Array | None = None,
+    start: int = 0,
+    end: int = 0,
 ) -> None:
-    """Add to `out` what the rank's rows of the residual c - G(z), or of c, give to the coarse points.
+    """Add to `out` what the rank's rows of the residual c - G(z), or of c, give to the coarse points; to rows start to end - 1.
 
     That is the transposed interpolation, halved where lines are coarsened: a row is a balance per unit width. Coarse points
     stand at the odd rows and columns, counted from 0 over the whole grid; the rank's first row is y0, and row 0 of `out` is
     the coarse line y0 // 2 - 1.
     """
     ny, nx = z.shape[0] - 2, z.shape[1] - 2
-    n_coarse = out.shape[1] - 2
+    n_coarse, end = out.shape[1] - 2, end if end else out.shape[0]
+    first, last = (2 * (start - 1 + y0 // 2) - y0 + 1, 2 * (end - 1 + y0 // 2) - y0 + 1) if by_y else (start, end - 1)
     r, w, coarse, south = np.zeros(nx + 2), np.zeros(n_coarse + 1), np.zeros(n_coarse + 2), np.zeros(n_coarse + 2)
-    for m in range(1, ny + 1):
+    for m in range(max(first, 1), min(last, ny) + 1):
         if residual:
             balance_row(z, kx, ky, m, r, carry)
             for i in range(1, nx + 1):
@@ -61,7 +64,9 @@ def restrict(
         if not by_y:
             out[m] += coarse
         elif j % 2 == 1:
-            out[(j - 1) // 2 - y0 // 2 + 1] += 0.5 * coarse
+            row = (j - 1) // 2 - y0 // 2 + 1
+            if start <= row < end:
+                out[row] += 0.5 * coarse
         else:
             row = j // 2 - y0 // 2
             if by_x:
@@ -72,8 +77,10 @@ def restrict(
                     south[k] = share(ky[m, k], ky[m + 1, k], harmonic)
             for k in range(1, n_coarse + 1):
                 part = 0.5 * south[k] * coarse[k]
-                out[row, k] += part
-                out[row + 1, k] += 0.5 * coarse[k] - part
+                if row >= start:
+                    out[row, k] += part
+                if row + 1 < end:
+                    out[row + 1, k] += 0.5 * coarse[k] - part
 
 
 @kernel
@@ -113,8 +120,12 @@ def correct(
     truncation: int,
     ring: bool = False,
     unit: float = 1.0,
+    start: int = 1,
+    end: int = 0,
 ) -> float:
     """Add the interpolated new - old of the coarse grid; returns the sum of squares of what was added.
+
+    In rows start to end - 1: of the others they see whether the film is full, which is not changed.
 
     Where the film reforms, what flows back into the cavity returns: a point between that and a coarse point in the full film is
     corrected as the latter, not by a part of it.
@@ -126,7 +137,7 @@ def correct(
     nx, size = z.shape[1] - 2, new.shape[1]
     w, d = np.zeros(size - 1), np.zeros(size)
     south, north, e, added = np.zeros(nx + 2), np.zeros(nx + 2), np.zeros(nx + 2), np.zeros(nx + 2)
-    for m in range(1, z.shape[0] - 1):
+    for m in range(start, end if end else z.shape[0] - 1):
         row, last = coarse_rows(y0 + m - 1, y0, m, by_y)
         if by_x:
             west_shares(kx[m], harmonic, w)
@@ -213,12 +224,15 @@ def mix(south: Array, north: Array, k_S: Array, k_N: Array, harmonic: bool, out:
 
 
 @kernel
-def interpolate(z: Array, coarse: Array, kx: Array, ky: Array, y0: int, by_x: bool, by_y: bool, harmonic: bool) -> None:
-    """A start from the coarse grid's answer: p and q interpolated one by one, the larger flow decides which one a point has."""
+def interpolate(
+    z: Array, coarse: Array, kx: Array, ky: Array, y0: int, by_x: bool, by_y: bool, harmonic: bool, start: int, end: int
+) -> None:
+    """Rows start to end - 1 of a start from the coarse grid's answer: p and q interpolated one by one, the larger flow decides
+    which one a point has."""
     nx, size = z.shape[1] - 2, coarse.shape[1]
     w, part, flows = np.zeros(size - 1), np.zeros(size), np.zeros((2, nx + 2))  # flows: p, q
     south, north = np.zeros(nx + 2), np.zeros(nx + 2)
-    for m in range(1, z.shape[0] - 1):
+    for m in range(start, end):
         row, last = coarse_rows(y0 + m - 1, y0, m, by_y)
         if by_x:
             west_shares(kx[m], harmonic, w)
@@ -237,61 +251,3 @@ def interpolate(z: Array, coarse: Array, kx: Array, ky: Array, y0: int, by_x: bo
         for i in range(1, nx + 1):
             p, q = flows[0, i], flows[1, i]
             z[m, i] = p if p * (kx[m, i] + kx[m, i + 1] + ky[m, i] + ky[m + 1, i]) > q else -q
-
-
-@kernel
-def series(a: float, b: float) -> float:
-    """Conductance of two faces one behind the other; one that lies in a supply, -1, resists nothing (`held.marked`)."""
-    if a < 0.0 or b < 0.0:
-        return max(a, b, 0.0)
-    return a * b / (a + b) if a + b > 0.0 else 0.0
-
-
-@kernel
-def coarsen_x_faces(kx: Array, ky: Array, out: Array, y0: int, by_x: bool, by_y: bool, harmonic: bool, beyond: bool) -> None:
-    """Conductances of the coarse x faces: in series along x, added up across with the restriction's weights.
-
-    beyond: the last coarse point is the last fine one, and only one fine face lies between it and the side.
-    """
-    n_rows, n_faces = out.shape[0] - 2, out.shape[1] - 2
-    shift = (1 - y0 % 2 if by_y else 0) + 1
-    for J in range(n_rows):
-        m = shift + (2 * J if by_y else J)
-        for f in range(1, n_faces + 1):
-            i = 2 * f - 1 if by_x else f  # the face's column, or that of the first of two, between which point i lies
-            total = 0.0
-            for d in range(-1 if by_y else 0, 2 if by_y else 1):
-                k = kx[m + d, i]
-                if by_x and not (beyond and f == n_faces):
-                    k = series(k, kx[m + d, i + 1])
-                at = min(i, ky.shape[1] - 2)
-                if d == -1:
-                    k *= 1.0 - share(ky[m - 1, at], ky[m, at], harmonic)
-                elif d == 1:
-                    k *= share(ky[m + 1, at], ky[m + 2, at], harmonic)
-                total += max(k, 0.0)
-            out[J + 1, f] = 0.5 * total if by_y else total
-
-
-@kernel
-def coarsen_y_faces(kx: Array, ky: Array, out: Array, y0: int, by_x: bool, by_y: bool, harmonic: bool, beyond: bool) -> None:
-    """The same for y faces; where lines are coarsened they are halved, as every row is a balance per unit width."""
-    n_faces, n_columns = out.shape[0] - 2, out.shape[1] - 2
-    # Row of the even line under the first coarse face; the face south of row m is ky[m].
-    shift = (0 if y0 % 2 == 1 else 1) if by_y else 1
-    for f in range(1, n_faces + 1):
-        m = shift + (2 * f - 2 if by_y else f - 1)
-        for k in range(1, n_columns + 1):
-            i = 2 * k if by_x else k
-            total = 0.0
-            for d in range(-1 if by_x else 0, 2 if by_x else 1):
-                value = ky[m, i + d]
-                if by_y and not (beyond and f == n_faces):
-                    value = series(value, ky[m + 1, i + d])
-                at = min(m, kx.shape[0] - 2)
-                if d == -1:
-                    value *= 1.0 - share(kx[at, i - 1], kx[at, i], harmonic)
-                elif d == 1:
-                    value *= share(kx[at, i + 1], kx[at, i + 2], harmonic)
-                total += max(value, 0.0)
-            out[f, k] = 0.5 * total if by_y else total

@@ -1,0 +1,87 @@
+"""Threads of this process for what is done to many lines of a grid: parts that do not depend on one another, or wait inside.
+
+The parts do not depend on the number of threads, and neither do the bits of what is made of them: sums are added up in the
+order of the parts.
+"""
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from threading import Lock
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from ..errors import InputError
+
+VARIABLE = "NUMBA_NUM_THREADS"  # what --threads sets
+FEWEST = 60_000  # points of a grid that threads are woken for
+PARTS = 8  # of the lines of such a grid
+
+
+class Crew:
+    """So many threads, the calling one among them; the others start with the first work for them.
+
+    One piece of work at a time: a task must not ask the crew for another one.
+    """
+
+    def __init__(self, threads: int):
+        self.threads = threads
+        self._others: ThreadPoolExecutor | None = None
+        self._busy = Lock()
+
+    def run(self, task: Callable[[int], Any], count: int) -> list[Any]:
+        """What task(0) to task(count - 1) return; they run at the same time where there are as many threads."""
+        some = min(self.threads, count)
+        if some < 2:
+            return [task(k) for k in range(count)]
+        out, errors = [None] * count, np.geterr()  # of arithmetic: each thread has settings of its own
+
+        def every(first: int) -> None:
+            with np.errstate(**errors):
+                for k in range(first, count, some):
+                    out[k] = task(k)
+
+        with self._busy:  # parts that wait for one another must all be at work
+            self._others = self._others or ThreadPoolExecutor(self.threads - 1, "lcp-lube")
+            others = [self._others.submit(every, first) for first in range(1, some)]
+            every(0)
+            for one in others:
+                one.result()
+        return out
+
+    def rows(self, task: Callable[[int, int], Any], lines: int, points: int) -> list[Any]:
+        """What task(first, last + 1) returns for parts of so many lines, of so many points in all."""
+        parts = min(PARTS, lines) if points >= FEWEST else 1
+        return self.run(lambda k: task(lines * k // parts, lines * (k + 1) // parts), parts)
+
+
+def crew() -> Crew:
+    """The threads of this process."""
+    return _crew(threads(), os.getpid())
+
+
+@cache
+def _crew(number: int, process: int) -> Crew:
+    return Crew(number)
+
+
+def threads() -> int:
+    """As many as were asked for; else the cores that this process may use, or one of several ranks 1.
+
+    Raises
+    ------
+    InputError : no whole number from 1 on was asked for.
+    """
+    asked = os.environ.get(VARIABLE, "")
+    if not asked:
+        return _cores() if MPI.COMM_WORLD.size == 1 else 1
+    if not asked.isdecimal() or int(asked) < 1:
+        raise InputError(f"{VARIABLE} = {asked}: a whole number from 1 on is needed")
+    return int(asked)
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -1,0 +1,69 @@
+"""The loops over a level by the threads of the process (`base/crew`): each part of the work is a call of a compiled loop.
+
+Rows that do not depend on one another are dealt out. A Gauss-Seidel sweep is divided into columns: a part of a line begins
+when the one to the west of it has ended, so that every point sees what it would see in a sweep by one thread, to the last bit.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from ...base.crew import FEWEST, crew
+from ...base.parallel import Array
+from ...problems.film.reynolds import BoxScheme
+from ...problems.grid import Grid
+from ...problems.strips import each_strip
+from . import kernels, transfer
+from .waiting import LINE, SLOTS
+
+COLUMNS = 128  # of a part of a line, at least
+inject = transfer.inject
+
+
+def sweep(z: Array, *others: Any) -> None:
+    """`kernels.sweep` of a film whose lines are open, and that stores no void, by several threads."""
+    *_, carry, ring = others
+    few = z.size < FEWEST or carry is not None or ring
+    parts = 1 if few else min(crew().threads, (z.shape[1] - 2) // COLUMNS)
+    if parts < 2:
+        kernels.sweep(z, *others)
+        return
+    done, west = np.zeros((parts, LINE), dtype=np.int64), np.zeros((parts, SLOTS, LINE))
+    crew().run(lambda part: kernels.sweep(*(z, *others, part, done, west)), parts)
+
+
+def norms(z: Array, *others: Any) -> Array:
+    """`kernels.norms` of all rows."""
+    return np.sum(_by_rows(lambda start, end: kernels.norms(*(z, *others, start, end)), z), axis=0)
+
+
+def add_balance(z: Array, *others: Any) -> None:
+    _by_rows(lambda start, end: kernels.add_balance(*(z, *others, start, end)), z)
+
+
+def correct(z: Array, *others: Any) -> float:
+    return sum(_by_rows(lambda start, end: transfer.correct(*(z, *others, start, end)), z))
+
+
+def interpolate(z: Array, *others: Any) -> None:
+    _by_rows(lambda start, end: transfer.interpolate(*(z, *others, start, end)), z)
+
+
+def restrict(z: Array, kx: Array, ky: Array, c: Array, out: Array, *others: Any) -> None:
+    """Dealt out by the rows that are written to."""
+    crew().rows(lambda start, end: transfer.restrict(*(z, kx, ky, c, out, *others, start, end)), out.shape[0], z.size)
+
+
+def pressure_and_void(z: Array, scheme: BoxScheme, grid: Grid) -> tuple[Array, Array]:
+    """p and r of the owned points."""
+    p, r = np.empty(z.shape), np.empty(z.shape)
+
+    def read(rows: slice) -> None:
+        p[rows], r[rows] = kernels.pressure_and_void(z[rows], scheme.rows(rows).b_C)
+
+    each_strip(grid, read)
+    return p, r
+
+
+def _by_rows(task: Any, z: Array) -> list[Any]:
+    return crew().rows(lambda start, end: task(start + 1, end + 1), z.shape[0] - 2, z.size)
