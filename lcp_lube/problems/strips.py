@@ -9,14 +9,15 @@ from numpy.typing import NDArray
 from ..base.crew import FEWEST, crew
 from .grid import Grid
 
-STRIP = 16_384  # points
+STRIP, LARGEST = 16_384, 65_536  # points: of the strips of a small grid; and of a large one, which has PARTS at least
+PARTS = 64
 MANY = 250_000  # points of a grid from which compiled loops over its strips are worth being loaded
 
 
 def in_strips(grid: Grid) -> Iterator[slice]:
     """This rank's lines, a strip at a time."""
     ny, nx = grid.box
-    lines = max(1, STRIP // nx)
+    lines = max(1, max(STRIP, min(LARGEST, nx * ny // PARTS)) // nx)
     return (slice(j, min(j + lines, ny)) for j in range(0, ny, lines))
 
 

@@ -118,7 +118,7 @@ def cavitated_area(problem: LubricationProblem, found: Fronts | None, p: Array, 
 
     def add_up(rows: slice) -> tuple[float, float]:
         part = places_of(grid, rows)
-        area, more = float((stream_weights(part)[:, 0] @ cavity[rows].astype(float)) @ part.widths(0)), 0.0
+        area, more = float(np.einsum("i,ij->j", stream_weights(part)[:, 0], cavity[rows].astype(float)) @ part.widths(0)), 0.0
         if found is None:
             return area, more
         stretch, dy = part.stretch(part.y), grid.spacing[1] if grid.dim == 2 else 1.0
