@@ -2,7 +2,7 @@
 
     python benchmarks/fas.py [EXPERIMENT ...] [--quick] [--repeats 3] [--results DIR]
 
-Experiments: factors, linear, points, bytes, options, ranks (see EXPERIMENTS); rows go to benchmarks/results/fas.csv, and cases
+Experiments: factors, linear, points, bytes, options, ranks, threads, small (see EXPERIMENTS); rows go to benchmarks/results/fas.csv, and cases
 that stand there already are not run again. Every case is a process of its own. Seconds are medians, by the clock and of the
 processor; on a machine that others use (`load`) the second ones are to be trusted.
 """
@@ -246,6 +246,20 @@ def ranks(film: str, n: int, variant: str, repeats: int) -> Values:
     return values
 
 
+def small(film: str, n: int, variant: str, repeats: int) -> Values:
+    """200 solves of a small film in one process, each with another speed and its load read off: seconds of one."""
+    scene, loads = load_scene(film, {"n": n}), []
+
+    def solves() -> None:
+        for k in range(200):
+            with solve(scene, U=scene.U * (1.0 + 1e-3 * k)) as solution:  # type: ignore[attr-defined]
+                loads.append(solution.load if variant == "with numbers" else len(solution.steps))
+
+    solves()
+    wall, cpu = (median(column) for column in zip(*(timed(solves)[1:] for _ in range(repeats)), strict=True))
+    return {"outcome": "converged", "wall_s": wall / 200, "cpu_s": cpu / 200}
+
+
 EXPERIMENTS: dict[str, Callable[[str, int, str, int], Values]] = {
     "factors": factors,
     "options": factors,
@@ -253,6 +267,8 @@ EXPERIMENTS: dict[str, Callable[[str, int, str, int], Values]] = {
     "points": points,
     "bytes": bytes_moved,
     "ranks": ranks,
+    "threads": points,
+    "small": small,
 }
 
 
@@ -276,9 +292,13 @@ def cases(experiment: str, quick: bool) -> Iterator[tuple[str, int, str]]:
     elif experiment == "bytes":
         for variant in ("1 sweep", "3 sweeps in one pass"):
             yield "problem4", 127 if quick else 2047, variant
-    elif experiment == "ranks":
+    elif experiment in ("ranks", "threads"):
         for variant in ("1", "2"):
             yield "problem4", 127 if quick else 2047, variant
+    elif experiment == "small":
+        for film, n in (("problem1", 100), ("problem4", 60)):
+            for variant in ("solved", "with numbers"):
+                yield film, n, variant
 
 
 def child(experiment: str, case: tuple[str, int, str], repeats: int) -> Values:
@@ -286,7 +306,8 @@ def child(experiment: str, case: tuple[str, int, str], repeats: int) -> Values:
     command = [sys.executable, __file__, "--job", json.dumps([experiment, *case]), "--repeats", str(repeats)]
     if experiment == "ranks" and case[2] != "1":
         command = [shutil.which("mpiexec") or "mpiexec", "-n", case[2], *command]
-    done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "OMP_NUM_THREADS": "1"})
+    environment = {"OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": case[2] if experiment == "threads" else "1"}
+    done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, **environment})
     if done.returncode:
         return {"outcome": "failed", "message": (done.stderr.strip().splitlines() or ["nothing said"])[-1]}
     return json.loads(done.stdout.splitlines()[-1])
