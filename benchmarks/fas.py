@@ -3,8 +3,8 @@
     python benchmarks/fas.py [EXPERIMENT ...] [--quick] [--repeats 3] [--results DIR]
 
 Experiments: factors, linear, points, bytes, options, ranks, threads, small (see EXPERIMENTS); rows go to
-benchmarks/results/fas.csv, and cases that stand there already are not run again. Every case is a process of its own. Seconds are
-medians, by the clock and of the processor; on a machine that others use (`load`) the second ones are to be trusted.
+benchmarks/results/fas.csv, and cases that stand there already are not run again. Every case is a process of its own. Seconds
+are medians, by the clock and of the processor; on a machine that others use (`load`) the second ones are to be trusted.
 """
 
 import argparse

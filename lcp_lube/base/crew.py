@@ -17,7 +17,7 @@ from mpi4py import MPI
 from ..errors import InputError
 
 VARIABLE = "NUMBA_NUM_THREADS"  # what --threads sets
-FEWEST = 60_000  # points of a grid that threads are woken for
+FEWEST = 120_000  # points of a grid that threads are woken for
 PARTS = 8  # of the lines of such a grid
 
 

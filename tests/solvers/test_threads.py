@@ -8,11 +8,11 @@ from lcp_lube.base import crew
 from lcp_lube.errors import InputError
 
 FILMS = [
-    ("problem4", {"nx": 320, "ny": 330}),
-    ("dimpled_pad", {"nx": 399, "ny": 203}),  # rims, deep jumps
-    ("pocketed_pad_2d", {"nx": 260, "ny": 300}),
-    ("journal", {"nx": 400, "ny": 201}),  # closed by a groove
-    ("ring_journal", {"nx": 400, "ny": 201}),  # lines that are closed: swept by one thread
+    ("problem4", {"nx": 350, "ny": 352}),
+    ("dimpled_pad", {"nx": 399, "ny": 311}),  # rims, deep jumps
+    ("pocketed_pad_2d", {"nx": 400, "ny": 310}),
+    ("journal", {"nx": 400, "ny": 311}),  # closed by a groove
+    ("ring_journal", {"nx": 400, "ny": 311}),  # lines that are closed: swept by one thread
 ]
 
 
@@ -37,7 +37,7 @@ def test_a_sweep_waits_for_the_part_to_the_west(monkeypatch):
 
     monkeypatch.setenv(crew.VARIABLE, "3")
     random = np.random.default_rng(0)
-    shape = (180, 402)
+    shape = (310, 402)
     z = random.standard_normal(shape)
     kx, ky = (np.exp(random.standard_normal(s)) for s in ((shape[0], shape[1] + 1), (shape[0] + 1, shape[1])))
     c = random.standard_normal(shape)
