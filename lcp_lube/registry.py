@@ -27,14 +27,17 @@ class Entry:
     """A name's code, imported when it is used, and a line that says what it is.
 
     about : modules of what it is for; while none of them is loaded there is nothing for it to do, and it need not be either.
+    table : of the scenes that it is for; of another one it has nothing to do either.
     """
 
     target: str
     line: str
     about: tuple[str, ...] = ()
+    table: str = ""
 
-    @property
-    def idle(self) -> bool:
+    def idle(self, scene: Any) -> bool:
+        if self.table and getattr(scene, self.table, None) is None:
+            return True
         return bool(self.about) and not any(module in sys.modules for module in self.about)
 
     def load(self) -> Any:
@@ -252,7 +255,7 @@ DRIVERS: dict[str, Entry] = {
     "position": Entry("lcp_lube.drivers.position", "where a journal lies under a load, by Newton's method", JOURNALS),
     "balance": Entry("lcp_lube.drivers.balance", "the film that carries the load asked for"),
     "attitude": Entry("lcp_lube.drivers.attitude", "the attitude that follows from the load's direction", JOURNALS),
-    "time": Entry("lcp_lube.drivers.time", "step by step, where the film moves", ("lcp_lube.scenes.motion",)),
+    "time": Entry("lcp_lube.drivers.time", "step by step, where the film moves", table="motion"),
     "turned": Entry("lcp_lube.drivers.turned", "a wall that moves to smaller x, by the mirror image"),
     "supplies": Entry("lcp_lube.drivers.supplies", "pressures of supplies behind restrictors, or of given flow"),
     "warm": Entry("lcp_lube.drivers.warm", "from a neighbour's answer, or anew where that leads nowhere"),

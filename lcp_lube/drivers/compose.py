@@ -28,7 +28,7 @@ class Driver(Protocol):
 def solve(scene: Solvable, ask: Ask, level: int = 0) -> Solution:
     """Solve through the drivers from this level on that the scene and the ask call for, outermost first. Collective."""
     for k, name in list(enumerate(DRIVERS))[level:]:
-        if DRIVERS[name].idle:
+        if DRIVERS[name].idle(scene):
             continue
         driver: Driver = DRIVERS[name].load()  # type: ignore[assignment]
         if driver.applies(scene, ask):

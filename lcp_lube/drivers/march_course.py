@@ -52,10 +52,16 @@ def check_march(scene: Scene) -> None:
         (any(one.open for one in model.supplies), "supplies whose pressures follow"),
         (model.U < 0, "a wall that moves to smaller x (give the mirror image, with -U)"),
         (hasattr(scene, "observer"), "events"),
+        (getattr(scene, "pads_follow", False), "pads that follow"),
+        (_level_free(scene), "a film whose level is free"),
         ((getattr(scene, "motion", None) and scene.motion.fill) not in (None, 1.0), "a film that begins partly filled"),  # type: ignore[attr-defined]
     ):
         if found:
             raise InputError(f"scene {scene.name}: [motion]: no derivatives in time through {what}")
+
+
+def _level_free(scene: Any) -> bool:
+    return scene.motion.free and scene.turning is None  # type: ignore[no-any-return]
 
 
 class Course:
@@ -63,7 +69,7 @@ class Course:
 
     def __init__(self, scene: Any, trace: Trace, comm: Any, near: "Course | None" = None):
         self.scene, self.trace, self.comm, self.table = scene, trace, comm, scene.motion
-        self.models, self._given = scene.models(), scene.motion.course(scene._folder)
+        self.models, self._given = scene.models(), scene.motion.course(scene._folder, len(scene.place))
         self.first = first_film(scene, self.models, self.place(0))
         if near is not None and not near.grid.even:
             places = followed(near.grid, near.first, self.first)

@@ -17,10 +17,10 @@ from ..problems.solution import Outcome, Solution, Step
 from ..scenes.motion import MotionTable
 from ..scenes.moving import motion_of
 from .ask import Ask, Start
-from .coefficients import motions_of, summed, supplied
+from .coefficients import supplied
 from .compose import Inner
-from .impedance import stiffness
 from .march import March
+from .march_coordinates import Coordinates
 from .march_file import MarchFile
 from .plan import plan
 from .rotor import Rotor
@@ -59,12 +59,16 @@ class Run:
         table = motion_of(scene)
         assert table is not None
         self.table: MotionTable = table
-        self.models, self.course = scene.models(), table.course(scene._folder)
+        self.models, self.course = scene.models(), table.course(scene._folder, len(scene.place))
         self.file = MarchFile(ask, scene)
-        self.rotor = Rotor.of(table, scene.turning.c, scene.place) if table.free else None
+        self.coordinates, self.rotor = Coordinates(scene, table), None
         self.watch, self.seen = ask.watch, getattr(scene, "observer", lambda: None)()
         self.times = sorted({t for t in ask.times if 0 < t < table.t_end})
         ask = replace(ask, nested=None if ask.nested else False, checkpoint=None, resume=None, every=1, watch=None, start=None)
+        if self.coordinates.any:
+            steady = not self._fill and self.file.resume is None
+            place, speed = self.coordinates.begin(self.course, replace(ask, nested=None), inner if steady else None)
+            self.rotor = Rotor(self.coordinates, [place], [speed])
         first = first_film(scene, self.models, self._given(0.0))
         problem = self._at(0.0, lambda: first.build(scene.shape, ask.comm))
         problem.shares_grid = True
@@ -93,12 +97,16 @@ class Run:
         if not self.file.restore(self, self.march.grid):
             self._begin(first, ask)
 
-    def _given(self, t: float) -> tuple[float, float] | None:
-        """Where the journal is, if it moves."""
+    def _given(self, t: float) -> tuple[float, ...] | None:
+        """Where what moves is, if anything does."""
         if self.rotor is not None:
-            x, y = self.rotor.places[0]
-            return float(x), float(y)
+            return tuple(map(float, self.rotor.places[0]))
         return self.course(t) if self.course is not None else None
+
+    @property
+    def _fill(self) -> float | None:
+        """The part of the film that is oil at t = 0, if that is given."""
+        return self.table.fill or (1.0 if self.table.start == "full" else None)
 
     def _at(self, t: float, call: Callable[[], Any]) -> Any:
         """A call's result; bad input is told with the time."""
@@ -110,7 +118,7 @@ class Run:
 
     def _begin(self, model: Any, ask: Ask) -> None:
         """The film at t = 0."""
-        fill = self.table.fill or (1.0 if self.table.start == "full" else None)
+        fill = self._fill
         if fill is not None:
             full, none = contents(self.march.grid, model, None), np.zeros(self.march.grid.local_size)
             self.march.begin(fill * full, None if fill == 1 else {"p": none, "r": none + 1.0 - fill})
@@ -199,7 +207,7 @@ class Run:
         solves: list[Solution] = []
 
         def film_at(e: Any) -> Solution:
-            model = self.models(t, None if e is None else (float(e[0]), float(e[1])))
+            model = self.models(t, None if e is None else [float(one) for one in e])
             self.model = replace(model, stored=term, places=march.grid.places)
             if model.sealed:
                 check_room(march.grid, self.model, t, self.scene.name)
@@ -214,18 +222,18 @@ class Run:
                 own.destroy()
             return solves[-1]
 
-        def stiffness_of(solution: Solution) -> Any:
-            whole = TimeStep(self.scene, self.model, march.grid)
-            ring: Any = solution.problem
-            motions = motions_of(self.scene.turning, False, 0.0)
-            return summed(stiffness, whole, supplied(whole.model, solution), ring, solution.fields, motions)
+        def pushes(solution: Solution, stiff: bool) -> Any:
+            return self.coordinates.forces(TimeStep(self.scene, supplied(self.model, solution), march.grid), solution, stiff)
 
         if self.rotor is None:
             place, why = self._at(t, lambda: self._given(t)), ""
             solution = film_at(place)
         else:
             guess = self.rotor.guess(dt, march.dts)
-            solution, place, why = self.rotor.settle(t, formula, guess, film_at, stiffness_of)
+            if self.course is not None:
+                given = self._at(t, lambda: self.course(t))  # type: ignore[misc]
+                guess[: len(given)] = given
+            solution, place, why = self.rotor.settle(t, formula, guess, film_at, pushes)
         return solution, place, why, [one.steps for one in solves]
 
     def _keep(self, solution: Solution, solves: list[list[Step]]) -> None:
@@ -253,7 +261,7 @@ class Run:
         found = solution.problem.quantities(solution.fields)
         row: dict[str, Any] = {"t": self.march.t, "dt": dt}
         if place is not None:
-            row |= {"journal_x": float(place[0]), "journal_y": float(place[1])}
+            row |= dict(zip(self.coordinates.names, map(float, place), strict=False))
         for name in TOLD:
             value = found.get(name)
             if isinstance(value, list):

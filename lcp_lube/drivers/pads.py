@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ..base.parallel import Array
 from ..errors import InputError
 from ..problems.solution import Outcome, Solution
+from ..scenes.moving import motion_of
 from ..scenes.scene import Solvable
 from .ask import Ask
 from .chain import Chain
@@ -35,7 +36,7 @@ NUDGES, NUDGE = 8, 0.5  # of a pad without stiffness: how often its inlet is ope
 
 def applies(scene: Solvable, ask: Ask) -> bool:
     """Whether the scene has pads whose tilts, or a place that, are to be found."""
-    return bearing_of(scene) is not None
+    return motion_of(scene) is None and bearing_of(scene) is not None
 
 
 def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:

@@ -1,9 +1,12 @@
-"""A journal that goes where load, film and its mass take it: Newton's method on its place at the end of a time step.
+"""What is free in a march: a journal or a film's level under a load, and pads that tilt; Newton's method on its place at the
+end of a time step.
 
-    mass c d2e/dt2 = F(e, film) + W(t),     d/dt by the formula that the film's contents have (`march`)
+    mass d2q/dt2 = Q(q, film) + W(t),     d/dt by the formula that the film's contents have (`march`)
 
-e = [X, Y] is in parts of the clearance c. The film is solved at every iterate; -dF/de of the step is exact
-(`linearised`: stiffness, and damping with what is stored, in one matrix), and is kept while iterates converge quickly.
+q : a journal's [X, Y] in parts of the clearance, or the film's level (m), and the pads' tilts (rad); Q : the film's forces on
+them, and its moments about the pivots, which without inertia are to be 0. The film is solved at every iterate; -dQ/dq of
+the step is exact (`linearised`: stiffness, and damping with what is stored, in one matrix), and is kept while iterates converge
+quickly.
 """
 
 from collections.abc import Callable
@@ -15,32 +18,26 @@ import numpy as np
 
 from ..base.parallel import Array
 from ..errors import InputError
-from ..problems.film.forces import forces
 from ..problems.solution import Solution
-from ..scenes.motion import MotionTable
 from .march import Formula
+from .march_coordinates import Coordinates
 
 MOST, TOL = 30, 1e-9  # iterates a step; forces left, in parts of the largest seen
 SLOW = 0.2  # fall of the forces left by an iterate above which the matrix is made anew
-NEAREST = 0.5  # of the thinnest film: the longest step of the journal
+NEAREST = 0.5  # of the thinnest film: the longest step
+SMALLEST = 1e-13  # of the thinnest film: a step that is none
 
 
 @dataclass
 class Rotor:
-    """Places (clearances) and speeds of the last times, the newest first; c : clearance, m."""
+    """Places and speeds of the last times, the newest first."""
 
-    table: MotionTable
-    c: float
+    of: Coordinates
     places: list[Array] = field(default_factory=list)
     speeds: list[Array] = field(default_factory=list)
     size: float = 0.0  # largest force so far, N
-    K: Array | None = None  # of the last step, N/m
+    K: Array | None = None  # of the last step, N/m of film
     weight: float = 0.0  # of the formula that it belongs to
-
-    @classmethod
-    def of(cls, table: MotionTable, c: float, place: tuple[float, float]) -> "Rotor":
-        """At t = 0; place : where the journal is unless the table says."""
-        return cls(table, c, [np.array(table.position or place)], [np.array(table.velocity)])
 
     def guess(self, dt: float, dts: list[float]) -> Array:
         """The place after a step, as the last steps went on."""
@@ -54,65 +51,67 @@ class Rotor:
         formula: Formula,
         start: Array,
         film_at: Callable[[Array], Solution],
-        stiffness: Callable[[Solution], Array],
+        pushes: Callable[[Solution, bool], tuple[Array, Array | None]],
     ) -> tuple[Solution, Array, str]:
         """The film and the place at the step's end; a reason where there is none. Collective.
 
         Parameters
         ----------
-        film_at : solves the film with the journal there. stiffness : -dF/de of such a solution, N/m.
+        start : where the search begins, with what is given at its place.
+        film_at : solves the film there. pushes : its forces in such a solution; with True -dQ/dq too, by m and rad.
         """
-        assert self.table.mass is not None  # as its validator found
-        load, mass = np.array(self.table.load_at(t)), self.table.mass * self.c
+        of, free = self.of, np.flatnonzero(self.of.free)
+        loads, inertia = of.loads(t), of.mass * of.unit
+        scale = of.unit / of.reach  # moments as forces
         if self.K is not None and formula.weight != self.weight:
             self.K = None
-        e, before = start, np.inf
+        q, before = start, np.inf
         for k in range(MOST):
-            solution, e = (film_at(e), e) if k else self._first(e, film_at)
+            solution, q = (film_at(q), q) if k else self._first(q, film_at)
             if not solution.converged:
-                return solution, e, ""
+                return solution, q, ""
             problem: Any = solution.problem
-            force = np.array(forces(problem, solution.fields["p"] * problem.p_unit)["force"])
-            speed = formula.weight * e - formula.old(self.places)
-            inertia = mass * (formula.weight * speed - formula.old(self.speeds))
-            left = inertia - force - load
-            self.size = max(self.size, float(np.hypot(*force)), float(np.hypot(*load)))
-            now = float(np.hypot(*left)) / (self.size or 1.0)
+            force, K = pushes(solution, self.K is None)
+            speed = formula.weight * q - formula.old(self.places)
+            left = scale * (inertia * (formula.weight * speed - formula.old(self.speeds)) - force - loads)
+            self.size = max(self.size, *(float(np.linalg.norm(scale * one)) for one in (force, loads)))
+            now = float(np.linalg.norm(left[free])) / (self.size or 1.0)
             if now <= TOL:
-                return solution, e, ""
-            if self.K is None or now > SLOW * before:
-                self.K, self.weight = stiffness(solution), formula.weight
+                return solution, q, ""
+            if K is None and now > SLOW * before:
+                _, K = pushes(solution, True)
+            if K is not None:
+                self.K, self.weight = K * np.outer(scale, scale), formula.weight
             before = now
-            try:
-                move = -np.linalg.solve(mass * formula.weight**2 * np.eye(2) + self.c * self.K, left)
-            except np.linalg.LinAlgError:
-                return solution, e, "the film has no stiffness there"
-            longest = NEAREST * problem.reduce.min(problem.scheme.h) / self.c
-            size = float(np.hypot(*move))
-            if not size < np.inf:
-                return solution, e, "its forces are no numbers"
-            if size <= 1e-14:
-                return solution, e, ""
-            e = e + move * min(1.0, longest / size)
+            assert self.K is not None  # as there is a matrix by now
+            matrix = np.diag(of.mass * (scale * formula.weight) ** 2) + self.K
+            if not (np.isfinite(left).all() and np.isfinite(matrix).all()):
+                return solution, q, "its forces are no numbers"
+            move = np.zeros(q.size)
+            move[free] = np.linalg.lstsq(matrix[np.ix_(free, free)], -left[free], rcond=1e-13)[0]
+            size, thinnest = float(np.linalg.norm(move)), problem.reduce.min(problem.scheme.h)
+            if size <= SMALLEST * thinnest:
+                return solution, q, ""
+            q = q + move / of.reach * min(1.0, NEAREST * thinnest / size)
             solution.destroy()
-        return solution, e, f"forces of {now:.1e} of the largest are left after {MOST} iterates of the journal's place"
+        return solution, q, f"forces of {now:.1e} of the largest are left after {MOST} iterates of the place of what is free"
 
-    def _first(self, e: Array, film_at: Callable[[Array], Solution]) -> tuple[Solution, Array]:
-        """The film where the journal is expected, or where it has room on the way there."""
-        last = self.places[0]
+    def _first(self, q: Array, film_at: Callable[[Array], Solution]) -> tuple[Solution, Array]:
+        """The film at the place that is expected, or where it has room on the way there."""
+        last = np.where(self.of.free, self.places[0], q)
         for part in (1.0, 0.5, 0.25):
             with suppress(InputError):  # the wall would touch
-                place = last + part * (e - last)
+                place = last + part * (q - last)
                 return film_at(place), place
         return film_at(last), last
 
-    def accept(self, e: Array, formula: Formula) -> None:
+    def accept(self, q: Array, formula: Formula) -> None:
         """Take a step over."""
-        speed = formula.weight * e - formula.old(self.places)
-        self.places, self.speeds = [e, *self.places[:2]], [speed, *self.speeds[:1]]
+        speed = formula.weight * q - formula.old(self.places)
+        self.places, self.speeds = [q, *self.places[:2]], [speed, *self.speeds[:1]]
 
-    def error(self, e: Array, dt: float, dts: list[float], thinnest: float) -> float | None:
-        """How far the journal is from where its last steps pointed, in parts of the thinnest film; None at first."""
+    def error(self, q: Array, dt: float, dts: list[float], thinnest: float) -> float | None:
+        """How far it is from where its last steps pointed, in parts of the thinnest film; None at first."""
         if len(dts) < 2:
             return None
-        return float(np.hypot(*(e - self.guess(dt, dts)))) * self.c / thinnest / 3.0
+        return float(np.linalg.norm(self.of.reach * (q - self.guess(dt, dts)))) / thinnest / 3.0

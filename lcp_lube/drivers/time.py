@@ -77,7 +77,7 @@ def answer(run: Run) -> Solution:
         "mass_defect_run": march.defect,
     }
     if run.rotor is not None or run.course is not None:
-        details["journal"] = [float(a) for a in (run._given(march.t) or (0.0, 0.0))]
+        details |= run.coordinates.told(run._given(march.t) or (0.0, 0.0))
     return replace(
         solution,
         problem=problem,

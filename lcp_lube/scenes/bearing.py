@@ -4,7 +4,7 @@ import cmath
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
@@ -18,8 +18,6 @@ from ..problems.film.turning import Turning
 from .effects.table import WithEffects
 from .film import FilmPart, JournalPart
 from .film_scene import RectangleScene, Sides
-from .motion import MotionTable
-from .moving import Models
 from .scene import Finite, Positive
 from .supply import Place, SupplyTable, supplies_of
 from .units import Measured, is_quantity, measured, metres
@@ -83,7 +81,6 @@ class BearingScene(RectangleScene, WithEffects):
     sides: SidesTable = Field(SidesTable(), description="condition at each side")
     supply: list[SupplyTable] = Field([], description="supplies inside the film")
     p_unit: Positive | None = measured("Pa", None, "pressure unit of the equations; default from mu U L/h^2")
-    motion: MotionTable | None = Field(None, description="how the film goes on in time")
 
     @field_validator("film", mode="before")
     @classmethod
@@ -115,16 +112,10 @@ class BearingScene(RectangleScene, WithEffects):
             raise ValueError(f"fluid.mu = {self.fluid.mu:g} and the viscosities of [temperature] are both given: one of them")
 
     def _check_motion(self) -> None:
-        """Raise ValueError where shapes and [motion] contradict one another."""
-        for k, table in enumerate(self.film, start=1):
-            if self.motion is None and table.changes and not isinstance(table, JournalPart):
-                raise ValueError(f"film.{k} ({table.shape}) changes with time: a table [motion] is needed")  # type: ignore[attr-defined]
-            if table.moves and isinstance(table, JournalPart):
-                raise ValueError(f"film.{k}.moves: a journal's place is motion.journal, motion.file or motion.free")
-        if self.motion is None:
-            return
-        if self.motion.moves_journal and (count := len(self._journals)) != 1:
+        count, motion = len(self._journals), self.motion
+        if motion is not None and (motion.journal is not None or (motion.moves_journal and count)) and count != 1:
             raise ValueError(f"motion: its journal is the shape 'journal' of [[film]]; there are {count}, 1 is needed")
+        super()._check_motion()
 
     def _supplies(self) -> tuple[Supply, ...]:
         """The supplies inside the film; angles are counted from x = 0 of a film with a journal."""
@@ -170,32 +161,24 @@ class BearingScene(RectangleScene, WithEffects):
         return self.fluid.p_c
 
     def _parts(self) -> Sequence[Shape]:
-        return [table.part(self.extent) for table in self.film]
+        return self.shapes_of(self.film)
 
-    def models(self) -> Models:
-        """The film at the time t (s), its journal, if that moves, at [X, Y] of its clearance; shapes at rest are made once."""
-        first, extent = replace(self.model, exact=None), self.extent
-        known = [None if table.changes else table.part(extent) for table in self.film]
-
-        def at(t: float, journal: tuple[float, float] | None) -> Model:
-            now = replace(extent, t=t, travel=self.U * t, journal=journal)
-            parts = [table.placed(now) if part is None else part for table, part in zip(self.film, known, strict=True)]
-            shaft = first.shaft
-            if shaft is not None and journal is not None:
-                shaft = replace(shaft, widest=math.pi + math.atan2(journal[1], journal[0]))
-            return replace(first, gap=self.sum_of(parts), shaft=shaft)
-
-        return at
+    def moved(self, place: Sequence[float]) -> Self:
+        if len(place) == 1:
+            return super().moved(place)
+        scene = self.model_copy()
+        scene._journal = place[0], place[1]
+        return scene
 
     @property
     def _journals(self) -> list[JournalPart]:
         return [table for table in self.film if isinstance(table, JournalPart)]
 
     @property
-    def place(self) -> tuple[float, float]:
-        """[X, Y] of the journal among the shapes, in parts of its clearance."""
+    def place(self) -> tuple[float, ...]:
+        """[X, Y] of the journal among the shapes, in parts of its clearance; without one the film's level."""
         if not self._journals:
-            return 0.0, 0.0
+            return super().place
         table = self._journals[0]
         e = cmath.rect(table.eccentricity, math.pi + 2.0 * math.pi * table.widest / self.L)
         return e.real, e.imag
@@ -205,9 +188,13 @@ class BearingScene(RectangleScene, WithEffects):
         """What the film is wrapped round: the journal among its shapes; eccentricities of several add up as vectors."""
         if not self._journals:
             return None
+        where, widest = self._journal, None
         R, B = self.L / (2.0 * math.pi), self.side_lengths[1] if self.dimension == 2 else 1.0
         offset = sum(one.c * one.eccentricity * cmath.exp(2j * math.pi * one.widest / self.L) for one in self._journals)
-        widest = cmath.phase(offset) if offset else None
+        if where is not None:
+            widest = math.pi + math.atan2(where[1], where[0])
+        elif offset:
+            widest = cmath.phase(offset)
         return Turning(R, 0.0, widest, c=self._journals[0].c, B=B, omega=self.U / R)
 
     def _model(self) -> Model:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 from petsc4py import PETSc
 from pydantic import Field, PrivateAttr
@@ -17,8 +17,12 @@ from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model, Side
 from ..problems.film.shapes import Block, Shape, Sum
 from ..problems.film.supplies import Supply
+from ..problems.film.turning import Turning
+from ..problems.film.views import Travelling
 from .balance import BalanceTable
 from .effects.named import FLUID, named
+from .motion import MotionTable
+from .moving import Models, models_of
 from .scene import Count, Finite, Positive, Scene
 from .units import measured, metres
 
@@ -47,15 +51,74 @@ class Extent:
 class FilmScene(Scene):
     """A scene that is a film; a family says which, in `_model`."""
 
-    _made: tuple[dict[str, Any], Path | None, Model] | None = PrivateAttr(None)  # `model`, and what it was made of
+    motion: MotionTable | None = Field(None, description="how the film goes on in time")
+    _t: float = PrivateAttr(0.0)  # the time, s
+    _travel: float = PrivateAttr(0.0)  # of the wall since t = 0, m
+    _journal: tuple[float, float] | None = PrivateAttr(None)  # where it is, if it moves
+    _shapes: dict[int, Shape] | None = PrivateAttr(None)  # of [[film]] at rest, where they are made once
+    _made: tuple[dict[str, Any], Any, Model] | None = PrivateAttr(None)  # `model`, and what it was made of
 
     def check(self) -> None:
         temperature, field = getattr(self, "temperature", None), type(self).model_fields.get("mu")
         mu = getattr(self, "mu", None)
         if field is not None and temperature is not None and temperature.own_mu and mu != field.default:
             raise ValueError(f"mu = {mu:g} and the viscosities of [temperature] are both given: one of them")
-        if getattr(self, "motion", None) is not None and getattr(self, "balance", None) is not None:
+        if self.motion is not None and getattr(self, "balance", None) is not None:
             raise ValueError("balance and motion are both given: one of them; a load in time is that of motion.free")
+        shapes = getattr(self, "film", None)
+        for k, table in enumerate(shapes if isinstance(shapes, list) else [], start=1):
+            if self.motion is None and table.changes and table.shape != "journal":
+                raise ValueError(f"film.{k} ({table.shape}) changes with time: a table [motion] is needed")
+            if table.moves and table.shape == "journal":
+                raise ValueError(f"film.{k}.moves: a journal's place is motion.journal, motion.file or motion.free")
+        if self.motion is None and getattr(self, "moves", False):
+            raise ValueError("moves = true: the film changes with time: a table [motion] is needed")
+
+    def _check_motion(self) -> None:
+        """Raise ValueError where the scene and its [motion] contradict one another; for the end of a family's `check`."""
+        if self.motion is not None:
+            self.motion.check_for(self.turning is not None, self.pads_follow)
+
+    @property
+    def turning(self) -> Turning | None:
+        """What the film is wrapped round, if it is."""
+        return None
+
+    @property
+    def place(self) -> tuple[float, ...]:
+        """Where what [motion] moves is: [X, Y] of a journal in parts of its clearance, else the film's level [h_offset], m."""
+        return (self.h_offset,)  # type: ignore[attr-defined]
+
+    @property
+    def pads_follow(self) -> bool:
+        """Whether pads tilt as their films have it."""
+        return False
+
+    def moved(self, place: Sequence[float]) -> Self:
+        """With what [motion] moves at this place."""
+        return self.model_copy(update={"h_offset": float(place[0])})
+
+    def at(self, t: float, travel: float, place: Sequence[float] | None = None) -> Self:
+        """As it is at the time t (s), when its wall has come by `travel` (m), and what else moves is at this place."""
+        scene = self.model_copy() if place is None else self.moved(place)
+        scene._t, scene._travel = t, travel
+        return scene
+
+    def models(self) -> Models:
+        """The film in time."""
+        return models_of(self)
+
+    def carried(self, shape: Shape) -> Shape:
+        """A shape on the wall."""
+        return Travelling(shape, self._travel, self.side_lengths[0]) if self._travel else shape
+
+    def shapes_of(self, tables: Sequence[Any]) -> list[Shape]:
+        """Of [[film]], at the scene's time."""
+        made = {} if self._shapes is None else self._shapes
+        for k, table in enumerate(tables):
+            if k not in made or table.changes:
+                made[k] = table.placed(self.extent)
+        return [made[k] for k in range(len(tables))]
 
     @property
     def mu_0(self) -> float:
@@ -83,12 +146,13 @@ class FilmScene(Scene):
         ------
         InputError : sides that contradict one another, a profile that cannot be read.
         """
-        if self._made is None or self._made[1] != self._folder or self._made[0] != vars(self):  # a copy may have changed
+        where = self._folder, self._t, self._travel, self._journal
+        if self._made is None or self._made[1] != where or self._made[0] != vars(self):  # a copy may have changed
             try:
                 model, effects = self._model(), self.effects
             except InputError as error:
                 raise self._named(error) from None
-            self._made = dict(vars(self)), self._folder, replace(model, effects=effects) if effects else model
+            self._made = dict(vars(self)), where, replace(model, effects=effects) if effects else model
         return self._made[2]
 
     def __getstate__(self) -> dict[Any, Any]:
@@ -107,7 +171,7 @@ class FilmScene(Scene):
     @property
     def extent(self) -> Extent:
         """What its shapes need of it."""
-        return Extent(self.side_lengths, self._folder or Path())
+        return Extent(self.side_lengths, self._folder or Path(), self._t, self._travel, self._journal)
 
     def facts(self, comm: PETSc.Comm | None = None) -> Facts:
         return self.model.facts(self.shape, comm)
@@ -191,7 +255,7 @@ class RectangleScene(FilmScene):
             scheme=self.scheme,
             mean_cubes=self.mean_cubes,
             exact=self.exact,
-            in_time=getattr(self, "motion", None) is not None,
+            in_time=self.motion is not None,
             supplies=self._supplies(),  # at once: they may be all that sets the pressure
         )
 

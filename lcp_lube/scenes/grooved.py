@@ -57,9 +57,6 @@ class GroovedJournalScene(ShaftScene, WithEffects):
             raise ValueError(f"grooves_deg = {self.grooves_deg}: grooves of {self.groove_deg:g} degrees overlap there")
         if self.balance is not None and self.balance.vary not in (None, "eccentricity"):
             raise ValueError(f"balance.vary = {self.balance.vary}: eccentricity is allowed, which follows from the load")
-        for k, table in enumerate(self.film, start=1):
-            if table.changes:
-                raise ValueError(f"film.{k}: shapes of this family do not change with time; family = bearing has such")
         if self.motion is not None and self.attitude_deg is None and not self.motion.moves_journal:
             raise ValueError("motion: attitude_deg, or where the journal is (motion.journal, file or free), is needed")
         if self.preload and len(places) < 2:
@@ -73,6 +70,7 @@ class GroovedJournalScene(ShaftScene, WithEffects):
         if self.dam_deg is not None and not 0 < self.dam_deg[1] - self.dam_deg[0] < 360:
             raise ValueError(f"dam_deg = {list(self.dam_deg)}: start < end < start + 360 is needed")
         self._supplies()
+        self._check_motion()
 
     def _supplies(self) -> tuple[Supply, ...]:
         """The tables' supplies, and behind them the grooves, where there are both: cells held on the whole ring."""
@@ -107,7 +105,7 @@ class GroovedJournalScene(ShaftScene, WithEffects):
             self.tilt_across,
             self.barrel,
             dam,
-            tuple(table.part(self.extent) for table in self.film),
+            tuple(self.shapes_of(self.film)),
         )
 
     @property

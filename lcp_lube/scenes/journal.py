@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -14,8 +14,6 @@ from ..problems.film.supplies import Supply
 from ..problems.film.turning import Turning
 from ..problems.grid import Places
 from .film_scene import Sides
-from .motion import MotionTable
-from .moving import Models
 from .published import LubricationScene
 from .scene import Positive
 from .supply import Place, SupplyTable, supplies_of
@@ -43,7 +41,6 @@ class JournalScene(LubricationScene):
     omega: Positive = measured("rad/s", 100.0, "angular velocity")
     mu: Positive = 0.02
     supply: list[SupplyTable] = Field([], description="supplies inside the film; pressures are absolute")
-    motion: MotionTable | None = Field(None, description="how the journal moves in time")
     L: Positive = Field(1.0, description="follows from D")
     U: Positive = Field(1.0, description="follows from D and omega")
 
@@ -75,6 +72,7 @@ class JournalScene(LubricationScene):
         if self.graded and (self.dimension == 1 or self.round == "periodic" or self.motion is not None):
             raise ValueError("graded = true: lines are graded in 2D, from a groove at the widest gap (round = groove), at rest")
         self._supplies()
+        self._check_motion()
 
     def _supplies(self) -> tuple[Supply, ...]:
         """The supplies inside the film, angles counted from the widest gap."""
@@ -91,28 +89,27 @@ class JournalScene(LubricationScene):
     def turning(self) -> Turning:
         """Angles are counted from the widest gap."""
         width = self.width if self.dimension == 2 and self.width else 1.0
-        widest = 0.0 if self.eccentricity else None
+        widest = self._widest if self.eccentricity else None
         return Turning(0.5 * self.D, 0.0, widest, c=0.5 * self.psi * self.D, B=width, omega=self.omega)
 
+    @property
+    def _widest(self) -> float:
+        """Angle of the widest gap, rad: 0, but where [motion] has the journal elsewhere."""
+        return 0.0 if self._journal is None else math.atan2(self._journal[1], self._journal[0]) + math.pi
+
     def _parts(self) -> Sequence[Shape]:
-        return [Journal(0.5 * self.psi * self.D, self.eccentricity, self.L)]
+        return [Journal(0.5 * self.psi * self.D, self.eccentricity, self.L, 0.5 * self.D * self._widest)]
 
     @property
-    def place(self) -> tuple[float, float]:
+    def place(self) -> tuple[float, ...]:
         """[X, Y] of the journal, in parts of the clearance: away from the widest gap."""
         return -self.eccentricity, 0.0
 
-    def models(self) -> Models:
-        """The film with the journal at [X, Y] of its clearance; angles are counted from the groove."""
-        still, c = self.model, self.turning.c
-
-        def at(t: float, journal: tuple[float, float] | None) -> Model:
-            x, y = journal if journal is not None else self.place
-            widest = math.atan2(y, x) + math.pi
-            gap = self.sum_of([Journal(c, math.hypot(x, y), self.L, 0.5 * self.D * widest)])
-            return replace(still, gap=gap, shaft=replace(self.turning, widest=widest if x or y else None))
-
-        return at
+    def moved(self, place: Sequence[float]) -> Self:
+        """Angles are counted from the groove."""
+        scene = self.model_copy(update={"eccentricity": math.hypot(*place)})
+        scene._journal = place[0], place[1]
+        return scene
 
     def _model(self) -> Model:
         return replace(super()._model(), shaft=self.turning, places=self._places, extras=self.bearing_numbers)

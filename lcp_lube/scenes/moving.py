@@ -1,29 +1,36 @@
-"""What the march in time asks of a scene that moves."""
+"""What the march in time asks of a scene that moves, and how the scenes of films answer: as they are at a time."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
+import numpy as np
+
+from ..errors import InputError
 from ..problems.film.model import Model
 from ..problems.film.turning import Turning
-from .scene import Solvable
+from .formula import Formula
+from .scene import Solvable, as_scene
 
 if TYPE_CHECKING:
     from .motion import MotionTable
 
-
-# The film at the time t, its journal at [X, Y] in parts of the clearance.
-Models = Callable[[float, tuple[float, float] | None], Model]
+# The film at the time t, its journal at [X, Y] in parts of the clearance, or its level at [h_offset] (m), and its pads' tilts.
+Models = Callable[[float, Sequence[float] | None], Model]
+SPEEDS = ("U", "omega", "speed_rpm")  # keys of the wall's speed
+PIECES = 64  # of the time, where the speed changes
 
 
 @runtime_checkable
 class Moving(Solvable, Protocol):
-    """A scene with a table [motion]; turning : its journal, if any; place : where that is, [X, Y], unless [motion] says."""
+    """A scene with a table [motion]; turning : its journal, if any; place : where that, or the film's level, is unless [motion]
+    says."""
 
     motion: MotionTable | None
     turning: Turning | None
-    place: tuple[float, float]
+    place: tuple[float, ...]
 
     def models(self) -> Models: ...
 
@@ -31,3 +38,53 @@ class Moving(Solvable, Protocol):
 def motion_of(scene: Any) -> MotionTable | None:
     """The [motion] of a scene that has one."""
     return getattr(scene, "motion", None)
+
+
+def models_of(scene: Any) -> Models:
+    """The film of a scene of any family, as its [motion] has it.
+
+    Raises
+    ------
+    InputError : by the function, a number that the scene cannot have, or one that changes the film's extent or its sides.
+    """
+    table, scene = scene.motion, scene.model_copy()
+    scene._shapes = {}  # shapes at rest are made once
+    still = replace(scene.model, exact=None)
+    travel = travel_of(scene, table)
+
+    def at(t: float, place: Sequence[float] | None) -> Model:
+        changes = table.changes(t) if table is not None else {}
+        now: Any = as_scene(scene, changes) if changes else scene
+        now = now.at(t, travel(t), place)
+        if not changes:
+            extras = getattr(now, "bearing_numbers", None)
+            return replace(still, gap=now.gap, shaft=now.turning, extras=extras)
+        model = replace(now.model, exact=None, p_unit=still.p_unit)
+        if _fixed(model, now.shape) != _fixed(still, scene.shape):
+            raise InputError(f"{scene.name}: motion.set: extent, kinds of sides, grooves, supplies and p_c stay as they are")
+        return model
+
+    return at
+
+
+def _fixed(model: Model, shape: Any) -> Any:
+    """What a march is about: none of it can change."""
+    grooves, c = [(one.first, one.count) for one in model.grooves], getattr(model.shaft, "c", None)
+    sides = [side.kind for side in model.sides]
+    return shape, model.lengths, model.polar, model.p_c, sides, grooves, c, len(model.supplies)
+
+
+def travel_of(scene: Any, table: MotionTable | None) -> Callable[[float], float]:
+    """How far the wall has come at a time, m; where its speed follows a formula, by Gauss' formula on pieces of the way."""
+    key = next((key for key in SPEEDS if table is not None and key in table.set), None)
+    if table is None or key is None:
+        return lambda t: scene.U * t
+    unit: Any = as_scene(scene, {key: 1.0})
+    speed, per = Formula(table.set[key], ("t",)), unit.U  # type: ignore[arg-type]
+    nodes, weights = np.polynomial.legendre.leggauss(3)
+    places = (np.arange(PIECES)[:, None] + 0.5 + 0.5 * nodes) / PIECES
+
+    def travel(t: float) -> float:
+        return float(per * t * np.mean(speed(places, places, t * places) @ (0.5 * weights)))  # type: ignore[arg-type]
+
+    return travel

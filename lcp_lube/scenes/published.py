@@ -36,7 +36,21 @@ class LubricationScene(RectangleScene, WithEffects):
         return west, east, ends, ends
 
 
-class SliderScene(LubricationScene):
+class SurfaceScene(LubricationScene):
+    """One with a surface that may be the moving wall's."""
+
+    moves: bool = Field(False, description="[motion]: wave, roughness or dimples travel with the wall, periodically over L")
+
+    def check(self) -> None:
+        super().check()
+        self._check_motion()
+
+    def on_wall(self, shape: Shape) -> Shape:
+        """A shape, travelling if it does."""
+        return self.carried(shape) if self.moves else shape
+
+
+class SliderScene(SurfaceScene):
     """A slider with one wave of the film; defaults are the published problems' data."""
 
     film: Literal["sinusoid", "parabola"] = "sinusoid"
@@ -53,10 +67,14 @@ class SliderScene(LubricationScene):
         if not self.wave[0] < self.wave[1] <= 1:
             raise ValueError(f"wave = {list(self.wave)}: 0 <= start < end <= 1 is needed")
 
-    def _parts(self) -> Sequence[Shape]:
+    @property
+    def _wave(self) -> Shape:
         heights = (self.h_min, self.h_max) if self.form == "convergent-divergent" else (self.h_max, self.h_min)
         start, end = (self.L * part for part in self.wave)
-        return [Along(self.film, *heights, start, end)]
+        return Along(self.film, *heights, start, end)
+
+    def _parts(self) -> Sequence[Shape]:
+        return [self.on_wall(self._wave)]
 
 
 class RoughScene(SliderScene):
@@ -78,10 +96,10 @@ class RoughScene(SliderScene):
 
     def _parts(self) -> Sequence[Shape]:
         surface = RandomSurface(self.amplitude * MEAN_SQUARE, self.seed, self.cells, self.extent.both)
-        return [*super()._parts(), surface]
+        return [self._wave, self.on_wall(surface)]
 
 
-class TexturedScene(LubricationScene):
+class TexturedScene(SurfaceScene):
     """Textured slider of the FBNS codes: 80 mm square, K x K cells with a square dimple each, 100 kPa all round.
 
     The reference grid has 30 K interior points a side; a dimple has 20 of a cell's 30, and a rim at half depth of one more on
@@ -117,4 +135,4 @@ class TexturedScene(LubricationScene):
         mesh = self.L / (30 * self.K + 1)
         inside = (0.5 * mesh, (30 * self.K + 0.5) * mesh)
         halves = (DimpleArray("square", 0.5 * self.depth, m * mesh, self.K, self.K, inside, inside) for m in (22, 20))
-        return [Block(self.h, ALL, ALL), *halves]
+        return [Block(self.h, ALL, ALL), *map(self.on_wall, halves)]

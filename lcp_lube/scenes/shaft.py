@@ -1,8 +1,8 @@
 """What journals under a load of given direction share, in one bush with grooves or in pads; 2D, unwrapped round the shaft."""
 
 import math
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, Self
 
 from pydantic import Field, field_validator
 
@@ -12,8 +12,6 @@ from ..problems.film.reynolds import Film
 from ..problems.film.turning import Turning
 from .balance import BalanceTable
 from .film_scene import FilmScene
-from .motion import MotionTable
-from .moving import Models
 from .scene import Count, Finite, NotNegative, Positive
 from .units import measured, metres
 
@@ -36,7 +34,6 @@ class ShaftScene(FilmScene):
     nx: Count | None = Field(None, description="points around; default n")
     ny: Count | None = Field(None, description="points across; default as n says")
     balance: BalanceTable | None
-    motion: MotionTable | None = Field(None, description="how the journal moves in time")
 
     @field_validator("scheme")
     @classmethod
@@ -59,6 +56,11 @@ class ShaftScene(FilmScene):
         return 2.0 * math.pi * self.speed_rpm / 60.0
 
     @property
+    def U(self) -> float:
+        """Speed of the journal's surface, m/s."""
+        return 0.5 * self.D * self.omega
+
+    @property
     def start(self) -> float:
         """Angle of an edge on which points of the grid lie, rad."""
         raise NotImplementedError
@@ -71,20 +73,16 @@ class ShaftScene(FilmScene):
         return Turning(0.5 * self.D, start, widest, c=self.clearance, B=self.L_over_D * self.D, omega=self.omega)
 
     @property
-    def place(self) -> tuple[float, float]:
+    def place(self) -> tuple[float, ...]:
         """[X, Y] of the journal, in parts of the clearance."""
         phi = math.radians(self.attitude_deg or 0.0)
         return self.eccentricity * math.cos(phi), self.eccentricity * math.sin(phi)
 
-    def models(self) -> Models:
-        """The film with the journal at [X, Y] of its clearance; nothing else of it moves."""
-
-        def at(t: float, journal: tuple[float, float] | None) -> Model:
-            x, y = journal if journal is not None else self.place
-            found = {"eccentricity": math.hypot(x, y), "attitude_deg": math.degrees(math.atan2(y, x))}
-            return self.model_copy(update=found).model
-
-        return at
+    def moved(self, place: Sequence[float]) -> Self:
+        """Its `place`, and behind it the tilts of pads that follow."""
+        x, y, *tilts = place
+        found = {"eccentricity": math.hypot(x, y), "attitude_deg": math.degrees(math.atan2(y, x))}
+        return self.model_copy(update={**found, "tilts": tilts} if tilts else found)
 
     @property
     def gap(self) -> Film:
@@ -104,7 +102,7 @@ class ShaftScene(FilmScene):
             sides=(Side("periodic"), Side("periodic"), ends, ends),
             gap=self.gap,
             mu=self.mu_0,
-            U=turning.R * turning.omega,
+            U=self.U,
             p_c=self.p_c,
             p_unit=self.mu_0 * self.omega * (turning.R / self.clearance) ** 2,
             scheme="face",

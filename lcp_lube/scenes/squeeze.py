@@ -52,7 +52,8 @@ class SqueezeScene(Scene):
         return MotionTable(t_end=self.t_end, steps=self.steps, scheme=self.scheme, start="full")
 
     turning: ClassVar[Turning | None] = None
-    place: ClassVar[tuple[float, float]] = (0.0, 0.0)
+    place: ClassVar[tuple[float, ...]] = (0.0,)
+    pads_follow: ClassVar[bool] = False
 
     def models(self) -> Models:
         """The film at the time t: d/dx(h^3 dp/dx) = 2 d(h theta)/dt is that of a viscosity of 1/6."""

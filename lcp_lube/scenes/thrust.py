@@ -1,8 +1,9 @@
 """Thrust bearings: equal sectors side by side, one of which is solved in polar coordinates."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field
@@ -103,6 +104,21 @@ class ThrustScene(WithEffects):
         if self.pivot_part is not None and self.balance is not None and self.balance.vary not in (None, "h_min"):
             raise ValueError(f"balance.vary = {self.balance.vary}: the film at the pivot follows from the load: h_min")
         self._supplies()
+        self._check_motion()
+
+    @property
+    def tilts_found(self) -> tuple[bool, bool]:
+        """Whether pitch and roll follow from the film."""
+        tilts = self.pivot_part is not None
+        return tilts and self.pitch is None, tilts and self.roll is None and self.pivot_radius is not None
+
+    @property
+    def pads_follow(self) -> bool:
+        return any(self.tilts_found)
+
+    def moved(self, place: Sequence[float]) -> Self:
+        """The level, and behind it pitch and roll of pads that follow."""
+        return self.model_copy(update=dict(zip(("h_offset", "pitch", "roll"), map(float, place), strict=False)))
 
     def _supplies(self) -> Any:
         least = min(self.p_inner, self.p_outer, *([] if self.pad_deg is None else [self.p_groove])) + self.p_c
@@ -121,6 +137,11 @@ class ThrustScene(WithEffects):
     def omega(self) -> float:
         """Angular velocity, rad/s."""
         return 2.0 * math.pi * self.speed_rpm / 60.0
+
+    @property
+    def U(self) -> float:
+        """Speed of the runner at the mean radius, m/s."""
+        return self.radii[1] * self.omega
 
     @property
     def side_lengths(self) -> tuple[float, float]:
@@ -145,7 +166,7 @@ class ThrustScene(WithEffects):
         if self.pivot_part is not None:
             pitch, roll = self.tilt_modes
             parts += [replace(pitch, by=self.pitch or 0.0), replace(roll, by=self.roll or 0.0)]
-        return Sum([*parts, *(table.part(self.extent) for table in self.film)])
+        return Sum([*parts, *self.shapes_of(self.film)])
 
     @property
     def tilt_modes(self) -> tuple[Any, Any]:
@@ -157,15 +178,14 @@ class ThrustScene(WithEffects):
     def _model(self) -> Model:
         """One sector."""
         along = Side("periodic") if self.pad_deg is None else Side(p=self.p_groove)
-        U = self.radii[1] * self.omega
         least = self.h_min + self.h_offset
-        drag = self.mu_0 * U * self.side_lengths[0] / least**2 if least > 0 else 1.0
+        drag = self.mu_0 * self.U * self.side_lengths[0] / least**2 if least > 0 else 1.0
         return Model(
             lengths=self.side_lengths,
             sides=(along, along, Side(p=self.p_inner), Side(p=self.p_outer)),
             gap=self.gap,
             mu=self.mu_0,
-            U=U,
+            U=self.U,
             p_c=self.p_c,
             p_unit=10.0 ** round(math.log10(max(drag, self.p_inner, self.p_outer, self.p_groove, 1e-90))),
             scheme="face",

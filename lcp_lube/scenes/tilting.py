@@ -20,7 +20,7 @@ class TiltingPadScene(ShaftScene, WithEffects):
     """A journal in pads that tilt about their pivots; 2D. Angles are counted from the load, in the sense of rotation.
 
     The pads' tilts are found at which no moment acts about any pivot, and with balance.load the journal's place at which the
-    films carry the load. With [motion] the pads are held in the `tilts` given.
+    films carry the load.
     clearance is that of the assembled bearing: between the journal in the middle and a pad at its pivot.
     preload m makes the pads' own bore wider, clearance/(1 - m). Between pads p_groove holds. With `tilts` given they are fixed.
     """
@@ -55,10 +55,13 @@ class TiltingPadScene(ShaftScene, WithEffects):
             raise ValueError(f"pad_deg = {self.pad_deg:g}: {apart}; at most {most:g} is allowed")
         if self.tilts is not None and len(self.tilts) != len(self.pivots_deg):
             raise ValueError(f"tilts = {self.tilts}: {len(self.pivots_deg)} values are needed, one a pad")
-        if self.motion is not None and self.tilts is None:
-            raise ValueError("motion: pads do not follow in time; their tilts are needed, in which they are held")
         if self.balance is not None and self.balance.vary not in (None, "eccentricity"):
             raise ValueError(f"balance.vary = {self.balance.vary}: the journal's place follows from the load: eccentricity")
+        self._check_motion()
+
+    @property
+    def pads_follow(self) -> bool:
+        return self.tilts is None
 
     @property
     def start(self) -> float:

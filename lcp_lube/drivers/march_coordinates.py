@@ -1,0 +1,139 @@
+"""What moves rigidly in a march: a journal or a film's level, and pads that tilt, as coordinates with a mass each."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..base.parallel import Array
+from ..errors import InputError
+from ..problems.film.forces import forces
+from ..problems.film.grooves import GroovedProblem
+from ..problems.solution import Solution
+from ..scenes.motion import Course, MotionTable
+from ..scenes.scene import as_scene
+from ..scenes.thrust import ThrustScene
+from ..scenes.tilting import TiltingPadScene
+from . import pads
+from .ask import Ask
+from .compose import Inner
+from .grooves import SideBySide, SolvedFilm, films_of
+from .impedance import Mode, displacements, stiffness
+from .pad_coordinates import Films, JournalPads, PadFilm, ThrustPads
+from .step import TimeStep
+
+
+class Coordinates:
+    """Of a scene: first its `place`, behind it the tilts of its pads that follow.
+
+    names : in the history; unit : m or rad of one of each; reach : m of the film that one of each moves; free : those that are
+    to be found; mass : kg or kg m2, of the part of the bearing that is solved.
+    """
+
+    def __init__(self, scene: Any, table: MotionTable):
+        self.scene, self.table = scene, table
+        journal, follow = scene.turning, scene.pads_follow
+        self.journal = journal is not None
+        self.pads: Any = None
+        first, tilts = 2 if self.journal else 1, 0
+        if follow and self.journal:
+            self.pads, tilts = JournalPads(scene), len(scene.pivots_deg)
+            names, reach, found = [f"tilt_{k + 1}" for k in range(tilts)], [journal.R] * tilts, [True] * tilts
+        elif follow:
+            self.pads, tilts = ThrustPads(scene), 2
+            names, reach, found = ["pitch", "roll"], list(scene.side_lengths), list(scene.tilts_found)
+        else:
+            names, reach, found = [], [], []
+        self.names = [*(("journal_x", "journal_y") if self.journal else ("h_offset",)), *names]
+        self.shares = scene.pads if isinstance(scene, ThrustScene) else 1  # of the load: one sector is solved
+        self.unit = np.array([journal.c if journal else 1.0] * first + [1.0] * tilts)
+        self.reach = np.array([journal.c if journal else 1.0] * first + reach)
+        self.free = np.array([table.free] * first + found, dtype=bool)
+        self.mass = np.array([(table.mass or 0.0) / self.shares] * first + [table.pad_inertia] * tilts)
+
+    @property
+    def any(self) -> bool:
+        """Whether anything is to be found."""
+        return bool(self.free.any())
+
+    def loads(self, t: float) -> Array:
+        """On each, N or N m; what lies on a film presses it down."""
+        out = np.zeros(self.unit.size)
+        if self.table.free:
+            given = np.array(self.table.load_at(t)) / self.shares
+            out[: given.size] = given if self.journal else -given
+        return out
+
+    def begin(self, course: Course | None, ask: Ask, inner: Inner | None) -> tuple[Array, Array]:
+        """Places and speeds at t = 0: pads where the steady film has them; without `inner`, as a search for that begins.
+
+        Raises
+        ------
+        InputError : pads that find no place. Collective.
+        """
+        place, velocity = self.table.start_of(self.scene.place)
+        if course is not None:
+            place, velocity = np.array(course(0.0)), np.zeros(place.size)
+        if self.pads is None:
+            return place, velocity
+        changes = self.table.changes(0.0)
+        still: Any = as_scene(self.scene, changes) if changes else self.scene
+        still = still.moved(place).model_copy(update={"motion": None})
+        q = np.concatenate([place, type(self.pads)(still).start()[place.size :]])
+        if inner is not None:
+            solution = pads.solve(still, ask, inner)
+            if not solution.converged:
+                why = f"no steady film at t = 0: {solution.message}; motion.start = full needs none"
+                raise InputError(f"{self.scene.name}: {why}")
+            q[place.size :] = solution.settings["coordinates"][place.size :]
+            solution.destroy()
+        return q, np.concatenate([velocity, np.zeros(q.size - place.size)])
+
+    @contextmanager
+    def films(self, step: TimeStep, solution: Solution) -> Iterator[Films]:
+        """Of a solved step, with the modes by which the coordinates move them. Collective."""
+        problem: Any = solution.problem
+        if isinstance(problem, GroovedProblem):
+            with films_of(step, problem, solution.fields) as films:
+                yield replace(films, mine=[self._film(one) for one in films.mine])  # type: ignore[misc]
+            return
+        comm, modes = problem.grid.comm, self._modes(0.0)
+        film = PadFilm(problem, step.model, solution.fields, modes, range(len(modes)))
+        yield SideBySide(comm, comm, [film])
+
+    def _film(self, one: SolvedFilm) -> PadFilm:
+        if isinstance(self.scene, TiltingPadScene) and self.pads is not None:
+            return self.pads._pad(one)  # type: ignore[no-any-return]
+        return PadFilm(one.problem, one.film.model, one.fields, self._modes(one.first), (0, 1))
+
+    def _modes(self, first: float) -> list[Mode]:
+        if self.journal:
+            return displacements(self.scene.turning, first)
+        level: Mode = lambda x, y: np.ones(np.broadcast_shapes(np.shape(x), np.shape(y)))  # noqa: E731
+        return [level, *(self.scene.tilt_modes if self.pads is not None else ())]
+
+    def forces(self, step: TimeStep, solution: Solution, stiff: bool) -> tuple[Array, Array | None]:
+        """What the film of a solved step does to each, N or N m; with minus its derivatives by m and rad. Collective."""
+        problem: Any = solution.problem
+        whole = forces(problem, solution.fields["p"] * problem.p_unit)
+        first = np.array(whole["force"] if self.journal else [whole["load"]])
+        if self.pads is None and not stiff:
+            return first, None
+        each = np.eye(self.unit.size)
+        with self.films(step, solution) as films:
+            if self.pads is not None:
+                moments = films.sum(lambda one: sum(one.pushes(one.modes[k]) * each[one.numbers[k]] for k in self._tilts(one)))
+                first = np.array([*first, *moments[first.size :]])
+            return first, films.sum(lambda one: one.spread(stiffness(one.response()), each[0].size)) if stiff else None
+
+    def _tilts(self, film: PadFilm) -> Sequence[int]:
+        """Its modes that are no displacement of the whole."""
+        return range(2 if self.journal else 1, len(film.modes))
+
+    def told(self, place: Sequence[float]) -> dict[str, Any]:
+        """As numbers of an answer."""
+        found, first = [float(one) for one in place], 2 if self.journal else 1
+        tilts = {"pad_tilts": found[first:]} if self.pads is not None else {}
+        return {"journal": found[:2]} | tilts if self.journal else {"h_offset": found[0]} | tilts
