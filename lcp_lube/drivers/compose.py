@@ -72,7 +72,10 @@ def check(scene: Solvable, ask: Ask) -> None:
     ------
     InputError : names the option, the scene, and the reason.
     """
-    kind = getattr(scene, "problem_kind", "")
+    kind, order = getattr(scene, "problem_kind", ""), [*DRIVERS]
+    marches = getattr(scene, "motion", None) is not None  # which has checkpoints of its own, whatever solves its steps
     for name, option, reason in CANNOT:
+        if marches and option in ("checkpoint", "resume") and name in order[order.index("time") :]:
+            continue
         if getattr(ask, option) and (DRIVERS[name].load().applies(scene, ask) if name in DRIVERS else name == kind):
             raise InputError(f"--{option}: not for scene {scene.name} ({name}): {reason}")

@@ -17,6 +17,7 @@ from ..problems.film.grooves import GroovedProblem
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.stored import Stored
 from ..problems.film.supplies import supply_flows
+from ..problems.film.turned import TurnedProblem
 from ..problems.grid import Grid
 from ..problems.solution import Fields
 
@@ -101,7 +102,8 @@ class March:
             balance = problem.scheme.flow_unit * problem.flow(p, r)
             into += [problem.reduce.sum(np.where(inside, balance, 0.0)) for inside in problem.columns]
         size = 0.5 * (self.grid.spacing[1] if self.grid.dim == 2 else 1.0)
-        into += [flow / size for flow in supply_flows(problem, p, r)]
+        moving, own = (problem.moving, problem.there(fields)) if isinstance(problem, TurnedProblem) else (problem, fields)
+        into += [flow / size for flow in supply_flows(moving, own["p"], own["r"])]
         volume = self._sum(contents)
         rate = formula.weight * volume - formula.old(self.volumes)
         self.flowed += dt * sum(into)

@@ -92,9 +92,11 @@ class Rotor:
             size, thinnest = float(np.linalg.norm(move)), problem.reduce.min(problem.scheme.h)
             if size <= SMALLEST * thinnest:
                 return solution, q, ""
-            q = q + move / of.reach * min(1.0, NEAREST * thinnest / size)
+            longest = NEAREST * thinnest
+            q = q + np.clip(move, -longest, longest) / of.reach
             solution.destroy()
-        return solution, q, f"forces of {now:.1e} of the largest are left after {MOST} iterates of the place of what is free"
+        most = of.names[free[np.argmax(np.abs(left[free]))]]
+        return solution, q, f"forces of {now:.1e} of the largest are left after {MOST} iterates, most of them on {most}"
 
     def _first(self, q: Array, film_at: Callable[[Array], Solution]) -> tuple[Solution, Array]:
         """The film at the place that is expected, or where it has room on the way there."""

@@ -54,7 +54,12 @@ def models_of(scene: Any) -> Models:
 
     def at(t: float, place: Sequence[float] | None) -> Model:
         changes = table.changes(t) if table is not None else {}
-        now: Any = as_scene(scene, changes) if changes else scene
+        now: Any = scene
+        if changes:
+            try:
+                now = as_scene(scene, changes)
+            except InputError as error:
+                raise InputError(f"{error} (motion.set at t = {t:g} s)") from None
         now = now.at(t, travel(t), place)
         if not changes:
             extras = getattr(now, "bearing_numbers", None)
