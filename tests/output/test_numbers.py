@@ -42,6 +42,7 @@ def answers():
         "certify": printed(solve(load_scene("problem1", {"n": 20}), certify=True)),
         "round": printed(solve(load_scene("dimpled_pad", {"nx": 30, "ny": 30, "film.dimples.form": "round"}))),
         "deep": printed(solve(load_scene("pocketed_pad_2d", {"nx": 14, "ny": 9, "film.pocket.depth": 0.2}))),
+        "level": printed(solve("problem1", n=20, motion={"t_end": 0.01, "steps": 2, "set": {"h_offset": "1e-4*t"}})),
         "asperity": printed(solve("lined_pad", n=12, asperity={"sigma": 1e-6, "E_reduced": 1e11})),
         "balance": printed(solve(load_scene("pocketed_pad", {**film, "balance.load": 3e4}))),
     }
