@@ -112,7 +112,8 @@ def run(values: list[float], misplaced: list[float], sizes: list[float], tol: fl
     """The last estimate and the grids of a run to a tolerance; of one that these grids do not lead to its end no grids."""
     used, estimates = [0], [np.inf]
     while used[-1] < len(values):
-        found = estimate(*([row[k] for k in used] for row in (values, misplaced, sizes)))
+        v, m, fine = ([row[k] for k in used] for row in (values, misplaced, sizes))
+        found = estimate(v, m, fine)
         estimates[-1] = found.relative
         if found.relative <= tol:
             return found, used
@@ -156,7 +157,7 @@ def main(seed: int, count: int, kinds: str = "") -> None:
                 return abs(found.value / limit - 1) + LEAST, found.error / abs(limit) + LEAST
 
             for k in (k for k in range(3, len(v) + 1) if points[k - 1] <= TOLD):
-                rows.append((name, *told(estimate(v[:k], misplaced[:k], sizes[:k]))))
+                rows.append((name, *told(estimate(v[:k], misplaced[:k], sizes[:k], name))))
             for tol in TOLERANCES if name in MAIN else ():
                 found, used = run(v, misplaced, sizes, tol)
                 if used and points[used[-1]] <= TOLD:

@@ -32,6 +32,8 @@ FEW_KNOWN = 64  # of a line whose number is known: no coarser grid is cheaper
 JUMP, NEARLY = 1, 0.5  # doublings of the points a side at once, and part of a rung that is not worth one more
 ALGEBRAIC = 1e-3  # ||F|| relative to the tolerance: with many small cavities it leaves up to 60 times itself in a load
 ALLOWED = (1e-10, 0.5)  # tolerances
+SOON = 3e-3  # a tolerance below which most films in 2D end on grids for multigrid: its loops are loaded at once
+WHOLE = {True: 20_000, False: 1500}  # points up to which looking for symmetries costs what it saves, by multigrid or directly
 HOPELESS = 1_000_000  # points on which an estimate that has not come down is taken to stay up
 PATIENCE = 6  # grids without a better estimate: rounding dominates
 BLANK = 3  # grids without a value: a finer one is not expected to have it
@@ -95,7 +97,9 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         level_begin, before = perf_counter(), solution
         near = ask.start if before is None else _start(before, prod(shape)) if ask.nested is not False else None
         stopping = _stopping(ask.stopping, tol, before)
-        solution = inner(scene.with_shape(shape), replace(ask, accuracy=None, stopping=stopping, start=near, nested=False))
+        halved = ask.reduction and (len(shape) == 1 or prod(shape) > WHOLE[tol < SOON])
+        this = replace(ask, accuracy=None, stopping=stopping, start=near, nested=False, reduction=halved)
+        solution = inner(scene.with_shape(shape), replace(this, direct_below=0 if tol < SOON else None))
         if before is not None:
             before.destroy()
         problem = solution.problem
@@ -201,7 +205,7 @@ def _best(
     if np.isfinite(truth):
         above = max(1.0, abs(value / truth)) if truth else 1.0  # relative to the truth, not to a value that is too large
         return Estimate(value, above * abs(value - truth) + QUADRATURE * abs(value))
-    return estimate([found.get(name, np.nan) for found in history], misplaced, sizes)
+    return estimate([found.get(name, np.nan) for found in history], misplaced, sizes, name)
 
 
 def ladder(levels: list[dict[str, Any]], quantity: str, tol: float) -> list[str]:

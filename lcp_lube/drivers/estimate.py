@@ -38,10 +38,12 @@ from ..scenes.moving import motion_of
 from ..scenes.scene import Solvable
 
 MOVED, PART = 1.1, 0.75  # factor of n, and what is added of a correction
+NOISY = dict.fromkeys(("cavitated_area", "cavitated_fraction"), 2.0)  # the same beside it: chance has more part in these
 EXPECTED = 1.0 / 3.0  # of what corrections before lead one to expect of the last one, which can be small by chance
 SPAN = 12.0  # over the square of finest over coarsest grid: factor of n
 ENOUGH = 3.9  # finest over coarsest of grids that are enough without those before
 CLEAN = 0.01  # what moves of w leave over the last correction
+FEW = 100  # points of a line whose quadrature is asked
 QUADRATURE = 1e-9  # relative: what a line's quadrature may leave
 ANSWER = (1.0, 10.0)  # least and greatest answer to what is misplaced: relative change over share of Int h^-3
 UNSEEN = 0.05  # share of its h^-3 that the face must miss for a cell without a jump to count: a steep ramp, a narrow ridge
@@ -71,7 +73,7 @@ class Estimate:
         return self.error / abs(self.value) if self.value and isfinite(self.value) else inf
 
 
-def estimate(values: Sequence[float], misplaced: Sequence[float], finer: Sequence[float]) -> Estimate:
+def estimate(values: Sequence[float], misplaced: Sequence[float], finer: Sequence[float], name: str = "") -> Estimate:
     """The best value of a quantity and its error, from its values on grids from coarse to fine.
 
     Parameters
@@ -79,6 +81,7 @@ def estimate(values: Sequence[float], misplaced: Sequence[float], finer: Sequenc
     values : NaN where a grid gave none.
     misplaced : `misplaced_film` on the same grids.
     finer : how fine they are: meshes a side, over any number.
+    name : of the quantity, which may be one of NOISY.
     """
     v, m = np.array(values, dtype=float), np.array(finer, dtype=float)
     usable = np.flatnonzero(np.isnan(v))
@@ -96,10 +99,10 @@ def estimate(values: Sequence[float], misplaced: Sequence[float], finer: Sequenc
     few = max(1.0, SPAN * (m[0] / m[-1]) ** 2)
     left = few * float(np.max(np.abs(w[-1] - w[:-1][-2:]) * np.minimum(1.0, 4.0 * shrink)))
     noise = max(left, few * EXPECTED * float(np.max(np.abs(corrections[:-1][-2:]) * shrink)))
-    correction = float(corrections[-1])
+    correction, moved = float(corrections[-1]), MOVED * NOISY.get(name, 1.0)
     whole, film = abs(correction), _of_film(np.abs(steps), misplaced, last)
     clean = left < CLEAN * whole
-    of_grid, of_limit = whole + MOVED * noise, left if clean else MOVED * noise + (1.0 - PART) * whole
+    of_grid, of_limit = whole + moved * noise, left if clean else moved * noise + (1.0 - PART) * whole
     if of_limit < of_grid:
         return Estimate(last + (1.0 if clean else PART) * correction, max(of_limit, film), True)
     return Estimate(last, max(of_grid, film))
@@ -144,7 +147,8 @@ def known_numbers(scene: Solvable, comm: PETSc.Comm | None) -> dict[str, float] 
     model = getattr(scene, "model", None)
     if not isinstance(model, Model) or len(scene.shape) != 1 or model.law or model.effects or model.supplies or model.grooves:
         return None
-    problem = replace(model, scheme="face", mean_cubes=False, integrals=True).build(scene.shape, comm)
+    few = (min(scene.shape[0], FEW),)  # the quadrature is that of any grid
+    problem = replace(model, scheme="face", mean_cubes=False, integrals=True).build(few, comm)
     try:
         fields = known_fields(problem)
         return None if fields is None else scalars(problem.quantities(fields))
@@ -166,7 +170,7 @@ def misplaced_film(problem: Problem) -> float:
     for side in range(grid.dim):
         n, around = grid.shape[side], grid.with_neighbours(side)  # points, on the boundary and beyond it
         meshes = np.diff(around)
-        fine = (around[:-1, None] + _LOOKS * meshes[:, None]).ravel()
+        fine = (around[:-1] + _LOOKS[:, None] * meshes).ravel()
         face = around[:-1] + 0.5 * meshes
         across = 1 - side
         if grid.dim == 1:
@@ -178,22 +182,22 @@ def misplaced_film(problem: Problem) -> float:
             for at in (fine, face)
         ]
         told = problem.coefficients_for is not None
-        share += _misplaced(film[0].reshape(lines.size, n + 1, PARTS + 1), film[1], told)
+        share += _misplaced(film[0].reshape(lines.size, PARTS + 1, n + 1), film[1], told)
     return share
 
 
 def _misplaced(looks: np.ndarray, face: np.ndarray, told: bool) -> float:
-    """`misplaced_film` from the film at the looks, shape (lines, n + 1, PARTS + 1), and at the faces, shape (lines, n + 1).
+    """`misplaced_film` from the film at the looks, shape (lines, PARTS + 1, n + 1), and at the faces, shape (lines, n + 1).
 
     told : the scheme knows where the film jumps.
     """
     if not (looks.min() > 0 and face.min() > 0):
         return inf  # what the grid's own points do not show
-    weight = looks**-3.0
-    mean = weight @ _WEIGHTS
-    off = np.abs(face**-3.0 - mean)
-    spread = looks.max(axis=-1) - looks.min(axis=-1)
-    jump = np.abs(np.diff(looks, axis=-1)).max(axis=-1) > 0.5 * spread
-    seen = jump & (spread > 1e-9 * looks.mean(axis=-1))
+    mean = _WEIGHTS @ (1.0 / (looks * looks * looks))
+    off = np.abs(1.0 / face**3 - mean)
+    most = looks.max(axis=1)
+    spread = most - looks.min(axis=1)
+    jump = np.abs(np.diff(looks, axis=1)).max(axis=1) > 0.5 * spread
+    seen = jump & (spread > 1e-9 * most)
     seen = ~seen & (off > UNSEEN * mean) if told else seen | (off > UNSEEN * mean)
     return float(np.sum(off[seen]) / np.sum(mean))

@@ -45,10 +45,11 @@ def plan(facts: Facts, ask: Ask, scene: str) -> Plan:
         no_linear = system == "auto" and recipe is None and not nested and not options
         why_direct = ""
         if method == "active-set" and no_linear and _suits_multigrid(facts):
-            if facts.size > FEW:
+            few = FEW if ask.direct_below is None else ask.direct_below
+            if facts.size > few:
                 method = "fas"
             else:
-                why_direct = f"; {FEW} points and fewer are solved sooner than multigrid's loops are loaded"
+                why_direct = f"; {few} points and fewer are solved sooner than multigrid's loops are loaded"
         reason = METHODS[method].of(facts.kind).line + why_direct
         if facts.kind == "lubrication" and DIN_ONLY & set(options):
             method, reason = "din", f"{', '.join(sorted(DIN_ONLY & set(options)))} are its options"

@@ -5,9 +5,12 @@ from collections.abc import Sequence
 from datetime import date
 from hashlib import sha256
 from importlib.util import find_spec
+from math import isfinite
 from pathlib import Path
 from time import perf_counter, process_time
 from typing import Any
+
+from mpi4py import MPI
 
 from ..api import solve
 from ..base.options import LATE, set_names
@@ -19,8 +22,8 @@ from ..scenes.scene import Scene
 from .compare import exact_errors, read_off
 from .reference import WRONG, Reference
 
-# Outcomes of the charts, beside those of `Outcome`: left by us, and solved, but by the method's fallback.
-KRYLOV_LIMIT, FELL_BACK = "krylov_limit", "fell_back"
+# Outcomes of the charts, beside those of `Outcome`: left by us (two), and solved, but by the method's fallback.
+KRYLOV_LIMIT, TIME_LIMIT, FELL_BACK = "krylov_limit", "time_limit", "fell_back"
 RECORD = """outcome iterations linear_iterations centrality backtracking c1 c2 ksp_type pc_type load rupture min_p min_r
     machine load_average petsc date message""".split()  # noqa: SIM905
 
@@ -55,7 +58,7 @@ def environment() -> dict[str, str]:
 
 
 class _Enough(Exception):
-    """Leaves a run from within its monitor."""
+    """Leaves a run from within its monitor; its argument is the outcome."""
 
 
 def run(
@@ -63,6 +66,7 @@ def run(
     krylov_limit: float = float("inf"),
     reference: Reference | None = None,
     steps: list[Step] | None = None,
+    cpu_limit: float = float("inf"),
     **choices: Any,
 ) -> dict[str, Any]:
     """One run, however it ends: RECORD, `wall_s`, `cpu_s` (this rank's), errors and the rest of the JSON's keys. Collective.
@@ -76,24 +80,28 @@ def run(
         then known. Counted in iterations, not in seconds: a limit that falls on the same step on every machine.
     reference : gives `distance` and `reference`; a certified answer that is as far from it as WRONG is a wrong one.
     steps : filled with the record of every step.
+    cpu_limit : as `krylov_limit`, in seconds of the processor (of the rank that used most), where what is measured is seconds.
     """
     steps = [] if steps is None else steps
 
     def monitor(k: int, step: Step) -> None:
         steps.append(step)
         if sum(step.linear_iterations for step in steps) > krylov_limit:
-            raise _Enough
+            raise _Enough(KRYLOV_LIMIT)
+        if isfinite(cpu_limit) and MPI.COMM_WORLD.allreduce(process_time() - cpu_begin, MPI.MAX) > cpu_limit:
+            raise _Enough(TIME_LIMIT)
 
     begin, cpu_begin = perf_counter(), process_time()
     try:
         solution = solve(scene, monitor=monitor, **choices)
-    except _Enough:
+    except _Enough as enough:
+        limit = f"{krylov_limit:,.0f} Krylov iterations" if enough.args[0] == KRYLOV_LIMIT else f"{cpu_limit:g} s"
         counts = {name: sum(getattr(s, name) for s in steps) for name in ("linear_iterations", "centrality", "backtracking")}
         return {
             **{**environment(), **counts, "iterations": len(steps), "krylov": counts["linear_iterations"]},
             **{"wall_s": perf_counter() - begin, "cpu_s": process_time() - cpu_begin},
-            **{"outcome": KRYLOV_LIMIT, "c1": steps[-1].norm, "c2": steps[-1].step_norm},
-            "message": f"left after {krylov_limit:,.0f} Krylov iterations with ||F|| = {steps[-1].norm:.2e}",
+            **{"outcome": enough.args[0], "c1": steps[-1].norm, "c2": steps[-1].step_norm},
+            "message": f"left after {limit} with ||F|| = {steps[-1].norm:.2e}",
         }
     clocks = {"wall_s": solution.times["total"], "cpu_s": process_time() - cpu_begin}
     with solution:

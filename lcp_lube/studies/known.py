@@ -16,7 +16,7 @@ from .compare import read_off
 from .experiment import scene_key
 
 QUANTITIES = ("load", "p_max", "rupture")
-SIDES: tuple[int, ...] = (255, 511, 1023)  # spacings halve
+SIDES: tuple[int, ...] = (511, 1023, 2047)  # spacings halve
 QUICK_SIDES = (31, 63, 127)
 KEY = ("scene", "data", "sides")
 COLUMNS = (*QUANTITIES, *(f"{name}_unsure" for name in QUANTITIES), "how", "cpu_s", "machine")
@@ -40,7 +40,7 @@ def known_answer(scene: RectangleScene, path: Path, quick: bool = False) -> Know
     if len(scene.shape) == 1:
         sides = tuple(16 * n for n in sides)
     if cells := dimple_cells(scene):
-        sides = tuple(k * cells - 1 for k in (2, 4, 8))
+        sides = tuple(k * cells - 1 for k in (4, 8, 16))
     store = ResumableCsv(path, [*KEY, *COLUMNS], KEY)
     name, data = scene_key(scene)
     key = {"scene": name, "data": data, "sides": " ".join(map(str, sides))}
@@ -79,5 +79,5 @@ def fine(scene: RectangleScene, sides: tuple[int, ...]) -> dict[str, object]:
 
 def on_grid(scene: Scene) -> dict[str, float | None]:
     """The three numbers of this grid's own solution, to rounding. Collective."""
-    with solve(scene, method="active-set", stopping={"eps1": 1e-11}) as solution:
+    with solve(scene, method="fas", stopping={"eps1": 1e-12}) as solution:
         return read_off(solution.problem, as_dict(solution)) if solution.converged else dict.fromkeys(QUANTITIES)

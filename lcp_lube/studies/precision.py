@@ -23,7 +23,7 @@ from ..scenes.film_scene import RectangleScene
 from ..scenes.scene import Scene, load_scene
 from ..solvers.newton import Stopping
 from .compare import errors
-from .experiment import KRYLOV_LIMIT, open_store, run, scene_key
+from .experiment import KRYLOV_LIMIT, TIME_LIMIT, open_store, run, scene_key
 from .known import Known, dimple_cells, known_answer, on_grid
 from .log import write_log
 from .precision_picture import draw_all, seconds
@@ -68,6 +68,7 @@ FINEST = {1: (100_000,), 2: (1500, 1500)}  # grids that it may go to
 REPEATS = 3  # of which the median counts
 LONG = 0.3  # seconds; a longer run is not repeated: its clock is steady enough
 KRYLOV_MOST = 20_000  # iterations
+CPU_MOST = 10.0  # seconds of a run; it is left after the step that passes them
 ENOUGH = 3.0  # seconds; after such a run a configuration is not tried on larger grids
 
 MARKS = (
@@ -180,7 +181,7 @@ class Bench:
             scene = self.scene.with_shape((n,) * len(self.scene.shape))
             key = {**choices, "recipe": configuration.recipe or "default", "eps": eps, "n": n}
             row = self.row(store, key, scene, **choices, stopping=Stopping(eps, eps))
-            limits = (KRYLOV_LIMIT, Outcome.MAX_ITERATIONS)
+            limits = (KRYLOV_LIMIT, TIME_LIMIT, Outcome.MAX_ITERATIONS)
             if row is None or row["outcome"] in limits or float(row["cpu_s"]) > ENOUGH:
                 return
 
@@ -211,10 +212,10 @@ class Bench:
         if self.repeats > 1 and kind not in self._warm:  # what is compiled and loaded at first use is so before a clock runs
             self._warm.add(kind)
             small = QUICK_SIZES[len(scene.shape)][0]
-            run(scene.with_shape((small,) * len(scene.shape)), KRYLOV_MOST, **choices)
-        runs = [run(scene, KRYLOV_MOST, **choices)]
+            run(scene.with_shape((small,) * len(scene.shape)), KRYLOV_MOST, cpu_limit=CPU_MOST, **choices)
+        runs = [run(scene, KRYLOV_MOST, cpu_limit=CPU_MOST, **choices)]
         while len(runs) < (self.repeats if MPI.COMM_WORLD.bcast(runs[0]["wall_s"]) < LONG else 1):
-            runs.append(run(scene, KRYLOV_MOST, **choices))
+            runs.append(run(scene, KRYLOV_MOST, cpu_limit=CPU_MOST, **choices))
         clocks = {clock: f"{median(a_run[clock] for a_run in runs):.6f}" for clock in CLOCKS}
         found = runs[0].get("read_off")
         shape = tuple(runs[0][side] for side in ("nx", "ny") if runs[0].get(side))

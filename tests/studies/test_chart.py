@@ -257,6 +257,8 @@ def test_failures_are_rows_and_crosses(tmp_path: Path, monkeypatch: pytest.Monke
     assert int(store.rows[0]["linear_iterations"]) > 100
     assert "100 Krylov iterations" in store.rows[0]["message"]
     assert error(store.rows[0], "load") is None
+    slow = experiment.run(scene, cpu_limit=0.0, method="din")
+    assert slow["outcome"] == experiment.TIME_LIMIT and slow["iterations"] == 1 and "left after 0 s" in slow["message"]
     figure = against_seconds(store.rows, "load")
     crosses = [line for axes in figure.axes for line in axes.lines if line.get_marker() == "x" and len(line.get_xdata())]  # type: ignore[arg-type]
     assert [len(line.get_xdata()) for line in crosses] == [1]  # type: ignore[arg-type]
