@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from lcp_lube import InputError, load_scene, solve
-from lcp_lube.drivers.accuracy import finer, rungs_up
 from lcp_lube.drivers.estimate import Estimate, estimate, misplaced_film
+from lcp_lube.drivers.rungs import finer, rungs_up
 
 FINEST, TOLD = 300, 140  # points a side
 NAMES = ("load", "p_max", "friction", "cavitated_area")

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import count
-from math import ceil, inf, isfinite, log2, prod
+from math import ceil, inf, isfinite, prod
 from time import perf_counter
 from typing import Any
 
@@ -25,11 +25,9 @@ from .compose import Inner
 from .estimate import QUADRATURE, Estimate, estimate, follow, known_numbers, misplaced_film, scalars
 from .memory import DENSE, available
 from .plan import SMALL
+from .rungs import ASYMPTOTIC, finer, first_shape, round_ring, rungs_up
 
-COARSEST = {1: 12, 2: 4}  # points a side at least on the first grid
-FEW = {1: 12, 2: 100}  # points of the first grid at least: coarser ones cost as much, and tell less
 FEW_KNOWN = 64  # of a line whose number is known: no coarser grid is cheaper
-JUMP, NEARLY = 1, 0.5  # doublings of the points a side at once, and part of a rung that is not worth one more
 ALGEBRAIC = 1e-3  # ||F|| relative to the tolerance: with many small cavities it leaves up to 60 times itself in a load
 ALLOWED = (1e-10, 0.5)  # tolerances
 SOON = 3e-3  # a tolerance below which most films in 2D end on grids for multigrid: its loops are loaded at once
@@ -37,7 +35,6 @@ WHOLE = {True: 20_000, False: 1500}  # points up to which looking for symmetries
 HOPELESS = 1_000_000  # points on which an estimate that has not come down is taken to stay up
 PATIENCE = 6  # grids without a better estimate: rounding dominates
 BLANK = 3  # grids without a value: a finer one is not expected to have it
-ASYMPTOTIC = 0.1  # an estimate below it falls by second order at best
 BYTES, BYTES_FAS = {1: 900, 2: 1200}, 300  # memory of a point (`memory.MEASURED`)
 SMALL_CHANGE = 1e8  # bytes that every machine has
 RELATIVE_NORM = ("active-set", "fas")  # methods that measure ||F|| relative to the data
@@ -82,10 +79,11 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     fewest = model.fewest_meshes() if isinstance(model := getattr(scene, "model", None), Model) else ()
     known = known_numbers(scene, ask.comm)
     first = first_shape(scene.shape, fewest, finest, FEW_KNOWN if known else None)
+    first, unit = round_ring(scene, first, finest)
     kinds = [model.sides[2 * k : 2 * k + 2] if isinstance(model, Model) else () for k in range(len(first))]
     meshes = [n + 1.0 - sum(1.0 - OFFSET[side.kind] for side in ends) for n, ends in zip(first, kinds, strict=True)]
-    rung = next(k for k in count() if ask.mpi.size == 1 or finer(first, meshes, k)[-1] >= 2 * ask.mpi.size)
-    shape = finer(first, meshes, rung)
+    rung = next(k for k in count() if ask.mpi.size == 1 or finer(first, meshes, k, unit)[-1] >= 2 * ask.mpi.size)
+    shape = finer(first, meshes, rung, unit)
     sizes: list[float] = []  # meshes a side
     solution: Solution | None = None
     history: list[dict[str, float]] = []
@@ -128,7 +126,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         times = added(times, solution.times)
         end = _end(estimates, values, tol, problem.grid.size)
         for up in range(0 if end else rungs_up(estimates, tol, known is not None, len(first)), 0, -1):
-            shape = finer(first, meshes, rung + up)
+            shape = finer(first, meshes, rung + up, unit)
             if not (end := _no_room(solution, shape, finest, best.relative, tol)):
                 rung += up
                 break
@@ -152,44 +150,6 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     solution.levels = levels
     solution.times = {**times, "total": perf_counter() - begin}
     return solution
-
-
-def first_shape(
-    shape: tuple[int, ...], fewest: Sequence[int] = (), finest: tuple[int, ...] | None = None, few: int | None = None
-) -> tuple[int, ...]:
-    """The first grid, of the scene's own proportions: FEW points, or fewer, so that `finest` leaves room for three grids.
-
-    fewest : meshes a side, without which a film's straight edges find no lines: coarser grids would tell nothing of it. Heeded
-        where that is no finer than the scene's own grid, or `finest`.
-    few : points, in the place of FEW.
-    """
-    most, few = finest or shape, few or FEW[len(shape)]
-
-    def enough(n: tuple[int, ...], now: tuple[int, ...]) -> bool:
-        cramped = any(2 * points >= end for points, end in zip(now, most, strict=True)) if finest else False
-        return min(n) >= COARSEST[len(n)] and (prod(n) >= few or cramped)
-
-    while enough(half := tuple((n - 1) // 2 for n in shape), shape):
-        shape = half
-    short = max((meshes / (n + 1) for n, meshes in zip(shape, fewest, strict=False)), default=0.0)
-    first = tuple(ceil(short * (n + 1)) - 1 for n in shape)
-    return first if short > 1.0 and all(n <= m for n, m in zip(first, most, strict=True)) else shape
-
-
-def finer(shape: tuple[int, ...], meshes: Sequence[float], rung: int) -> tuple[int, ...]:
-    """The grid so many rungs above one of this shape and these meshes a side: each has twice the points of the one before, in
-    the plane every other one half the spacing. The same on any number of ranks."""
-    doublings, odd = divmod(rung, 2) if len(shape) == 2 else (rung, 0)
-    more = [max(1, round((2.0**0.5 - 1.0) * m)) * odd for m in meshes]
-    return tuple(n + k + round((2**doublings - 1) * (m + k)) for n, m, k in zip(shape, meshes, more, strict=True))
-
-
-def rungs_up(estimates: Sequence[float], tol: float, known: bool, dim: int) -> int:
-    """How many rungs the next grid lies above this one: the first that reaches the tolerance, if an estimate below ASYMPTOTIC
-    (of three grids, or of one whose error is known) falls by second order; at most JUMP doublings of the points a side."""
-    if not (known or len(estimates) >= 3) or not estimates[-1] < ASYMPTOTIC:
-        return 1
-    return min(max(1, ceil(0.5 * dim * log2(estimates[-1] / tol) - NEARLY)), dim * JUMP)
 
 
 def _best(

@@ -8,8 +8,8 @@ import pytest
 from films import FilmScene, L, Pieces, random_films
 
 from lcp_lube.api import solve
-from lcp_lube.drivers.accuracy import finer, first_shape, rungs_up
 from lcp_lube.drivers.estimate import estimate, known_numbers, misplaced_film
+from lcp_lube.drivers.rungs import finer, first_shape, round_ring, rungs_up
 from lcp_lube.errors import InputError
 from lcp_lube.problems.solution import Outcome
 from lcp_lube.registry import scene_names
@@ -307,3 +307,24 @@ def test_ranks(cli, ranks):
     assert more["converged"]
     assert [level["nx"] for level in more["levels"]] == [level["nx"] for level in one["levels"]]
     assert more["load"] == pytest.approx(one["load"], rel=1e-6)
+
+
+def test_rings_whose_edges_lie_on_points():
+    """All grids of a ladder are multiples of the meshes that put every groove's edge on a point, where so few will do."""
+    scene = load_scene("two_groove_journal")
+    first, unit = round_ring(scene, (89, 5))
+    assert (first, unit) == ((90, 5), 18)  # edges at 0, 20, 180, 200 degrees
+    assert all(finer(first, (90.0, 6.0), k, unit)[0] % 18 == 0 for k in range(8))
+    assert [finer(first, (90.0, 6.0), k, unit)[0] for k in (2, 4)] == [180, 360]
+    assert round_ring(scene, (89, 5), finest=(89, 5)) == ((89, 5), 1)
+    odd = load_scene("two_groove_journal", {"groove_deg": 13.7})
+    assert round_ring(odd, (89, 5)) == ((89, 5), 1)
+    assert round_ring(load_scene("journal"), (89, 19)) == ((89, 19), 1)
+
+
+def test_a_load_on_a_ring_with_grooves_to_a_per_cent():
+    """Edges 30 degrees wide at 80, 200 and 310: 288 points around, where grids that miss the edges take 712."""
+    scene = load_scene("two_groove_journal", {"groove_deg": 30, "grooves_deg": [80, 200, 310]})
+    with solve(scene, accuracy=1e-2) as found:
+        assert found.converged and found.problem.grid.shape == (288, 15)
+        assert abs(found.load / 1554.3 - 1) < 1e-2  # limit of 720 and 1440 points around
