@@ -24,13 +24,13 @@ from .chain import added
 from .compose import Inner
 from .estimate import QUADRATURE, Estimate, estimate, follow, known_numbers, misplaced_film, scalars
 from .memory import DENSE, available
-from .plan import SMALL
+from .plan import FEW, SMALL
 from .rungs import ASYMPTOTIC, finer, first_shape, round_ring, rungs_up
 
 FEW_KNOWN = 64  # of a line whose number is known: no coarser grid is cheaper
 ALGEBRAIC = 1e-3  # ||F|| relative to the tolerance: with many small cavities it leaves up to 60 times itself in a load
 ALLOWED = (1e-10, 0.5)  # tolerances
-SOON = 3e-3  # a tolerance below which most films in 2D end on grids for multigrid: its loops are loaded at once
+SOON = 3e-3  # a tolerance below which most films in 2D end on grids for multigrid
 WHOLE = {True: 20_000, False: 1500}  # points up to which looking for symmetries costs what it saves, by multigrid or directly
 HOPELESS = 1_000_000  # points on which an estimate that has not come down is taken to stay up
 PATIENCE = 6  # grids without a better estimate: rounding dominates
@@ -90,14 +90,14 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     misplaced: list[float] = []
     levels: list[dict[str, Any]] = []
     times: dict[str, float] = {}
-    end, best = "", Estimate(np.nan, inf)
+    end, best, soon = "", Estimate(np.nan, inf), tol < SOON
     while not end:
         level_begin, before = perf_counter(), solution
         near = ask.start if before is None else _start(before, prod(shape)) if ask.nested is not False else None
         stopping = _stopping(ask.stopping, tol, before)
-        halved = ask.reduction and (len(shape) == 1 or prod(shape) > WHOLE[tol < SOON])
+        halved = ask.reduction and (len(shape) == 1 or prod(shape) > WHOLE[soon])
         this = replace(ask, accuracy=None, stopping=stopping, start=near, nested=False, reduction=halved)
-        solution = inner(scene.with_shape(shape), replace(this, direct_below=0 if tol < SOON else None))
+        solution = inner(scene.with_shape(shape), replace(this, direct_below=0 if soon else None))
         if before is not None:
             before.destroy()
         problem = solution.problem
@@ -111,6 +111,8 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         misplaced.append(misplaced_film(problem))
         sizes.append(prod(problem.grid.meshes) ** (1.0 / len(first)))
         best = _best(quantity, history, misplaced, sizes, known)
+        # Where the last grid will be one for multigrid (second order: points as 1/error) its loops serve those before it too.
+        soon = soon or inf > best.relative > 3 * FEW / problem.grid.size * tol
         levels.append(
             {
                 **dict(zip(("nx", "ny"), problem.grid.shape, strict=False)),
