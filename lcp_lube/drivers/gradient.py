@@ -73,7 +73,7 @@ def gradient_of(solution: Solution, quantity: str, keys: Sequence[str]) -> dict[
     scene = placed(_scene(solution), solution)
     out = {}
     for text in keys:
-        key = key_of(scene, text)
+        key = text if text in found.gradient else key_of(scene, text)  # placed, it has no balance.load
         if key in found.held:
             raise InputError(f"{text}: no derivative: {found.held[key]}")
         out[text] = found.gradient[key]

@@ -186,6 +186,7 @@ def test_through_what_was_found_and_what_stands_around_it(name, changes):
         assert load.gradient["balance.load"] == pytest.approx(1.0) and not any(
             v for k, v in load.gradient.items() if k != "balance.load"
         )
+        assert solution.gradient("load", ["balance.load"]) == {"balance.load": pytest.approx(1.0)}
     solution.destroy()
 
 
