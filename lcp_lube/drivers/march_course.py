@@ -1,5 +1,6 @@
 """A march in time as scenes near by have it: the equations of its steps at the fields that were found."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,7 +19,7 @@ from .step import TimeStep, contents
 
 @dataclass(frozen=True)
 class Kept:
-    """A step's end; p in Pa above p_c. dry : as the film's own. place : of the journal."""
+    """A step's end; p in Pa above p_c. dry : as the film's own. place : of the journal. pressures : of the supplies."""
 
     t: float
     dt: float
@@ -26,6 +27,7 @@ class Kept:
     r: Array
     dry: Array | None
     place: Any
+    pressures: tuple[float, ...] = ()
 
 
 class Trace:
@@ -38,10 +40,20 @@ class Trace:
     def __call__(self, moment: Moment) -> None:
         problem, row = moment.problem, moment.row
         if not self.steps and moment.before is not None:
-            self.begun = Kept(0.0, 0.0, moment.before["p"] * problem.p_unit, moment.before["r"].copy(), None, None)
+            p = moment.before["p"] * problem.p_unit
+            self.begun = Kept(0.0, 0.0, p, moment.before["r"].copy(), None, None, _pressures(problem, p))
         place = np.array([row["journal_x"], row["journal_y"]]) if "journal_x" in row else None
         p, r = moment.fields["p"] * problem.p_unit, moment.fields["r"].copy()
-        self.steps.append(Kept(moment.t, row["dt"], p, r, problem.dry, place))
+        self.steps.append(Kept(moment.t, row["dt"], p, r, problem.dry, place, _pressures(problem, p)))
+
+
+def _pressures(problem: Any, p: Array) -> tuple[float, ...]:
+    """Of the supplies, Pa above p_c, from the film's at their points. Collective."""
+    held = problem.held
+    owner = held.owner.ravel() if held is not None else None
+    return tuple(
+        problem.reduce.max(np.where(owner == k, p, -np.inf)) for k in range(len(held.supplies) if held is not None else 0)
+    )
 
 
 def check_march(scene: Scene) -> None:
@@ -49,7 +61,7 @@ def check_march(scene: Scene) -> None:
     model: Any = scene.models()(0.0, None)  # type: ignore[attr-defined]
     for found, what in (
         (bool(model.effects) or (model.law is not None and model.law.dowson_higginson), "effects and densities that change"),
-        (any(one.open for one in model.supplies), "supplies whose pressures follow"),
+        (any(one.open for one in model.supplies) and scene.motion.free, "supplies that follow beside a journal that is free"),  # type: ignore[attr-defined]
         (model.U < 0, "a wall that moves to smaller x (give the mirror image, with -U)"),
         (hasattr(scene, "observer"), "events"),
         (getattr(scene, "pads_follow", False), "pads that follow"),
@@ -109,15 +121,15 @@ class Course:
             self.known[n] = contents(self.grid, self.film(n), None if kept is None else {"r": kept.r})
         return self.known[n]
 
-    def at(self, n: int, shift: Any = 0.0) -> Equations:
-        """G and Q of step n; n = 0: of the steady film that it begins with."""
+    def at(self, n: int, shift: Any = 0.0, pressures: Sequence[float] = ()) -> Equations:
+        """G and Q of step n; n = 0: of the steady film that it begins with. pressures : of the supplies, other than its own."""
         model, kept = self.film(n, shift), self.kept(n)
         assert kept is not None  # as its caller asks for no others
         if n:
             formula = self.formula(n)
             old = formula.old([self.content(n - 1), self.content(n - 2) if formula.before else None])
             model = replace(model, stored=Stored(formula.weight, old, self.grid))
-        return Equations(TimeStep(self.scene, model, self.grid), self.comm, dry=kept.dry)  # type: ignore[arg-type]
+        return Equations(TimeStep(self.scene, model, self.grid), self.comm, pressures or kept.pressures, dry=kept.dry)  # type: ignore[arg-type]
 
     def destroy(self) -> None:
         self.grid.destroy()

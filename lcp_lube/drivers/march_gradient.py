@@ -7,7 +7,8 @@ earlier fields are the contents u = h (1 - r) of cells of size s, d/dt u ~ w_n u
     dQ/da = d/da [ Q - sum over n of lambda_n' G_n ] at held z:
 
 one transposed solve a step and quantity, whatever the number of parameters. A journal that is free adds its place e_n and speed
-v_n, with V_n = v_n - d/dt e and E_n = m c d/dt v - F(z_n) - W: G_n(e_n) makes their adjoints four numbers a step.
+v_n, with V_n = v_n - d/dt e and E_n = m c d/dt v - F(z_n) - W: G_n(e_n) makes their adjoints four numbers a step. A supply
+whose pressure P_n follows adds what its source and the film disagree by, M_n(z_n, P_n) = 0, and one number a step.
 """
 
 from collections.abc import Sequence
@@ -27,11 +28,12 @@ from ..scenes.values import values_of, with_values
 from .adjoint import scale_of
 from .ask import Ask
 from .compose import solve
-from .equations import Equations, cavity_of, right_side, unknowns
+from .equations import MISFIT, Equations, cavity_of, right_side, unknowns
 from .linearised import Linear
 from .march_course import Course, Trace, check_march
 
 MEAN = "mean_"  # of a quantity: its mean over the march, of the steps' ends
+STEP = 1e-3  # of a supply's pressure, in which G and what it is told by are linear
 NUDGE = 1e-5  # of the thinnest film: of the journal's place, for differences
 HELD = ("t_end", "dt", "tol")
 STEPS = "the steps in time are held"
@@ -58,6 +60,7 @@ class MarchGradient:
         self.scene, self.trace, self.comm, self.names = scene, trace, comm, list(dict.fromkeys(quantities))
         self.lambdas: dict[str, list[Any]] = {name: [None] * (len(trace.steps) + 1) for name in self.names}
         self.journal: dict[str, Array] = {name: np.zeros((len(trace.steps) + 1, 4)) for name in self.names}  # of E and V
+        self.fed: dict[str, list[Any]] = {name: [np.zeros(0)] * (len(trace.steps) + 1) for name in self.names}  # of supplies
         self.units: dict[int, float] = {}  # of flow, of each step
         self.sizes = dict.fromkeys(self.names, 0.0)
         self.report: dict[str, float] = {}
@@ -116,12 +119,17 @@ class MarchGradient:
         linear = Linear(problem, cavity, entries, eq.held)
         z = unknowns(cavity, p, r, problem.p_unit)
         some = [*rows.values(), *(right_side(slopes, {force: 1.0}, cavity) for force in forces)]
+        off = [eq.partials(numbers, name) for name in told if name.startswith(MISFIT)]
+        by_flow = {part: eq.slope(p, r, part) for part in dict.fromkeys(part for one in off for part in one)}
+        some += [right_side(by_flow, one, cavity) for one in off]
         solved = linear.solve_transposed(some, z)
         linear.destroy()
         self.units[n], terms = problem.scheme.flow_unit, eq.terms(p, r) / problem.scheme.flow_unit
         found = dict(zip(rows, solved, strict=False))
         if forces:
             self._place(n, found, solved[-2:], later)
+        if off:
+            self._feed(n, found, solved[-len(off) :])
         for name, one in found.items():
             self.lambdas[name][n] = one
             own = sum(abs(w * numbers[part]) for part, w in parts.get(name, {}).items())
@@ -156,6 +164,31 @@ class MarchGradient:
             self.journal[name][n] = *one, *(inertia * (mu - weight * one))
             found[name] = found[name] + one[0] * pushed[0] + one[1] * pushed[1]
 
+    def _feed(self, n: int, found: dict[str, Array], answers: list[Array]) -> None:
+        """Adjoints of step n's supplies; those of the film with them. answers : J'^-1 of what they disagree by."""
+        kept, dot = self.course.kept(n), self.course.grid.reduce.dot
+        assert kept is not None  # as `_back` asks
+        by_p = []  # of G and the numbers told, by the pressure of each
+        for k, one in enumerate(self.course.film(n).supplies):
+            if not one.open:
+                continue
+            P = np.array(kept.pressures)
+            d = STEP * (abs(P[k]) or P.max() or 1.0)
+            ends = []
+            for change in (d, -d):
+                eq = self.course.at(n, pressures=[*P[:k], P[k] + change, *P[k + 1 :]])
+                ends.append((self._scaled(n, eq), eq.report(eq.numbers(kept.p, kept.r))))
+                eq.destroy()
+            (G, above), (G_below, below) = ends
+            by_p.append(((G - G_below) / (2.0 * d), {name: (above[name] - below[name]) / (2.0 * d) for name in above}))
+        misfits = [name for name in by_p[0][1] if name.startswith(MISFIT)]
+        C = np.array([[told[name] - dot(one, G) for name, one in zip(misfits, answers, strict=True)] for G, told in by_p])
+        for name in self.names:
+            base, share = self._asked(n).get(name, ("", 0.0))
+            own = [share * told.get(base, 0.0) - dot(found[name], G) for G, told in by_p]
+            self.fed[name][n] = one = np.linalg.solve(C, own)
+            found[name] = found[name] - sum(part * answer for part, answer in zip(one, answers, strict=True))
+
     def _scaled(self, n: int, eq: Equations) -> Array:
         """G of step n in the units of its adjoints."""
         kept = self.course.kept(n)
@@ -181,8 +214,10 @@ class MarchGradient:
                 rest[:2] = inertia * (formula.weight * own - formula.old(at)) - course.table.load_at(kept.t)
                 rest[:2] -= numbers["force_x"], numbers["force_y"]
                 rest[2:] = own - (formula.weight * places[0] - formula.old(places[1:]))
+            off = np.array([value for name, value in told.items() if name.startswith(MISFIT)])
             for name in self.names:
                 total[name] -= dot(self.lambdas[name][n], G) + float(self.journal[name][n] @ rest)
+                total[name] -= float(self.fed[name][n] @ off)
             eq.destroy()
         return np.array([total[name] for name in self.names])
 

@@ -29,7 +29,8 @@ def _collect(value: Any, path: str, found: dict[str, float]) -> None:
         for key, inner in value.items():
             _collect(inner, f"{path}.{key}" if path else key, found)
     elif isinstance(value, list):
-        names = [one.get("shape") if isinstance(one, dict) else None for one in value]
+        named = path == "film"  # of others the shape may be a default, which is not written
+        names = [one.get("shape") if named and isinstance(one, dict) else None for one in value]
         for k, (name, one) in enumerate(zip(names, value, strict=True), start=1):
             _collect(one, f"{path}.{name if name and names.count(name) == 1 else k}", found)
     elif isinstance(value, float):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lcp_lube import solve
-from lcp_lube.drivers import rotor
+from lcp_lube.drivers import rotor, supplies
 from lcp_lube.drivers.gradient import check, gradients
 from lcp_lube.drivers.march_course import Trace
 from lcp_lube.drivers.march_gradient import means
@@ -16,10 +16,29 @@ PUSH = ["2000*exp(-400*(mod(50*t,1)-0.1)^2)", "900.0"]
 TEXTURE = {"t_end": 0.01, "steps": 7}
 FREE = {"t_end": 0.002, "steps": 4, "free": True, "mass": 15.0, "load": PUSH}
 ON_A_COURSE = {"t_end": 0.002, "steps": 5, "journal": ["0.5 + 0.2*cos(400*t)", "0.2*sin(400*t)"]}
+SUPPLIES = [
+    {"x_mm": [12.3, 14.1], "restrictor": "capillary", "K": 1e-11, "p_s": 8e6, "backflow": True},
+    {"x_mm": [2.1, 2.9], "flow": 2e-6},
+]
 CASES = {
     "texture": ("moving_texture", {"n": 40, "motion": TEXTURE}, ["fluid.mu", "film.constant.h", "fluid.p_supply"]),
     "euler": ("moving_texture", {"n": 40, "motion": {**TEXTURE, "scheme": "euler", "start": "full"}}, ["fluid.mu"]),
     "barus": ("moving_texture", {"n": 40, "fluid.barus": 2e-8, "motion": TEXTURE}, ["fluid.barus", "fluid.mu"]),
+    "supplies": (
+        "moving_texture",
+        {"n": 40, "motion": TEXTURE, "supply": SUPPLIES},
+        ["fluid.mu", "supply.1.K", "supply.2.flow"],
+    ),
+    "orifice, barus, euler": (
+        "moving_texture",
+        {
+            "n": 40,
+            "motion": {**TEXTURE, "scheme": "euler"},
+            "fluid.barus": 2e-8,
+            "supply": [{**SUPPLIES[0], "restrictor": "orifice", "K": 1e-8}],
+        },
+        ["supply.1.p_s", "fluid.barus"],
+    ),
     "course": ("dynamic_journal", {"nx": 24, "motion": ON_A_COURSE}, ["film.journal.c", "U", "sides.south.p"]),
     "free": (
         "dynamic_journal",
@@ -42,6 +61,7 @@ def marched(scene, names):
 @pytest.mark.parametrize("case", CASES)
 def test_against_differences_of_marches(case, monkeypatch):
     monkeypatch.setattr(rotor, "TOL", 1e-11)
+    monkeypatch.setattr(supplies, "TOLERANCE", 1e-13)
     name, changes, keys = CASES[case]
     scene, names = load_scene(name, **changes), ["load", "mean_load", "friction", "mean_friction", "p_max"]
     trace = Trace()
