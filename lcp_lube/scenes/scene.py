@@ -222,7 +222,7 @@ def family_of(source: str | Path, family: Any) -> Any:
 
 
 def parse_changes(assignments: Iterable[str]) -> dict[str, Any]:
-    """{'h_min': 1e-5} from ['h_min=1e-5']; values as TOML, bare words as strings.
+    """{'h_min': 1e-5} from ['h_min=1e-5']; values as TOML, bare words as strings; balance=none leaves a table or a number out.
 
     Raises
     ------
@@ -233,7 +233,7 @@ def parse_changes(assignments: Iterable[str]) -> dict[str, Any]:
         key, equals, value = (part.strip() for part in text.partition("="))
         if not (key and equals and value):
             raise InputError(f"--set {text}: KEY=VALUE is needed")
-        changes[key] = _value(value)
+        changes[key] = None if value == "none" and "." not in key else _value(value)
     return changes
 
 

@@ -153,7 +153,7 @@ def test_a_folder_is_no_scene(tmp_path):
 
 def test_parse_changes():
     given = ["h_min=1e-5", " n = 7", "film=parabola", "wave=[0.1, 0.9]", "mean_cubes=true", "U=1", "U=2", 'name="a=b"']
-    assert parse_changes(given) == {
+    assert parse_changes([*given, "balance=none"]) == {
         "h_min": 1e-5,
         "n": 7,
         "film": "parabola",
@@ -161,6 +161,7 @@ def test_parse_changes():
         "mean_cubes": True,
         "U": 2,
         "name": "a=b",
+        "balance": None,
     }
 
 
