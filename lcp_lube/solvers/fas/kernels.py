@@ -189,12 +189,10 @@ def lost_void(b_E: Array, b_W: Array, b_C: Array) -> tuple[float, float]:
 
 
 @kernel
-def pressure_and_void(z: Array, b_C: Array) -> tuple[Array, Array]:
-    """p and r of z, whose frame is left out."""
-    p, r = np.empty(z.shape), np.empty(z.shape)
+def pressure_and_void(z: Array, b_C: Array, p: Array, r: Array) -> None:
+    """Into p and r those of z, whose frame is left out."""
     for j in range(z.shape[0]):
         for i in range(z.shape[1]):
             here = z[j, i]
             p[j, i] = here if here > 0.0 else 0.0
             r[j, i] = here / b_C[j, i] if here < 0.0 else 0.0
-    return p, r

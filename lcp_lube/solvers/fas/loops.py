@@ -58,10 +58,7 @@ def pressure_and_void(z: Array, scheme: BoxScheme, grid: Grid) -> tuple[Array, A
     """p and r of the owned points."""
     p, r = np.empty(z.shape), np.empty(z.shape)
 
-    def read(rows: slice) -> None:
-        p[rows], r[rows] = kernels.pressure_and_void(z[rows], scheme.rows(rows).b_C)
-
-    each_strip(grid, read)
+    each_strip(grid, lambda rows: kernels.pressure_and_void(z[rows], scheme.rows(rows).b_C, p[rows], r[rows]))
     return p, r
 
 
