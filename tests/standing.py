@@ -15,8 +15,23 @@ import marshal
 import os
 import sys
 
-# Of a launcher of MPI jobs, read when MPI starts; and what has no meaning for a command.
-LAUNCHER = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "ORTE_", "PRRTE_", "HFI_", "IPATH_", "PWD", "OLDPWD", "PYTEST_", "_", "SHLVL")
+# Of a launcher of MPI jobs, read when MPI starts; what is looked up when it is needed; what has no meaning for a command.
+LAUNCHER = (
+    "OMPI_",
+    "PMIX_",
+    "PMI_",
+    "PRTE_",
+    "ORTE_",
+    "PRRTE_",
+    "HFI_",
+    "IPATH_",
+    "PWD",
+    "OLDPWD",
+    "PYTEST_",
+    "_",
+    "SHLVL",
+    "PATH",
+)
 FORWARDED = (_signal.SIGINT, _signal.SIGTERM, _signal.SIGHUP, _signal.SIGQUIT, _signal.SIGUSR1, _signal.SIGUSR2)
 
 
@@ -49,6 +64,7 @@ def told(connection: "_socket.socket") -> int:
 
 def preload() -> None:
     """Import what a command may import, MPI and PETSc without starting them, and leave these two to be found when they are."""
+    import contextlib
     import gc
     import importlib.abc
     import importlib.machinery
@@ -66,6 +82,9 @@ def preload() -> None:
     for module in pkgutil.walk_packages(lcp_lube.__path__, "lcp_lube."):
         if not module.name.endswith("__main__"):
             importlib.import_module(module.name)
+    with contextlib.suppress(ImportError):
+        import matplotlib.backends.backend_agg
+        import matplotlib.figure  # noqa: F401
     if MPI.Is_initialized() or PETSc.Sys.isInitialized():
         raise RuntimeError("an import has started MPI or PETSc")
 

@@ -8,9 +8,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from test_readme import environment, run
-
-__all__ = ["environment"]  # the fixture, with `lcp-lube` on the path
+from conftest import python
+from test_readme import run, with_command
 
 GUIDE = Path(__file__).parents[2] / "docs" / "guide"
 PAGES = {page.stem: page.read_text(encoding="utf-8") for page in sorted(GUIDE.glob("*.md"))}
@@ -54,6 +53,11 @@ def test_the_scene_reference_is_current():
     module = importlib.util.module_from_spec(specification)
     specification.loader.exec_module(module)
     assert module.page() == PAGES["scenes"]
+
+
+@pytest.fixture
+def environment(tmp_path):
+    return with_command(tmp_path, python())
 
 
 @pytest.mark.parametrize("page", [*PAGES])

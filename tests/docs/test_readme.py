@@ -2,6 +2,7 @@
 
 import os
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -20,14 +21,19 @@ SCENES = [block for kind, block in BLOCKS if kind == "toml"]
 SETUP = r"make( |$)|conda |pip |python3 -m venv |export |source |git |sudo |apt"
 
 
-@pytest.fixture
-def environment(tmp_path):
-    """With `lcp-lube` on the path, installed or not."""
+def with_command(tmp_path, python):
+    """Variables with `lcp-lube` on the path, installed or not."""
     shim = tmp_path / "bin" / "lcp-lube"
     shim.parent.mkdir()
-    shim.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m lcp_lube "$@"\n')
+    shim.write_text(f'#!/bin/sh\nexec {shlex.join(python)} -m lcp_lube "$@"\n')
     shim.chmod(0o755)
     return {"PATH": f"{shim.parent}{os.pathsep}{os.environ['PATH']}"}
+
+
+@pytest.fixture
+def environment(tmp_path):
+    """What stands first is run as a user runs it, in new processes."""
+    return with_command(tmp_path, [sys.executable])
 
 
 def run(command, tmp_path, environment):

@@ -8,11 +8,10 @@ import sys
 from pathlib import Path
 
 import pytest
-from test_readme import environment, run
+from conftest import python
+from test_readme import run, with_command
 
 from lcp_lube.registry import METHODS
-
-__all__ = ["environment"]
 
 ROOT = Path(__file__).parents[2]
 NAVIGATION = runpy.run_path(str(ROOT / "docs" / "site" / "navigation.py"))
@@ -33,6 +32,11 @@ def test_every_page_has_its_place_once() -> None:
     assert there - {"docs/index"} <= set(places)
     for names in NAVIGATION["SECTIONS"].values():
         assert all(name.endswith("*") or (ROOT / f"{name}.md").is_file() for name in names)
+
+
+@pytest.fixture
+def environment(tmp_path: Path) -> dict[str, str]:
+    return with_command(tmp_path, python())
 
 
 @pytest.mark.parametrize("name", METHODS)
