@@ -15,7 +15,7 @@ export PRTE_MCA_rmaps_default_mapping_policy := :oversubscribe
 # The ranks are the parallelism; threads inside each would only compete.
 export OMP_NUM_THREADS := 1
 
-.PHONY: help setup demo test coverage test-rounding test-petsc-new boundscheck mutations lint format charts pictures docs links man paper dist clean
+.PHONY: help setup demo test coverage test-rounding test-petsc-new boundscheck mutations lint loops format charts pictures docs links man paper dist clean
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | expand -t 16
@@ -30,8 +30,14 @@ $(READY): pyproject.toml tools/setup.sh
 demo: $(READY) ## solve problem 4 and draw it: problem4.png
 	$(BIN)/lcp-lube solve problem4 --n 100 --plot problem4.png
 
-test: lint ## ruff, mypy, then all tests
+test: $(READY) ## ruff, mypy, then all tests
+	$(MAKE) --no-print-directory -j 2 lint loops
 	$(PYTEST) || $(ALONE)
+
+# Beside mypy, once for a clone: else two processes of tests compile the same at the same time.
+loops: $(READY)
+	for words in "solve obstacle_bratu" "sensitivity journal" "coefficients journal"; do \
+	  $(BIN)/lcp-lube $$words --method fas > /dev/null || exit; done
 
 # Following every line takes half as long again as the tests.
 coverage: $(READY) ## which lines the tests run

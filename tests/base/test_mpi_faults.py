@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from conftest import ENVIRONMENT, TESTS, gone, without_notices
@@ -49,21 +50,34 @@ class Job:
         return self.process.returncode, lines, seconds
 
 
-@pytest.mark.parametrize(
-    "failure, status, message",
-    [
-        ("error", 1, "ZeroDivisionError: on purpose"),
-        ("input", 2, "lcp-lube: bad on purpose"),
-        ("memory", 2, "lcp-lube: not enough memory; fewer points or more ranks are needed"),
-        ("interrupt", 130, "lcp-lube: interrupted"),
-    ],
-)
-def test_an_exception_on_one_rank(tmp_path, failure, status, message):
-    job = Job(failure, tmp_path)
-    ended, lines, seconds = job.end()
-    assert ended == status and lines[-1] == message
+EXCEPTIONS = {
+    "error": (1, "ZeroDivisionError: on purpose"),
+    "input": (2, "lcp-lube: bad on purpose"),
+    "memory": (2, "lcp-lube: not enough memory; fewer points or more ranks are needed"),
+    "interrupt": (130, "lcp-lube: interrupted"),
+}
+
+
+@pytest.fixture(scope="module")
+def ended(tmp_path_factory):
+    """How a job of each exception ended: at the same time, as each waits some seconds for ranks that do not come."""
+
+    folders = {failure: tmp_path_factory.mktemp(failure) for failure in EXCEPTIONS}
+
+    def end(failure):
+        job = Job(failure, folders[failure])
+        return *job.end(), gone(job.pids, 2)
+
+    with ThreadPoolExecutor(len(EXCEPTIONS)) as pool:
+        return dict(zip(EXCEPTIONS, pool.map(end, EXCEPTIONS), strict=True))
+
+
+@pytest.mark.parametrize("failure", EXCEPTIONS)
+def test_an_exception_on_one_rank(ended, failure):
+    status, lines, seconds, left = ended[failure]
+    assert (status, lines[-1]) == EXCEPTIONS[failure]
     assert len(lines) == 1 or failure == "error"
-    assert seconds < limit() and gone(job.pids, 2)
+    assert seconds < limit() and left
 
 
 @pytest.mark.parametrize("victim", range(RANKS))
