@@ -21,6 +21,9 @@ import pytest
 from hypothesis import settings
 
 TESTS = Path(__file__).parent
+# Open MPI's own files: one process of tests ends its jobs, and removes the folder that is empty then, while another starts one.
+JOBS = tempfile.mkdtemp(prefix="mpi-")
+atexit.register(shutil.rmtree, JOBS, ignore_errors=True)
 # A singleton's MPI leaves traces in the environment that would confuse a job started from it.
 ENVIRONMENT = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_COMM", "PMIX_", "PMI_", "PETSC_OPTIONS"))} | {
     "OMP_NUM_THREADS": "1",
@@ -30,6 +33,7 @@ ENVIRONMENT = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_CO
     # On cores that others use too: ranks that wait give way, and move.
     "OMPI_MCA_mpi_yield_when_idle": "1",
     "OMPI_MCA_hwloc_base_binding_policy": "none",
+    "OMPI_MCA_orte_tmpdir_base": JOBS,
     "PYTHONPATH": os.pathsep.join(filter(None, [str(TESTS.parent), os.environ.get("PYTHONPATH", "")])),
 }
 os.environ.setdefault("OMP_NUM_THREADS", "1")
