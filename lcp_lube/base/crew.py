@@ -19,6 +19,7 @@ from ..errors import InputError
 VARIABLE = "NUMBA_NUM_THREADS"  # what --threads sets
 FEWEST = 120_000  # points of a grid that threads are woken for
 PARTS = 8  # of the lines of such a grid
+MOST = 4  # threads that nobody asked for: more have not been measured, and a core may be here in name alone
 
 
 class Crew:
@@ -69,7 +70,7 @@ def _crew(number: int, process: int) -> Crew:
 
 
 def threads() -> int:
-    """As many as were asked for; else the cores that this process may use, or one of several ranks 1.
+    """As many as were asked for; else the cores that this process may use, MOST at most, or one of several ranks 1.
 
     Raises
     ------
@@ -77,7 +78,7 @@ def threads() -> int:
     """
     asked = os.environ.get(VARIABLE, "")
     if not asked:
-        return _cores() if MPI.COMM_WORLD.size == 1 else 1
+        return min(_cores(), MOST) if MPI.COMM_WORLD.size == 1 else 1
     if not asked.isdecimal() or int(asked) < 1:
         raise InputError(f"{VARIABLE} = {asked}: a whole number from 1 on is needed")
     return int(asked)
