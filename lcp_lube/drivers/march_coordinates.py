@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base.parallel import Array
 from ..errors import InputError
-from ..problems.film.forces import forces
+from ..problems.film.forces import PIVOT, totals
 from ..problems.film.grooves import GroovedProblem
 from ..problems.solution import Solution
 from ..scenes.motion import Course, MotionTable
@@ -117,20 +117,13 @@ class Coordinates:
     def forces(self, step: TimeStep, solution: Solution, stiff: bool) -> tuple[Array, Array | None]:
         """What the film of a solved step does to each, N or N m; with minus its derivatives by m and rad. Collective."""
         problem: Any = solution.problem
-        whole = forces(problem, solution.fields["p"] * problem.p_unit)
-        first = np.array(whole["force"] if self.journal else [whole["load"]])
-        if self.pads is None and not stiff:
-            return first, None
-        each = np.eye(self.unit.size)
+        told = totals(problem, solution.fields["p"] * problem.p_unit)
+        tilts = [f"{PIVOT}{k + 1}" for k in range(self.unit.size - (2 if self.journal else 1))]
+        found = np.array([told[name] for name in (*(("force_x", "force_y") if self.journal else ("load",)), *tilts)])
+        if not stiff:
+            return found, None
         with self.films(step, solution) as films:
-            if self.pads is not None:
-                moments = films.sum(lambda one: sum(one.pushes(one.modes[k]) * each[one.numbers[k]] for k in self._tilts(one)))
-                first = np.array([*first, *moments[first.size :]])
-            return first, films.sum(lambda one: one.spread(stiffness(one.response()), each[0].size)) if stiff else None
-
-    def _tilts(self, film: PadFilm) -> Sequence[int]:
-        """Its modes that are no displacement of the whole."""
-        return range(2 if self.journal else 1, len(film.modes))
+            return found, films.sum(lambda one: one.spread(stiffness(one.response()), found.size))
 
     def told(self, place: Sequence[float]) -> dict[str, Any]:
         """As numbers of an answer."""
