@@ -51,7 +51,7 @@ def test_second_order(name):
     scene, changes = WAYS[name]
     ends = [
         march(scene, **changes | {"balance": None}, **{"motion.t_end": 0.004, "motion.steps": steps}).load
-        for steps in (4, 8, 32)
+        for steps in (3, 6, 24)
     ]
     errors = np.abs(np.array(ends[:-1]) - ends[-1])
     assert np.log2(errors[0] / errors[1]) > 1.7 and errors[1] < 1e-2 * abs(ends[-1])
@@ -125,7 +125,7 @@ def test_pads_answer_small_motions_as_their_coefficients_say():
 
 
 def test_pads_are_taken_up_and_march_on_ranks(cli, tmp_path):
-    motion = {"motion.t_end": 0.004, "motion.steps": 8, "motion.journal": ["0.3+0.1*sin(300*t)", "0.1*cos(300*t)-0.1"]}
+    motion = {"motion.t_end": 0.002, "motion.steps": 4, "motion.journal": ["0.3+0.1*sin(300*t)", "0.1*cos(300*t)-0.1"]}
     scene = load_scene("tilting_pad_journal", PADS | motion)
     whole = march(scene)
 
@@ -133,21 +133,22 @@ def test_pads_are_taken_up_and_march_on_ranks(cli, tmp_path):
         pass
 
     def watch(moment):
-        if moment.count == 5:
+        if moment.count == 3:
             raise Stop
 
     with pytest.raises(Stop):
         solve(scene, checkpoint=tmp_path / "c", every=2, watch=watch)
     with solve(scene, resume=tmp_path / "c") as s:
-        assert len(s.history) == 8 and s.pad_tilts == pytest.approx(whole.pad_tilts, rel=1e-7)
+        assert len(s.history) == 4 and s.pad_tilts == pytest.approx(whole.pad_tilts, rel=1e-7)
     (tmp_path / "pads.toml").write_text(
-        'family = "tilting_pad"\nnx = 90\nny = 5\neccentricity = 0.3\n[motion]\nt_end = 0.004\nsteps = 8\n'
+        'family = "tilting_pad"\nnx = 90\nny = 5\neccentricity = 0.3\npivots_deg = [60.0, 180.0, 300.0]\n'
+        "[motion]\nt_end = 0.001\nsteps = 2\n"
         'journal = ["0.3+0.1*sin(300*t)", "0.1*cos(300*t)-0.1"]\n'
     )
     alone = march(load_scene(tmp_path / "pads.toml"))
-    run = cli("solve", "pads.toml", "--history", "h.csv", "--json", ranks=3)
+    run = cli("solve", "pads.toml", "--history", "h.csv", "--json", ranks=3, timeout=300)
     assert run.status == 0 and run.json["pad_tilts"] == pytest.approx(alone.pad_tilts, rel=1e-7), run.err
-    assert (tmp_path / "h.csv").read_text().startswith("t,dt,journal_x,journal_y,tilt_1,tilt_2,tilt_3,tilt_4,tilt_5,load")
+    assert (tmp_path / "h.csv").read_text().startswith("t,dt,journal_x,journal_y,tilt_1,tilt_2,tilt_3,load")
 
 
 @pytest.mark.parametrize(
