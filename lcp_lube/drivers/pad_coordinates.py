@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.parallel import Array
-from ..problems.film.forces import PIVOT, ambient, integral, totals
+from ..problems.film.forces import PIVOT, totals
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.solution import Fields, Solution
@@ -34,10 +34,6 @@ class PadFilm:
     fields: Fields
     modes: Sequence[Mode]
     numbers: Sequence[int]
-
-    def pushes(self, mode: Mode) -> float:
-        """Integral of (p - ambient) g. Collective."""
-        return integral(self.problem, self.fields["p"] * self.problem.p_unit, ambient(self.problem), mode)
 
     def response(self) -> Response:
         """To its modes. Collective."""
