@@ -14,9 +14,10 @@ QUICK, BENT = 1e-5, 1e-4  # of a number, relative; least part of the slope that 
 KINK = 1e-2  # relative difference between both sides
 CHORD, SLIGHT = 1e-2, 1e-2  # relative: width and least slope of a function that changes by steps
 ROUNDING, TINY = 1e-15, 1e-300
+WIDTHS, APART = (0.5, 1.0, 2.0), 0.2  # of chords, in CHORD; by what part they may differ where f changes by steps
 
 
-def differences(f: Callable[[float], Array], a: float, scale: float, sizes: Array) -> tuple[Array, Array]:
+def differences(f: Callable[[float], Array], a: float, scale: float, sizes: Array, wary: bool = False) -> tuple[Array, Array]:
     """df/da of a vector function to rounding, and by how much its derivatives to both sides differ where it has a kink.
 
     A kink's derivative is the mean of both sides. Where f changes by steps (it jumps at a, or nothing changes but over a wider
@@ -26,6 +27,7 @@ def differences(f: Callable[[float], Array], a: float, scale: float, sizes: Arra
     Parameters
     ----------
     scale : a change of a that is not small. sizes : of the terms that f is made of, whose rounding is left in it.
+    wary : f may change by many steps, though it seems smooth next to a: NaN where chords half and twice as wide differ.
 
     Raises
     ------
@@ -48,6 +50,14 @@ def differences(f: Callable[[float], Array], a: float, scale: float, sizes: Arra
         value = np.abs(np.nan_to_num(at(0.0))) + SLIGHT * sizes  # type: ignore[arg-type]
         return chord, none & (np.abs(chord) * scale > SLIGHT * value)
 
+    def told(slope: Array, kinks: Array) -> tuple[Array, Array]:
+        if wary:
+            chords = np.array([slope, *(_chord(at, width * CHORD * scale) + 0.0 * slope for width in WIDTHS)])
+            apart, most = np.ptp(chords, axis=0), np.abs(chords).max(axis=0)
+            none = (apart > APART * most) & (apart * scale > SLIGHT * np.abs(at(0.0)) + 1e-9 * sizes)  # type: ignore[arg-type]
+            slope, kinks = np.where(none, np.nan, slope), np.where(none, np.inf, kinks)
+        return slope, kinks
+
     d = QUICK * scale
     if all(at(m * d) is not None for m in (-1, 0, 1)):
         low, here, high = (known[m * d] for m in (-1, 0, 1))
@@ -55,7 +65,7 @@ def differences(f: Callable[[float], Array], a: float, scale: float, sizes: Arra
         slope, bend = (high - low) / (2.0 * d), np.abs(high - 2.0 * here + low) / d  # type: ignore[operator]
         none = np.abs(slope) <= noise
         if (bend <= BENT * np.abs(slope) + noise).all() and not (none.any() and stepped(none)[1].any()):
-            return np.where(none, 0.0, slope), np.zeros_like(slope)
+            return told(np.where(none, 0.0, slope), np.zeros_like(slope))
     best: tuple[float, Array] | None = None
     before, kinks = np.zeros_like(sizes), np.zeros_like(sizes)
     for k in range(TRIES):
@@ -83,7 +93,7 @@ def differences(f: Callable[[float], Array], a: float, scale: float, sizes: Arra
         chord, more = stepped(slope == 0.0)
         steps = steps | more
         slope, kinks = np.where(steps, chord, slope), np.where(steps, np.inf, kinks)
-    return slope, kinks
+    return told(slope, kinks)
 
 
 def _chord(at: Callable[[float], Array | None], d: float) -> Array:

@@ -16,6 +16,7 @@ import numpy as np
 from ..base.differences import differences
 from ..base.parallel import Array
 from ..errors import InputError
+from ..problems.film.edges import oblique
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Solution
 from ..registry import SMALL
@@ -180,7 +181,7 @@ class Adjoint:
                 quick[0] = found is not None
                 return self.lagrangians(scene) if found is None else found
 
-            slope, jump = differences(near, value, scale, sizes)
+            slope, jump = differences(near, value, scale, sizes, oblique(self.equations.model.gap))
         return dict(zip(names, slope, strict=True)), dict(zip(names, jump, strict=True))
 
     @property

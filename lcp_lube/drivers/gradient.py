@@ -9,6 +9,7 @@ of fourth order: no solve, and an error near 1e-11 (`base.differences`). Where s
 the scene its conditions have adjoints of their own (`adjoint.Implicit`).
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -27,6 +28,7 @@ from .equations import check_film
 from .march_course import Trace, check_march
 from .march_gradient import MarchGradient
 
+BY_STEPS = "no derivative on this grid: it changes by steps, whose mean slope is another over other widths"
 STEPWISE = "the edges of grooves lie on points of the grid: the answer changes by steps"
 FOUND = "it was found, and follows the other numbers"
 
@@ -180,10 +182,12 @@ def _gradients(
             value = adjoint.value(name) if name in adjoint.found else report[name]
             found = {key: implicit.total(name, key, slope) for key, slope in slopes.items()}
             of = {**values, **({"balance.load": balance["load"]} if balance else {})}
+            none = {key: BY_STEPS for key, slope in found.items() if math.isnan(slope)}
+            found = {key: slope for key, slope in found.items() if key not in none}
             elasticity = {key: slope * of[key] / value if value and of[key] else None for key, slope in found.items()}
-            sides = {key: jump[name] for key, jump in jumps.items() if jump.get(name)}
+            sides = {key: jump[name] for key, jump in jumps.items() if jump.get(name) and key in found}
             switching = adjoint.switching + adjoint.ties.get(name, 0)
-            out.append(Gradient(name, value, found, elasticity, held, sides, switching))
+            out.append(Gradient(name, value, found, elasticity, held | none, sides, switching))
         return out
     finally:
         adjoint.destroy()

@@ -20,6 +20,7 @@ import numpy as np
 from ..base.differences import differences
 from ..base.parallel import Array
 from ..errors import InputError
+from ..problems.film.edges import oblique
 from ..problems.film.flows import point_weights
 from ..problems.film.stored import mean_film
 from ..problems.solution import Solution
@@ -265,7 +266,9 @@ class MarchGradient:
             eq = self.course.at(len(self.trace.steps))
             scale = scale_of(self.scene, key, eq.constant, last.p / eq.constant.p_unit)
             eq.destroy()
-        found = differences(at, value, scale, np.array([self.sizes[name] for name in self.names]))
+        found = differences(
+            at, value, scale, np.array([self.sizes[name] for name in self.names]), oblique(self.course.first.gap)
+        )
         slope, jump = (dict(zip(self.names, map(float, one), strict=True)) for one in found)
         return slope, jump
 

@@ -244,6 +244,21 @@ def test_edges_on_points_have_a_derivative_to_each_side():
     solution.destroy()
 
 
+def test_edges_across_the_lines_have_no_derivative():
+    """By the angle of spirals a load changes in steps: its chords have any sign. By their depth it has a slope."""
+    scene = load_scene("spiral_groove", nx=40, ny=20)
+    with solve(scene) as solution:
+        (found,) = gradients(scene, solution, ["load"])
+        assert {"angle_deg", "ratio", "seal"} <= set(found.held) and "on this grid" in found.held["angle_deg"]
+        with pytest.raises(InputError, match="no derivative on this grid"):
+            solution.gradient("load", ["angle_deg"])
+        depths = {}
+        for k in (-1, 1):
+            with solve(with_values(scene, {"taper": scene.taper * (1 + 1e-4 * k)})) as other:
+                depths[k] = other.load
+    assert found.gradient["taper"] == pytest.approx((depths[1] - depths[-1]) / (2e-4 * scene.taper), rel=1e-6)
+
+
 def test_cells_about_to_change_are_counted():
     """A film at rest without pressures: p = r = 0 everywhere; and two points that tie for the largest pressure."""
     scene = load_scene("problem1", n=21, U=0.0)

@@ -39,6 +39,12 @@ def jumps_of(film: Any, axis: str) -> tuple[float, ...]:
     return () if tell is None else tuple(tell(axis))
 
 
+def oblique(film: Any) -> bool:
+    """Whether a film has edges that run across the lines of points, by which its coefficients change in steps."""
+    inside = (*getattr(film, "parts", ()), *filter(None, [getattr(film, "film", None)]))
+    return bool(getattr(film, "oblique", False)) or any(map(oblique, inside))
+
+
 @dataclass(frozen=True)
 class Around:
     """A film on a grid, that goes on beyond periodic sides: what lies behind one is what lies within the other, edges too."""

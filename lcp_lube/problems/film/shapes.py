@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -147,6 +148,8 @@ class Herringbone:
     land: float
     lengths: tuple[float, float]
 
+    oblique: ClassVar[bool] = True
+
     def __call__(self, x: Array, y: Array) -> Array:
         L, width = self.lengths
         off = np.abs(y - 0.5 * width)
@@ -167,6 +170,8 @@ class SpiralGrooves:
     ratio: float
     between: tuple[float, float]
     polar: tuple[float, float]
+
+    oblique: ClassVar[bool] = True
 
     def __call__(self, x: Array, y: Array) -> Array:
         theta, r = x / self.polar[1], self.polar[0] + y
