@@ -45,7 +45,7 @@ class March:
     ----------
     grid : of all steps. second : BDF2 in place of Euler's formula.
     t, dts : the time, and the lengths of the last steps; contents : h (1 - r) of the last times, m; fields, full : theirs, and
-        which cells were full. All of them with the newest first.
+        which cells were full; carried : contents times temperatures, m K, if any. All of them with the newest first.
     volumes : sums of contents, 2 dx m2; flowed, stored, moved : of the whole run, in time: what came in, what was stored, and
         the larger of all that passed and all that was stored.
     """
@@ -55,6 +55,7 @@ class March:
     t: float = 0.0
     dts: list[float] = field(default_factory=list)
     contents: list[Array] = field(default_factory=list)
+    carried: list[Array] = field(default_factory=list)
     fields: list[Fields] = field(default_factory=list)
     full: list[Any] = field(default_factory=list)
     volumes: list[float] = field(default_factory=list)
@@ -62,10 +63,12 @@ class March:
     stored: float = 0.0
     moved: float = 0.0
     rates: float = 0.0  # largest so far: what drives the film, 2 dx sums
+    warming: float = 0.0  # likewise, of what is carried
 
-    def begin(self, contents: Array, fields: Fields | None) -> None:
+    def begin(self, contents: Array, fields: Fields | None, carried: Array | None = None) -> None:
         """At t = 0."""
         self.contents = [contents]
+        self.carried = [] if carried is None else [carried]
         self.volumes = [self._sum(contents)]
         if fields is not None:
             self.fields = [fields]
@@ -79,7 +82,8 @@ class March:
 
     def term(self, formula: Formula) -> Stored:
         """What the step adds to the film's balance."""
-        return Stored(formula.weight, formula.old(self.contents), self.grid)
+        carried = formula.old(self.carried) if self.carried else None
+        return Stored(formula.weight, formula.old(self.contents), self.grid, carried=carried)
 
     def guess(self, dt: float) -> Fields | None:
         """Fields at the step's end, as they went on in the last step: z = p or -r in a line, but where a front passed."""
@@ -92,7 +96,9 @@ class March:
         z = ahead["p"] / P - ahead["r"] / R
         return {"p": P * np.maximum(z, 0.0), "r": R * np.maximum(-z, 0.0)}
 
-    def accept(self, dt: float, problem: LubricationProblem, fields: Fields, contents: Array) -> dict[str, float]:
+    def accept(
+        self, dt: float, problem: LubricationProblem, fields: Fields, contents: Array, carried: Array | None = None
+    ) -> dict[str, float]:
         """Take a step over; returns its flows: in and out, m2/s or m3/s, as volumes. Collective."""
         formula = self.formula(dt)
         p, r = fields["p"], fields["r"]
@@ -113,6 +119,7 @@ class March:
         self.volumes = [volume, *self.volumes[:1]]
         self.dts = [dt, *self.dts[:2]]
         self.contents = [contents, *self.contents[:2]]
+        self.carried = [] if carried is None else [carried, *self.carried[:2]]
         self.fields = [fields, *self.fields[:1]]
         self.full = [cavity_sign(problem.reduce, p, r) >= 0, *self.full[:3]]
         return {
@@ -128,30 +135,44 @@ class March:
         held = 1e-3 * max(map(abs, self.volumes), default=0.0)  # of a film that hardly moves
         return lost / max(self.moved, held) if lost else 0.0
 
-    def error(self, dt: float, problem: LubricationProblem, contents: Array) -> float | None:
+    def error(self, dt: float, problem: LubricationProblem, contents: Array, carried: Array | None = None) -> float | None:
         """Estimated relative error of the rates d/dt h (1 - r) of a step not yet accepted; None before there are enough.
 
-        Of cells that were full, or cavitated, all the while: in those that a front crosses no formula has an order. Collective.
+        Of what the contents carry likewise, if that is more. Of cells that were full, or cavitated, all the while: in those
+        that a front crosses no formula has an order. Collective.
         """
-        order = 2 if self.second else 1
-        s, known = problem.scheme, len(self.dts)
+        s = problem.scheme
         drag = s.flow_unit * problem.reduce.sum(np.abs(s.couette_E - s.couette_W))
-        rate = self.formula(dt).weight * contents - self.formula(dt).old(self.contents)
-        self.rates = max(self.rates, drag + self._sum(np.abs(rate)))
-        if known < order or not self.rates:
+        self.rates = max(self.rates, drag + self._rate(dt, contents, self.contents))
+        found = self._error(dt, contents, self.contents, self.rates)
+        if carried is None or not self.rates:
+            return found
+        warmest = problem.reduce.max(np.abs(carried)) / problem.reduce.max(np.abs(contents))
+        self.warming = max(self.warming, warmest * self.rates + self._rate(dt, carried, self.carried))
+        other = self._error(dt, carried, self.carried, self.warming)
+        return max(filter(None, (found, other)), default=found)
+
+    def _rate(self, dt: float, new: Array, before: list[Array]) -> float:
+        """Of what cells come to store, in sum."""
+        formula = self.formula(dt)
+        return self._sum(np.abs(formula.weight * new - formula.old(before)))
+
+    def _error(self, dt: float, new: Array, before: list[Array], size: float) -> float | None:
+        """Of the rates of what cells store, over their size."""
+        order = 2 if self.second else 1
+        if len(self.dts) < order or not size:
             return None
         steps = [dt, *self.dts][: order + 1]
-        times = -np.concatenate([[0.0], np.cumsum(steps)])  # of the contents known, from the new one back
-        used = [contents, *self.contents][: order + 2]
+        times = -np.concatenate([[0.0], np.cumsum(steps)])  # of the values known, from the new one back
+        used = [new, *before][: order + 2]
         if len(used) < order + 2:
             return None
         # The divided difference of order + 1, times the derivative of the formula's error.
         weights = [1.0 / np.prod([times[k] - other for j, other in enumerate(times) if j != k]) for k in range(order + 2)]
         high = sum(weight * values for weight, values in zip(weights, used, strict=True))
         factor = dt * (dt + self.dts[0]) if order == 2 else dt
-        now = self.full[0]
-        steady = np.logical_and.reduce([full == now for full in self.full[: order + 1]])
-        return self._sum(np.where(steady, np.abs(factor * high), 0.0)) / self.rates
+        steady = np.logical_and.reduce([full == self.full[0] for full in self.full[: order + 1]])
+        return self._sum(np.where(steady, np.abs(factor * high), 0.0)) / size
 
     def next_step(self, dt: float, error: float | None, tol: float) -> float:
         """The length of the next step, or of the same once more."""

@@ -14,8 +14,8 @@ from . import checkpoint_file
 from .ask import Ask
 from .checkpoint import Checkpointer, scene_record
 
-NUMBERS = ("t", "dts", "volumes", "flowed", "stored", "moved", "rates")  # of a `March`
-ARRAYS = ("contents", "full")
+NUMBERS = ("t", "dts", "volumes", "flowed", "stored", "moved", "rates", "warming")  # of a `March`
+ARRAYS = ("contents", "carried", "full")
 RUN = ("history", "solves", "lengths", "step", "rescuer", "times_s", "settings")  # of what takes the steps
 
 
@@ -83,6 +83,7 @@ class MarchFile:
         for name, value in header["march"].items():
             setattr(run.march, name, value)
         run.march.contents = [a for name, a in arrays.items() if name.startswith("contents.")]
+        run.march.carried = [a for name, a in arrays.items() if name.startswith("carried.")]
         run.march.full = [a > 0.5 for name, a in arrays.items() if name.startswith("full.")]
         count = sum(name.startswith("fields.") for name in arrays) // 2
         run.march.fields = [{name: arrays[f"fields.{k}.{name}"] for name in ("p", "r")} for k in range(count)]

@@ -24,7 +24,7 @@ from .march_coordinates import Coordinates
 from .march_file import MarchFile
 from .plan import plan
 from .rotor import Rotor
-from .step import TimeStep, check_content, check_room, contents
+from .step import TimeStep, carried, check_content, check_room, contents
 from .supplies import check_backflow
 
 SOME = 0.37  # of t_end: when edges are looked at that may have moved
@@ -35,7 +35,8 @@ REST = 0.05  # of multigrid's residual in a step's guess may be left: that is fa
 EPS1 = 3e-10  # of multigrid: its root bounds what the certificate lets a step leave (other methods' is 1e-4)
 SHARE = 0.01  # of t_end: in shorter steps an error of the rates counts by its part of that time
 REPEAT = 2.0  # times the tolerance: the error beyond which a step is taken again
-TOLD = ("load", "force", "moment", "p_max", "min_h", "cavitated_fraction", "friction")  # of a step, for the history
+HEAT = ("temperature_max", "temperature_effective", "temperature_out", "heat_power", "heat_out", "heat_stored")
+TOLD = ("load", "force", "moment", "p_max", "min_h", "cavitated_fraction", "friction", *HEAT)  # of a step, for the history
 
 
 @dataclass(frozen=True)
@@ -121,7 +122,7 @@ class Run:
         fill = self._fill
         if fill is not None:
             full, none = contents(self.march.grid, model, None), np.zeros(self.march.grid.local_size)
-            self.march.begin(fill * full, None if fill == 1 else {"p": none, "r": none + 1.0 - fill})
+            self.march.begin(fill * full, None if fill == 1 else {"p": none, "r": none + 1.0 - fill}, carried(model, full))
             return
         if model.sealed or not model.fed:
             why = "no side has a pressure" if model.sealed else "nothing feeds the film"
@@ -129,7 +130,8 @@ class Run:
         solution = self.inner(TimeStep(self.scene, model, self.march.grid), ask)
         if not solution.converged:
             raise InputError(f"{self.scene.name}: no steady film at t = 0: {solution.message}; motion.start = full needs none")
-        self.march.begin(contents(self.march.grid, model, solution.fields, solution.problem), solution.fields)
+        full = contents(self.march.grid, model, solution.fields, solution.problem)
+        self.march.begin(full, solution.fields, carried(model, full, solution.problem))
         solution.destroy()
 
     @property
@@ -165,9 +167,9 @@ class Run:
                 return
             model = self.model
             new = contents(march.grid, model, solution.fields, problem)
-            error = None
+            heat, error = carried(model, new, problem), None
             if self.table.step is None:
-                error = march.error(dt, problem, new)
+                error = march.error(dt, problem, new, heat)
                 if error is not None:  # where a cavity closes rates jump, whatever the step: a short step's error soon passes
                     error *= min(1.0, dt / (SHARE * self.table.t_end))
                 if self.rotor is not None:
@@ -187,7 +189,7 @@ class Run:
         formula = march.formula(dt)
         if self.rotor is not None:
             self.rotor.accept(place, formula)
-        flows = march.accept(dt, problem, solution.fields, new)
+        flows = march.accept(dt, problem, solution.fields, new, heat)
         self._keep(solution, solves)
         if self.seen is not None:
             self.seen.accept(problem, solution.fields, march.t, dt)

@@ -56,6 +56,15 @@ def contents(grid: Grid, model: Model, fields: Fields | None, problem: Any = Non
     return (h + cells.get("lift", 0.0)) * (1.0 - fields["r"]) * cells.get("density", 1.0)
 
 
+def carried(model: Model, content: Array, problem: Any = None) -> Array | None:
+    """What the contents carry along, times temperature, m K; without a problem, of oil as it comes in. None: nothing."""
+    found = [effect.carried for effect in model.effects if effect.carried]
+    if problem is None:
+        return 0.0 * content if found else None
+    parts = [content * (problem.more_fields[name][0] - level) for name, level in found]
+    return parts[0] if parts else None
+
+
 def check_room(grid: Grid, model: Model, t: float, name: str) -> None:
     """Raise InputError where a sealed film of constant density has no room for its oil, and none to spare. Collective.
 

@@ -37,9 +37,6 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     if ask.system == "cavity":
         raise InputError("--system cavity: cells of a film that moves store liquid; allowed are full, reduced")
     assert isinstance(scene, Moving)
-    model: Any = getattr(scene, "model", None)
-    for kept in filter(None, (getattr(effect, "keeps", "") for effect in getattr(model, "effects", ()))):
-        raise InputError(f"scene {scene.name}: [motion]: {kept}: only effects whose law is local in time go on in time")
     run = Run(scene, ask, inner)
     with run.file.keeper.listening():
         while run.outcome is Outcome.CONVERGED and not run.done:

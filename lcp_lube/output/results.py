@@ -147,7 +147,8 @@ def _bearing_lines(data: dict[str, Any], one_d: bool) -> list[str]:
     if data.get("temperature_max") is not None:
         hot = ", ".join(f"{name} {data[f'temperature_{name}']:.5g}" for name in ("max", "effective", "out"))
         into, out = (with_unit(data[key], "W" + per) for key in ("heat_power", "heat_out"))
-        lines.append(f"temperature {hot} K; heat in {into}, out {out}")
+        stored = f", stored {with_unit(data['heat_stored'], 'W' + per)}" if "heat_stored" in data else ""
+        lines.append(f"temperature {hot} K; heat in {into}, out {out}{stored}")
     if data.get("flow_growth"):
         growth = ", ".join(f"{side} {value:+.2g}" for side, value in data["flow_growth"].items() if value)
         lines.append(f"these flows have no limit: sides of unequal pressure meet; each halving of the spacings adds {growth}")

@@ -201,7 +201,7 @@ class ThrustScene(WithEffects):
         flow = {side: n * value for side, value in values["flow"].items()}
         keys = ("load", "pressure_integral", "cavitated_area", "friction", "friction_torque", "side_leakage")
         total = {key: n * values[key] for key in keys}
-        total |= {key: n * values[key] for key in ("heat_power", "heat_out") if key in values}
+        total |= {key: n * values[key] for key in ("heat_power", "heat_out", "heat_stored") if key in values}
         if "supply_flow" in values:
             total["supply_flow"] = [n * value for value in values["supply_flow"]]
         return total | {

@@ -395,7 +395,6 @@ def test_bad_input(cli, tmp_path):
         ("pocketed_pad", {"film.pocket.moves": True}, r"a table \[motion\] is needed"),
         ("journal", {"motion.t_end": 1.0, "balance.load": 3.0}, "balance and motion"),
         ("journal", {"motion.t_end": 1.0, "graded": True}, "graded = true"),
-        ("moving_texture", {"temperature.beta": 0.03}, "the heat that the oil stores"),
     ],
 )
 def test_scenes_that_cannot_move(scene, changes, message):

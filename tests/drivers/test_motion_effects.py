@@ -6,7 +6,7 @@ import marches
 import numpy as np
 import pytest
 
-from lcp_lube import InputError, load_scene, solve
+from lcp_lube import load_scene, solve
 from lcp_lube.problems.film.fluid import Law
 
 WEDGE = marches.WEDGE | {"n": 24, "motion": {"t_end": 0.02, "steps": 12}}
@@ -67,12 +67,6 @@ def test_nothing_is_lost(name):
         loads.append(solution.load)
         solution.destroy()
     assert loads[0] == pytest.approx(loads[1], rel=1e-4)
-
-
-def test_heat_is_refused():
-    oil = {"fluid": {"mu": 0.01, "p_supply": 1e5}, "temperature": {"beta": 0.03}}
-    with pytest.raises(InputError, match="the heat that the oil stores"):
-        solve(load_scene(WEDGE | oil))
 
 
 def test_the_decision_in_time():

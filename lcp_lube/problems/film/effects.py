@@ -58,13 +58,17 @@ NOTHING = Report({}, {}, {})
 class Effect:
     """A rung: what one effect makes of an answer; these are most: even, the same in the mirror image, nothing to tell.
 
-    channels : what it may change. even : whether what it makes of an answer that is symmetric in y is so too. keeps : what it
-    would have to remember of earlier times in a film that moves; empty: its law is local in time.
+    channels : what it may change. even : whether what it makes of an answer that is symmetric in y is so too. carried : of a
+    field that the oil carries along in time, by its equation: its name among those that are told, and the level from which it
+    is counted; None: its law is local in time.
     """
 
     channels: ClassVar[tuple[str, ...]] = ("viscosity",)
     even = True
-    keeps = ""
+
+    @property
+    def carried(self) -> tuple[str, float] | None:
+        return None
 
     def apply(self, at: "Answer", out: Cells) -> None:
         """Change `out` by what follows from the answer. Collective."""

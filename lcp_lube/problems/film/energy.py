@@ -8,6 +8,9 @@ which the liquid comes; beyond the sides T_in, beyond a groove what is mixed the
 Dissipation is what the wall drags, mu U^2/h times the liquid's share, and what pressure drives through the faces, q_P dp. Its
 sum is the power that goes in, drag U plus the pumping at the sides, because liquid is conserved; the sum of the equations is
 the heat that goes out. Both are told, and their difference is in the certificate. In the cavity the liquid carries heat.
+
+In time cells hold heat, rho c_p d/dt [area h (1 - r) T] by the step's formula (`stored`) and the film's own contents, and what
+walls that approach do to the film goes in too. What is in minus what is out is stored.
 """
 
 from dataclasses import dataclass
@@ -27,7 +30,8 @@ from .reynolds import sides
 from .strip import line_weights
 
 RTOL = 1e-13  # of the linear solves
-NOTHING = 1e-24  # of that: the square of rounding
+NOTHING = 1e-18  # of what pressures could turn into heat: the square of what a solve may leave of them
+LEVEL = 1e-15  # of the largest pressure: a drop by less is rounding where no wall moves
 STILL = 1e-11  # of the largest flow out of a cell: what is less is rounding
 SAME = 1e-300
 
@@ -40,6 +44,7 @@ class Carried:
     dissipation : of each cell; sheared : the part of it that the wall drags.
     power : what drag and pumps put in, as the film's own numbers have it.
     area : of the cells, m2 (1D: m).
+    held, kept : of a time step: liquid of a cell over the step's length, m3/s, and what it held before times T, K m3/s.
     """
 
     q: tuple[Array, Array, Array, Array]
@@ -48,29 +53,32 @@ class Carried:
     power: float
     area: Array
     sheared: Array
+    held: Array
+    kept: Array
 
 
 def holders(at: Answer) -> list[Any]:
     """For each groove or supply inside the film, whether an owned point lies in it."""
-    held = at.problem.held
-    supplies = [(held.owner == k).ravel() for k in range(len(held.supplies))] if held is not None else []
-    return [*getattr(at.problem, "columns", []), *supplies]
+    held: Any = at.problem.held
+    count = len(held.supplies) if held is not None else 0
+    return [*getattr(at.problem, "columns", []), *((held.owner == k).ravel() for k in range(count))]
 
 
 def carried(at: Answer) -> Carried:
     """Flows, dissipation and power of an answer. Collective."""
     problem, grid = at.problem, at.grid
-    s, box = problem.scheme, at.grid.box
-    dy = grid.spacing[1] if grid.dim == 2 else 1.0
+    s: Any = problem.scheme
+    box, dy = grid.box, grid.spacing[1] if grid.dim == 2 else 1.0
     unit = volume_unit(problem)
     held = holders(at)
     free = ~np.logical_or.reduce(held).reshape(box) if held else np.ones(box, dtype=bool)
     p, r = at.p.reshape(box), at.r.reshape(box)
     beside = around(framed_by(grid, at.p, problem.p_sides))
     k = [unit * a / problem.p_unit for a in (s.k_W, s.k_E, s.k_S, s.k_N)]
-    pushed = [a * (p - b) for a, b in zip(k, beside, strict=True)]  # out of the cell
+    flat = 0.0 if problem.U else LEVEL * problem.reduce.max(np.abs(p))
+    pushed = [np.where(np.abs(p - b) > flat, a * (p - b), 0.0) for a, b in zip(k, beside, strict=True)]  # out of the cell
     void_W = grid.ghosted(at.r, outside=0.0)[1:-1, :-2]
-    dragged = [-unit * (s.couette_W - s.b_W * void_W), unit * (s.couette_E + s.b_C * r)]
+    dragged = [-unit * (s.couette_W - s.b_W * void_W), unit * (s.couette_E + s.b_E * r)]
     q = (pushed[0] + dragged[0], pushed[1] + dragged[1], pushed[2], pushed[3])
 
     other_free = [a > 0.5 for a in _inside(at, free)]
@@ -94,10 +102,14 @@ def carried(at: Answer) -> Carried:
     # No oil is lost: the pumps' work may be counted from any level of pressure, best from one that is among theirs.
     pumped, least = 0.0, min((a for a in open_pressures(problem) if a is not None), default=0.0)
     for flow, near, is_free in zip(q, beside, other_free, strict=True):
-        at_edge = free & ~is_free
-        pumped -= float(problem.reduce.sum(np.where(at_edge, flow * (near - least), 0.0)))
+        pumped -= float(problem.reduce.sum(np.where(free & ~is_free, flow * (near - least), 0.0)))
     area = grid.cell * point_weights(grid).reshape(box)
-    return Carried(q, free, np.where(free, heat + shear, 0.0), power_shear + push + pumped, area, sheared)
+    stays = was = np.zeros(box)
+    if problem.stored is not None:
+        stays = np.where(free, unit * s.storage * (1.0 - r), 0.0)
+        pumped -= float(problem.reduce.sum(np.where(free, p - least, 0.0) * (stays - unit * s.kept)))
+        was = np.where(free, area * problem.stored.on(grid, problem.stored.carried), 0.0)
+    return Carried(q, free, np.where(free, heat + shear, 0.0), power_shear + push + pumped, area, sheared, stays, was)
 
 
 def _shear(at: Answer, dy: float, other_free: list[Any]) -> tuple[Array, Array]:
@@ -117,7 +129,7 @@ def _shear(at: Answer, dy: float, other_free: list[Any]) -> tuple[Array, Array]:
     mu_west = np.where(np.isnan(mu_west), at.mu.reshape(box), mu_west)
     before, behind = grid.steps(0)[:-1], grid.steps(0)[1:]
     faces = [sheared_faces(problem, grid.x + step)[1:] for step in (-before / 2, behind / 2)]
-    liquid = 1.0 + s.b_C * r / np.where(s.couette_E != 0.0, s.couette_E, np.inf)
+    liquid = 1.0 + s.b_E * r / np.where(s.couette_E != 0.0, s.couette_E, np.inf)
     liquid_west = grid.ghosted(np.ascontiguousarray(liquid).ravel(), outside=1.0)[1:-1, :-2]
     rims = grid.rims(1) if grid.dim == 2 else (0.0, 0.0)
     rows = problem.U**2 * dy * grid.stretch(grid.y) ** 3 * (line_weights(grid) + 0.5 * (rims[0] * south + rims[1] * north))
@@ -129,7 +141,7 @@ def _shear(at: Answer, dy: float, other_free: list[Any]) -> tuple[Array, Array]:
         inner = np.where(is_free, 0.5, 1.0) * (h[0] + share / h[1])
         at_wall = 0.5 * np.where(full, 4.0, 1.0 - r) / s.h
         shear = shear + dx * mu * np.where(wall, at_wall, inner)
-    return rows * shear, volume_unit(problem) * (s.couette_E + s.b_C * r)
+    return rows * shear, volume_unit(problem) * (s.couette_E + s.b_E * r)
 
 
 @dataclass(frozen=True)
@@ -137,12 +149,14 @@ class Heated:
     """Temperatures above T_in at the points (K; in grooves those of their oil), and where the heat goes.
 
     out : all that leaves, W. fresh : oil that enters at T_in and leaves again, m3/s. residual : relative, of the equations.
+    stored : what stays in the film in a time step, W.
     """
 
     theta: Array
     out: float
     fresh: float
     residual: float
+    stored: float = 0.0
 
 
 def heated(
@@ -168,7 +182,7 @@ def heated(
     leaves, enters = [np.maximum(a, 0.0) for a in q], [np.maximum(-a, 0.0) for a in q]
     inside = _inside(at, free)
     H, falls = exchange * flow.area, np.where(free, falls, 0.0)
-    diagonal = np.where(free, rho_c * sum(leaves) + H, 0.0)  # type: ignore[operator]
+    diagonal = np.where(free, rho_c * (sum(leaves) + flow.held) + H, 0.0)  # type: ignore[operator]
     still = diagonal <= STILL * reduce.max(diagonal)  # grooves, and cells whose liquid does not go on, an empty film's say
     diagonal = np.where(still, 1.0, diagonal + falls)
     offsets = ((0, -1), (0, 1), (-1, 0), (1, 0))
@@ -176,7 +190,7 @@ def heated(
     for (dj, di), a, near in list(zip(offsets, enters, inside, strict=True))[: 2 * grid.dim]:
         entries.append((dj, di, np.where(still, 0.0, -rho_c * a * near)))
     solver = _Transport(assemble(grid, entries))
-    heat = np.where(still, 0.0, flow.dissipation + np.where(free, more, 0.0) + H * wall).ravel()
+    heat = np.where(still, 0.0, flow.dissipation + np.where(free, more, 0.0) + H * wall + rho_c * flow.kept).ravel()
     left = reduce.sum(np.where(free & still, np.maximum(flow.dissipation, 0.0), 0.0))
     nowhere = left > STILL * reduce.sum(np.abs(flow.dissipation))  # heat that no liquid carries away
     try:
@@ -206,7 +220,7 @@ def heated(
     for columns, back in zip(holders(at), mixed, strict=False):
         theta = np.where(columns, back, theta)
     fresh = reduce.sum(edge) - sum(share * reduce.sum(into) for _, into, share in mixers)
-    return Heated(theta, float(out), float(fresh), residual)
+    return Heated(theta, float(out), float(fresh), residual, float(rho_c * reduce.sum(flow.held * T - flow.kept)))
 
 
 def _mixers(at: Answer, flow: Carried, carry_over: float | None) -> list[tuple[Array, Array, float]]:

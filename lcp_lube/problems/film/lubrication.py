@@ -35,9 +35,8 @@ class LubricationProblem:
 
     Parameters
     ----------
-    grid : the interior points.
-    scheme : coefficients of the box scheme there, in units of p_unit.
-    mu, U : viscosity in Pa s and wall speed in m/s. p_unit : pressure unit in Pa.
+    grid : the interior points. scheme : coefficients of the box scheme there, in units of p_unit.
+    mu, U, p_unit : viscosity in Pa s, wall speed in m/s, pressure unit in Pa.
     p_sides : pressures above p_c at west, east, south, north in Pa.
     p_c : cavitation pressure in Pa, added to the pressures that are reported.
     film : h(x, y) in metres.
@@ -54,6 +53,7 @@ class LubricationProblem:
     factors: Any = None  # of its faces, that follow from `cells`
     contact: Any = None  # of asperities
     levers: Any = ()  # `Model.levers`
+    stored: Any = None  # by its cells, in a time step (`stored.Stored`)
 
     def __init__(
         self,

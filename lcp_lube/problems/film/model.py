@@ -197,7 +197,7 @@ class Model:
             held=held,
             integrals=integrals,
         )
-        problem.shares_grid, problem.extras, problem.levers = shared, self.extras, self.levers
+        problem.shares_grid, problem.extras, problem.levers, problem.stored = shared, self.extras, self.levers, self.stored
         problem.edged = not self.mean_cubes
         problem.tops = self.scheme == "face" and problem.edged
         if isinstance(problem, GroovedProblem):

@@ -35,7 +35,7 @@ UNITS = {
     "pad_tilts": "rad",
     **dict.fromkeys(("inner_flow", "outer_flow"), "m3/s"),
     "pressure_centre": "m, deg",
-    **dict.fromkeys(("power_loss", "heat_power", "heat_out"), "W"),
+    **dict.fromkeys(("power_loss", "heat_power", "heat_out", "heat_stored"), "W"),
     **dict.fromkeys(("temperature_max", "temperature_effective", "temperature_out"), "K"),
     "attitude_deg": "deg",
 }

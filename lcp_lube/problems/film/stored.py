@@ -31,6 +31,7 @@ class Stored:
     old : m/s, at this rank's points of `grid`, that of the whole march.
     first, step : the film that is solved is a part of that one: its column i is column first + step i there, counted round.
     exact : what hangs on the step's answer needs its last digit.
+    carried : as `old`, of what the oil carries along, contents times temperature; None: nothing.
     """
 
     weight: float
@@ -39,16 +40,18 @@ class Stored:
     first: int = 0
     step: int = 1
     exact: bool = False
+    carried: Array | None = None
 
-    def on(self, grid: Grid) -> Array:
-        """`old` at the owned points of the film's own grid, shape `grid.box`. Collective."""
+    def on(self, grid: Grid, values: Array | None = None) -> Array:
+        """`old`, or other values there, at the owned points of the film's own grid, shape `grid.box`. Collective."""
+        values = self.old if values is None else values
         if grid is self.grid:
-            return self.old.reshape(grid.box)
+            return values.reshape(grid.box)
         j, i = numbers(grid)
         take = Pick(self.grid, grid, j, (self.first + self.step * i) % self.grid.shape[0])
-        values = take(self.old)
+        found = take(values)
         take.destroy()
-        return values.reshape(grid.box)
+        return found.reshape(grid.box)
 
     def terms(self, grid: Grid, film: Any, share: Array, b_C: Array, c: Array) -> dict[str, Array]:
         """What it makes of a scheme; share : twice the area that a row of the balance has for each m of film."""

@@ -17,6 +17,7 @@ from .table import EffectTable
 
 Kelvin = Annotated[Finite, Field(ge=oils.LOWEST, le=oils.HIGHEST)]
 NEWTON, FOUND, NEAR = 30, 1e-9, 1e-2  # steps, and K: of T ahead; for derivatives by T
+LITTLE = 1e-6  # of the heat that walls could take, and that films hold over a step's length: the balance of less is not told
 POINTS = {"exponential": 2, "walther": 2, "roelands": 2, "vogel": 3}
 
 
@@ -95,8 +96,11 @@ class Heat(Effect):
     mu: float
     table: Temperature
     wall: float
-    keeps = "temperature: the heat that the oil stores is not in its equation"
     channels: ClassVar[tuple[str, ...]] = ("viscosity", "warmth")
+
+    @property
+    def carried(self) -> tuple[str, float] | None:
+        return "T", self.table.T_in
 
     def apply(self, at: Answer, out: Cells) -> None:
         factor = self.law(self._ahead(at)) / self.mu
@@ -116,8 +120,9 @@ class Heat(Effect):
         if table.model == "effective":
             fresh, power = fresh_flow(at, flow, table.carry_over), float(reduce.sum(flow.dissipation))
             sheared, before = float(reduce.sum(flow.sheared)), reduce.max(old)
-            by_heat = lambda T: power + sheared * (law(T) / before - 1.0)  # noqa: E731
-            gain = table.share / (rho_c * fresh) if fresh > 0 else np.inf
+            held, kept = reduce.sum(flow.held), rho_c * reduce.sum(flow.kept)
+            by_heat = lambda T: power + kept + sheared * (law(T) / before - 1.0)  # noqa: E731
+            gain = self._gain(rho_c, fresh, held)
             with np.errstate(invalid="ignore"):
                 T = bisect(lambda T: table.T_in + gain * by_heat(T) - T, np.array([coldest]), np.array([oils.HIGHEST]))
             return np.full(at.p.size, T[0])
@@ -134,6 +139,11 @@ class Heat(Effect):
                 break
         return T
 
+    def _gain(self, rho_c: float, fresh: float, held: float) -> float:
+        """By what a watt raises the effective temperature, K/W; held : liquid that stays in the film, over a step's length."""
+        carries = rho_c * (max(fresh, 0.0) / self.table.share + held)
+        return 1.0 / carries if carries > 0 else np.inf
+
     def _temperature(self, at: Answer) -> tuple[Array, dict[str, float], float]:
         """T at the points, K; what is told of the heat; the equations' residual. Taken once an answer. Collective."""
         if id(self) not in at.memory:
@@ -147,25 +157,34 @@ class Heat(Effect):
         fresh = fresh_flow(at, flow, table.carry_over)
         if table.model == "energy":
             found = heated(at, flow, rho_c, table.exchange, self.wall, table.carry_over)
-            T, out, residual = table.T_in + found.theta, found.out, found.residual
-            walls = np.where(flow.free, flow.area * (found.theta - self.wall).reshape(flow.area.shape), 0.0)
-            by_flow = out - table.exchange * reduce.sum(walls)
+            T, out, residual, stored = table.T_in + found.theta, found.out, found.residual, found.stored
+            through = np.where(flow.free, flow.area * (found.theta - self.wall).reshape(flow.area.shape), 0.0)
+            by_flow = out - table.exchange * reduce.sum(through)
             effective = reduce.sum(np.where(flow.free.ravel(), T, 0.0)) / max(reduce.sum(flow.free.astype(float)), 1.0)
         else:
-            out = by_flow = power
-            rise = power / (rho_c * fresh) if fresh > 0 else np.inf if power > 0 else 0.0
-            effective, residual = table.T_in + table.share * rise, 0.0
+            held, kept = reduce.sum(flow.held), rho_c * reduce.sum(flow.kept)
+            heat = power + kept
+            rise = heat * self._gain(rho_c, fresh, held) if heat else 0.0
+            stored = rho_c * held * rise - kept if held else 0.0
+            out = by_flow = power - stored
+            effective, residual = table.T_in + rise, 0.0
             T = np.full(at.p.size, effective)
-        T_out = table.T_in + (by_flow / (rho_c * fresh) if fresh > 0 else 0.0 if not power > 0 else np.inf)
-        size = max(abs(flow.power), abs(power))
+        if fresh > 0:
+            T_out = table.T_in + by_flow / (rho_c * fresh)
+        else:  # nothing flows out: in time what stays in the film is as warm as that is
+            T_out = effective if at.problem.stored is not None else np.inf if power > 0 else table.T_in
+        walls = table.exchange * float(reduce.sum(flow.area)) * max(reduce.max(T) - table.T_in, abs(self.wall))
+        gross = walls + rho_c * float(reduce.sum(np.abs(flow.kept)))
+        size = max(abs(flow.power), abs(power), abs(out), abs(stored), LITTLE * gross)
         told = {
             "temperature_max": max(reduce.max(T), T_out if table.model == "effective" else -np.inf),
             "temperature_effective": float(effective),
             "temperature_out": float(T_out),
             "heat_power": flow.power,
             "heat_out": out,
-            "heat_defect": abs(flow.power - out) / size if size > 0 else 0.0,
+            "heat_defect": abs(flow.power - out - stored) / size if size > 0 else 0.0,
         }
+        told |= {"heat_stored": stored} if at.problem.stored is not None else {}
         return T, told, residual
 
     def report(self, at: Answer) -> Report:
