@@ -36,6 +36,7 @@ def printed(solution):
 def answers():
     """What the built-in scenes print on small grids, and the options that print more."""
     film = {"n": 15, "U": 1.0}
+    heat = {"n": 15, "motion.steps": 8, "temperature.beta": 0.03}
     extra = {
         "accuracy": printed(solve("problem1", accuracy=1e-4)),
         "fas": printed(solve("problem4", n=20, method="fas")),
@@ -44,6 +45,7 @@ def answers():
         "deep": printed(solve(load_scene("pocketed_pad_2d", {"nx": 14, "ny": 9, "film.pocket.depth": 0.2}))),
         "level": printed(solve("problem1", n=20, motion={"t_end": 0.01, "steps": 2, "set": {"h_offset": "1e-4*t"}})),
         "asperity": printed(solve("lined_pad", n=12, asperity={"sigma": 1e-6, "E_reduced": 1e11})),
+        "warm": printed(solve(load_scene("moving_texture", heat), model="full")),
         "balance": printed(solve(load_scene("pocketed_pad", {**film, "balance.load": 3e4}))),
     }
     return {
