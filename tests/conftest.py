@@ -89,7 +89,6 @@ def python() -> list[str]:
         [sys.executable, str(TESTS / "standing.py"), "--serve", path], env=ENVIRONMENT, stdin=pipe, stdout=pipe, text=True
     )
     assert server.stdin is not None and server.stdout is not None
-    atexit.register(shutil.rmtree, Path(path).parent)
     atexit.register(server.communicate)
     assert server.stdout.readline() == "ready\n"
     return [sys.executable, "-I", "-S", str(TESTS / "standing.py"), path]

@@ -116,6 +116,7 @@ def preload() -> None:
 
 def serve(path: str) -> list[str]:
     """Fork until standard input ends, which ends this process; returns in each child, with the words of its command."""
+    import contextlib
     import select
     import socket
 
@@ -136,6 +137,8 @@ def serve(path: str) -> list[str]:
                 for _, pid, _ in children.values():
                     os.kill(pid, _signal.SIGKILL)
                 os.unlink(path)
+                with contextlib.suppress(OSError):  # whoever asked may have gone without
+                    os.rmdir(os.path.dirname(path))
                 os._exit(0)
             if found != listener.fileno():
                 end, pid, connection = children.pop(found)
