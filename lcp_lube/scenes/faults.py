@@ -17,7 +17,8 @@ def first_fault(error: ValidationError, model: type[BaseModel]) -> str:
         (fault for fault in faults if fault["type"] == "extra_forbidden"), faults[0]
     )  # a typo explains what is missing
     path, tables = _walk(model, fault["loc"])
-    key, found, context = ".".join(path), _short(fault["input"]), fault.get("ctx", {})
+    key, context = ".".join(path), fault.get("ctx", {})
+    found = "none" if fault["input"] is None else _short(fault["input"])  # as --set has it
     if fault["type"] == "extra_forbidden":
         known = [name for table in tables for name in known_keys(table)]
         return f"unknown key {key}{nearest(path[-1], known) or '; known are ' + ', '.join(_plain(tables))}"
