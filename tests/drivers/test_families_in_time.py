@@ -124,6 +124,20 @@ def test_pads_answer_small_motions_as_their_coefficients_say():
     assert in_phase == pytest.approx(-Z.K[0, 0], rel=5e-3) and across == pytest.approx(-nu * Z.C[0, 0], rel=2e-2)
 
 
+@pytest.mark.parametrize("name", ["grooves on the journal", "to smaller x", "tilting sector"])
+def test_a_march_is_taken_up_whatever_solves_its_steps(name, tmp_path):
+    data, changes = WAYS[name]
+    scene = load_scene(data, {"balance": None, **changes, "motion.t_end": 0.004, "motion.steps": 4})
+    whole, short = march(scene), load_scene(scene, {"motion.t_end": 0.002, "motion.steps": 2})
+    solve(short, checkpoint=tmp_path / "c", every=1).destroy()
+    with pytest.raises(InputError, match="another scene"):  # of steps of another number
+        solve(scene, resume=tmp_path / "c")
+    halves = {"motion.steps": None, "motion.dt": 0.001}
+    solve(load_scene(short, halves), checkpoint=tmp_path / "d", every=1).destroy()
+    with solve(load_scene(scene, halves), resume=tmp_path / "d") as s:
+        assert len(s.history) == 4 and s.load == pytest.approx(whole.load, rel=1e-7)
+
+
 def test_pads_are_taken_up_and_march_on_ranks(cli, tmp_path):
     motion = {"motion.t_end": 0.002, "motion.steps": 4, "motion.journal": ["0.3+0.1*sin(300*t)", "0.1*cos(300*t)-0.1"]}
     scene = load_scene("tilting_pad_journal", PADS | motion)
