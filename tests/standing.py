@@ -32,6 +32,7 @@ LAUNCHER = (
     "SHLVL",
     "PATH",
 )
+STARTS = ("petsc4py.init(", "lcp_lube.__main__", "lcp_lube.base.petsc")  # in programs that start PETSc themselves
 FORWARDED = (_signal.SIGINT, _signal.SIGTERM, _signal.SIGHUP, _signal.SIGQUIT, _signal.SIGUSR1, _signal.SIGUSR2)
 
 
@@ -97,7 +98,8 @@ def preload() -> None:
         def exec_module(self, module) -> None:  # type: ignore[no-untyped-def]
             if module.__name__ == "mpi4py.MPI":
                 sys.modules[module.__name__] = MPI
-                MPI.Init_thread(MPI.THREAD_FUNNELED)
+                if not MPI.Is_initialized():  # PETSc may have come first
+                    MPI.Init_thread(MPI.THREAD_FUNNELED)
             else:
                 petsc4py.lib.ImportPETSc()._initialize()
 
@@ -193,11 +195,20 @@ def run(words: list[str]) -> None:
         sys.argv, sys.path[0] = words[1:], os.getcwd()
         runpy.run_module(words[1], run_name="__main__", alter_sys=True)
     elif words[0] == "-c":
+        start_petsc(words[1])
         sys.argv, sys.path[0] = ["-c", *words[2:]], ""
         exec(words[1], {"__name__": "__main__"})
     else:
+        with open(words[0]) as program:
+            start_petsc(program.read())
         sys.argv, sys.path[0] = words, os.path.dirname(words[0])
         runpy.run_path(words[0], run_name="__main__")
+
+
+def start_petsc(program: str) -> None:
+    """For a program that imports modules of the package, which in a new process start PETSc; they have been imported here."""
+    if "lcp_lube" in program and not any(own in program for own in STARTS):
+        from petsc4py import PETSc  # noqa: F401
 
 
 if __name__ == "__main__":
