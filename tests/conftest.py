@@ -94,9 +94,9 @@ def python() -> list[str]:
     return [sys.executable, "-I", "-S", str(TESTS / "standing.py"), path]
 
 
-def job(arguments: list[str], ranks: int) -> list[str]:
-    """The command of a Python process, or of an MPI job of several."""
-    command = [*python(), *arguments]
+def job(arguments: list[str], ranks: int, new: bool = False) -> list[str]:
+    """The command of a Python process, or of an MPI job of several; new : that share nothing with a standing process."""
+    command = [*([sys.executable] if new else python()), *arguments]
     if ranks == 1:
         return command
     mpiexec = shutil.which("mpiexec")
@@ -105,9 +105,9 @@ def job(arguments: list[str], ranks: int) -> list[str]:
     return [mpiexec, "-n", str(ranks), *command]
 
 
-def start(arguments: list[str], ranks: int, cwd: Path, timeout: float) -> Run:
+def start(arguments: list[str], ranks: int, cwd: Path, timeout: float, new: bool = False) -> Run:
     """A Python process, or an MPI job of several, with a time limit."""
-    done = subprocess.run(job(arguments, ranks), cwd=cwd, env=ENVIRONMENT, capture_output=True, text=True, timeout=timeout)
+    done = subprocess.run(job(arguments, ranks, new), cwd=cwd, env=ENVIRONMENT, capture_output=True, text=True, timeout=timeout)
     return Run(done.returncode, done.stdout, done.stderr)
 
 
@@ -131,8 +131,8 @@ def gone(pids: list[int], seconds: float) -> bool:
 def cli(tmp_path: Path) -> Callable[..., Run]:
     """`cli("solve", "problem1", ranks=2)`: the command line as a process, in a folder of its own."""
 
-    def run(*words: object, ranks: int = 1, timeout: float = 60) -> Run:
-        return start(["-m", "lcp_lube", *map(str, words)], ranks, tmp_path, timeout)
+    def run(*words: object, ranks: int = 1, timeout: float = 60, new: bool = False) -> Run:
+        return start(["-m", "lcp_lube", *map(str, words)], ranks, tmp_path, timeout, new)
 
     return run
 

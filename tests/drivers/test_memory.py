@@ -32,13 +32,15 @@ GB = 2**30
 def test_peaks_are_foreseen(cli, words, sizes):
     """Within 25 %, each in a process of its own."""
     for n in sizes:
-        data = cli("solve", *words.split(), "--n", n, "--json").json
+        data = cli("solve", *words.split(), "--n", n, "--json", new=True).json
         assert data["memory_estimate_mb"] == pytest.approx(data["memory_mb"], rel=0.25), n
         assert 0 < data["memory_base_mb"] < data["memory_estimate_mb"]
 
 
 def test_on_several_ranks(cli):
-    data = cli("solve", "problem4", "--n", 50, "--method", "din", "--max-it", 1, "--no-rescue", "--json", ranks=2).json
+    data = cli(
+        "solve", "problem4", "--n", 50, "--method", "din", "--max-it", 1, "--no-rescue", "--json", ranks=2, new=True
+    ).json
     assert data["memory_estimate_mb"] == pytest.approx(data["memory_mb"], rel=0.25)
 
 
