@@ -219,7 +219,7 @@ def test_panels_of_the_full_chart_can_be_read(draw: Any, printed: None) -> None:
     rows = stored("precision")
     figure = draw(rows)
     panels = [axes for axes in figure.axes if axes.get_title(loc="left")]
-    assert len(panels) >= 6
+    assert len(panels) >= 5  # places of ruptures that every grid has to rounding are not drawn
     for axes in panels:
         lines = [
             line
