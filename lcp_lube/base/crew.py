@@ -12,14 +12,12 @@ from threading import Lock
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
 from ..errors import InputError
 
 VARIABLE = "NUMBA_NUM_THREADS"  # what --threads sets
 FEWEST = 120_000  # points of a grid that threads are woken for
 PARTS = 8  # of the lines of such a grid
-MOST = 4  # threads that nobody asked for: more have not been measured, and a core may be here in name alone
 
 
 class Crew:
@@ -70,19 +68,13 @@ def _crew(number: int, process: int) -> Crew:
 
 
 def threads() -> int:
-    """As many as were asked for; else the cores that this process may use, MOST at most, or one of several ranks 1.
+    """As many as were asked for; else 1: on two cores two gain nothing to a fifth, and lose on a busy machine.
 
     Raises
     ------
     InputError : no whole number from 1 on was asked for.
     """
-    asked = os.environ.get(VARIABLE, "")
-    if not asked:
-        return min(_cores(), MOST) if MPI.COMM_WORLD.size == 1 else 1
+    asked = os.environ.get(VARIABLE) or "1"
     if not asked.isdecimal() or int(asked) < 1:
         raise InputError(f"{VARIABLE} = {asked}: a whole number from 1 on is needed")
     return int(asked)
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

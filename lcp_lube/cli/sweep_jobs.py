@@ -114,7 +114,7 @@ def _lead(
 
 def _start(words: Sequence[str]) -> "subprocess.Popen[str]":
     """A worker, out of reach of the terminal's interrupts."""
-    environment = {"NUMBA_NUM_THREADS": "1", **os.environ}  # without what this process's MPI has put into it for itself
+    environment = dict(os.environ)  # without what this process's MPI has put into it for itself
     environment["PYTHONPATH"] = os.pathsep.join(filter(None, [str(PACKAGE.parent), environment.get("PYTHONPATH", "")]))
     return subprocess.Popen(
         [sys.executable, "-m", "lcp_lube", *words, "--worker"],
