@@ -146,10 +146,12 @@ class CoupledGradient(CoupledResponse):
     def _step(self, key: str, a: float) -> float:
         """A small change of a number; of one that is zero one that changes the equations by more than rounding does."""
         d = STEP * scale_of(self.scene, key, self.loop.base, self.p, key in self.found)
+        if a:
+            return d
         with suppress(InputError):  # so large a value is not allowed
-            for _ in range(0 if a else LARGER):
-                change = self._beside(key, 10.0 * d)[0] - self._beside(key, 0.0)[0]
-                if self.loop.base.reduce.max(np.abs(change)) > STEP:
+            here = self._beside(key, 0.0)[0]
+            for _ in range(LARGER):
+                if self.loop.base.reduce.max(np.abs(self._beside(key, 10.0 * d)[0] - here)) > STEP:
                     break
                 d *= 10.0
         return d

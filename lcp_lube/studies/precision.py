@@ -73,7 +73,7 @@ ENOUGH = 3.0  # seconds; after such a run a configuration is not tried on larger
 
 MARKS = (
     "`-`: no run is known to, by a reference that is as sure. `not run`: none did on the grids run, and larger ones, which "
-    "others have, would take minutes. A run is left after 10 s of the processor, and counts as failed."
+    f"others have, would take minutes. A run is left after {CPU_MOST:g} s of the processor, and counts as failed."
 )
 
 KEY = ("scene", "data", "n", "method", "nested", "system", "recipe", "eps", "ranks")
