@@ -1,6 +1,12 @@
-"""Films in time: built-in scenes, small enough for tests that solve every scene, and a wedge that breathes."""
+"""Films in time: built-in scenes, small enough for tests that solve every scene, a wedge that breathes, marches taken up."""
 
+from pathlib import Path
 from typing import Any
+
+import pytest
+
+from lcp_lube import Solution, solve
+from lcp_lube.scenes.scene import Scene
 
 SMALL: dict[str, dict[str, Any]] = {
     "squeeze": {"steps": 8},
@@ -19,3 +25,19 @@ WEDGE: dict[str, Any] = {
     ],
     "motion": {"t_end": 0.02, "steps": 20},
 }
+
+
+class Stopped(Exception):
+    pass
+
+
+def taken_up(scene: Scene, path: Path, step: int) -> Solution:
+    """The end of a march that was stopped after so many steps, and went on from its checkpoint."""
+
+    def watch(moment: Any) -> None:
+        if moment.count == step:
+            raise Stopped
+
+    with pytest.raises(Stopped):
+        solve(scene, checkpoint=path, every=2, watch=watch)
+    return solve(scene, resume=path)

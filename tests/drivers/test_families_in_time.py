@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from marches import WEDGE
+from marches import WEDGE, taken_up
 from test_motion import march
 
 from lcp_lube import InputError, load_scene, solve
@@ -142,17 +142,7 @@ def test_pads_are_taken_up_and_march_on_ranks(cli, tmp_path):
     motion = {"motion.t_end": 0.002, "motion.steps": 4, "motion.journal": ["0.3+0.1*sin(300*t)", "0.1*cos(300*t)-0.1"]}
     scene = load_scene("tilting_pad_journal", PADS | motion)
     whole = march(scene)
-
-    class Stop(Exception):
-        pass
-
-    def watch(moment):
-        if moment.count == 3:
-            raise Stop
-
-    with pytest.raises(Stop):
-        solve(scene, checkpoint=tmp_path / "c", every=2, watch=watch)
-    with solve(scene, resume=tmp_path / "c") as s:
+    with taken_up(scene, tmp_path / "c", 3) as s:
         assert len(s.history) == 4 and s.pad_tilts == pytest.approx(whole.pad_tilts, rel=1e-7)
     (tmp_path / "pads.toml").write_text(
         'family = "tilting_pad"\nnx = 90\nny = 5\neccentricity = 0.3\npivots_deg = [60.0, 180.0, 300.0]\n'

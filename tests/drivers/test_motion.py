@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from conftest import ENVIRONMENT
-from marches import WEDGE
+from marches import WEDGE, taken_up
 
 from lcp_lube import InputError, load_scene, solve
 
@@ -291,17 +291,7 @@ def test_a_march_is_taken_up_where_it_was_killed(cli, tmp_path):
 def test_an_orbit_is_taken_up(tmp_path):
     small = {"nx": 16, "ny": 3, "motion.t_end": 0.001, "motion.steps": 12}
     whole = march("dynamic_journal", **small)
-
-    class Stop(Exception):
-        pass
-
-    def watch(moment):
-        if moment.count == 8:
-            raise Stop
-
-    with pytest.raises(Stop):
-        solve(load_scene("dynamic_journal", small), checkpoint=tmp_path / "c", every=2, watch=watch)
-    solution = solve(load_scene("dynamic_journal", small), resume=tmp_path / "c")
+    solution = taken_up(load_scene("dynamic_journal", small), tmp_path / "c", 8)
     assert [row["t"] for row in solution.history] == [row["t"] for row in whole.history]
     assert solution.journal == pytest.approx(whole.journal, abs=1e-8) and solution.load == pytest.approx(whole.load, rel=1e-6)
     solution.destroy()
