@@ -32,11 +32,11 @@ class GroovedJournalScene(ShaftScene, WithEffects):
     say where the bore has a pressure dam, a recess about the middle of the width that ends in a step.
     """
 
-    eccentricity: Annotated[float, Field(ge=0, lt=1, description="relative eccentricity")] = 0.5
+    eccentricity: Annotated[Finite, Field(ge=0, lt=1, description="relative eccentricity")] = 0.5
     attitude_deg: Finite | None = Field(None, description="from the load to the thinnest film, degrees; default: as it follows")
     grooves_deg: list[Finite] = Field([90.0, 270.0], description="middles of the grooves, degrees from the load; [] for none")
-    groove_deg: Annotated[float, Field(gt=0, lt=180, description="extent of each groove, degrees")] = 20.0
-    preload: Annotated[float, Field(ge=0, lt=1, description="of the lobes between the grooves; 0: a round bush")] = 0.0
+    groove_deg: Annotated[Finite, Field(gt=0, lt=180, description="extent of each groove, degrees")] = 20.0
+    preload: Annotated[Finite, Field(ge=0, lt=1, description="of the lobes between the grooves; 0: a round bush")] = 0.0
     tilt: Finite = Field(0.0, description="slope of the shaft in the plane of the load, rad")
     tilt_across: Finite = Field(0.0, description="slope of the shaft across the load, rad")
     barrel: Finite = metres(0.0, "by how much the film is larger at both ends: a barrel-shaped journal")
@@ -44,7 +44,7 @@ class GroovedJournalScene(ShaftScene, WithEffects):
         None, description="where a pressure dam begins and ends, degrees from the load"
     )
     dam_depth: NotNegative = metres(0.0, "depth of the pressure dam")
-    dam_width: Annotated[float, Field(gt=0, le=1)] = Field(0.75, description="width of the dam over the bearing's")
+    dam_width: Annotated[Finite, Field(gt=0, le=1)] = Field(0.75, description="width of the dam over the bearing's")
     film: list[FilmPart] = Field([], description="shapes that are added to the film; x from the first groove's edge")
     supply: list[SupplyTable] = Field([], description="supplies inside the film, beside the grooves; pressures are absolute")
     balance: BalanceTable | None = Field(None, description="load to carry; eccentricity and open attitude follow")

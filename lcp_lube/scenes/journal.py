@@ -15,7 +15,7 @@ from ..problems.film.turning import Turning
 from ..problems.grid import Places
 from .film_scene import Sides
 from .published import LubricationScene
-from .scene import Positive
+from .scene import Finite, Positive
 from .supply import Place, SupplyTable, supplies_of
 from .units import measured, metres
 
@@ -30,14 +30,14 @@ class JournalScene(LubricationScene):
 
     derived: ClassVar[tuple[str, ...]] = ("L", "U", "width", "p_unit")
     dimension: Literal[1, 2] = 2
-    eccentricity: Annotated[float, Field(ge=0, lt=1, description="relative eccentricity")] = 0.5
+    eccentricity: Annotated[Finite, Field(ge=0, lt=1, description="relative eccentricity")] = 0.5
     width_over_diameter: Positive = Field(1.0, description="B/D (2D)")
     round: Literal["groove", "periodic"] = Field("groove", description="at phi = 0: an axial groove, or nothing (2D)")
     graded: bool = Field(
         False, description="lines graded towards the thinnest film and the ends: eccentricities near 1 (2D, groove)"
     )
     D: Positive = metres(0.1, "diameter")
-    psi: Annotated[float, Field(gt=0, lt=1, description="relative clearance c/(D/2)")] = 1e-3
+    psi: Annotated[Finite, Field(gt=0, lt=1, description="relative clearance c/(D/2)")] = 1e-3
     omega: Positive = measured("rad/s", 100.0, "angular velocity")
     mu: Positive = 0.02
     supply: list[SupplyTable] = Field([], description="supplies inside the film; pressures are absolute")

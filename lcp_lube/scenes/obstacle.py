@@ -8,9 +8,9 @@ from ..base.parallel import Array
 from ..problems.grid import Grid
 from ..problems.obstacle import ObstacleProblem
 from .formula import Formula, FormulaText
+from .scene import Finite
 from .semilinear import OneUnknownScene
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
 Surface = Annotated[float | str, FormulaText]
 
 

@@ -48,19 +48,19 @@ class ThrustScene(WithEffects):
     D_inner: Positive = metres(0.06, "inner diameter")
     D_outer: Positive = metres(0.12, "outer diameter")
     pads: Annotated[int, Field(strict=True, ge=1, le=10_000)] = Field(6, description="number of pads, or of spiral grooves")
-    pad_deg: Annotated[float, Field(gt=0, le=360)] | None = Field(
+    pad_deg: Annotated[Finite, Field(gt=0, le=360)] | None = Field(
         None, description="angle of a pad, degrees; between pads p_groove holds; default: no grooves, the film is periodic"
     )
     profile: Literal["flat", "tapered_land", "step", "spiral"] = Field("tapered_land", description="form of the pads")
     h_min: Positive = metres(2.5e-5, "film on the lands")
     taper: NotNegative = metres(0.0, "by how much the film is larger where the runner enters, or in a groove")
-    taper_part: Annotated[float, Field(gt=0, le=1)] = Field(0.8, description="part of the pad's angle before the flat land")
-    angle_deg: Annotated[float, Field(gt=-90, lt=90)] = Field(
+    taper_part: Annotated[Finite, Field(gt=0, le=1)] = Field(0.8, description="part of the pad's angle before the flat land")
+    angle_deg: Annotated[Finite, Field(gt=-90, lt=90)] = Field(
         15.0, description="of spirals against the motion, degrees; negative: they pump outwards"
     )
-    ratio: Annotated[float, Field(gt=0, lt=1)] = Field(0.5, description="groove over groove and land, of spirals")
+    ratio: Annotated[Finite, Field(gt=0, lt=1)] = Field(0.5, description="groove over groove and land, of spirals")
     seal: NotNegative = metres(0.0, "width at the inner radius without spirals (angle below 0: at the outer one)")
-    pivot_part: Annotated[float, Field(gt=0, lt=1)] | None = Field(
+    pivot_part: Annotated[Finite, Field(gt=0, lt=1)] | None = Field(
         None, description="pads tilt about a pivot at this part of their angle from the inlet; default: fixed pads"
     )
     pivot_radius: Positive | None = metres(None, "of a pivot that is a point; default: a radial line")

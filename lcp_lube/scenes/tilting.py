@@ -26,16 +26,16 @@ class TiltingPadScene(ShaftScene, WithEffects):
     """
 
     clearance: Positive = metres(1e-4, "radial clearance at the pivots, the journal in the middle")
-    preload: Annotated[float, Field(ge=0, lt=1, description="of the pads: 1 - clearance over that of their own bore")] = 0.3
+    preload: Annotated[Finite, Field(ge=0, lt=1, description="of the pads: 1 - clearance over that of their own bore")] = 0.3
     pivots_deg: list[Finite] = Field(
         [36.0, 108.0, 180.0, 252.0, 324.0], min_length=1, description="pivots of the pads, degrees from the load, ascending"
     )
-    pad_deg: Annotated[float, Field(gt=0, lt=360, description="extent of each pad, degrees")] = 60.0
-    pivot_part: Annotated[float, Field(gt=0, lt=1, description="where the pivot is, in parts of the pad from its inlet")] = 0.5
+    pad_deg: Annotated[Finite, Field(gt=0, lt=360, description="extent of each pad, degrees")] = 60.0
+    pivot_part: Annotated[Finite, Field(gt=0, lt=1, description="where the pivot is, in parts of the pad from its inlet")] = 0.5
     tilts: list[Finite] | None = Field(
         None, description="tilts of the pads, rad, positive: inlet open; default: as they follow"
     )
-    eccentricity: Annotated[float, Field(ge=0, lt=2, description="of the journal over the clearance")] = 0.3
+    eccentricity: Annotated[Finite, Field(ge=0, lt=2, description="of the journal over the clearance")] = 0.3
     attitude_deg: Finite = Field(0.0, description="from the load to the journal's displacement, degrees")
     p_groove: NotNegative = measured("Pa", 0.0, "pressure between the pads, above p_c")
     balance: BalanceTable | None = Field(None, description="load to carry; the journal's place is found for it")

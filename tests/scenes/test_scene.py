@@ -106,6 +106,14 @@ def test_refused_values(changes, message):
     assert str(caught.value).startswith(f"problem1: {message}") and "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("name", ["journal", "two_groove_journal", "dam_journal", "tilting_pad_thrust", "tilting_pad_journal"])
+def test_true_is_no_number(name):
+    for key, field in type(load_scene(name)).model_fields.items():
+        if "float" in str(field.annotation) and "dict" not in str(field.annotation):
+            with pytest.raises(InputError):
+                load_scene(name, {key: True})
+
+
 @pytest.mark.parametrize(
     "content, message",
     [
