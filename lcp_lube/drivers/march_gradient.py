@@ -36,6 +36,7 @@ from .march_course import Course, Trace, check_march
 MEAN = "mean_"  # of a quantity: its mean over the march, of the steps' ends
 STEP = 1e-3  # of a supply's pressure, in which G and what it is told by are linear
 NUDGE = 1e-5  # of the thinnest film: of the journal's place, for differences
+FORCES = ("force_x", "force_y")  # on a free journal
 HELD = ("t_end", "dt", "tol")
 STEPS = "the steps in time are held"
 
@@ -104,7 +105,7 @@ class MarchGradient:
         parts = {
             name: {part: share * w for part, w in eq.partials(numbers, base).items()} for name, (base, share) in asked.items()
         }
-        forces = ("force_x", "force_y") if self.course.table.free and n else ()
+        forces = FORCES if self.course.table.free and n else ()
         slopes = {part: eq.slope(p, r, part) for part in dict.fromkeys([*(q for one in parts.values() for q in one), *forces])}
         later = self._later(n)
         left = np.where(
@@ -203,9 +204,10 @@ class MarchGradient:
         for n in range(0 if self.trace.begun is not None else 1, len(self.trace.steps) + 1):
             eq, kept, dot = course.at(n), course.kept(n), course.grid.reduce.dot
             assert kept is not None
-            numbers = eq.numbers(kept.p, kept.r)
+            asked = self._asked(n)
+            numbers = eq.numbers(kept.p, kept.r, None if asked else FORCES if course.table.free else ())
             told, G = eq.report(numbers), self._scaled(n, eq)
-            for name, (base, share) in self._asked(n).items():
+            for name, (base, share) in asked.items():
                 total[name] += share * told[base]
             rest = np.zeros(4)
             if course.table.free and n:
