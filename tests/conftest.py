@@ -1,6 +1,8 @@
 """Fixtures of all tests: clean PETSc options, the command line, jobs under mpiexec."""
 
 import atexit
+import fcntl
+import gc
 import json
 import os
 import re
@@ -33,6 +35,8 @@ ENVIRONMENT = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_CO
     # On cores that others use too: ranks that wait give way, and move.
     "OMPI_MCA_mpi_yield_when_idle": "1",
     "OMPI_MCA_hwloc_base_binding_policy": "none",
+    # A job whose ranks end with a status of ours: the ranks have ended already, mpiexec need not wait a second for them.
+    "OMPI_MCA_odls_base_sigkill_timeout": "0",
     "OMPI_MCA_orte_tmpdir_base": JOBS,
     "PYTHONPATH": os.pathsep.join(filter(None, [str(TESTS.parent), os.environ.get("PYTHONPATH", "")])),
 }
@@ -43,6 +47,12 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 # The same examples in every run; HYPOTHESIS_PROFILE=default looks for new ones.
 settings.register_profile("fixed", derandomize=True, deadline=None, database=None)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "fixed"))
+
+
+def pytest_collection_finish() -> None:
+    """Thousands of tests wait in memory: the garbage collector, which tests call hundreds of times, passes over them."""
+    gc.collect()
+    gc.freeze()
 
 
 @dataclass(frozen=True)
@@ -99,10 +109,10 @@ def job(arguments: list[str], ranks: int, new: bool = False) -> list[str]:
     command = [*([sys.executable] if new else python()), *arguments]
     if ranks == 1:
         return command
-    mpiexec = shutil.which("mpiexec")
-    if mpiexec is None:
+    if shutil.which("mpiexec") is None:
         pytest.skip("no mpiexec")
-    return [mpiexec, "-n", str(ranks), *command]
+    # By its name: called by its path it sets LD_LIBRARY_PATH, an environment for which the standing process does not fork.
+    return ["mpiexec", "-n", str(ranks), *command]
 
 
 def start(arguments: list[str], ranks: int, cwd: Path, timeout: float, new: bool = False) -> Run:
@@ -191,16 +201,23 @@ def petsc_options() -> Iterator[Callable[..., None]]:
 
 @pytest.fixture(scope="session")
 def mpi_job(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int], dict[str, Any]]:
-    """`mpi_job(3)`: the record and, under "fields", the whole fields of tests/mpi_job.py; run once for a number of ranks."""
-    done: dict[int, dict[str, Any]] = {}
+    """`mpi_job(3)`: the record and, under "fields", the whole fields of tests/mpi_job.py; run once for a number of ranks.
 
+    Whichever process of tests asks first runs it for all.
+    """
+    base = tmp_path_factory.getbasetemp()
+    shared = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+
+    @cache
     def run(ranks: int) -> dict[str, Any]:
-        if ranks not in done:
-            folder = tmp_path_factory.mktemp(f"ranks{ranks}")
-            end = start([str(TESTS / "mpi_job.py"), str(folder)], ranks, folder, timeout=400)
-            assert end.status == 0, end.err
-            with np.load(folder / "fields.npz") as fields:
-                done[ranks] = {**json.loads((folder / "record.json").read_text()), "fields": dict(fields)}
-        return done[ranks]
+        folder = shared / f"ranks{ranks}"
+        folder.mkdir(exist_ok=True)
+        with open(folder / "lock", "w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not (folder / "record.json").exists():
+                end = start([str(TESTS / "mpi_job.py"), str(folder)], ranks, folder, timeout=400)
+                assert end.status == 0, end.err
+        with np.load(folder / "fields.npz") as fields:
+            return {**json.loads((folder / "record.json").read_text()), "fields": dict(fields)}
 
     return run

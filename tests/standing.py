@@ -151,12 +151,16 @@ def serve(path: str) -> list[str]:
                 status = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
                 children.pop(connection.fileno() if found == end else end)
                 if found == end:
-                    connection.send(status.to_bytes(4, "big", signed=True))
+                    with contextlib.suppress(OSError):  # the command was killed meanwhile
+                        connection.send(status.to_bytes(4, "big", signed=True))
                 os.close(end)
                 connection.close()
                 break  # the other of the two may be among those found
             connection, _ = listener.accept()
             data, streams, _, _ = socket.recv_fds(connection, 1 << 20, 3)
+            if not data:  # the command was killed before it said anything
+                connection.close()
+                continue
             words, folder, environment = marshal.loads(data)
             plain = {name: value for name, value in environment.items() if not name.startswith(LAUNCHER)}
             pid = os.fork() if plain == known else 0
@@ -173,7 +177,8 @@ def serve(path: str) -> list[str]:
                 return words
             for stream in streams:
                 os.close(stream)
-            connection.send(pid.to_bytes(4, "big", signed=True))
+            with contextlib.suppress(OSError):
+                connection.send(pid.to_bytes(4, "big", signed=True))
             if pid == 0:
                 connection.close()
                 continue

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import pytest
 from conftest import ENVIRONMENT, TESTS, gone, without_notices
@@ -15,6 +16,8 @@ from conftest import ENVIRONMENT, TESTS, gone, without_notices
 WORDS = "solve problem1 --n 30 --method din --system full --recipe mumps".split()  # noqa: SIM905
 RANKS = 3
 PIDS = re.compile(r"pid (\d+)")
+# What a user's mpiexec does.
+PLAIN = {name: value for name, value in ENVIRONMENT.items() if name != "OMPI_MCA_odls_base_sigkill_timeout"}
 
 
 def limit():
@@ -26,12 +29,10 @@ class Job:
     """A job of tests/mpi_one_rank_fails.py, watched until every rank has come to its first linear solve."""
 
     def __init__(self, failure, folder):
-        if shutil.which("mpiexec") is None:
-            pytest.skip("no mpiexec")
         script = [sys.executable, str(TESTS / "mpi_one_rank_fails.py"), failure, *WORDS]
         pipe = subprocess.PIPE
         self.process = subprocess.Popen(
-            ["mpiexec", "-n", str(RANKS), *script], cwd=folder, env=ENVIRONMENT, stdout=pipe, stderr=pipe, text=True
+            ["mpiexec", "-n", str(RANKS), *script], cwd=folder, env=PLAIN, stdout=pipe, stderr=pipe, text=True
         )
         self.said, self.pids = "", []
         for line in self.process.stderr:
@@ -58,86 +59,100 @@ EXCEPTIONS = {
 }
 
 
+def excepted(folder, failure):
+    job = Job(failure, folder)
+    return *job.end(), gone(job.pids, 2)
+
+
+def rank_killed(folder, victim):
+    job = Job("sleep", folder)
+    os.kill(job.pids[victim], signal.SIGKILL)
+    return *job.end(), gone(job.pids, 2)
+
+
+def mpiexec_killed(folder):
+    job = Job("sleep", folder)
+    job.process.kill()
+    left = gone(job.pids, limit())
+    job.process.communicate(timeout=60)
+    return left
+
+
+def interrupted(folder):
+    job = Job("sleep", folder)
+    job.process.send_signal(signal.SIGINT)
+    return *job.end(), gone(job.pids, 2)
+
+
+def unequal(folder, programs, files):
+    """One rank each with words and a folder of its own; status and our lines."""
+    command = ["mpiexec"]
+    for k, (words, file) in enumerate(zip(programs, files, strict=True)):
+        own = folder / str(k)
+        own.mkdir()
+        if file:
+            (own / "my.toml").write_text(file)
+        command += [*([":"] if k else []), "-n", "1", "-wdir", str(own), sys.executable, "-m", "lcp_lube", *words.split()]
+    done = subprocess.run(command, cwd=folder, env=PLAIN, capture_output=True, text=True, timeout=60, check=False)
+    assert done.stdout == "" and "Traceback" not in done.stderr
+    return done.returncode, [line for line in done.stderr.splitlines() if line.startswith("lcp-lube: ")]
+
+
+MINE = "family = 'slider'\nh_min = {}\nn = 30\n"
+CASES: dict[str, tuple[Any, ...]] = {
+    **{failure: (excepted, failure) for failure in EXCEPTIONS},
+    "one lacks": (unequal, ["solve my.toml"] * 2, [MINE.format(1e-5), ""]),
+    **{f"rank {victim}": (rank_killed, victim) for victim in range(RANKS)},
+    "mpiexec": (mpiexec_killed,),
+    "Control-C": (interrupted,),
+    "words": (unequal, ["solve problem1 --n 30", "solve problem1 --n 31"], ["", ""]),
+    "files": (unequal, ["solve my.toml"] * 2, [MINE.format(1e-5), MINE.format(2e-5)]),
+}  # those that wait longest first
+
+
 @pytest.fixture(scope="module")
 def ended(tmp_path_factory):
-    """How a job of each exception ended: at the same time, as each waits some seconds for ranks that do not come."""
-
-    folders = {failure: tmp_path_factory.mktemp(failure) for failure in EXCEPTIONS}
-
-    def end(failure):
-        job = Job(failure, folders[failure])
-        return *job.end(), gone(job.pids, 2)
-
-    with ThreadPoolExecutor(len(EXCEPTIONS)) as pool:
-        return dict(zip(EXCEPTIONS, pool.map(end, EXCEPTIONS), strict=True))
+    """How each job ended: some at the same time, as most wait seconds for ranks that do not come."""
+    if shutil.which("mpiexec") is None:
+        pytest.skip("no mpiexec")
+    folders = {name: tmp_path_factory.mktemp("job") for name in CASES}
+    with ThreadPoolExecutor(6) as pool:
+        jobs = {name: pool.submit(run, folders[name], *given) for name, (run, *given) in CASES.items()}
+        yield lambda name: jobs[name].result()
 
 
 @pytest.mark.parametrize("failure", EXCEPTIONS)
 def test_an_exception_on_one_rank(ended, failure):
-    status, lines, seconds, left = ended[failure]
+    status, lines, seconds, left = ended(failure)
     assert (status, lines[-1]) == EXCEPTIONS[failure]
     assert len(lines) == 1 or failure == "error"
     assert seconds < limit() and left
 
 
 @pytest.mark.parametrize("victim", range(RANKS))
-def test_a_killed_rank(tmp_path, victim):
+def test_a_killed_rank(ended, victim):
     """mpiexec hears of it and ends the others, which wait for it in a collective call."""
-    job = Job("sleep", tmp_path)
-    os.kill(job.pids[victim], signal.SIGKILL)
-    status, lines, seconds = job.end()
-    assert status != 0 and lines == [] and seconds < limit()
-    assert gone(job.pids, 2)
+    status, lines, seconds, left = ended(f"rank {victim}")
+    assert status != 0 and lines == [] and seconds < limit() and left
 
 
-def test_a_killed_mpiexec_leaves_no_orphans(tmp_path):
-    job = Job("sleep", tmp_path)
-    job.process.kill()
-    assert gone(job.pids, limit())
-    job.process.communicate(timeout=60)
+def test_a_killed_mpiexec_leaves_no_orphans(ended):
+    assert ended("mpiexec")
 
 
-def test_an_interrupted_mpiexec_leaves_no_orphans(tmp_path):
+def test_an_interrupted_mpiexec_leaves_no_orphans(ended):
     """Control-C."""
-    job = Job("sleep", tmp_path)
-    job.process.send_signal(signal.SIGINT)
-    status, _, seconds = job.end()
-    assert status != 0 and seconds < limit() and gone(job.pids, 2)
+    status, _, seconds, left = ended("Control-C")
+    assert status != 0 and seconds < limit() and left
 
 
-# --- unequal input
-
-
-def unequal(tmp_path, *programs):
-    """One rank each with words and a folder of its own; status and our lines."""
-    mpiexec = shutil.which("mpiexec")
-    if mpiexec is None:
-        pytest.skip("no mpiexec")
-    command = [mpiexec]
-    for k, words in enumerate(programs):
-        folder = tmp_path / str(k)
-        folder.mkdir(exist_ok=True)
-        command += [*([":"] if k else []), "-n", "1", "-wdir", str(folder), sys.executable, "-m", "lcp_lube", *words.split()]
-    done = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, timeout=60, check=False)
-    assert done.stdout == "" and "Traceback" not in done.stderr
-    return done.returncode, [line for line in done.stderr.splitlines() if line.startswith("lcp-lube: ")]
-
-
-def test_unequal_command_lines(tmp_path):
-    status, lines = unequal(tmp_path, "solve problem1 --n 30", "solve problem1 --n 31")
-    assert status == 2 and lines == ["lcp-lube: command line: not the same on rank 0 and on rank 1"]
-
-
-def test_unequal_scene_files(tmp_path):
-    for k, h_min in enumerate(("1e-5", "2e-5")):
-        (tmp_path / str(k)).mkdir()
-        (tmp_path / str(k) / "my.toml").write_text(f"family = 'slider'\nh_min = {h_min}\nn = 30\n")
-    status, lines = unequal(tmp_path, "solve my.toml", "solve my.toml")
-    assert status == 2 and lines == ["lcp-lube: scene my or how to solve it: not the same on rank 0 and on rank 1"]
-
-
-def test_a_scene_file_that_one_rank_lacks(tmp_path):
-    (tmp_path / "0").mkdir()
-    (tmp_path / "0" / "my.toml").write_text("family = 'slider'\nh_min = 1e-5\nn = 30\n")
-    status, lines = unequal(tmp_path, "solve my.toml", "solve my.toml")
-    assert status == 2 and lines == ["lcp-lube: my.toml: No such file or directory"]
+@pytest.mark.parametrize(
+    "case, message",
+    [
+        ("words", "command line: not the same on rank 0 and on rank 1"),
+        ("files", "scene my or how to solve it: not the same on rank 0 and on rank 1"),
+        ("one lacks", "my.toml: No such file or directory"),
+    ],
+)
+def test_unequal_input(ended, case, message):
+    assert ended(case) == (2, [f"lcp-lube: {message}"])

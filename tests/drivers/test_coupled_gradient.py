@@ -112,11 +112,11 @@ def test_supplies_whose_pressures_follow():
         found = gradients(scene, solution, quantities, ["supply.1.K", "supply.2.p_s", "clearance"])
         for key, slopes in found[0].gradient.items():
             a, told = values_of(scene)[key], []
-            for k in (-2, -1, 1, 2):
+            for k in (-1, 1):
                 with answer(with_values(scene, {key: a * (1 + 1e-4 * k)}), solution) as other:
                     n = other.numbers
                     told.append(np.array([n["load"], n["temperature_max"], n["supply_flow"][1], n["supply_p"][0]]))
-            slopes = (8.0 * (told[2] - told[1]) - (told[3] - told[0])) / (12e-4 * a)
+            slopes = (told[1] - told[0]) / (2e-4 * a)
             least = 2e-6 * np.abs(told[0] / a)  # sources and film agree to 1e-10 of a flow
             for one, slope, small in zip(found, slopes, least, strict=True):
                 assert one.gradient[key] == pytest.approx(slope, rel=1e-6, abs=small), (one.quantity, key)

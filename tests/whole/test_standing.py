@@ -1,15 +1,17 @@
 """Commands that tests fork from a standing process are as new ones: words, status, signals, environment, no state shared."""
 
+import marshal
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import time
 from pathlib import Path
 
 import pytest
-from conftest import ENVIRONMENT, TESTS, Run, gone, python
+from conftest import ENVIRONMENT, TESTS, Run, gone, python, start
 
 STATE = """
 import os, random, sys
@@ -55,6 +57,26 @@ def test_a_forked_command_says_what_a_new_one_says(tmp_path: Path, words: str) -
     times = re.compile(r"\d+(\.\d+)?(e[+-]\d+)? s\b|pid \d+")
     assert forked.status == new.status
     assert times.sub("", forked.out) == times.sub("", new.out) and times.sub("", forked.err) == times.sub("", new.err)
+
+
+@needs_forks
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_ranks_are_forked_too(tmp_path: Path, ranks: int) -> None:
+    """mpiexec hands on an environment for which that is right."""
+    words = ["-c", "import sys; print('lcp_lube.api' in sys.modules)"]
+    assert start(words, ranks, tmp_path, timeout=60).out.count("True") == ranks
+
+
+@needs_forks
+def test_who_asks_may_be_killed(tmp_path: Path) -> None:
+    """Before a word, and before the answer, as mpiexec ends ranks: the standing process goes on."""
+    for said in (False, True):
+        with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as asks, open(os.devnull, "r+b") as null:
+            asks.connect(python()[-1])
+            if said:
+                words = ["-c", "import time; time.sleep(0.1)"], str(tmp_path), dict(ENVIRONMENT)
+                socket.send_fds(asks, [marshal.dumps(words)], 3 * [null.fileno()])
+    assert start(["-c", "print(1)"], 1, tmp_path, timeout=60).out == "1\n"
 
 
 def test_an_exception_is_a_traceback_and_status_1(tmp_path: Path) -> None:
