@@ -30,11 +30,6 @@ def set_names() -> set[str]:
     return set(PETSc.Options().getAll())
 
 
-def names_solver() -> bool:
-    """Whether a -ksp_type or -pc_type is set: no inner solver of ours is wanted."""
-    return not {"ksp_type", "pc_type"}.isdisjoint(set_names())
-
-
 def wants_ksp() -> bool:
     """Whether an option is set that only a KSP, its preconditioner or its matrix reads: -ksp_monitor, -mat_type dense."""
     return any(LINEAR.match(name) for name in set_names())

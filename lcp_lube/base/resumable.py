@@ -150,8 +150,6 @@ class ResumableCsv:
             if self.comm.rank == 0:
                 try:
                     result = call()
-                except InputError:
-                    raise
                 except (OSError, UnicodeDecodeError, csv.Error) as error:
                     raise InputError(f"{self.path}: {getattr(error, 'strerror', None) or error}") from None
         return self.comm.bcast(result)

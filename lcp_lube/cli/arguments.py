@@ -63,17 +63,15 @@ class Parser(argparse.ArgumentParser):
         if unknown:
             option, below = unknown[1].partition("=")[0], [parser for parser in self.parsers() if parser is not self]
             having = [parser.prog.split()[-1] for parser in below if option in parser._option_string_actions]
-            near = f"; it is one of {', '.join(having)}" if having else nearest(option, self.option_names())
+            # Of this parser and of its commands: the error of an unknown option is raised at the top.
+            names = [name for parser in self.parsers() for action in parser._actions for name in action.option_strings]
+            near = f"; it is one of {', '.join(having)}" if having else nearest(option, names)
             message = f"{unknown[1]}: no such option{near}"
         wrong = re.match(r"argument (\S+): invalid choice: '(.*?)' \(choose from (.*)\)", message)
         if wrong:
             legal = [name.strip("' ") for name in wrong[3].split(",")]
             message = f"{wrong[1]} {wrong[2]}: allowed are {', '.join(legal)}{nearest(wrong[2], legal)}"
         raise InputError(message)
-
-    def option_names(self) -> list[str]:
-        """Of this parser and of its commands: the error of an unknown option is raised at the top."""
-        return [option for parser in self.parsers() for action in parser._actions for option in action.option_strings]
 
     def parsers(self) -> Iterator["Parser"]:
         """This one and those of its commands."""

@@ -58,6 +58,7 @@ def run(args: argparse.Namespace) -> int:
 
 def inspect() -> dict[str, Any]:
     """Versions, libraries and resources of this process."""
+    has = PETSc.Sys.hasExternalPackage
     return {
         "versions": {
             "lcp_lube": __version__,
@@ -66,7 +67,8 @@ def inspect() -> dict[str, Any]:
             **{name: _version(name) for name in PYTHON_PACKAGES},
         },
         "petsc_numbers": f"{PETSc.ScalarType().dtype}, {PETSc.IntType().dtype} indices",
-        "solver_packages": {name: has_package(name) for name in PACKAGES},
+        # Newer releases of PETSc name SuiteSparse by its parts.
+        "solver_packages": {name: bool(has(name) or (name == "suitesparse" and has("umfpack"))) for name in PACKAGES},
         "blas": blas(),
         "mpi": re.split(r"[,\n]", MPI.Get_library_version().strip("\0 "))[0].strip(),
         "mpiexec": shutil.which("mpiexec"),
@@ -75,12 +77,6 @@ def inspect() -> dict[str, Any]:
         "omp_num_threads": os.environ.get("OMP_NUM_THREADS"),
         "memory_gb": round(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 1e9, 1),
     }
-
-
-def has_package(name: str) -> bool:
-    """Whether this PETSc has a solver package; newer releases name SuiteSparse by its parts."""
-    has = PETSc.Sys.hasExternalPackage
-    return bool(has(name) or (name == "suitesparse" and has("umfpack")))
 
 
 def blas() -> str | None:

@@ -136,7 +136,8 @@ def pictures(args: argparse.Namespace, scene: Scene, solution: Solution, found: 
         sensitivity.plot(found[0], solution, fields[names[0]], args.plot)
     if args.output:
         dim = solution.problem.grid.dim
-        units = {name: sensitivity.field_unit(sensitivity.unit_of(solution, name), dim) for name in names}
+        # Of d(Q)/dh per area (1D: per length).
+        units = {name: f"{sensitivity.unit_of(solution, name) or '1'}/m{dim + 1}" for name in names}
         shape = solution.problem.grid.box if dim == 2 else (-1,)
         more = {f"d{name}_dh": (fields[name].reshape(shape), units[name]) for name in names}
         files.save(solution, args.output, more=more)

@@ -39,7 +39,7 @@ class Row:
         if not self.errors[-1] <= self.reference.tol:  # NaN is wrong too
             return f"{self.errors[-1]:.1e} > {self.reference.tol:.0e}"
         needed = self.reference.order
-        if needed is None or self.errors[-1] <= ROUNDING or self.steady or (self.order is not None and self.order >= needed):
+        if not needed or self.errors[-1] <= ROUNDING or self.steady or (self.order is not None and self.order >= needed):
             return ""
         return f"order {self.order:.2f}" if self.order is not None else "no order"
 
@@ -49,7 +49,7 @@ class Row:
         return bool(np.ptp(self.values) <= ROUNDING * abs(self.values[-1]))
 
     def as_dict(self) -> dict[str, Any]:
-        known = {"reference": self.reference.value, "tol": self.reference.tol, "order_needed": self.reference.order}
+        known = {"reference": self.reference.value, "tol": self.reference.tol, "order_needed": self.reference.order or None}
         return {**asdict(self), **known, "ours": self.values[-1], "passed": not self.fault}
 
 

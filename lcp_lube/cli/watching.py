@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from bisect import bisect_right
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,7 @@ from mpi4py import MPI
 from ..base.quantity import in_si
 from ..errors import InputError
 from ..output.files import check_target
-from ..output.frames import Frames, HistoryFile, Series, due
+from ..output.frames import Frames, HistoryFile, Series
 from ..output.style import save_figure
 from ..problems.solution import Solution
 from ..scenes.moving import motion_of
@@ -58,7 +59,7 @@ class Watching:
         dt = moment.row["dt"]
         if self.history is not None:
             self.history.add(moment.row, dt)
-        done = due(self.times, moment.t, dt, self._done)
+        done = bisect_right(self.times, moment.t + 0.5 * dt)  # of the times, which ascend
         if done > self._done:
             self._done = done
             for series in self.series:

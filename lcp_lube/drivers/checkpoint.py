@@ -85,13 +85,11 @@ class Checkpointer:
 
     Raises
     ------
-    InputError : every < 1, or the file cannot be written.
+    InputError : the file cannot be written.
     """
 
     def __init__(self, path: str | Path | None, every: int = 1, comm: MPI.Comm = MPI.COMM_WORLD):
         self.active, self.path, self.every, self.comm = path is not None, Path(path or ""), every, comm
-        if every < 1:
-            raise InputError(f"--every {every}: at least 1 is needed")
         if self.active and (reason := comm.bcast(not_writable(self.path) if comm.rank == 0 else None)):
             raise InputError(f"--checkpoint {path}: {reason}")
         self.record: dict[str, Any] = {}
@@ -231,11 +229,7 @@ class Checkpoint:
         expected = [name for name, value in old if isinstance(value, np.ndarray)]
         if names != expected or {name for name, _ in old} != {*names, *self.record["scalars"]}:
             raise InputError(f"--resume {self.path}: not the state of {type(run).__name__} on this system")
-        try:
-            arrays = checkpoint_file.read_arrays(self.path, grid, self.record, self.start)
-        except InputError as error:
-            raise InputError(f"--resume {self.path}: {error}") from None
-        values = {**self.record["scalars"], **arrays}
+        values = {**self.record["scalars"], **checkpoint_file.read_arrays(self.path, grid, self.record, self.start)}
         for name in state_names(run):
             path, _, last = name.rpartition(".")
             owner = attrgetter(path)(run) if path else run
@@ -271,21 +265,18 @@ class Checkpoint:
         return given
 
 
-def load(path: str | Path, scene: Solvable, comm: MPI.Comm = MPI.COMM_WORLD) -> Checkpoint:
-    """Read a checkpoint of this scene. Collective.
+def load(path: str | Path, new: dict[str, Any], comm: MPI.Comm = MPI.COMM_WORLD) -> Checkpoint:
+    """Read a checkpoint of the scene with this `scene_record`. Collective.
 
     Raises
     ------
     InputError : no checkpoint, one of another scene, of another version, cut short or damaged.
     """
     path = Path(path)
-    try:
-        header, start = checkpoint_file.read_header(path, comm)
-    except InputError as error:
-        raise InputError(f"--resume {path}: {error}") from None
+    header, start = checkpoint_file.read_header(path, comm)
     if header["version"] != __version__:
         raise InputError(f"--resume {path}: written by lcp_lube {header['version']}, this is {__version__}")
-    old, new = header["scene"], scene_record(scene)
+    old = header["scene"]
     if changed := [key for key in {**old, **new} if key != "name" and old.get(key) != new.get(key)]:
         differs = f"its {changed[0]} is {old.get(changed[0])}, here it is {new.get(changed[0])}"
         raise InputError(f"--resume {path}: a checkpoint of another scene: {differs}")

@@ -78,7 +78,7 @@ def read_header(path: Path, comm: MPI.Comm) -> tuple[dict[str, Any], int]:
             reason = str(error)
     reason, found = comm.bcast((reason, found))
     if found is None:
-        raise InputError(reason)
+        raise InputError(f"--resume {path}: {reason}")
     return found
 
 
@@ -92,10 +92,10 @@ def read_arrays(path: Path, grid: Grid, header: dict[str, Any], start: int) -> d
     arrays = [np.empty(grid.local_size) for _ in header["arrays"]]
     with on_all_ranks(grid.comm):
         if reason := _transfer(grid, path, start, arrays, write=False):
-            raise InputError(reason)
+            raise InputError(f"--resume {path}: {reason}")
     for (name, checksum), values in zip(header["arrays"], arrays, strict=True):
         if _checksum(grid, values) != checksum:
-            raise InputError(f"damaged: {name} is not what was written")
+            raise InputError(f"--resume {path}: damaged: {name} is not what was written")
     return {name: values for (name, _), values in zip(header["arrays"], arrays, strict=True)}
 
 

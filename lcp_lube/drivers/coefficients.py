@@ -52,16 +52,14 @@ def motions_of(turning: Turning | None, tilt: bool, middle: float, along: float 
     """dh/de of each motion; along : angle of the load, rad from where theta is counted."""
     if turning is None:
         return [lambda x, y: np.ones(np.broadcast_shapes(x.shape, y.shape))]
-    changes: list[Change] = [_towards(turning, along + shift) for shift in (0.0, 0.5 * math.pi)]
-    return changes + [_times_distance(change, middle) for change in changes] if tilt else changes
-
-
-def _towards(turning: Turning, angle: float) -> Change:
-    return lambda x, y: -np.cos(turning.theta(x) - angle) + 0.0 * y
-
-
-def _times_distance(change: Change, middle: float) -> Change:
-    return lambda x, y: (y - middle) * change(x, y)
+    theta, aside = turning.theta, along + 0.5 * math.pi
+    changes: list[Change] = [
+        lambda x, y: -np.cos(theta(x) - along) + 0.0 * y,
+        lambda x, y: -np.cos(theta(x) - aside) + 0.0 * y,
+        lambda x, y: (y - middle) * changes[0](x, y),
+        lambda x, y: (y - middle) * changes[1](x, y),
+    ]
+    return changes if tilt else changes[:2]
 
 
 def coefficients(
@@ -112,7 +110,7 @@ def coefficients(
         own = _of_pads(scene, solution, frequencies, follow, with_effects, stored)
         total = turn.T @ own @ turn if turning is not None else own
     elif with_effects:  # as a whole: a ring's films share their oil
-        gaps = [partial(_moved, model.gap, motion) for motion in motions]
+        gaps = [lambda e, motion=motion: Moved(model.gap, motion, e, 0.0) for motion in motions]
         total = impedance(CoupledResponse(scene, solution, gaps), frequencies, stored)
     else:
         of = partial(impedance, frequencies=frequencies, stored=stored)
@@ -122,10 +120,6 @@ def coefficients(
         Coefficients(nu, one.real, one.imag / nu if nu > 0 else one.imag, names)
         for nu, one in zip(frequencies, total, strict=True)
     ]
-
-
-def _moved(gap: Any, motion: Change, e: float) -> Moved:
-    return Moved(gap, motion, e, 0.0)
 
 
 def _of_pads(
@@ -153,10 +147,8 @@ def _reduced(Z: Array, nu: float, felt: int, tilts: Any) -> Array:
     Kd = K[np.ix_(d, d)]
     if nu:
         return Z[e, e] - Z[e, d] @ np.linalg.solve(Z[np.ix_(d, d)], Z[d, e])
-    follows, pushed = (
-        -np.linalg.solve(Kd, K[d, e]),
-        -np.linalg.solve(Kd.T, K[e, d].T).T,
-    )  # tilts by displacement; forces by moment
+    # Tilts by displacement; forces by moment.
+    follows, pushed = -np.linalg.solve(Kd, K[d, e]), -np.linalg.solve(Kd.T, K[e, d].T).T
     damped = C[e, e] + C[e, d] @ follows + pushed @ C[d, e] + pushed @ C[np.ix_(d, d)] @ follows
     return K[e, e] + K[e, d] @ follows + 1j * damped
 
@@ -197,12 +189,13 @@ def summed(
     """
     if not isinstance(ring, GroovedProblem):
         return of(Response(ring, model, fields, motions, film=scene if symmetric else None))
+
+    def found(one: SolvedFilm) -> Any:
+        film = one.film if symmetric else None
+        return of(Response(one.problem, one.film.model, one.fields, motions, one.first, film=film))
+
     with films_of(scene, ring, fields) as films:
-        return films.sum(lambda one: of(_response(one, motions, symmetric)))
-
-
-def _response(one: SolvedFilm, motions: Sequence[Change], symmetric: bool) -> Response:
-    return Response(one.problem, one.film.model, one.fields, motions, one.first, film=one.film if symmetric else None)
+        return films.sum(found)
 
 
 def stability(K: Array, C: Array) -> tuple[float | None, float | None]:

@@ -6,7 +6,6 @@ A driver is a module with two functions: `applies(scene, ask)`, and `solve(scene
 
 from collections.abc import Callable
 from functools import partial
-from typing import Protocol
 
 from ..errors import InputError
 from ..problems.solution import Solution
@@ -17,51 +16,36 @@ from .ask import Ask
 Inner = Callable[[Solvable, Ask], Solution]
 
 
-class Driver(Protocol):
-    """What a module among the drivers offers."""
-
-    def applies(self, scene: Solvable, ask: Ask) -> bool: ...
-
-    def solve(self, scene: Solvable, ask: Ask, inner: Inner) -> Solution: ...
-
-
 def solve(scene: Solvable, ask: Ask, level: int = 0) -> Solution:
     """Solve through the drivers from this level on that the scene and the ask call for, outermost first. Collective."""
     for k, name in list(enumerate(DRIVERS))[level:]:
         if DRIVERS[name].idle(scene):
             continue
-        driver: Driver = DRIVERS[name].load()  # type: ignore[assignment]
+        driver = DRIVERS[name].load()
         if driver.applies(scene, ask):
             return driver.solve(scene, ask, partial(solve, level=k + 1))
     raise AssertionError("the innermost driver applies to everything")
 
 
+def _no_file(name: str, reason: str) -> list[tuple[str, str, str]]:
+    return [(name, option, reason) for option in ("checkpoint", "resume")]
+
+
 NO_FILM = "it is no film with cavitation, for which alone the theorem holds"
 # What does not compose, and why: (a driver that applies, or a kind of problem; an attribute of the ask; the reason).
 CANNOT = (
-    ("box", "certify", NO_FILM),
-    ("equations", "certify", NO_FILM),
-    ("mixed", "certify", NO_FILM),
-    ("user", "certify", NO_FILM),
-    ("user", "checkpoint", "its functions are no data that a file could hold"),
-    ("user", "resume", "its functions are no data that a file could hold"),
+    *((kind, "certify", NO_FILM) for kind in ("box", "equations", "mixed", "user")),
+    *_no_file("user", "its functions are no data that a file could hold"),
     ("user", "accuracy", "its points are its own, and no grid's that could be refined"),
-    ("accuracy", "checkpoint", "its many grids make one answer; give --n for one grid"),
-    ("accuracy", "resume", "its many grids make one answer; give --n for one grid"),
-    ("balance", "checkpoint", "its many solves make one answer; give the value that was found for one solve"),
-    ("balance", "resume", "its many solves make one answer; give the value that was found for one solve"),
-    ("pads", "checkpoint", "its many solves make one answer; give the place and the tilts that were found for one solve"),
-    ("pads", "resume", "its many solves make one answer; give the place and the tilts that were found for one solve"),
-    ("position", "checkpoint", "its many solves make one answer; give the eccentricity that was found for one solve"),
-    ("position", "resume", "its many solves make one answer; give the eccentricity that was found for one solve"),
+    *_no_file("accuracy", "its many grids make one answer; give --n for one grid"),
+    *_no_file("balance", "its many solves make one answer; give the value that was found for one solve"),
+    *_no_file("pads", "its many solves make one answer; give the place and the tilts that were found for one solve"),
+    *_no_file("position", "its many solves make one answer; give the eccentricity that was found for one solve"),
     ("time", "certify", "it goes on in time, and the theorem is of one steady film"),
     ("time", "nested", "it goes on in time, each step from the one before, on one grid"),
-    ("grooves", "checkpoint", "its films are solved one by one"),
-    ("grooves", "resume", "its films are solved one by one"),
-    ("supplies", "checkpoint", "its many solves make one answer; give the pressures that were found for one solve"),
-    ("supplies", "resume", "its many solves make one answer; give the pressures that were found for one solve"),
-    ("turned", "checkpoint", "U < 0 is solved as its mirror image; give that, with -U"),
-    ("turned", "resume", "U < 0 is solved as its mirror image; give that, with -U"),
+    *_no_file("grooves", "its films are solved one by one"),
+    *_no_file("supplies", "its many solves make one answer; give the pressures that were found for one solve"),
+    *_no_file("turned", "U < 0 is solved as its mirror image; give that, with -U"),
 )
 
 

@@ -18,7 +18,7 @@ from ..problems.solution import Step
 from ..scenes.effects.named import named
 from . import checkpoint_file
 from .ask import Ask, Start
-from .checkpoint import CHOICES, Checkpoint, Checkpointer, load
+from .checkpoint import CHOICES, Checkpoint, Checkpointer, load, scene_record
 from .loop import Loop
 
 NUMBERS = ("solves", "work")
@@ -40,7 +40,7 @@ class CouplingFile:
         self.keeper = Checkpointer(ask.checkpoint, ask.every, ask.mpi)
         self.saved: Checkpoint | None = None
         if ask.resume is not None:
-            self.saved = load(ask.resume, scene, ask.mpi)
+            self.saved = load(ask.resume, scene_record(scene), ask.mpi)
             if "effects" not in self.saved.record:
                 raise InputError(f"--resume {ask.resume}: no checkpoint of a film with effects")
             ask = replace(ask, **self.saved.settle(**{name: getattr(ask, name) for name in CHOICES}))
@@ -73,10 +73,7 @@ class CouplingFile:
         """
         assert self.saved is not None  # as `holds` found
         grid, record = loop.base.grid, self.saved.record
-        try:
-            arrays = checkpoint_file.read_arrays(self.saved.path, grid, record, self.saved.start)
-        except InputError as error:
-            raise InputError(f"--resume {self.saved.path}: {error}") from None
+        arrays = checkpoint_file.read_arrays(self.saved.path, grid, record, self.saved.start)
 
         def vector(name: str) -> Array:
             return np.concatenate([arrays[f"{name}.{of}"] for of in loop.names])
@@ -98,7 +95,4 @@ def kept_in(path: str | Path, comm: MPI.Comm) -> list[str]:
     ------
     InputError : no checkpoint, one cut short or damaged.
     """
-    try:
-        return list(checkpoint_file.read_header(Path(path), comm)[0].get("effects", ()))
-    except InputError as error:
-        raise InputError(f"--resume {path}: {error}") from None
+    return list(checkpoint_file.read_header(Path(path), comm)[0].get("effects", ()))

@@ -22,7 +22,7 @@ from ..solvers.method import Method
 from ..solvers.newton import Stopping, iterate
 from . import memory
 from .ask import Ask, Start
-from .checkpoint import CHOICES, Checkpoint, Checkpointer, load
+from .checkpoint import CHOICES, Checkpoint, Checkpointer, load, scene_record
 from .compose import Inner
 from .levels import guess, level_shapes
 from .plan import Plan, default_recipe, plan
@@ -57,7 +57,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner | None = None) -> Solution:
         problem = scene.build(ask.comm)
     keeper = Checkpointer(ask.checkpoint, ask.every, problem.grid.comm)
     if ask.resume is not None:
-        saved = load(ask.resume, scene, problem.grid.comm)
+        saved = load(ask.resume, scene_record(scene), problem.grid.comm)
         given = {name: getattr(ask, name) for name in CHOICES}
         ask = replace(ask, **saved.settle(**given))
         chosen = plan(facts, ask, scene.name)

@@ -142,12 +142,9 @@ class Equations:
         if (fields := known_fields(problem)) is not None:  # a line's numbers are free of the grid's error (`film.line`)
             told, discrete = _flat(problem.quantities(fields)), slopes.numbers(problem, fields["p"], fields["r"])
             found = {name: value + (told.get(name, discrete[name]) - discrete[name]) for name, value in found.items()}
-        found = self._flipped(found) if self.turned else found
+        if self.turned:
+            found = {FLIPPED.get(name, name): -value if name in DRAGS else value for name, value in found.items()}
         return {name: (rest or found)[name] if value != value else value for name, value in found.items()}
-
-    def _flipped(self, found: dict[str, float]) -> dict[str, float]:
-        out = {FLIPPED.get(name, name): value for name, value in found.items()}
-        return {**out, **{name: -out[name] for name in DRAGS if name in out}}
 
     def slope(self, p: Array, r: Array, name: str, last: bool = False) -> slopes.Slope:
         """dQ/dp (p in p_unit) and dQ/dr of one of `numbers` (`slopes.slope`). Collective."""

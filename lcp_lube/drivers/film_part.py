@@ -70,9 +70,6 @@ class Part(Derived):
     def shape(self) -> tuple[int, ...]:
         return self.whole.shape[:1] if self.kind == "line" else self.whole.shape
 
-    def with_shape(self, shape: tuple[int, ...]) -> "Part":
-        return Part(self.whole.with_shape(shape), self.kind)
-
     def _model(self) -> tuple[Model, tuple[int, ...]]:
         """The part's own film, and its grid."""
         model = model_of(self.whole)

@@ -12,7 +12,6 @@ from petsc4py import PETSc
 from ..base.parallel import Array
 from ..base.together import EXPECTED, on_all_ranks
 from ..linear.krylov import LinearSolverError
-from ..problems.facts import Facts
 from ..problems.film.effects import FaceFactors
 from ..problems.film.grooves import GroovedProblem, Pad
 from ..problems.film.lubrication import LubricationProblem
@@ -41,9 +40,6 @@ class PadFilm(Derived):
 
     def with_shape(self, shape: tuple[int, ...]) -> "PadFilm":
         return replace(self, points=shape)
-
-    def facts(self, comm: PETSc.Comm | None = None) -> Facts:
-        return self.model.facts(self.shape, comm)
 
     def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
         problem = self.model.build(self.shape, comm)

@@ -34,11 +34,16 @@ FEWEST = 5  # steps of a march that is looked at, at least
 
 def coarse_shape(shape: tuple[int, ...], solves: int) -> tuple[int, ...] | None:
     """The grid for the decision: so many solves on it cost `SHARE` of one on `shape`; None where it would be too small."""
-    factor = (SHARE / solves) ** (1.0 / len(shape))
-    coarse = tuple(max(1, int(factor * n)) for n in shape)
-    if len(shape) == 2 and coarse[1] < LEAST[2] <= shape[1]:  # few lines: keep them, take the points along
-        coarse = (int(SHARE / solves * prod(shape) / LEAST[2]), LEAST[2])
+    coarse = _coarser(shape, SHARE / solves)
     return coarse if min(coarse) >= LEAST[len(shape)] and coarse[0] >= 2 * LEAST[2] else None
+
+
+def _coarser(shape: tuple[int, ...], part: float) -> tuple[int, ...]:
+    """A grid with this part of the points."""
+    coarse = tuple(max(1, int(part ** (1.0 / len(shape)) * n)) for n in shape)
+    if len(shape) == 2 and coarse[1] < LEAST[2] <= shape[1]:  # few lines: keep them, take the points along
+        coarse = (max(1, int(part * prod(shape) / LEAST[2])), LEAST[2])
+    return coarse
 
 
 def looked(names: list[str]) -> list[str]:
@@ -188,13 +193,7 @@ def quick(ask: Ask) -> Ask:
 def first_shape(shape: tuple[int, ...]) -> tuple[int, ...]:
     """The grid on which the film without effects is looked at."""
     points = prod(shape)
-    if points <= NESTED_ABOVE:
-        return shape
-    factor = (min(max(FIRST, SHARE_FIRST * points), SMALL) / points) ** (1.0 / len(shape))
-    coarse = tuple(max(1, int(factor * n)) for n in shape)
-    if len(shape) == 2 and coarse[1] < LEAST[2] <= shape[1]:
-        coarse = (max(int(factor * factor * points / LEAST[2]), 1), LEAST[2])
-    return coarse
+    return shape if points <= NESTED_ABOVE else _coarser(shape, min(max(FIRST, SHARE_FIRST * points), SMALL) / points)
 
 
 def _by_solving(

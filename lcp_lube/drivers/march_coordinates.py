@@ -114,16 +114,17 @@ class Coordinates:
         level: Mode = lambda x, y: np.ones(np.broadcast_shapes(np.shape(x), np.shape(y)))  # noqa: E731
         return [level, *(self.scene.tilt_modes if self.pads is not None else ())]
 
-    def forces(self, step: TimeStep, solution: Solution, stiff: bool) -> tuple[Array, Array | None]:
-        """What the film of a solved step does to each, N or N m; with minus its derivatives by m and rad. Collective."""
+    def forces(self, solution: Solution) -> Array:
+        """What the film of a solved step does to each, N or N m. Collective."""
         problem: Any = solution.problem
         told = totals(problem, solution.fields["p"] * problem.p_unit)
         tilts = [f"{PIVOT}{k + 1}" for k in range(self.unit.size - (2 if self.journal else 1))]
-        found = np.array([told[name] for name in (*(("force_x", "force_y") if self.journal else ("load",)), *tilts)])
-        if not stiff:
-            return found, None
+        return np.array([told[name] for name in (*(("force_x", "force_y") if self.journal else ("load",)), *tilts)])
+
+    def stiffness(self, step: TimeStep, solution: Solution) -> Array:
+        """Minus the derivatives of `forces` by m and rad. Collective."""
         with self.films(step, solution) as films:
-            return found, films.sum(lambda one: one.spread(stiffness(one.response()), found.size))
+            return films.sum(lambda one: one.spread(stiffness(one.response()), self.unit.size))
 
     def told(self, place: Sequence[float]) -> dict[str, Any]:
         """As numbers of an answer."""

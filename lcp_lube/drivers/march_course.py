@@ -65,15 +65,11 @@ def check_march(scene: Scene) -> None:
         (model.U < 0, "a wall that moves to smaller x (give the mirror image, with -U)"),
         (hasattr(scene, "observer"), "events"),
         (getattr(scene, "pads_follow", False), "pads that follow"),
-        (_level_free(scene), "a film whose level is free"),
+        (scene.motion.free and scene.turning is None, "a film whose level is free"),  # type: ignore[attr-defined]
         ((getattr(scene, "motion", None) and scene.motion.fill) not in (None, 1.0), "a film that begins partly filled"),  # type: ignore[attr-defined]
     ):
         if found:
             raise InputError(f"scene {scene.name}: [motion]: no derivatives in time through {what}")
-
-
-def _level_free(scene: Any) -> bool:
-    return scene.motion.free and scene.turning is None  # type: ignore[no-any-return]
 
 
 class Course:

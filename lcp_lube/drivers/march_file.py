@@ -1,18 +1,16 @@
 """Checkpoints of a march in time: what its next step starts from, written after every so many steps (`checkpoint_file`)."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .. import __version__
 from ..errors import InputError
 from ..problems.certificate import Certificate
 from ..problems.grid import Grid
 from ..problems.solution import Step
 from . import checkpoint_file
 from .ask import Ask
-from .checkpoint import Checkpointer, scene_record
+from .checkpoint import Checkpointer, load, scene_record
 
 NUMBERS = ("t", "dts", "volumes", "flowed", "stored", "moved", "rates", "warming")  # of a `March`
 ARRAYS = ("contents", "carried", "full")
@@ -29,8 +27,7 @@ class MarchFile:
 
     def __init__(self, ask: Ask, scene: Any):
         self.keeper = Checkpointer(ask.checkpoint, ask.every, ask.mpi)
-        self.resume = None if ask.resume is None else Path(ask.resume)
-        self.scene = scene_record(scene)
+        self.resume, self.scene = ask.resume, scene_record(scene)
         self.scene.get("motion", {}).pop("t_end", None)  # a march may go on beyond its first end
         self.comm = ask.mpi
 
@@ -68,18 +65,11 @@ class MarchFile:
         """
         if self.resume is None:
             return False
-        try:
-            header, start = checkpoint_file.read_header(self.resume, self.comm)
-            if "march" not in header:
-                raise InputError("no checkpoint of a march in time")
-            if header["version"] != __version__:
-                raise InputError(f"written by lcp_lube {header['version']}, this is {__version__}")
-            old = header["scene"]
-            if changed := [key for key in {**old, **self.scene} if key != "name" and old.get(key) != self.scene.get(key)]:
-                raise InputError(f"a checkpoint of another scene: its {changed[0]} is not the one here")
-            arrays = checkpoint_file.read_arrays(self.resume, grid, header, start)
-        except InputError as error:
-            raise InputError(f"--resume {self.resume}: {error}") from None
+        saved = load(self.resume, self.scene, self.comm)
+        header = saved.record
+        if "march" not in header:
+            raise InputError(f"--resume {self.resume}: no checkpoint of a march in time")
+        arrays = checkpoint_file.read_arrays(saved.path, grid, header, saved.start)
         for name, value in header["march"].items():
             setattr(run.march, name, value)
         run.march.contents = [a for name, a in arrays.items() if name.startswith("contents.")]

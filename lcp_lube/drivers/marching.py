@@ -224,8 +224,8 @@ class Run:
                 own.destroy()
             return solves[-1]
 
-        def pushes(solution: Solution, stiff: bool) -> Any:
-            return self.coordinates.forces(TimeStep(self.scene, supplied(self.model, solution), march.grid), solution, stiff)
+        def stiffness(solution: Solution) -> Any:
+            return self.coordinates.stiffness(TimeStep(self.scene, supplied(self.model, solution), march.grid), solution)
 
         if self.rotor is None:
             place, why = self._at(t, lambda: self._given(t)), ""
@@ -235,7 +235,7 @@ class Run:
             if self.course is not None:
                 given = self._at(t, lambda: self.course(t))  # type: ignore[misc]
                 guess[: len(given)] = given
-            solution, place, why = self.rotor.settle(t, formula, guess, film_at, pushes)
+            solution, place, why = self.rotor.settle(t, formula, guess, film_at, stiffness)
         return solution, place, why, [one.steps for one in solves]
 
     def _keep(self, solution: Solution, solves: list[list[Step]]) -> None:

@@ -2,9 +2,9 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,42 +49,12 @@ class PadFilm:
 Films = SideBySide[PadFilm]
 
 
-class Bearing(Protocol):
-    """A scene seen as coordinates. sizes : what counts as a change of each; free : those that are to be found; pitches : the
-    tilts that open an inlet."""
-
-    sizes: Array
-    free: NDArray[np.bool_]
-
-    @property
-    def pitches(self) -> Sequence[int]: ...
-
-    def start(self) -> Array: ...
-
-    def at(self, q: Array) -> Scene: ...
-
-    def films(self, scene: Scene, solution: Solution) -> AbstractContextManager[Films]: ...
-
-    @property
-    def keys(self) -> Sequence[str]:
-        """The scene's, of the coordinates."""
-        ...
-
-    @property
-    def conditions(self) -> dict[str, float]:
-        """The numbers of the results that are met by what is found, and their values: in the order of the coordinates."""
-        ...
-
-    def misfit(self, solution: Solution) -> tuple[Array, Array]:
-        """What is left of each equation, and what it counts by."""
-        ...
-
-    def told(self, solution: Solution, q: Array) -> dict[str, Any]: ...
-
-
 @dataclass
 class JournalPads:
-    """Coordinates: the journal's displacement along the load and ahead of it (m), and a tilt (rad) a pad."""
+    """Coordinates: the journal's displacement along the load and ahead of it (m), and a tilt (rad) a pad.
+
+    sizes : what counts as a change of each; free : those that are to be found.
+    """
 
     scene: TiltingPadScene
     sizes: Array = field(init=False)
@@ -97,6 +67,7 @@ class JournalPads:
 
     @property
     def pitches(self) -> Sequence[int]:
+        """The tilts that open an inlet."""
         return range(2, self.sizes.size)
 
     def start(self) -> Array:
@@ -138,10 +109,12 @@ class JournalPads:
 
     @property
     def keys(self) -> Sequence[str]:
+        """The scene's, of the coordinates."""
         return ["eccentricity", "attitude_deg", *(f"tilts.{k + 1}" for k in self._pads)]
 
     @property
     def conditions(self) -> dict[str, float]:
+        """The numbers of the results that are met by what is found, and their values: in the order of the coordinates."""
         load = self.scene.balance.load if self.scene.balance is not None else 0.0
         return {"load": load, "force_y": 0.0} | {f"{PIVOT}{k + 1}": 0.0 for k in self._pads}
 
@@ -150,6 +123,7 @@ class JournalPads:
         return range(len(self.scene.pivots_deg))
 
     def misfit(self, solution: Solution) -> tuple[Array, Array]:
+        """What is left of each equation, and what it counts by."""
         told = _integrals(solution)
         fx, fy = told["force_x"], told["force_y"]
         load = self.scene.balance.load if self.scene.balance is not None else math.hypot(fx, fy)
@@ -175,9 +149,7 @@ class ThrustPads:
         scene = self.scene
         slope = scene.h_min / scene.side_lengths[0]
         self.sizes = np.array([scene.h_min, slope, slope])
-        self.free = np.array(
-            [scene.balance is not None, scene.pitch is None, scene.roll is None and scene.pivot_radius is not None]
-        )
+        self.free = np.array([scene.balance is not None, *scene.tilts_found])
 
     @property
     def pitches(self) -> Sequence[int]:
@@ -219,6 +191,9 @@ class ThrustPads:
 
     def told(self, solution: Solution, q: Array) -> dict[str, Any]:
         return {"vary": "h_min", "value": float(q[0]), "tilts": q[1:]}
+
+
+Bearing = JournalPads | ThrustPads
 
 
 def _integrals(solution: Solution) -> dict[str, float]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from petsc4py import PETSc
 
 from ..base.compiled import has_numba
-from ..base.options import names_solver, wants_ksp
+from ..base.options import set_names, wants_ksp
 from ..errors import InputError, nearest
 from ..problems.facts import Facts
 from ..registry import DEFAULT_METHOD, METHODS, SMALL, SMALL_BOX
@@ -89,7 +89,7 @@ def plan(facts: Facts, ask: Ask, scene: str) -> Plan:
             why.append("nested: the front found on a coarser grid leaves a few steps on this one")
     elif nested and not entry.nested:
         raise InputError(f"--nested: method {method} does not start from a coarser grid")
-    if recipe is None and not names_solver():
+    if recipe is None and {"ksp_type", "pc_type"}.isdisjoint(set_names()):  # else no inner solver of ours is wanted
         recipe, reason = default_recipe(facts, system, large)
         why.append(f"recipe {recipe}: {reason}")
     return Plan(method, system, recipe, nested, why)

@@ -58,9 +58,6 @@ class Quarter(Derived):
         part, whole = (int(np.prod(shape)) for shape in (part_shape(self.shape, self.axes), self.shape))
         return f"{what} is solved, {part} of {whole} points: all data are symmetric about the middle {how}"
 
-    def with_shape(self, shape: tuple[int, ...]) -> "Quarter":
-        return Quarter(self.whole.with_shape(shape), self.axes)  # type: ignore[arg-type]
-
     def facts(self, comm: PETSc.Comm | None = None) -> Facts:
         return replace(self.whole.facts(comm), shape=part_shape(self.shape, self.axes))
 

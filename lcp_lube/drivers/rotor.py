@@ -51,14 +51,14 @@ class Rotor:
         formula: Formula,
         start: Array,
         film_at: Callable[[Array], Solution],
-        pushes: Callable[[Solution, bool], tuple[Array, Array | None]],
+        stiffness: Callable[[Solution], Array],
     ) -> tuple[Solution, Array, str]:
         """The film and the place at the step's end; a reason where there is none. Collective.
 
         Parameters
         ----------
         start : where the search begins, with what is given at its place.
-        film_at : solves the film there. pushes : its forces in such a solution; with True -dQ/dq too, by m and rad.
+        film_at : solves the film there. stiffness : -dQ/dq of such a solution, by m and rad.
         """
         of, free = self.of, np.flatnonzero(self.of.free)
         loads, inertia = of.loads(t), of.mass * of.unit
@@ -71,19 +71,16 @@ class Rotor:
             if not solution.converged:
                 return solution, q, ""
             problem: Any = solution.problem
-            force, K = pushes(solution, self.K is None)
+            force = of.forces(solution)
             speed = formula.weight * q - formula.old(self.places)
             left = scale * (inertia * (formula.weight * speed - formula.old(self.speeds)) - force - loads)
             self.size = max(self.size, *(float(np.linalg.norm(scale * one)) for one in (force, loads)))
             now = float(np.linalg.norm(left[free])) / (self.size or 1.0)
             if now <= TOL:
                 return solution, q, ""
-            if K is None and now > SLOW * before:
-                _, K = pushes(solution, True)
-            if K is not None:
-                self.K, self.weight = K * np.outer(scale, scale), formula.weight
+            if self.K is None or now > SLOW * before:
+                self.K, self.weight = stiffness(solution) * np.outer(scale, scale), formula.weight
             before = now
-            assert self.K is not None  # as there is a matrix by now
             matrix = np.diag(of.mass * (scale * formula.weight) ** 2) + self.K
             if not (np.isfinite(left).all() and np.isfinite(matrix).all()):
                 return solution, q, "its forces are no numbers"

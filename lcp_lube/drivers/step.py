@@ -8,7 +8,6 @@ from petsc4py import PETSc
 
 from ..base.parallel import Array
 from ..errors import InputError
-from ..problems.facts import Facts
 from ..problems.film.flows import point_weights
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
@@ -34,9 +33,6 @@ class TimeStep(Derived):
 
     def with_shape(self, shape: tuple[int, ...]) -> "TimeStep":
         raise NotImplementedError("a step is on its march's grid")
-
-    def facts(self, comm: PETSc.Comm | None = None) -> Facts:
-        return self.model.facts(self.shape, comm)
 
     def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
         """The discrete problem; on the march's own grid, unless the wall moves to smaller x. Collective."""

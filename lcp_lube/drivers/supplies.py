@@ -48,9 +48,6 @@ class Fed(Derived):
     def model(self) -> Model:
         return replace(self.whole.model, supplies=self.supplies, exact=None)
 
-    def with_shape(self, shape: tuple[int, ...]) -> "Fed":
-        return Fed(self.whole.with_shape(shape), self.supplies)
-
     def facts(self, comm: PETSc.Comm | None = None) -> Facts:
         return self.whole.facts(comm)
 

@@ -6,15 +6,10 @@ fails the whole problem is solved. (A film that does not cavitate needs no choic
 linear solve.)
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import Protocol
+from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ..problems.grid import Grid
-from ..problems.solution import Fields, Outcome, Problem, Solution
+from ..problems.solution import Outcome, Problem, Solution
 from ..problems.transfer import Pick, numbers
 from ..scenes.scene import Solvable
 from . import film_part, rectangle_part
@@ -23,38 +18,11 @@ from .compose import Inner
 from .memory import look_ahead
 from .plan import plan
 
-
-class Part(Solvable, Protocol):
-    """What is left of a scene. kind : names it; sentence : says what it is, and why."""
-
-    @property
-    def kind(self) -> str: ...
-
-    @property
-    def sentence(self) -> str: ...
-
-    def answer(self, problem: Problem) -> Fields | None: ...
-
-    def places(self, grid: Grid) -> tuple[NDArray[np.int64], NDArray[np.int64]]: ...
+Part = film_part.Part | rectangle_part.Quarter
+FAMILIES = (film_part, rectangle_part)  # their UNLIKELY and NONE: why there is no part, by a few points and by all of them
 
 
-class Family(Protocol):
-    """What a module with parts offers. UNLIKELY, NONE : why there is none, by a few points and by all of them."""
-
-    UNLIKELY: str
-    NONE: str
-
-    def applies(self, scene: Solvable) -> bool: ...
-
-    def promising(self, scene: Solvable) -> bool: ...
-
-    def part_of(self, scene: Solvable, problem: Problem) -> Part | None: ...
-
-
-FAMILIES: Sequence[Family] = (film_part, rectangle_part)  # type: ignore[assignment]
-
-
-def family_of(scene: Solvable) -> Family | None:
+def family_of(scene: Solvable) -> Any:
     """Where parts of this scene are looked for, if anywhere."""
     return next((family for family in FAMILIES if family.applies(scene)), None)
 

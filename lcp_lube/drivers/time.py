@@ -9,7 +9,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..problems.solution import Outcome, Solution
-from ..scenes.moving import Moving, motion_of
+from ..scenes.moving import motion_of
 from ..scenes.scene import Solvable
 from .ask import Ask
 from .compose import Inner
@@ -36,7 +36,6 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     """
     if ask.system == "cavity":
         raise InputError("--system cavity: cells of a film that moves store liquid; allowed are full, reduced")
-    assert isinstance(scene, Moving)
     run = Run(scene, ask, inner)
     with run.file.keeper.listening():
         while run.outcome is Outcome.CONVERGED and not run.done:

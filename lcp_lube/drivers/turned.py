@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 
 from petsc4py import PETSc
 
-from ..problems.facts import Facts
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.turned import TurnedProblem
@@ -21,12 +20,6 @@ class Mirrored(Derived):
     @property
     def model(self) -> Model:
         return self.whole.model.mirrored  # type: ignore[attr-defined]
-
-    def with_shape(self, shape: tuple[int, ...]) -> "Mirrored":
-        return Mirrored(self.whole.with_shape(shape))
-
-    def facts(self, comm: PETSc.Comm | None = None) -> Facts:
-        return self.model.facts(self.shape, comm)
 
     def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
         return self.model.build(self.shape, comm)

@@ -2,7 +2,6 @@
 
 import csv
 import os
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import ceil
 from pathlib import Path
@@ -47,7 +46,8 @@ class HistoryFile:
                 if self._file is None:
                     kept = self._kept(row["t"] - 0.5 * dt) if self.resumed else []
                     self._begin([*row], kept)
-                csv.writer(self._file, lineterminator="\n").writerow(_told(value) for value in row.values())
+                told = (f"{value:.12g}" if isinstance(value, float) else str(value) for value in row.values())
+                csv.writer(self._file, lineterminator="\n").writerow(told)
                 self._file.flush()
 
     def _kept(self, before: float) -> list[list[str]]:
@@ -66,10 +66,6 @@ class HistoryFile:
     def close(self) -> None:
         if self._file is not None:
             self._file.close()
-
-
-def _told(value: Any) -> str:
-    return f"{value:.12g}" if isinstance(value, float) else str(value)
 
 
 class Series:
@@ -146,10 +142,3 @@ class Frames:
         if len(self.lines) > LINES:
             self._every *= 2
             self.line_times, self.lines = self.line_times[1::2], self.lines[1::2]
-
-
-def due(targets: Sequence[float], t: float, dt: float, done: int) -> int:
-    """How many of the targets a step that ends at t has reached, with those that were reached before."""
-    while done < len(targets) and targets[done] <= t + 0.5 * dt:
-        done += 1
-    return done

@@ -59,7 +59,7 @@ def journal(axes: Axes, picture: Picture, row: int | None = None) -> None:
     axes.plot(*np.transpose([0.0 * centre, 0.85 * unit(narrowest)]), color=GREY, lw=0.8, ls=(0, (6, 3)))
     load = {"arrowstyle": "-|>", "lw": 1.6, "color": "black"}
     axes.annotate("", centre - [0.0, 0.62], centre, arrowprops=load)
-    text = with_unit(picture.load or 0.0, "N/m" if row is None else "N")
+    text = with_unit(picture.quantities.get("load") or 0.0, "N/m" if row is None else "N")
     axes.text(centre[0] - 0.04, centre[1] - 0.3, text, ha="right", fontsize=8.5)
     turn = np.linspace(0.35 * np.pi, 0.65 * np.pi, 30)
     axes.plot(*np.transpose([0.5 * unit(angle) for angle in turn]), color="black", lw=1.0)

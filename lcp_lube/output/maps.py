@@ -57,12 +57,12 @@ def colour_map(figure: Figure | SubFigure, axes: Axes, picture: Picture, name: s
     factor, unit = prefix(max(map(abs, limits)), unit)
     label = NAMES.get(name, name) + (f" ({unit})" if unit else "")
     (scale_x, label_x), (scale_y, label_y) = picture.along, picture.across
-    x, y = (_to_the_sides(at, start, L) for at, start, L in zip((picture.x, picture.y), grid.origin, grid.lengths, strict=True))
+    x, y = _to_the_sides(picture)
     ratio = shape(picture)
     width_over_height = scale_x * grid.lengths[0] / (scale_y * grid.lengths[1])
     look: dict[str, Any] = {"cmap": MAPS.get(name, "viridis"), "vmin": factor * limits[0], "vmax": factor * limits[1]}
     cells = np.pad(factor * values, 1, mode="edge")
-    edges_x, edges_y = scale_x * _cell_edges(x), scale_y * _cell_edges(y)
+    edges_x, edges_y = _cell_edges(x), _cell_edges(y)
     if grid.even:
         box = (edges_x[0], edges_x[-1], edges_y[0], edges_y[-1])
         image: Any = axes.imshow(cells, extent=box, origin="lower", interpolation="nearest", **look)
@@ -108,10 +108,14 @@ def _cell_edges(at: Array) -> Array:
     return np.concatenate([at[:1] - half[:1], at[:-1] + half, at[-1:] + half[-1:]])
 
 
-def _to_the_sides(at: Array, start: float, length: float) -> Array:
-    """The points of one direction, and one more at each end, as far away as points are from one another."""
-    step = at[1] - at[0] if at.size > 1 else 2.0 * max(at[0] - start, start + length - at[0])
-    return np.concatenate([[at[0] - step], at, [at[-1] + step]])
+def _to_the_sides(picture: Picture) -> list[Array]:
+    """x and y as they are drawn, with one more at each end, as far away as points are from one another."""
+    grid: Any = picture.solution.problem.grid
+    scales, found = (picture.along[0], picture.across[0]), []
+    for scale, at, start, length in zip(scales, (picture.x, picture.y), grid.origin, grid.lengths, strict=True):
+        step = at[1] - at[0] if at.size > 1 else 2.0 * max(at[0] - start, start + length - at[0])
+        found.append(scale * np.concatenate([[at[0] - step], at, [at[-1] + step]]))
+    return found
 
 
 def outline(axes: Axes, picture: Picture, hatch: str) -> None:
@@ -119,16 +123,9 @@ def outline(axes: Axes, picture: Picture, hatch: str) -> None:
     sign = np.pad(picture.sign, 1, mode="edge")  # up to the sides, as the colours reach
     if not sign.min() < 0:
         return
-    grid: Any = picture.solution.problem.grid
-    x, y = (
-        scale * _to_the_sides(at, start, L)
-        for (scale, _), at, start, L in zip(
-            (picture.along, picture.across), (picture.x, picture.y), grid.origin, grid.lengths, strict=True
-        )
-    )
     from matplotlib import rc_context
 
     with rc_context({"hatch.color": hatch}):
-        axes.contourf(x, y, sign, levels=[sign.min() - 1.0, 0.0], colors="none", hatches=[".."])
+        axes.contourf(*_to_the_sides(picture), sign, levels=[sign.min() - 1.0, 0.0], colors="none", hatches=[".."])
     for curve in picture.curves:
         axes.plot(picture.along[0] * curve[:, 0], picture.across[0] * curve[:, 1], color="white", lw=1.2)

@@ -114,11 +114,6 @@ class Picture:
         """x with its unit."""
         return f"{self.along[0] * x:.4g}°" if self.is_journal else with_unit(x, "m")
 
-    @property
-    def load(self) -> float | None:
-        """What the bearing carries."""
-        return self.quantities.get("load")
-
 
 def collect(solution: Solution) -> Picture | None:
     """What there is to draw, on rank 0; None elsewhere. Collective."""
@@ -181,8 +176,8 @@ def title(picture: Picture) -> str:
         largest_p = with_unit(values["p_max"], picture.fields["p"][1]).rstrip()
         when = "" if now is None else f" at $t$ = {values['p_max_time']:.4g}"
         parts.append(f"$p_{{max}}$ {'was ' * bool(when)}{largest_p}{when}")
-    if picture.load is not None:
-        parts.append(f"load {with_unit(picture.load, 'N/m' if picture.y.size == 0 else 'N')}")
+    if values.get("load") is not None:
+        parts.append(f"load {with_unit(values['load'], 'N/m' if picture.y.size == 0 else 'N')}")
     if values.get("sommerfeld") is not None:
         parts.append(f"So {values['sommerfeld']:.4g}")
     if values.get("cavitated_fraction") is not None:

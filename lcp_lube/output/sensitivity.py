@@ -29,11 +29,6 @@ def unit_of(solution: Solution, name: str) -> str:
     return key_unit(solution.solved_scene, name) if found is None else found
 
 
-def field_unit(unit: str, dim: int) -> str:
-    """Of d(Q)/dh per area (1D: per length)."""
-    return f"{unit or '1'}/m{dim + 1}"
-
-
 def as_dict(gradient: Gradient, solution: Solution) -> dict[str, Any]:
     """The keys of the command line's --json that are a gradient's own, docs/gradients.md."""
     return {

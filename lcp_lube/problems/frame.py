@@ -49,22 +49,19 @@ class Frame:
         known : values at the sides, shape `box`, NaN where they are not known: there the nearest point's value goes on (at a
             periodic side the mean of the two nearest).
         """
-        grid = self.grid
+        grid, periodic = self.grid, (*self.grid.periodic, False)
         out = grid.ghosted(values)
         inner = out[1:-1, 1:-1]
         for k, (edge, near) in enumerate(((out[0], inner[0]), (out[-1], inner[-1]))):
-            edge[1:-1] = 0.5 * (edge[1:-1] + near) if self._periodic(1) else near
+            edge[1:-1] = 0.5 * (edge[1:-1] + near) if periodic[1] else near
             outer, last = (out[:, 0], out[:, 1]) if k == 0 else (out[:, -1], out[:, -2])
-            outer[1:-1] = 0.5 * (outer[1:-1] + last[1:-1]) if self._periodic(0) else last[1:-1]
+            outer[1:-1] = 0.5 * (outer[1:-1] + last[1:-1]) if periodic[0] else last[1:-1]
         out[[0, 0, -1, -1], [0, -1, 0, -1]] = out[[0, 0, -1, -1], [1, -2, 1, -2]]  # corners
         row, column = int(self.dim == 2 and self.y_start == 0), int(self.x_start == 0)  # of the first point that is no side's
         out = out[1 - row : 1 - row + self.box[0], 1 - column : 1 - column + self.box[1]]
         at_side = np.ones(self.box, dtype=bool)
         at_side[row : row + grid.box[0], column : column + grid.box[1]] = False
         return np.where(at_side & ~np.isnan(known), known, out)
-
-    def _periodic(self, side: int) -> bool:
-        return side < self.dim and self.grid.periodic[side]
 
     def dm(self) -> PETSc.DMDA:
         """A new DMDA of these points, each rank with its own part."""

@@ -37,10 +37,10 @@ def changed(data: dict[str, Any], changes: dict[str, Any], prefixes: set[str], k
         if len(path) == 1 and stem(path[0]) not in known:  # a key of the one shape that has it
             shapes = [entry for entry in out.get("film", []) if isinstance(entry, dict) and stem(path[0]) in map(stem, entry)]
             table = shapes[0] if len(shapes) == 1 and isinstance(out.get("film"), list) else out
-        for k, word in enumerate(path[:-1]):
+        for word in path[:-1]:
             if isinstance(table, dict) and "shape" in table and word not in table and word in ("1", table["shape"]):
                 continue  # one [film] instead of [[film]]
-            table = _entry(table, word, path[k + 1 :], key) if isinstance(table, list) else _table(table, word)
+            table = _entry(table, word, key) if isinstance(table, list) else _table(table, word)
         if isinstance(table, list):
             table = _only(table, path[-1], key)
         for old in [name for name in table if stem(name) == stem(path[-1])]:  # h_min replaces h_min_um
@@ -65,7 +65,7 @@ def _table(table: dict[str, Any], word: str) -> Any:
     return table[word]
 
 
-def _entry(entries: list[Any], word: str, rest: list[str], key: str) -> dict[str, Any]:
+def _entry(entries: list[Any], word: str, key: str) -> dict[str, Any]:
     """The entry of an array that a word names."""
     tables = [entry for entry in entries if isinstance(entry, dict)]
     if word.isdigit():

@@ -18,7 +18,6 @@ from ..problems.film.model import Model, Side
 from ..problems.film.shapes import Block, Shape, Sum
 from ..problems.film.supplies import Supply
 from ..problems.film.turning import Turning
-from ..problems.film.views import Travelling
 from .balance import BalanceTable
 from .effects.named import FLUID, named
 from .motion import MotionTable
@@ -107,10 +106,6 @@ class FilmScene(Scene):
     def models(self) -> Models:
         """The film in time."""
         return models_of(self)
-
-    def carried(self, shape: Shape) -> Shape:
-        """A shape on the wall."""
-        return Travelling(shape, self._travel, self.side_lengths[0]) if self._travel else shape
 
     def shapes_of(self, tables: Sequence[Any]) -> list[Shape]:
         """Of [[film]], at the scene's time."""
@@ -233,15 +228,11 @@ class RectangleScene(FilmScene):
         """The shapes of the film."""
         raise NotImplementedError
 
-    def sum_of(self, parts: Sequence[Shape]) -> Sum:
-        """The film of these shapes."""
-        level = [Block(self.h_offset, ALL, ALL)] if self.h_offset else []
-        return Sum([*parts, *level], self.h_floor)
-
     @property
     def gap(self) -> Sum:
         """The film h(x, y) in metres."""
-        return self.sum_of(self._parts())
+        level = [Block(self.h_offset, ALL, ALL)] if self.h_offset else []
+        return Sum([*self._parts(), *level], self.h_floor)
 
     def _model(self) -> Model:
         return Model(

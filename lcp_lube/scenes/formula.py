@@ -79,11 +79,6 @@ class Formula:
         return Formula, (self.text, self.names)
 
 
-def of_time(text: str | float, t: float) -> float:
-    """The value of a formula in t."""
-    return float(Formula(text, ("t",))(np.zeros(()), np.zeros(()), t))
-
-
 def _check(value: Any, names: tuple[str, ...] = ("x", "y")) -> Any:
     """A number as a number, a text as it is if it is a formula; pydantic prints what InputError says."""
     if isinstance(value, bool) or not isinstance(value, (int, float, str)) or value != value:

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field
 
 from ..errors import InputError
-from .formula import TimeText, of_time
+from .formula import Formula, TimeText
 from .scene import Finite, Positive
 from .units import Measured, measured
 
@@ -160,7 +160,8 @@ class MotionTable(Measured):
 
 
 def _values(name: str, texts: Sequence[float | str], t: float) -> tuple[float, ...]:
-    found = tuple(of_time(text, t) for text in texts)
+    nowhere = np.zeros(())
+    found = tuple(float(Formula(text, ("t",))(nowhere, nowhere, t)) for text in texts)
     if not np.all(np.isfinite(found)):
         raise InputError(f"{name} = {', '.join(map(str, texts))}: no number at t = {t:g} s")
     return found

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import InputError
 from ..problems.film.model import Model
-from ..problems.film.turning import Turning
 from .formula import Formula
-from .scene import Solvable, as_scene
+from .scene import as_scene
 
 if TYPE_CHECKING:
     from .motion import MotionTable
@@ -21,18 +20,6 @@ if TYPE_CHECKING:
 Models = Callable[[float, Sequence[float] | None], Model]
 SPEEDS = ("U", "omega", "speed_rpm")  # keys of the wall's speed
 PIECES = 64  # of the time, where the speed changes
-
-
-@runtime_checkable
-class Moving(Solvable, Protocol):
-    """A scene with a table [motion]; turning : its journal, if any; place : where that, or the film's level, is unless [motion]
-    says."""
-
-    motion: MotionTable | None
-    turning: Turning | None
-    place: tuple[float, ...]
-
-    def models(self) -> Models: ...
 
 
 def motion_of(scene: Any) -> MotionTable | None:

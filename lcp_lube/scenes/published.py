@@ -7,6 +7,7 @@ from pydantic import Field, model_validator
 
 from ..problems.film.model import Side
 from ..problems.film.shapes import MEAN_SQUARE, Along, Block, DimpleArray, RandomSurface, Shape
+from ..problems.film.views import Travelling
 from .effects.table import WithEffects
 from .film_scene import ALL, RectangleScene, Sides
 from .scene import Finite, NotNegative, Positive
@@ -47,7 +48,7 @@ class SurfaceScene(LubricationScene):
 
     def on_wall(self, shape: Shape) -> Shape:
         """A shape, travelling if it does."""
-        return self.carried(shape) if self.moves else shape
+        return Travelling(shape, self._travel, self.side_lengths[0]) if self.moves and self._travel else shape
 
 
 class SliderScene(SurfaceScene):

@@ -2,10 +2,10 @@
 
 import tomllib
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Protocol
+from typing import Annotated, Any, ClassVar, Protocol, Self
 
 from petsc4py import PETSc
 from pydantic import Field, PrivateAttr, ValidationError
@@ -61,6 +61,12 @@ class Derived:
     @property
     def shape(self) -> tuple[int, ...]:
         return self.whole.shape
+
+    def with_shape(self, shape: tuple[int, ...]) -> Self:
+        return replace(self, whole=self.whole.with_shape(shape))
+
+    def facts(self, comm: PETSc.Comm | None = None) -> Facts:
+        return self.model.facts(self.shape, comm)  # type: ignore[attr-defined]
 
 
 class Scene(Measured):

@@ -11,6 +11,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from ..base.together import on_all_ranks
 from ..errors import InputError
 from .faults import models_of, tags_of
 from .scene import family_of, load_scene, read_scene
@@ -28,15 +29,10 @@ def run(path: Path, source: str) -> int:
     ------
     InputError : no such scene, or `path` is there already or cannot be written.
     """
-    comm, refused = MPI.COMM_WORLD, None
-    if comm.rank == 0:
-        try:
+    with on_all_ranks(MPI.COMM_WORLD):
+        if MPI.COMM_WORLD.rank == 0:
             _write(path, template(source, path.parent))
             print(f"{path}: made from {source}; solve it by 'lcp-lube solve {path}'", flush=True)
-        except InputError as error:
-            refused = str(error)
-    if refused := comm.bcast(refused):
-        raise InputError(refused)
     return 0
 
 

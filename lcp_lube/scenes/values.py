@@ -83,14 +83,8 @@ def _numbered(scene: Scene, key: str) -> str:
     tables = getattr(scene, words[0], None)
     if len(words) < 3 or not isinstance(tables, list):
         return key
-    return next(
-        (
-            ".".join([words[0], str(k), *words[2:]])
-            for k, one in enumerate(tables, 1)
-            if getattr(one, "shape", None) == words[1]
-        ),
-        key,
-    )
+    number = next((str(k) for k, one in enumerate(tables, 1) if getattr(one, "shape", None) == words[1]), words[1])
+    return ".".join([words[0], number, *words[2:]])
 
 
 def with_values(scene: Scene, values: dict[str, float]) -> Scene:

@@ -1,8 +1,8 @@
 """Stability against the film ratio: h_max/h_min from 1.1 to 1e4 on coarse to fine grids, by every method."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
+from functools import partial
 
-from ..base.resumable import Row
 from .map_picture import Axis, Panels
 from .outcome_map import Case, OutcomeMap, methods, tallies
 
@@ -31,8 +31,5 @@ def film(scene: str, ratio: float) -> dict[str, float]:
     return {"K": 2, "h": low, "depth": float(f"{(ratio - 1) * low:.6g}")}
 
 
-def sentence(rows: Sequence[Row]) -> str:
-    return tallies(rows, ("method",), (Y, X))
-
-
+sentence = partial(tallies, by=("method",), axes=(Y, X))
 chart = OutcomeMap("film_ratio", cases, Panels("method", "scene"), X, Y, sentence).chart

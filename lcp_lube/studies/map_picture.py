@@ -92,16 +92,18 @@ def picture(
     """All panels, with one colour scale and one legend; panels that are the same in every cell are drawn once."""
     down = unique(rows, panels.down) if panels.down else [""]
     titles = _merged(rows, panels, x, y)
-    words = max(
-        0.062 * len(x.label), *(0.078 * len(title) for title in titles.values())
-    )  # inches of the widest text of a panel
+    # Inches of the widest text of a panel.
+    words = max(0.062 * len(x.label), *(0.078 * len(title) for title in titles.values()))
     fits = max(1, min(panels.columns, int((WIDTH - 0.8) / (words + 0.1))))
     lines_each = math.ceil(len(titles) / fits)
     columns = math.ceil(len(titles) / lines_each)
     kept = [row for row in rows if row[panels.across] in titles]
     blocks = {d: chosen(kept, **({panels.down: d} if panels.down else {})) for d in down}
-    heights = [_height(mine, y) for mine in blocks.values() for _ in range(lines_each)]
-    figure = new_figure(0.55 + sum(heights) + 0.5 * len(heights) + 0.35 * _long(rows, x), sentence)
+    # A line of type for every cell, and room for the label.
+    tall = [max(0.75, 0.155 * len(values_of(mine, y)), 0.064 * len(y.label)) for mine in blocks.values()]
+    heights = [height for height in tall for _ in range(lines_each)]
+    turned = _crowded([tick(value) if x.number else value for value in values_of(rows, x)])  # the numbers under a panel
+    figure = new_figure(0.55 + sum(heights) + 0.5 * len(heights) + 0.35 * turned, sentence)
     grid = figure.subplots(len(heights), columns, squeeze=False, height_ratios=heights)
     for block, (d, mine) in enumerate(blocks.items()):
         for number in range(lines_each * columns):
@@ -130,18 +132,8 @@ def picture(
     return figure
 
 
-def _long(rows: Sequence[Row], x: Axis) -> int:
-    """Whether the numbers under a panel are turned."""
-    return int(_crowded([tick(value) if x.number else value for value in values_of(rows, x)]))
-
-
 def _crowded(labels: Sequence[str]) -> bool:
     return sum(len(label.strip("${}^")) + 1 for label in labels) > 22
-
-
-def _height(rows: Sequence[Row], y: Axis) -> float:
-    """Of a panel in inches: a line of type for every cell, and room for its label."""
-    return max(0.75, 0.155 * len(values_of(rows, y)), 0.064 * len(y.label))
 
 
 def _merged(rows: Sequence[Row], panels: Panels, x: Axis, y: Axis) -> dict[str, str]:

@@ -102,8 +102,9 @@ class OutcomeMap:
         key = (*cases[0].key, "ranks")
         store = open_store(results / f"{stem}.csv", key, (*COLUMNS, *self.columns))
         find = self.reference or References().of
+        ranks = {"ranks": store.comm.size}
         with Line() as line:
-            runs = line.over(cases, lambda _: f"{self.stem}, run", lambda case: store.find(**self.key(store, case)) is not None)
+            runs = line.over(cases, lambda _: f"{self.stem}, run", lambda case: store.find(**case.key, **ranks) is not None)
             rows = [row for case in runs if (row := self.row(store, case, find)) is not None]
         sentence = f"Numbers: steps. {self.sentence(rows)} {judged(rows)}"
         say(sentence)
@@ -118,24 +119,19 @@ class OutcomeMap:
         say(f"{path}: {len(rows)} runs, {store.said}")
         return 0
 
-    @staticmethod
-    def key(store: ResumableCsv, case: Case) -> dict[str, Any]:
-        return {**case.key, "ranks": store.comm.size}
-
     def row(self, store: ResumableCsv, case: Case, reference: Callable[[Scene], Reference]) -> Row | None:
         """The row of one run, from the csv or made now; None if it was refused. Collective."""
-        key = self.key(store, case)
-        row = store.find(**key)
-        if row is None:
-            scene, steps = case.load(), list[Step]()
-            try:
-                values = run(scene, KRYLOV_MOST, reference(scene), steps, **case.choices)
-            except InputError as error:
-                say(f"{case.command()}: left out: {error}")
-                return None
-            more = self.more(case, steps) if self.more else {}
-            row = store.add({**values, **more, **key, "command": case.command()})
-        return row
+        key = {**case.key, "ranks": store.comm.size}
+        if (row := store.find(**key)) is not None:
+            return row
+        scene, steps = case.load(), list[Step]()
+        try:
+            values = run(scene, KRYLOV_MOST, reference(scene), steps, **case.choices)
+        except InputError as error:
+            say(f"{case.command()}: left out: {error}")
+            return None
+        more = self.more(case, steps) if self.more else {}
+        return store.add({**values, **more, **key, "command": case.command()})
 
 
 def methods() -> list[str]:

@@ -194,10 +194,9 @@ class Bench:
         """One run's row, from the csv or made now; None if it was refused. Collective."""
         name, data = scene_key(self.scene)
         key = {"scene": name, "data": data, **key, "ranks": store.comm.size}
-        row = store.find(**key)
-        if row is not None:
+        if (row := store.find(**key)) is not None:
             return row
-        told = ", ".join(str(value) for value in key.values())
+        told = ", ".join(map(str, key.values()))
         try:
             row = store.add({**self.measure(scene, choices), **key})
         except InputError as error:

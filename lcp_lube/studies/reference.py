@@ -30,12 +30,11 @@ class Reference:
 
     def distance(self, problem: Problem, fields: Fields) -> float | None:
         """To the nearest answer: largest difference of p or v, relative to `_size`, or of r; None without any. Collective."""
-        far = [max(_apart(problem, fields[name], answer[name], name) for name in answer) for answer in self.answers]
-        return min(far, default=None)
 
+        def apart(name: str, known: Array) -> float:
+            return problem.reduce.max(np.abs(fields[name] - known)) / (1.0 if name == "r" else _size(problem, known))
 
-def _apart(problem: Problem, a: Array, b: Array, name: str) -> float:
-    return problem.reduce.max(np.abs(a - b)) / (1.0 if name == "r" else _size(problem, b))
+        return min((max(apart(*one) for one in answer.items()) for answer in self.answers), default=None)
 
 
 def _size(problem: Problem, values: Array) -> float:

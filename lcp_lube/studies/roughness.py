@@ -6,15 +6,8 @@ from ..base.resumable import Row
 from .map_picture import Axis, Panels
 from .outcome_map import Case, OutcomeMap, methods, tallies
 
-AMPLITUDES = (
-    0,
-    1,
-    2,
-    4,
-    6,
-    10,
-    20,
-)  # um, of the random numbers: the surface's is 0.479 of it; on a film of 15 to 25 um; 1 um is left everywhere
+# um, of the random numbers: the surface's is 0.479 of it; on a film of 15 to 25 um; 1 um is left everywhere
+AMPLITUDES = (0, 1, 2, 4, 6, 10, 20)
 SIZES = (16, 32, 64)
 SEEDS = (1, 2, 3)
 

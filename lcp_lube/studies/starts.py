@@ -55,7 +55,9 @@ def chart(quick: bool, results: Path) -> int:
     if not quick:
         write_log(results, "stability: starts", rows, f"{lines_sentence(rows)} {map_sentence(rows)}", pictures)
     save(lambda: lines(rows), pictures[0], store.comm)
-    save(lambda: starts_map(rows), pictures[1], store.comm)
+    x, y = Axis("p0", "p0 in MPa"), Axis("r0", "r0")  # iterations over both: a column a scene, a row a rule
+    figure = partial(picture, grid_starts(rows), Panels("scene", "rule"), x, y, map_sentence(rows))
+    save(figure, pictures[1], store.comm)
     say(f"{', '.join(map(str, pictures))}: {len(rows)} runs, {store.said}")
     return 0
 
@@ -166,9 +168,3 @@ def _rule(axes: Axes, rows: Sequence[Row], number: int, name: str) -> None:
         failed = chosen(rows, outcome=outcome)
         x, y = [float(row["p0"]) for row in failed], [float(row["iterations"]) for row in failed]
         axes.plot(x, y, color=look(number)["color"], marker=mark, mfc="none", ls="none", ms=6.5 - number)
-
-
-def starts_map(rows: Sequence[Row]) -> Figure:
-    """Iterations over p0 x r0: a column a scene, a row a rule."""
-    x, y = Axis("p0", "p0 in MPa"), Axis("r0", "r0")
-    return picture(grid_starts(rows), Panels("scene", "rule"), x, y, map_sentence(rows))

@@ -1,8 +1,8 @@
 """Stability against load: supply pressure and speed, from a film that is full everywhere to one that is nearly all cavity."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
+from functools import partial
 
-from ..base.resumable import Row
 from .map_picture import Axis, Panels
 from .outcome_map import Case, OutcomeMap, methods, tallies
 
@@ -26,8 +26,5 @@ def cases(quick: bool) -> Iterator[Case]:
                     yield Case({"scene": scene, "method": method, "U": U, "p": p}, scene, changes, {"method": method})
 
 
-def sentence(rows: Sequence[Row]) -> str:
-    return tallies(rows, ("method",), (X, Y))
-
-
+sentence = partial(tallies, by=("method",), axes=(X, Y))
 chart = OutcomeMap("supply_speed", cases, Panels("method", "scene"), X, Y, sentence).chart

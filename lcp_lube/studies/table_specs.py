@@ -2,10 +2,9 @@
 
 import math
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from mpi4py import MPI
 
@@ -20,7 +19,7 @@ class Spec:
     title: str
     command: str
     rows: Callable[[list[Row]], list[Row]] = list
-    points: tuple[int, ...] = ()
+    points: Sequence[int] = ()
     quick: float = math.inf
     system: str = "full"
     printed: str = ""
@@ -105,7 +104,8 @@ def _line_contact(printed: list[Row]) -> list[Row]:
     return [a | b for a, b in zip(rows + own, measured + len(own) * [{"it": "", "time_s": ""}], strict=True)]
 
 
-ROWS = {
+ROWS: dict[str, Callable[[list[Row]], list[Row]]] = {
+    "": list,
     "row_a_method": _row_a_method,
     "row_a_preconditioner": _row_a_preconditioner,
     "cimmino": _cimmino,
@@ -114,13 +114,12 @@ ROWS = {
 }
 
 
-def _spec(keys: dict[str, Any]) -> Spec:
-    return Spec(**{**keys, "rows": ROWS[keys["rows"]] if "rows" in keys else list, "points": tuple(keys.get("points", ()))})
-
-
 _TABLES = tomllib.loads(Path(__file__).with_name("tables.toml").read_text(encoding="utf-8"))
 # The papers by the name that --paper takes: folder of the printed figures, and tables by number.
 PAPERS: dict[str, tuple[str, dict[int, Spec]]] = {
-    paper: (tables.pop("folder"), {int(number): _spec(keys) for number, keys in tables.items()})
+    paper: (
+        tables.pop("folder"),
+        {int(number): Spec(**{**keys, "rows": ROWS[keys.get("rows", "")]}) for number, keys in tables.items()},
+    )
     for paper, tables in _TABLES.items()
 }

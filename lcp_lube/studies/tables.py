@@ -138,7 +138,7 @@ def run_published_table(
     return 1 if refused or absent else 0
 
 
-def run_command(command: str, points: tuple[int, ...] = (), progress: Progress | None = None) -> dict[str, Any]:
+def run_command(command: str, points: Sequence[int] = (), progress: Progress | None = None) -> dict[str, Any]:
     """Run a `lcp-lube solve` command line: the columns RECORD, and p_i in the problem's unit for the points asked for; outcome
     'refused' and a message alone where the run could not start. Collective."""
     begin = process_time()

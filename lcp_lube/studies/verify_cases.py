@@ -20,12 +20,12 @@ class Reference:
     """A known value.
 
     tol : relative error allowed on the finest grid. order : that the error must fall with, between the first grid and the last;
-    None where theory gives none, see `Case.note`.
+    0 where theory gives none, see `Case.note`.
     """
 
     value: float
     tol: float
-    order: float | None = None
+    order: float = 0.0
     source: str = ""  # where it is another one than the case's
 
 
@@ -117,12 +117,8 @@ DERIVED: dict[str, Callable[[Solution, Values], Values]] = {
 
 def _read() -> tuple[Case, ...]:
     cases = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))["case"]
-    known = [{name: _reference(*row) for name, row in case.pop("known").items()} for case in cases]
+    known = [{name: Reference(*row) for name, row in case.pop("known").items()} for case in cases]
     return tuple(Case(references=references, **case) for case, references in zip(cases, known, strict=True))
-
-
-def _reference(value: float, tol: float, order: float = 0.0, source: str = "") -> Reference:
-    return Reference(value, tol, order or None, source)
 
 
 CASES = _read()

@@ -201,7 +201,7 @@ def test_the_last_step_of_a_fallback(tmp_path, stopped_at, failed):
 
     with pytest.raises(Stopped):
         solve(scene, **how, checkpoint=tmp_path / "c", monitor=monitor)
-    record = checkpoint.load(tmp_path / "c", scene).record
+    record = checkpoint.load(tmp_path / "c", checkpoint.scene_record(scene)).record
     assert [outcome for outcome, _, _ in record["failed"]] == ["max_iterations"] * failed and len(record["steps"]) == 1
     made = []
     again = solve(scene, **how, resume=tmp_path / "c", monitor=lambda k, step: made.append(k))
@@ -349,7 +349,7 @@ def test_a_file_limit(tmp_path):
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert str(refused.value).endswith("could not be written: File too large; the last one is still there")
     assert os.listdir(tmp_path) == ["c"]
-    assert len(checkpoint.load(tmp_path / "c", scene).shapes) == 2
+    assert len(checkpoint.load(tmp_path / "c", checkpoint.scene_record(scene)).shapes) == 2
 
 
 def test_a_full_disk(tmp_path):

@@ -22,11 +22,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"--port {args.port}: allowed are 0 (any free port) to 65535")
     scene, ask = scene_of(args), ask_of(args)
     trial, answers = Answers(scene, ask, args.accuracy), Answers(scene, ask, args.accuracy)
-    for level in (
-        0,
-        0,
-        1 - trial.moves,
-    ):  # what cannot be solved is refused here; loops are compiled, a start's too
+    for level in (0, 0, 1 - trial.moves):  # what cannot be solved is refused here; loops are compiled, a start's too
         trial.solve({}, level)
     trial.forget()
     check_unread()

@@ -15,8 +15,6 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-import numpy as np
-
 from ... import api
 from ...drivers.ask import Ask
 from ...errors import InputError
@@ -258,10 +256,7 @@ def _fields(problem: Problem, fields: Fields) -> dict[str, Any]:
     stride = thinning(grid, SHOWN)
     lines = {name: line[taken(line.size, step)] for name, line, step in zip("xy", grid.lines, stride, strict=False)}
     found = problem.physical(fields)
-    values = {name: {"unit": unit, "values": _packed(gather(grid, array, stride))} for name, (array, unit) in found.items()}
+    packed = {name: gather(grid, array, stride).astype("<f4").tobytes() for name, (array, _) in found.items()}
+    values = {name: {"unit": found[name][1], "values": base64.b64encode(packed[name]).decode()} for name in found}
     length = "m" if any(unit for _, unit in found.values()) else ""
     return {"axes": {name: {"unit": length, "values": line.tolist()} for name, line in lines.items()}, "fields": values}
-
-
-def _packed(values: np.ndarray) -> str:
-    return base64.b64encode(np.ascontiguousarray(values, dtype="<f4").tobytes()).decode()

@@ -132,7 +132,7 @@ def factorise(A: sp.csr_matrix, drop: float) -> tuple[sp.csr_matrix, sp.csr_matr
     row, column = scaling(A)
     scaled = scale(A, row, column)
     transposed = scaled.T.tocsr()
-    symmetric = _equal(scaled, transposed)
+    symmetric = bool(abs(scaled - transposed).max() <= 1e-12)
     run = compiled(biconjugate)
 
     def unit_upper(left: sp.csr_matrix, right: sp.csr_matrix) -> tuple[sp.csc_matrix, Array, int]:
@@ -258,12 +258,6 @@ def scale(A: sp.csr_matrix, row: Array, column: Array) -> sp.csr_matrix:
     """diag(row) A diag(column)."""
     data = A.data * np.repeat(row, np.diff(A.indptr)) * column[A.indices]
     return sp.csr_matrix((data, A.indices, A.indptr), shape=A.shape)
-
-
-def _equal(A: sp.csr_matrix, B: sp.csr_matrix) -> bool:
-    """Whether two matrices with canonical CSR have the same entries, up to rounding."""
-    same = np.array_equal(A.indptr, B.indptr) and np.array_equal(A.indices, B.indices)
-    return same and bool(np.all(np.abs(A.data - B.data) <= 1e-12))
 
 
 def _index64(A: sp.csr_matrix) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...base.compiled import has_numba
 from ...base.parallel import Array
@@ -163,28 +162,16 @@ def misfits(problem: "LubricationProblem", p: Array, r: Array, p_max: float, abo
     return Misfits(pressure, void, residual, diagonal, dragged, worst, gap, inside, reduce.min(np.array([least])))
 
 
-def cell_misfits(
-    p: Array,
-    r: Array,
-    k_W: Array,
-    k_E: Array,
-    k_S: Array,
-    k_N: Array,
-    b_C: Array,
-    b_W: Array,
-    c: Array,
-    held: NDArray[np.bool_],
-    p_max: float,
-    above: float,
-) -> tuple[Array, Array]:
+def cell_misfits(p: Array, r: Array, *given: Any) -> tuple[Array, Array]:
     """Of some cells the sums of the squares of A p, B r, A p + B r - c, diag(A) p and b_C, and of diag(A) (|p| + above), and
-    the largest of `worst` and `gap`. p and r have a frame of neighbours."""
+    the largest of `worst` and `gap`. p and r have a frame of neighbours; given : as to `cell_loops.loop_misfits`."""
+    *owned, held, p_max, above = given
     here, void = p[1:-1, 1:-1], r[1:-1, 1:-1]
     around = (p[1:-1, :-2], p[1:-1, 2:], p[:-2, 1:-1], p[2:, 1:-1])
     if held.size:
         around = tuple(np.where(held, 0.0, beside) for beside in around)  # type: ignore[assignment]
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        found = cell_misfit(np.where, here, *around, void, r[1:-1, :-2], k_W, k_E, k_S, k_N, b_C, b_W, c, p_max, above)
+        found = cell_misfit(np.where, here, *around, void, r[1:-1, :-2], *owned, p_max, above)  # type: ignore[call-arg]
     *squared, inside, worst, gap = found
     sums = [float(np.sum(np.square(term))) for term in squared]
     return np.array([*sums, float(np.sum(inside))]), np.array([np.max(worst, initial=0.0), np.max(gap, initial=0.0)])

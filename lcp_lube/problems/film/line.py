@@ -78,10 +78,6 @@ class Line:
         return float(np.sum(np.where(self.full, 4.0 * self.U * one - 3.0 * self.Q * two, self.Q * two)))
 
     @property
-    def length(self) -> float:
-        return float(self.integrals.points[-1] - self.integrals.points[0])
-
-    @property
     def cavitated(self) -> float:
         """Length of the cavities, m."""
         return float(np.sum(np.diff(self.integrals.points)[~self.full]))

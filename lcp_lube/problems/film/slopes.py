@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...base.parallel import Array
 from .cavity import cavity_sign
 from .effects import around
-from .flows import friction, point_weights, sheared_faces, side_flows, volume_unit
+from .flows import SIDES, friction, point_weights, sheared_faces, side_flows, volume_unit
 from .forces import totals, weights
 from .grooves import GroovedProblem
 from .lubrication import LubricationProblem
@@ -25,7 +25,6 @@ from .strip import line_weights
 from .supplies import supply_flows
 from .tangent import Tangent
 
-SIDES = ("west", "east", "south", "north")
 TIE = 1e-9  # relative: pressures so near the largest one are as large
 
 

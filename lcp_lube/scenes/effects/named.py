@@ -12,11 +12,8 @@ FLUID = {"barus": 0.0, "density": "constant"}  # effects that are keys of the ta
 def named(scene: Any) -> list[str]:
     """The effects that a scene has data for, in the registry's order."""
     fluid = getattr(scene, "fluid", None)
-    return [
-        name
-        for name in RUNGS
-        if (getattr(fluid, name, FLUID[name]) != FLUID[name] if name in FLUID else getattr(scene, name, None) is not None)
-    ]
+    given = {name for name, none in FLUID.items() if getattr(fluid, name, none) != none}
+    return [name for name in RUNGS if name in given or (name not in FLUID and getattr(scene, name, None) is not None)]
 
 
 def without(scene: Any, names: Iterable[str]) -> Any:

@@ -27,20 +27,15 @@ class SurfaceRoughness(EffectTable):
     moving: Annotated[Finite, Field(ge=0, le=1)] = Field(0.5, description="part of sigma^2 that the moving wall has")
 
     @property
-    def excess(self) -> float:
-        """Of the moving wall's part of sigma^2 over the other's."""
-        return 2.0 * self.moving - 1.0
-
-    @property
     def channels(self) -> tuple[str, ...]:  # type: ignore[override]
-        return ("pressure_flow", "drag_flow") if self.excess else ("pressure_flow",)
+        return ("pressure_flow",) if self.moving == 0.5 else ("pressure_flow", "drag_flow")
 
     def apply(self, at: Answer, out: Cells) -> None:
         H = at.h / self.sigma
         out["pressure_flow"] *= 1.0 - 0.9 * np.exp(-0.56 * H)
-        if self.excess:
+        if excess := 2.0 * self.moving - 1.0:  # of the moving wall's part of sigma^2 over the other's
             low = np.clip(H, 0.0, 5.0)
             near = 1.899 * low**0.98 * np.exp(-0.92 * low + 0.05 * low**2)
             far = 1.126 * np.exp(-0.25 * np.minimum(H, THICKEST))
             # The moving wall's valleys carry oil along: they add to the flow where it is the rougher one.
-            out["drag_flow"] *= 1.0 + self.excess * np.where(H <= 5.0, near, far) / H
+            out["drag_flow"] *= 1.0 + excess * np.where(H <= 5.0, near, far) / H
