@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
         if args.json:
             say(json.dumps(finite(record)))
         else:
-            say(text(record, scene, solution, found if solution.converged else []))
+            say(text(record, solution, found if solution.converged else []))
             if solution.converged and bars:
                 say("\n".join(bar_line(name, bar, sensitivity.unit_of(solution, name)) for name, bar in bars.items()))
             if told := record.get("grid_error"):
@@ -143,7 +143,7 @@ def pictures(args: argparse.Namespace, scene: Scene, solution: Solution, found: 
         files.save(solution, args.output, more=more)
 
 
-def text(record: dict[str, Any], scene: Scene, solution: Solution, found: list[Gradient]) -> str:
+def text(record: dict[str, Any], solution: Solution, found: list[Gradient]) -> str:
     """Tables for people."""
     shape = " x ".join(str(record[side]) for side in ("nx", "ny") if record[side])
     if not found:

@@ -15,7 +15,7 @@ def added(times: Mapping[str, float], more: Mapping[str, float]) -> dict[str, fl
 
 
 class Chain:
-    """Attributes: count, of the solves; steps, of all of them; solution, the last one. Collective.
+    """Attributes: steps, of all solves. Collective.
 
     Parameters
     ----------
@@ -25,19 +25,13 @@ class Chain:
     def __init__(self, ask: Ask, inner: Inner):
         self._ask, self._inner = ask, inner
         self._last: Solution | None = None
-        self.count = 0
         self.steps: list[Step] = []
         self._times: dict[str, float] = {}
-
-    @property
-    def solution(self) -> Solution:
-        assert self._last is not None  # a first one was solved
-        return self._last
 
     def solve(self, scene: Solvable) -> Solution:
         new = self._inner(scene, replace(self._ask, start=self._last or self._ask.start))
         if self._last is not None:
             self._last.destroy()
-        self._last, self.count, self.steps = new, self.count + 1, [*self.steps, *new.steps]
+        self._last, self.steps = new, [*self.steps, *new.steps]
         self._times = new.times = added(self._times, new.times)
         return new

@@ -148,13 +148,11 @@ def _shear(at: Answer, dy: float, other_free: list[Any]) -> tuple[Array, Array]:
 class Heated:
     """Temperatures above T_in at the points (K; in grooves those of their oil), and where the heat goes.
 
-    out : all that leaves, W. fresh : oil that enters at T_in and leaves again, m3/s. residual : relative, of the equations.
-    stored : what stays in the film in a time step, W.
+    out : all that leaves, W. residual : relative, of the equations. stored : what stays in the film in a time step, W.
     """
 
     theta: Array
     out: float
-    fresh: float
     residual: float
     stored: float = 0.0
 
@@ -219,8 +217,7 @@ def heated(
     out = rho_c * (reduce.sum(edge * T) - sum(on)) + reduce.sum(np.where(free, H * (T - wall), 0.0))
     for columns, back in zip(holders(at), mixed, strict=False):
         theta = np.where(columns, back, theta)
-    fresh = reduce.sum(edge) - sum(share * reduce.sum(into) for _, into, share in mixers)
-    return Heated(theta, float(out), float(fresh), residual, float(rho_c * reduce.sum(flow.held * T - flow.kept)))
+    return Heated(theta, float(out), residual, float(rho_c * reduce.sum(flow.held * T - flow.kept)))
 
 
 def _mixers(at: Answer, flow: Carried, carry_over: float | None) -> list[tuple[Array, Array, float]]:

@@ -36,7 +36,7 @@ class GradedJacobian:
     """
 
     def __init__(self, problem: "LubricationProblem", full: NDArray[np.bool_]):
-        s, self.grid, self._full = problem.scheme, problem.grid, full
+        s, self.grid = problem.scheme, problem.grid
         self._at, b = _order(self.grid)
         k_W, k_E, k_S, k_N, b_C, theta = whole(self.grid, s.k_W, s.k_E, s.k_S, s.k_N, s.b_C, full.astype(float))
         W, E, S, N, b_W = whole(self.grid, *s.coupling, s.entering)  # what a cell takes from its neighbours
