@@ -19,7 +19,7 @@ from conftest import TESTS, start
         ("h5", "x.h5: could not be written: File too large", 2),
         ("h5 elsewhere", "x.h5: could not be written: No such file or directory", 2),
         ("write", "MPI_ERR_NO_SUCH_FILE", 2),
-        ("read", "MPI_ERR_NO_SUCH_FILE", 2),
+        ("read", "--resume y.ckpt: MPI_ERR_NO_SUCH_FILE", 2),
         ("doctor", "ZeroDivisionError: on purpose", 2),
     ],
 )
