@@ -1,5 +1,6 @@
 """Accuracy asked for: grids from coarse to fine, until the estimated relative error of a quantity is below a tolerance."""
 
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import count
@@ -17,20 +18,24 @@ from ..problems.film.model import Model
 from ..problems.grid import OFFSET
 from ..problems.solution import Outcome, Solution
 from ..registry import METHODS
+from ..scenes.moving import motion_of
 from ..scenes.scene import Solvable
 from ..solvers.newton import Stopping
 from .ask import Ask
 from .chain import added
 from .compose import Inner
-from .estimate import QUADRATURE, Estimate, estimate, follow, known_numbers, misplaced_film, scalars
+from .estimate import INTEGRALS, is_known, scalars
 from .memory import DENSE, available
 from .plan import FEW, SMALL
 from .rungs import ASYMPTOTIC, finer, first_shape, round_ring, rungs_up
+from .values import Values, carried, sought
 
-FEW_KNOWN = 64  # of a line whose number is known: no coarser grid is cheaper
+FEW_KNOWN = 64  # points of the first grid of a line whose number is known: no coarser grid is cheaper
+FEW_PAIRS = 200  # of a film whose load is estimated from each two grids: these are solved by elimination
 ALGEBRAIC = 1e-3  # ||F|| relative to the tolerance: with many small cavities it leaves up to 60 times itself in a load
 ALLOWED = (1e-10, 0.5)  # tolerances
 SOON = 3e-3  # a tolerance below which most films in 2D end on grids for multigrid
+LOOPS = "lcp_lube.solvers.fas.loops"  # multigrid's, which take as long to load as ten small grids to solve
 WHOLE = {True: 20_000, False: 1500}  # points up to which looking for symmetries costs what it saves, by multigrid or directly
 HOPELESS = 1_000_000  # points on which an estimate that has not come down is taken to stay up
 PATIENCE = 6  # grids without a better estimate: rounding dominates
@@ -66,7 +71,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     -------
     Solution : on the last grid. The quantity among its numbers is the best value: this grid's, or the one extrapolated from all
         (settings['accuracy_extrapolated']; 'accuracy_grid_value' is the grid's own). settings['accuracy_estimate'] is its
-        estimated relative error, 'estimates' has value, error (in its unit) and extrapolated of all numbers, `levels` every
+        estimated relative error, `estimates` has value, error (in its unit) and extrapolated of all numbers, `levels` every
         grid with its own value and the estimate. Where grids end before the estimate is below the tolerance: outcome ACCURACY.
 
     Raises
@@ -77,20 +82,20 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     assert tol is not None
     begin = perf_counter()
     fewest = model.fewest_meshes() if isinstance(model := getattr(scene, "model", None), Model) else ()
-    known = known_numbers(scene, ask.comm)
-    first = first_shape(scene.shape, fewest, finest, FEW_KNOWN if known else None)
+    line, pairs = is_known(scene), _by_pairs(scene, quantity)
+    few = FEW_KNOWN if line else FEW_PAIRS if pairs else None
+    first = first_shape(scene.shape, fewest, finest, few)
+    pairs = pairs and first == first_shape(scene.shape, (), finest, few)  # else its cells are as wide as what they show
     first, unit = round_ring(scene, first, finest)
     kinds = [model.sides[2 * k : 2 * k + 2] if isinstance(model, Model) else () for k in range(len(first))]
     meshes = [n + 1.0 - sum(1.0 - OFFSET[side.kind] for side in ends) for n, ends in zip(first, kinds, strict=True)]
     rung = next(k for k in count() if ask.mpi.size == 1 or finer(first, meshes, k, unit)[-1] >= 2 * ask.mpi.size)
     shape = finer(first, meshes, rung, unit)
-    sizes: list[float] = []  # meshes a side
     solution: Solution | None = None
-    history: list[dict[str, float]] = []
-    misplaced: list[float] = []
+    told = Values(line, pairs)
     levels: list[dict[str, Any]] = []
     times: dict[str, float] = {}
-    end, best, soon = "", Estimate(np.nan, inf), tol < SOON
+    end, soon = "", tol < SOON or LOOPS in sys.modules
     while not end:
         level_begin, before = perf_counter(), solution
         near = ask.start if before is None else _start(before, prod(shape)) if ask.nested is not False else None
@@ -98,19 +103,18 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         halved = ask.reduction and (len(shape) == 1 or prod(shape) > WHOLE[soon])
         this = replace(ask, accuracy=None, stopping=stopping, start=near, nested=False, reduction=halved)
         solution = inner(scene.with_shape(shape), replace(this, direct_below=0 if soon else None))
+        problem = solution.problem
+        sure = quantity or (DEFAULT_QUANTITY[0] if pairs or line else "")
+        value = carried(problem, solution.fields, sure)
+        if value is not None:
+            quantity = sure
+        else:
+            found = {**sought(solution), **solution.numbers}  # what is sought is the number where the load is given
+            quantity = quantity or next((name for name in (*sought(solution), *DEFAULT_QUANTITY) if name in found), "")
+            value = find_value(found, quantity, scene)
+        best = told.add(solution, before, prod(problem.grid.meshes) ** (1.0 / len(first)), quantity, value)
         if before is not None:
             before.destroy()
-        problem = solution.problem
-        found = dict(solution.numbers)
-        if balance := solution.settings.get("balance"):  # what is sought is the number; the load is given
-            found, known = {balance["vary"]: balance["value"], **found}, None
-            quantity = quantity or balance["vary"]
-        quantity = quantity or next((name for name in DEFAULT_QUANTITY if name in found), "")
-        value = find_value(found, quantity, scene)
-        history.append({**scalars(found), quantity: value} if solution.converged else {})
-        misplaced.append(misplaced_film(problem))
-        sizes.append(prod(problem.grid.meshes) ** (1.0 / len(first)))
-        best = _best(quantity, history, misplaced, sizes, known)
         # Where the last grid will be one for multigrid (second order: points as 1/error) its loops serve those before it too.
         soon = soon or inf > best.relative > 3 * FEW / problem.grid.size * tol
         levels.append(
@@ -119,7 +123,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
                 "iterations": solution.iterations,
                 "linear_iterations": solution.total("linear_iterations"),
                 "time_s": perf_counter() - level_begin,
-                "value": history[-1].get(quantity, np.nan),
+                "value": value if solution.converged else np.nan,
                 "estimate": best.relative,
             }
         )
@@ -127,7 +131,8 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         ask.tell("accuracy", f"{quantity} to {best.relative:.0e}", of_ladder(seconds, best.relative, tol, 2.0 ** len(shape)))
         times = added(times, solution.times)
         end = _end(estimates, values, tol, problem.grid.size)
-        for up in range(0 if end else rungs_up(estimates, tol, known is not None, len(first)), 0, -1):
+        most = 0 if end else rungs_up(estimates, tol, told.line is not None, len(first), pairs)
+        for up in range(most, 0, -1):
             shape = finer(first, meshes, rung + up, unit)
             if not (end := _no_room(solution, shape, finest, best.relative, tol)):
                 rung += up
@@ -141,33 +146,22 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         "accuracy_quantity": quantity,
         "accuracy_estimate": best.relative,
         "accuracy_extrapolated": best.extrapolated,
-        "accuracy_grid_value": history[-1].get(quantity),
-        "estimates": {
-            name: vars(one) for name in history[-1] if isfinite((one := _best(name, history, misplaced, sizes, known)).error)
-        },
+        "accuracy_grid_value": levels[-1]["value"] if solution.converged else None,
     }
-    if best.extrapolated and quantity in solution.numbers:
-        follow(solution.numbers, quantity, value, best.value)
+    solution.told_by = told
+    if "numbers" in vars(solution):
+        told.tell(solution, solution.numbers)
     solution.because(*ladder(levels, quantity, tol), after=True)
     solution.levels = levels
     solution.times = {**times, "total": perf_counter() - begin}
     return solution
 
 
-def _best(
-    name: str,
-    history: Sequence[Mapping[str, float]],
-    misplaced: Sequence[float],
-    sizes: Sequence[float],
-    known: Mapping[str, float] | None,
-) -> Estimate:
-    """The best value of a number and its error: from what is known of a line, or from its values on all grids."""
-    value = history[-1].get(name, np.nan)
-    truth = np.nan if known is None else known.get(name, np.nan)
-    if np.isfinite(truth):
-        above = max(1.0, abs(value / truth)) if truth else 1.0  # relative to the truth, not to a value that is too large
-        return Estimate(value, above * abs(value - truth) + QUADRATURE * abs(value))
-    return estimate([found.get(name, np.nan) for found in history], misplaced, sizes, name)
+def _by_pairs(scene: Solvable, quantity: str | None) -> bool:
+    """Whether each two grids give an estimate (`estimate.of_pair`): of the load of a steady film in the plane."""
+    given = getattr(scene, "balance", None) is None and motion_of(scene) is None
+    film = isinstance(getattr(scene, "model", None), Model) and len(scene.shape) == 2
+    return film and given and quantity in (None, *INTEGRALS)
 
 
 def ladder(levels: list[dict[str, Any]], quantity: str, tol: float) -> list[str]:

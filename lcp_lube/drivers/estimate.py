@@ -19,21 +19,23 @@ Values from grids so coarse that the scheme did not see the film's edges tell no
 cannot tell of what no grid has met: where the film has detail inside cells that the scheme does not see (`misplaced_film`), the
 share of Int h^-3 that it misplaces is an error too.
 
-A line needs none of this: it is solved by quadrature (`film.line`), so the first grid's error is known (`known_numbers`).
+A line needs none of this: it is solved by quadrature (`film.line`), so the first grid's error is known (`known_line`).
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from copy import copy
+from dataclasses import dataclass
 from math import inf, isfinite
 from typing import Any
 
 import numpy as np
-from petsc4py import PETSc
 
-from ..problems.film.line import known_fields
+from ..problems.film.integrals import line_integrals
+from ..problems.film.line import KINDS, known_fields
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
-from ..problems.solution import Problem
+from ..problems.film.turned import TurnedProblem
+from ..problems.solution import Fields, Problem
 from ..scenes.moving import motion_of
 from ..scenes.scene import Solvable
 
@@ -42,8 +44,9 @@ NOISY = dict.fromkeys(("cavitated_area", "cavitated_fraction"), 2.0)  # the same
 EXPECTED = 1.0 / 3.0  # of what corrections before lead one to expect of the last one, which can be small by chance
 SPAN = 12.0  # over the square of finest over coarsest grid: factor of n
 ENOUGH = 3.9  # finest over coarsest of grids that are enough without those before
+INTEGRALS = ("load", "pressure_integral")  # whose change from grid to grid is at most that of the pressure
+PAIR, BESIDE, SHARE = 1.2, 3.0, 0.3  # factors of an error from two grids, of these and of others, and of the pressure's change
 CLEAN = 0.01  # what moves of w leave over the last correction
-FEW = 100  # points of a line whose quadrature is asked
 QUADRATURE = 1e-9  # relative: what a line's quadrature may leave
 ANSWER = (1.0, 10.0)  # least and greatest answer to what is misplaced: relative change over share of Int h^-3
 UNSEEN = 0.05  # share of its h^-3 that the face must miss for a cell without a jump to count: a steep ramp, a narrow ridge
@@ -108,6 +111,28 @@ def estimate(values: Sequence[float], misplaced: Sequence[float], finer: Sequenc
     return Estimate(last, max(of_grid, film))
 
 
+def of_pair(values: Sequence[float], misplaced: Sequence[float], finer: Sequence[float], change: float, name: str) -> Estimate:
+    """The best value and its error from two grids, and from how far the pressure changed between them.
+
+    Values can agree by chance, pressures everywhere do not: the integral of |p_k - p_(k-1)| is never less than the change of
+    an integral of p. By second order the last grid's error is the change over (d_(k-1)/d_k)^2 - 1.
+
+    Parameters
+    ----------
+    values, misplaced, finer : as in `estimate`. change : that integral over the quantity, or over the integral of p for a
+        quantity that is none of p.
+    """
+    if name in NOISY or len(values) < 2:
+        return Estimate(values[-1], inf)
+    factor, least = (PAIR, 1.0) if name in INTEGRALS else (BESIDE, SHARE)
+    step, to_come = values[-1] - values[-2], 1.0 / ((finer[-1] / finer[-2]) ** 2 - 1.0)
+    error = factor * to_come * max(abs(step), least * change * abs(values[-1]))
+    film = _of_film(np.abs(np.diff(values)), misplaced, values[-1])
+    return (
+        Estimate(values[-1] + PART * to_come * step, max(error, film), True) if isfinite(error) else Estimate(values[-1], inf)
+    )
+
+
 def _of_film(steps: np.ndarray, misplaced: Sequence[float], value: float) -> float:
     """The error that detail unseen inside cells makes: its share, times how strongly the value was seen to answer to it."""
     if not misplaced[-1] or not value:
@@ -137,23 +162,29 @@ def scalars(found: Mapping[str, Any]) -> dict[str, float]:
     }
 
 
-def known_numbers(scene: Solvable, comm: PETSc.Comm | None) -> dict[str, float] | None:
-    """The numbers of a film in 1D by quadrature; None for other films: 2D, ends that are not open, supplies, in time, effects.
-
-    Collective.
-    """
-    if getattr(scene, "balance", None) is not None or motion_of(scene) is not None:
-        return None  # its film, or what it has come from, is not known yet
+def is_known(scene: Solvable) -> bool:
+    """Whether a film in 1D can be solved by quadrature: its ends open or closed, no supplies, not in time, no effects."""
     model = getattr(scene, "model", None)
     if not isinstance(model, Model) or len(scene.shape) != 1 or model.law or model.effects or model.supplies or model.grooves:
+        return False
+    if getattr(scene, "balance", None) is not None or motion_of(scene) is not None:
+        return False  # its film, or what it has come from, is not known yet
+    return {side.kind for side in model.sides[:2]} <= KINDS
+
+
+def known_line(problem: Problem) -> tuple[LubricationProblem, Fields] | None:
+    """A problem and its fields that have a film's numbers by quadrature, from its problem on any grid. Collective.
+
+    None where they overflow. The film is one that `is_known`; the scheme may be any.
+    """
+    if not isinstance(problem, LubricationProblem):
         return None
-    few = (min(scene.shape[0], FEW),)  # the quadrature is that of any grid
-    problem = replace(model, scheme="face", mean_cubes=False, integrals=True).build(few, comm)
-    try:
-        fields = known_fields(problem)
-        return None if fields is None else scalars(problem.quantities(fields))
-    finally:
-        problem.destroy()
+    line = solved = copy(problem)
+    if isinstance(line, TurnedProblem):
+        solved = line.moving = copy(line.moving)
+    solved.integrals = solved.integrals or line_integrals(solved.grid, solved.film)
+    fields = known_fields(line)
+    return None if fields is None else (line, fields)
 
 
 def misplaced_film(problem: Problem) -> float:

@@ -2,13 +2,14 @@
 
 from collections.abc import Sequence
 from fractions import Fraction
-from math import ceil, lcm, log2, prod
+from math import ceil, inf, lcm, log2, prod
 
 from ..scenes.scene import Solvable
 
 COARSEST = {1: 12, 2: 4}  # points a side at least on the first grid
 FEW = {1: 12, 2: 100}  # points of the first grid at least: coarser ones cost as much, and tell less
 JUMP, NEARLY = 1, 0.5  # doublings of the points a side at once, and part of a rung that is not worth one more
+NEAR = 1.7  # times the tolerance: an estimate for which twice the points will do
 ASYMPTOTIC = 0.1  # an estimate below it falls by second order at best
 MOST_ROUND, SAME = 720, 1e-9  # meshes that a turn is thought in to find edges, and by how much of a turn they may be off
 
@@ -46,9 +47,14 @@ def finer(shape: tuple[int, ...], meshes: Sequence[float], rung: int, unit: int 
     return tuple(n + k + round((2**doublings - 1) * (m + k)) for n, m, k in zip(shape, meshes, more, strict=True))
 
 
-def rungs_up(estimates: Sequence[float], tol: float, known: bool, dim: int) -> int:
+def rungs_up(estimates: Sequence[float], tol: float, known: bool, dim: int, pairs: bool = False) -> int:
     """How many rungs the next grid lies above this one: the first that reaches the tolerance, if an estimate below ASYMPTOTIC
-    (of three grids, or of one whose error is known) falls by second order; at most JUMP doublings of the points a side."""
+    (of three grids, or of one whose error is known) falls by second order; at most JUMP doublings of the points a side.
+
+    pairs : two grids give an estimate, best with half the spacing on the second; twice the points once, where that may do.
+    """
+    if pairs:
+        return 1 if estimates[-1] < NEAR * tol and not min(estimates[:-1], default=inf) < NEAR * tol else dim
     if not (known or len(estimates) >= 3) or not estimates[-1] < ASYMPTOTIC:
         return 1
     return min(max(1, ceil(0.5 * dim * log2(estimates[-1] / tol) - NEARLY)), dim * JUMP)

@@ -16,7 +16,7 @@ from ..scenes.doubts import too_high
 from ..scenes.effects.named import sentence
 from .units import place, with_unit
 
-ACCURACY = ("accuracy", *(f"accuracy_{name}" for name in ("quantity", "estimate", "extrapolated", "grid_value")), "estimates")
+ACCURACY = ("accuracy", *(f"accuracy_{name}" for name in ("quantity", "estimate", "extrapolated", "grid_value")))
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -45,7 +45,9 @@ def as_dict(solution: Solution) -> dict[str, Any]:
         **certificate.measures,
         "certificate_tol": certificate.tol,
         **(solution.enclosure.as_dict() if solution.enclosure else {}),
-        **{key: settings[key] for key in (*ACCURACY, "balance", "model") if key in settings},
+        **{key: settings[key] for key in ACCURACY if key in settings},
+        **({"estimates": solution.estimates} if "accuracy" in settings else {}),
+        **{key: settings[key] for key in ("balance", "model") if key in settings},
         **settings.get("details", {}),
         **({"levels": solution.levels} if solution.levels else {}),
         "warnings": [*settings.get("warnings", []), *too_high(quantities)],

@@ -21,12 +21,22 @@ class Shown:
 
     problem: "Problem"
     fields: "Fields"
+    told_by: Any
 
     @cached_property
     @overflow_is_no_warning
     def numbers(self) -> dict[str, Any]:
-        """`Problem.quantities` of the fields; taken once. Collective the first time, which `solve` sees to on several ranks."""
-        return self.problem.quantities(self.fields)
+        """`Problem.quantities` of the fields; taken once. Collective the first time, which `solve` sees to on several ranks.
+
+        Of a run to an accuracy the number asked for is the best value, that of all grids.
+        """
+        found = self.problem.quantities(self.fields)
+        return found if self.told_by is None else self.told_by.tell(self, found)
+
+    @property
+    def estimates(self) -> dict[str, dict[str, Any]]:
+        """Of a run to an accuracy: value, error (in its unit) and extrapolated of every number. Collective as `numbers`."""
+        return self.told_by.estimates if self.told_by is not None and self.numbers else {}
 
     @property
     def quantities(self) -> dict[str, Any]:

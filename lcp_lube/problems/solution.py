@@ -165,6 +165,7 @@ class Solution(Shown):
     enclosure : the band that `certify` asked for.
     solved_scene : the scene as it was solved, on the last grid and with the value that a balance found.
     history : of a march in time, a row for each step: t, dt, load, p_max, min_h, flows ...
+    told_by : of a run to an accuracy, what all its grids say of the numbers (`drivers.values.Values`).
     """
 
     problem: Problem
@@ -179,6 +180,7 @@ class Solution(Shown):
     enclosure: Enclosure | None = None
     solved_scene: Any = None
     history: list[dict[str, Any]] = field(default_factory=list)
+    told_by: Any = None
 
     @property
     def method(self) -> str:

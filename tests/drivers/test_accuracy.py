@@ -8,7 +8,7 @@ import pytest
 from films import FilmScene, L, Pieces, random_films
 
 from lcp_lube.api import solve
-from lcp_lube.drivers.estimate import estimate, known_numbers, misplaced_film
+from lcp_lube.drivers.estimate import estimate, is_known, known_line, misplaced_film, of_pair
 from lcp_lube.drivers.rungs import finer, first_shape, round_ring, rungs_up
 from lcp_lube.errors import InputError
 from lcp_lube.problems.solution import Outcome
@@ -238,13 +238,48 @@ def test_grids_that_an_estimate_leaves_out():
     assert rungs_up([math.inf, math.inf, 9e-2], 1e-2, False, 2) == 2
     assert rungs_up([math.inf, math.inf, 1.1e-2], 1e-2, False, 2) == 1
     assert rungs_up([5e-2], 1e-2, True, 1) == 1
+    assert rungs_up([math.inf], 1e-2, False, 2, True) == rungs_up([math.inf, 5e-2], 1e-2, False, 2, True) == 2
+    assert rungs_up([math.inf, 1.5e-2], 1e-2, False, 2, True) == 1  # twice the points, once
+    assert rungs_up([math.inf, 1.5e-2, 1.1e-2], 1e-2, False, 2, True) == 2
+
+
+def known_numbers(problem):
+    line, fields = known_line(problem)
+    return line.quantities(fields)
 
 
 def test_what_a_line_is_known_by():
     """Quadrature knows a steady line; not one in time, nor one that effects act on."""
-    assert known_numbers(load_scene("pocketed_pad"), None)["load"] == pytest.approx(34165.70098, rel=1e-9)
-    assert known_numbers(load_scene("moving_texture"), None) is None
-    assert known_numbers(load_scene("lined_pad"), None) is None
+    for n in (7, 100):
+        pad = load_scene("pocketed_pad", {"n": n})
+        assert is_known(pad) and known_numbers(pad.build())["load"] == pytest.approx(34165.70098, rel=1e-9)
+    assert not is_known(load_scene("moving_texture")) and not is_known(load_scene("lined_pad"))
+    for scene in ("problem1", "problem3"):  # whatever the scheme that it is solved with, and whichever way it moves
+        nodal, turned = load_scene(scene), load_scene(scene, {"U": -4.0})
+        face = known_numbers(nodal.model_copy(update={"scheme": "face"}).build())
+        assert known_numbers(nodal.build())["load"] == pytest.approx(face["load"], rel=1e-12)
+        assert is_known(turned) and np.isfinite(known_numbers(turned.build())["load"])
+
+
+def test_numbers_of_a_ladder_are_taken_when_they_are_asked_for():
+    """The load of each grid alone; the rest, and estimates of it, at the first look, and the same on any way to them."""
+    with solve("journal", accuracy=1e-2) as solution:
+        assert "numbers" not in vars(solution)
+        numbers, estimates = solution.numbers, solution.estimates
+    assert numbers["load"] == estimates["load"]["value"] != solution.settings["accuracy_grid_value"]
+    assert numbers["load"] == pytest.approx(np.hypot(*numbers["force"]), rel=1e-12)
+    assert {"friction", "p_max", "sommerfeld"} < set(estimates) and "cavitated_area" not in estimates  # of two grids
+    assert all(one["error"] >= 0.0 for one in estimates.values())
+
+
+def test_estimate_of_two_grids():
+    """Values that agree by chance have an estimate by what the pressure changed; the answer has 3/4 of the correction."""
+    found = of_pair([1.0, 1.3], [0.0, 0.0], [16.0, 32.0], 0.1, "load")
+    assert found.value == pytest.approx(1.375) and found.error == pytest.approx(1.2 * 0.3 / 3) and found.extrapolated
+    assert of_pair([1.0, 1.0], [0.0, 0.0], [16.0, 32.0], 0.1, "load").error == pytest.approx(1.2 * 0.1 / 3)
+    assert of_pair([1.0, 1.0], [0.0, 0.0], [16.0, 32.0], 0.1, "friction").error == pytest.approx(3 * 0.03 / 3)
+    assert of_pair([1.0], [0.0], [16.0], 0.1, "load").error == math.inf
+    assert of_pair([1.0, 1.1], [0.0, 0.0], [16.0, 32.0], 0.1, "cavitated_area").error == math.inf
 
 
 def test_textured_slider_of_narrow_rims():

@@ -245,17 +245,25 @@ def _gauss(f: Callable[[Array], Array], a: Array, b: Array) -> Array:
 def bisect(f: Callable[[Array], Array], a: Array, b: Array) -> Array:
     """Return the roots of f, positive at a and not at b, in all brackets at once; rounding cannot make it fail.
 
-    f is asked at 15 places of a bracket at once, along a first axis, where they are few: a call costs more than a place then.
+    Where they are few, f is asked at many places of a bracket at once, along a first axis: a call costs more than a place then.
+    They lie closest around the chord's root, so that a bracket of a smooth f shrinks to what the chord errs by.
     """
-    bits = 4 if np.size(a) < 256 else 1
-    parts = (np.arange(1, 2**bits) / 2**bits).reshape(-1, *[1] * np.ndim(a))
-    for _ in range(60 // bits if np.size(a) else 0):
-        inside = np.clip(a + (b - a) * parts, a, b)
+    if not np.size(a):
+        return b
+    few = np.size(a) < 256
+    even, near = (np.arange(1, 8) / 8.0, 4.0 ** -np.arange(2.0, 14.0)) if few else (np.array([0.5]), np.zeros(0))
+    column = (-1, *[1] * np.ndim(a))
+    even, around = even.reshape(column), np.concatenate([-near, 0.0 * near[:1], near]).reshape(column)
+    f_a, f_b = np.ones_like(a), -np.ones_like(b)  # not known
+    for _ in range(60):
+        with np.errstate(all="ignore"):
+            chord = np.nan_to_num(f_a / (f_a - f_b), nan=0.5)
+        inside = np.clip(a + (b - a) * np.concatenate([even + 0.0 * chord, chord + around]), a, b)
         if not ((a < inside) & (inside < b)).any():
             break
-        left = np.logical_and.accumulate(f(inside) > 0, axis=0)
-        a, b = (
-            np.max(np.where(left, inside, a), axis=0),
-            np.min(np.where(left, b, inside), axis=0),
-        )
+        inside.sort(axis=0)
+        values = f(inside)
+        x, f_x = (np.concatenate([left[None], of, right[None]]) for left, of, right in ((a, inside, b), (f_a, values, f_b)))
+        last = np.logical_and.accumulate(values > 0, axis=0).sum(axis=0)[None]
+        (a, f_a), (b, f_b) = ([np.take_along_axis(at, last + k, axis=0)[0] for at in (x, f_x)] for k in (0, 1))
     return b

@@ -152,10 +152,10 @@ def empty(nx: int, ny: int, y0: int, y1: int, comm: MPI.Comm | None, whole: bool
     return Level(nx, ny, y0, y1, comm, whole, periodic, z, c, kx, ky)
 
 
-def hierarchy(level: Level, harmonic: bool) -> list[Level]:
-    """A level and all coarser ones. Collective."""
+def hierarchy(level: Level, harmonic: bool, enough: int = 0) -> list[Level]:
+    """A level and all coarser ones, down to so few points or as far as they go. Collective."""
     levels = [level]
-    while (coarse := _coarser(levels[-1], harmonic)) is not None:
+    while levels[-1].nx * levels[-1].ny > enough and (coarse := _coarser(levels[-1], harmonic)) is not None:
         levels.append(coarse)
     return levels
 

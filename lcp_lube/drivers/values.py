@@ -1,0 +1,137 @@
+"""What the grids of a run to an accuracy say of its numbers: taken where they are asked for, and the best of each."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from math import inf, isfinite
+from typing import Any
+
+import numpy as np
+
+from ..problems.film.forces import forces, integral
+from ..problems.film.line import known_of
+from ..problems.film.lubrication import LubricationProblem
+from ..problems.film.turned import TurnedProblem
+from ..problems.solution import Fields, Problem, Solution
+from ..problems.transfer import interpolated
+from .estimate import INTEGRALS, QUADRATURE, Estimate, estimate, follow, known_line, misplaced_film, of_pair, scalars
+
+LEAST_PAIR = 0.25  # weight of the estimate of two grids beside that of all: in the exponent, halved by each grid more
+SMALL = 10_000  # points up to which one rank takes the numbers where they are asked for
+
+
+class Values:
+    """The values on all grids so far, coarse to fine. It becomes `Solution.told_by`.
+
+    Parameters
+    ----------
+    line : whether the film is known by quadrature (`estimate.is_known`). pairs : whether an integral of the pressure is
+        estimated from each two grids (`estimate.of_pair`).
+
+    Attributes
+    ----------
+    line : a problem and its fields that have the numbers of a line that is known; None of other films.
+    estimates : value, error (in its unit) and extrapolated of every number that has an estimate, once `tell` has been called.
+    """
+
+    def __init__(self, line: bool, pairs: bool):
+        self.line: tuple[LubricationProblem, Fields] | None = None
+        self._known: Mapping[str, float] | None = None  # all numbers of it
+        self.estimates: dict[str, dict[str, Any]] = {}
+        self.quantity, self.best = "", Estimate(np.nan, inf)
+        self._is_line, self._pairs = line, pairs
+        self._grids: list[Solution | Mapping[str, float]] = []  # those before the last, or their numbers
+        self._own: list[float] = []  # of the quantity
+        self._sizes: list[float] = []
+        self._misplaced: list[float] = []
+        self._converged = False  # on the last grid
+        self._change = (inf, inf)  # of the pressure from the grid before: its integral over the load, and over that of p
+
+    def add(self, solution: Solution, before: Solution | None, size: float, quantity: str, value: float) -> Estimate:
+        """One grid more, so many meshes a side, and this value of the quantity there; its best value. Collective."""
+        problem = solution.problem
+        if self._is_line and before is None:
+            self.line = known_line(problem)
+        if before is not None:
+            self._grids.append(before if "numbers" not in vars(before) else _numbers(before))
+        self.quantity, self._converged = quantity, solution.converged
+        self._own.append(value if solution.converged else np.nan)
+        self._sizes.append(size)
+        # Of what quadrature does not tell nothing is known.
+        self._misplaced.append(misplaced_film(problem) if self.line is None else inf)
+        self._change = _change(solution, before, quantity) if self._pairs else (inf, inf)
+        self.best = self._best(quantity, self._own)
+        return self.best
+
+    def _best(self, name: str, values: list[float]) -> Estimate:
+        """The best value of a number and its error: from what is known of a line, or from its values on all grids."""
+        value, truth = values[-1], self._truth(name)
+        if np.isfinite(truth):
+            above = max(1.0, abs(value / truth)) if truth else 1.0  # relative to the truth, not to a value that is too large
+            return Estimate(value, above * abs(value - truth) + QUADRATURE * abs(value))
+        of_all, (by_load, by_all) = estimate(values, self._misplaced, self._sizes, name), self._change
+        if not isfinite(by_load) or (name not in INTEGRALS and len(values) > 2):
+            return of_all
+        pair = of_pair(values, self._misplaced, self._sizes, by_load if name in INTEGRALS else by_all, name)
+        if not isfinite(of_all.error):
+            return pair
+        weight = max(0.5 ** (len(values) - 2), LEAST_PAIR)
+        return replace(pair, error=pair.error**weight * of_all.error ** (1.0 - weight))
+
+    def _truth(self, name: str) -> float:
+        """A number of a line that is known; NaN where there is none. Collective."""
+        if self.line is None:
+            return np.nan
+        if self._known is None:
+            if name == self.quantity and (found := carried(*self.line, name)) is not None:
+                return found
+            self._known = scalars(self.line[0].quantities(self.line[1]))
+        return self._known.get(name, np.nan)
+
+    def tell(self, solution: Solution, numbers: dict[str, Any]) -> dict[str, Any]:
+        """The last grid's numbers with the best value in the place of its own, in place; fills `estimates`. Collective."""
+        grids = [one if isinstance(one, Mapping) else _numbers(one) for one in self._grids]
+        grids.append({**sought(solution), **scalars(numbers)} if self._converged else {})
+        for name in {**grids[-1], self.quantity: 0.0}:
+            values = self._own if name == self.quantity else [found.get(name, np.nan) for found in grids]
+            if isfinite((best := self._best(name, values)).error):
+                self.estimates[name] = vars(best)
+        if self.best.extrapolated and self.quantity in numbers:
+            follow(numbers, self.quantity, self._own[-1], self.best.value)
+        return numbers
+
+
+def carried(problem: Problem, fields: Fields, quantity: str) -> float | None:
+    """An integral of the pressure without all other numbers, where a scene makes nothing else of it; else None. Collective."""
+    small = problem.grid.comm.size == 1 and problem.grid.size <= SMALL
+    if quantity not in INTEGRALS or not isinstance(problem, LubricationProblem) or not small or problem.more:
+        return None
+    if isinstance(problem, TurnedProblem) or (problem.extras is not None and problem.shaft is None):
+        return None
+    found: float = forces(problem, fields["p"] * problem.p_unit, known_of(problem))[quantity]
+    return found
+
+
+def sought(solution: Solution) -> dict[str, float]:
+    """The value that a balance found: what it carries is given."""
+    balance = solution.settings.get("balance")
+    return {balance["vary"]: balance["value"]} if balance else {}
+
+
+def _numbers(solution: Solution) -> dict[str, float]:
+    return {**sought(solution), **scalars(solution.numbers)} if solution.converged else {}
+
+
+def _change(solution: Solution, before: Solution | None, quantity: str) -> tuple[float, float]:
+    """The integral of |p - p of the grid before| at its points, over the integral asked for, and over that of p. Collective."""
+    problem = solution.problem
+    if before is None or not isinstance(problem, LubricationProblem) or not (solution.converged and before.converged):
+        return inf, inf
+    coarse: Any = before.problem
+    there = interpolated(problem.grid, coarse.grid, solution.fields["p"] * problem.p_unit)
+    p = before.fields["p"] * coarse.p_unit
+    one = np.ones(1)
+    sides = integral(coarse, 0.0 * p, 0.0, lambda x, y: one)  # what the given pressures add
+    changed = integral(coarse, np.abs(there - p), 0.0, lambda x, y: one) - sides
+    whole = forces(coarse, p)
+    own = abs(whole[quantity]) if quantity in INTEGRALS else 0.0
+    return changed / own if own else inf, changed / whole["pressure_integral"] if whole["pressure_integral"] else inf
