@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from math import inf, isfinite
+from math import hypot, inf, isfinite
 from typing import Any
 
 import numpy as np
 
-from ..problems.film.forces import forces, integral
+from ..base.parallel import Array
+from ..problems.film.forces import totals
 from ..problems.film.line import known_of
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.turned import TurnedProblem
@@ -107,8 +108,14 @@ def carried(problem: Problem, fields: Fields, quantity: str) -> float | None:
         return None
     if isinstance(problem, TurnedProblem) or (problem.extras is not None and problem.shaft is None):
         return None
-    found: float = forces(problem, fields["p"] * problem.p_unit, known_of(problem))[quantity]
-    return found
+    return _integral(problem, fields["p"] * problem.p_unit, quantity)
+
+
+def _integral(problem: LubricationProblem, p_pa: Array, quantity: str) -> float:
+    """One of INTEGRALS, as `forces` has it. Collective."""
+    names = ("force_x", "force_y") if quantity == "load" and problem.shaft is not None else (quantity,)
+    found = totals(problem, p_pa, known_of(problem), names)
+    return hypot(found["force_x"], found["force_y"]) if len(names) == 2 else found[quantity]
 
 
 def sought(solution: Solution) -> dict[str, float]:
@@ -122,16 +129,14 @@ def _numbers(solution: Solution) -> dict[str, float]:
 
 
 def _change(solution: Solution, before: Solution | None, quantity: str) -> tuple[float, float]:
-    """The integral of |p - p of the grid before| at its points, over the integral asked for, and over that of p. Collective."""
-    problem = solution.problem
-    if before is None or not isinstance(problem, LubricationProblem) or not (solution.converged and before.converged):
+    """The integral of |p - p of the grid before| at its points, over the integral asked for and over that of p. Collective."""
+    problem, told = solution.problem, quantity in INTEGRALS and solution.converged
+    if before is None or not (told and before.converged) or not isinstance(problem, LubricationProblem):
         return inf, inf
     coarse: Any = before.problem
     there = interpolated(problem.grid, coarse.grid, solution.fields["p"] * problem.p_unit)
     p = before.fields["p"] * coarse.p_unit
-    one = np.ones(1)
-    sides = integral(coarse, 0.0 * p, 0.0, lambda x, y: one)  # what the given pressures add
-    changed = integral(coarse, np.abs(there - p), 0.0, lambda x, y: one) - sides
-    whole = forces(coarse, p)
-    own = abs(whole[quantity]) if quantity in INTEGRALS else 0.0
-    return changed / own if own else inf, changed / whole["pressure_integral"] if whole["pressure_integral"] else inf
+    sides, changed, whole = (_integral(coarse, values, INTEGRALS[1]) for values in (0.0 * p, np.abs(there - p), p))
+    changed -= sides  # what the given pressures add
+    own = abs(_integral(coarse, p, quantity))
+    return changed / own if own else inf, changed / whole if whole else inf

@@ -264,6 +264,7 @@ def bisect(f: Callable[[Array], Array], a: Array, b: Array) -> Array:
         inside.sort(axis=0)
         values = f(inside)
         x, f_x = (np.concatenate([left[None], of, right[None]]) for left, of, right in ((a, inside, b), (f_a, values, f_b)))
-        last = np.logical_and.accumulate(values > 0, axis=0).sum(axis=0)[None]
-        (a, f_a), (b, f_b) = ([np.take_along_axis(at, last + k, axis=0)[0] for at in (x, f_x)] for k in (0, 1))
+        last = np.logical_and.accumulate(values > 0, axis=0).sum(axis=0)
+        at = tuple(np.indices(last.shape, sparse=True))
+        (a, f_a), (b, f_b) = ([of[last + k, *at] for of in (x, f_x)] for k in (0, 1))
     return b

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -115,6 +115,7 @@ def solve_line(
         _, two, three = 6.0 * mu * line.upto(x)
         return three, U * two
 
+    @cache
     def crossings(level: float) -> Array:
         """Where U h goes through a level."""
         over = level < U * h
