@@ -22,6 +22,7 @@ from ..problems.solution import Enclosure, Fields, Outcome, Solution
 from ..problems.transfer import Transfer
 from ..scenes.scene import Solvable
 from ..solvers.enclosure import bounds_of
+from . import density_step
 from .ask import Ask, Start
 from .compose import Inner
 from .coupling_file import CouplingFile
@@ -57,6 +58,8 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         loop.film({})
         loop.change = 0.0
         return _told(ask, loop)
+    if density_step.applies(scene, ask) and (found := density_step.solve(scene, ask)) is not None:
+        return found
     file = CouplingFile(scene, ask)
     with file.keeper.listening():
         return _settled_on(scene, file.ask, inner, file)

@@ -42,6 +42,7 @@ class Linear:
         """entries : of dG/dp, where that is not A (of a fluid with a law). given : points in a groove, whose rows are those of
         the identity. M : the diagonal of what void is stored (`at`). factored : it is solved with so often that factors pay.
         least : points from which multigrid does; default SMALL."""
+        entries = entries or problem.entries
         self.problem, self.cavity, self.entries, self.given, self.M = problem, cavity, entries, given, M
         grid, self.frozen = problem.grid, None
         apart = entries is None and not factored and (given is None or problem.held is None)

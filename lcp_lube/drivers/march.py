@@ -64,6 +64,7 @@ class March:
     moved: float = 0.0
     rates: float = 0.0  # largest so far: what drives the film, 2 dx sums
     warming: float = 0.0  # likewise, of what is carried
+    curved: bool = False  # whether `guess` knows three steps
 
     def begin(self, contents: Array, fields: Fields | None, carried: Array | None = None) -> None:
         """At t = 0."""
@@ -86,12 +87,19 @@ class March:
         return Stored(formula.weight, formula.old(self.contents), self.grid, carried=carried)
 
     def guess(self, dt: float) -> Fields | None:
-        """Fields at the step's end, as they went on in the last step: z = p or -r in a line, but where a front passed."""
+        """Fields at the step's end, as they went on in the last steps: z = p or -r in a line, `curved` in a parabola, but where
+        a front passed."""
         if len(self.fields) < 2 or len(self.full) < 2:
             return self.fields[0] if self.fields else None
         w = np.where(self.full[0] == self.full[1], min(dt / self.dts[0], 1.0), 0.0)
-        last, before = self.fields
+        last, before = self.fields[:2]
         ahead = {name: (1.0 + w) * last[name] - w * before[name] for name in ("p", "r")}
+        if len(self.fields) > 2 and len(self.full) > 2:
+            (a, b), ahead_by = self.dts[:2], min(dt, self.dts[0])
+            same = (self.full[0] == self.full[1]) & (self.full[1] == self.full[2])
+            c = np.where(same, ahead_by * (ahead_by + a) / (a + b), 0.0)
+            for name, values in ahead.items():
+                values += c * ((last[name] - before[name]) / a - (before[name] - self.fields[2][name]) / b)
         P, R = (self.grid.reduce.max(last[name]) or 1.0 for name in ("p", "r"))
         z = ahead["p"] / P - ahead["r"] / R
         return {"p": P * np.maximum(z, 0.0), "r": R * np.maximum(-z, 0.0)}
@@ -120,7 +128,7 @@ class March:
         self.dts = [dt, *self.dts[:2]]
         self.contents = [contents, *self.contents[:2]]
         self.carried = [] if carried is None else [carried, *self.carried[:2]]
-        self.fields = [fields, *self.fields[:1]]
+        self.fields = [fields, *self.fields[: 2 if self.curved else 1]]
         self.full = [cavity_sign(problem.reduce, p, r) >= 0, *self.full[:3]]
         return {
             "volume": size * volume,

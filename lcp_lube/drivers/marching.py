@@ -80,7 +80,8 @@ class Run:
         if chosen.method == "active-set":  # the steps before have the front to within a cell or two: see `_sweeps`
             self.may_sweep = "sweeps" not in ask.options
             ask = replace(ask, options={"sweeps": 0, **ask.options})
-        coupled = first.effects or (first.law is not None and first.law.dowson_higginson)
+        coupled = bool(first.effects) or (first.law is not None and first.law.dowson_higginson)
+        self.march.curved = coupled
         loose = chosen.method == "fas" and self.rotor is None and not coupled  # those want an answer to the last digit
         if loose and ask.options.get("rest", REST):
             ask = replace(ask, options={"rest": REST, **ask.options}, stopping=ask.stopping or {"eps1": EPS1})
@@ -92,7 +93,7 @@ class Run:
         self.lengths = [np.inf, 0.0]
         self.rescuer: str | None = None
         self.last: Solution | None = None
-        self.settings: dict[str, Any] = {}
+        self.settings, self.begun = dict[str, Any](), dict[str, Any]()  # of the steps, and of the steady film
         self.outcome, self.message = Outcome.CONVERGED, ""
         self.step, self.solves = table.step or FIRST * table.t_end, 0
         if not self.file.restore(self, self.march.grid):
@@ -114,8 +115,7 @@ class Run:
         try:
             return call()
         except InputError as error:
-            text = str(error).removeprefix(f"{self.scene.name}: ")
-            raise InputError(f"{self.scene.name}: t = {t:.6g} s: {text}") from None
+            raise InputError(f"{self.scene.name}: t = {t:.6g} s: {str(error).removeprefix(f'{self.scene.name}: ')}") from None
 
     def _begin(self, model: Any, ask: Ask) -> None:
         """The film at t = 0."""
@@ -132,6 +132,7 @@ class Run:
             raise InputError(f"{self.scene.name}: no steady film at t = 0: {solution.message}; motion.start = full needs none")
         full = contents(self.march.grid, model, solution.fields, solution.problem)
         self.march.begin(full, solution.fields, carried(model, full, solution.problem))
+        self.begun = solution.settings
         solution.destroy()
 
     @property
@@ -142,8 +143,7 @@ class Run:
         """Length of the next step."""
         t, end = self.march.t, self.table.t_end
         if self.table.step is not None:  # from its number: sums of steps have rounding
-            count = round(t / self.table.step) + 1
-            return min(count * self.table.step, end) - t
+            return min((round(t / self.table.step) + 1) * self.table.step, end) - t
         targets = [time for time in self.times if time > t * (1.0 + 1e-12)] + [end]
         left = targets[0] - t
         return left if left <= 1.01 * self.step else 0.5 * left if left < 2.0 * self.step else self.step
@@ -214,8 +214,8 @@ class Run:
             if model.sealed:
                 check_room(march.grid, self.model, t, self.scene.name)
             found = near if not solves else solves[-1].fields
-            problem = self.last.problem if self.last is not None else None
-            known = self.last.settings if self.last is not None else {}
+            last = self.last
+            problem, known = (last.problem, last.settings) if last is not None else (None, self.settings or self.begun)
             step = TimeStep(self.scene, self.model, march.grid)
             own = None if problem is not None or found is None else self._at(t, lambda: step.build(self.ask.comm))
             start = None if found is None else Start(problem or own, found, known)  # type: ignore[arg-type]

@@ -84,3 +84,39 @@ def test_the_decision_in_time():
     assert 0.1 * off < abs(told["left_out"]["shear"]) < 10.0 * off < told["tolerance"]  # few steps miss the load's peaks
     with solve(data | {"motion": {"t_end": 0.002, "steps": 8}}) as s:
         assert not s.settings["model"]["left_out"] and "so few steps" in s.settings["model"]["reason"]
+
+
+@pytest.mark.parametrize("film", ["plates", "ring"])
+def test_density_costs_no_more_steps_than_none(film):
+    """One or two Newton steps a time step, also where compression is most of what a cell gains; the loop's answer."""
+    fluid = {"mu": 0.05, "p_supply": 1e6, "density": "dowson-higginson"}
+    data: dict[str, Any] = {"family": "bearing", "L": 0.1, "fluid": fluid}
+    if film == "plates":
+        data |= {"U": 0.0, "n": 49, "film": {"shape": "linear", "h_start": 6e-5, "h_end": 3e-5}}
+        data["motion"] = {"t_end": 0.02, "steps": 40, "set": {"h_offset": "3e-6*sin(314*t)"}}
+    else:
+        data |= {"U": 5.0, "n": 60, "film": {"shape": "journal", "c": 2e-5, "eccentricity": 0.5}}
+        data["motion"] = {"t_end": 0.02, "steps": 40, "journal": ["0.5+0.1*sin(314*t)", "0.1*sin(314*t)"]}
+    solution, by_loop = solve(load_scene(data)), solve(load_scene(data), method="din")
+    assert solution.converged and solution.mass_defect < 1e-10 and solution.mass_defect_run < 1e-10
+    assert any("as a whole" in reason for reason in solution.settings["why"])
+    counts = [row["iterations"] for row in solution.history[4:]]
+    # Not a step more than a film of constant density takes, but for its front.
+    assert sum(counts) < 1.6 * len(counts)
+    loads = [np.array([row["load"] for row in one.history]) for one in (solution, by_loop)]
+    assert np.abs(loads[0] - loads[1]).max() < 1e-4 * np.abs(loads[1]).max()
+    solution.destroy()
+    by_loop.destroy()
+
+
+def test_a_journal_is_free_in_a_fluid_that_gives_way():
+    """Newton's method on its place has the film's exact stiffness, that of compression too."""
+    film = {"shape": "journal", "c": 2e-5, "eccentricity": 0.5}
+    motion: dict[str, Any] = {"t_end": 0.002, "steps": 6, "start": "full", "free": True, "mass": 5.0, "position": [0.3, 0.2]}
+    motion["load"] = ["3e3", "2e2"]
+    data = {"family": "bearing", "dimension": 2, "L": 0.1, "width": 0.04, "nx": 24, "ny": 5, "U": 5.0, "film": film}
+    data |= {"sides": {"west": "periodic", "east": "periodic"}, "motion": motion}
+    solution = solve(load_scene(data | {"fluid": {"mu": 0.05, "p_supply": 1e5, "density": "dowson-higginson"}}))
+    assert solution.converged, solution.message
+    assert solution.mass_defect_run < 1e-10 and max(row["solves"] for row in solution.history) < 15
+    solution.destroy()

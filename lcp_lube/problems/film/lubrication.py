@@ -51,6 +51,7 @@ class LubricationProblem:
     edged = True  # whether the coefficients know the film's edges inside cells; not where mean_cubes
     tops = False  # whether the largest pressure is looked for between the points (`peak`)
     factors: Any = None  # of its faces, that follow from `cells`
+    entries: Any = None  # of dG/dp, where that is not A
     contact: Any = None  # of asperities
     levers: Any = ()  # `Model.levers`
     stored: Any = None  # by its cells, in a time step (`stored.Stored`)
@@ -256,8 +257,7 @@ class LubricationProblem:
     def revised(self, dry: Array) -> "LubricationProblem":
         """The same film with the faces that round edges cut (`rims`) made for these points, 1 where cavitated. Collective."""
         assert self.coefficients_for is not None
-        other = copy(self)
-        other.dry, other.scheme = dry, self.coefficients_for(cavity=dry)
+        (other := copy(self)).dry, other.scheme = dry, self.coefficients_for(cavity=dry)
         return other
 
     def with_scheme(
@@ -272,7 +272,7 @@ class LubricationProblem:
         other.scheme, other.mu, other.exact = scheme, mu, None  # type: ignore[assignment]
         other.p_sides, other.held = p_sides or self.p_sides, held or self.held
         new: dict[str, Any] = {name: {} for name in ("more", "more_fields", "more_measures", "cells")}
-        other.__dict__ |= {"plain": False, "coefficients_for": None, "factors": None, "contact": None, **new}
+        other.__dict__ |= {"plain": False, "coefficients_for": None, "factors": None, "contact": None, "entries": None, **new}
         return other
 
     def with_lift(self, lift: Array) -> Self:

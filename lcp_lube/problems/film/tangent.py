@@ -31,6 +31,7 @@ class Tangent:
 
     own, other : by the cell's pressure, and by its neighbour's. carried, entering : of the Couette flow alone out of the east
     and the west face, by the cell's pressure. viscosity : d log(mu)/dp of the east face by its two points; None where constant.
+    stored : of what the cell stores, in a time step, by its pressure.
     """
 
     own: list[Array]
@@ -38,12 +39,13 @@ class Tangent:
     carried: Array
     entering: Array
     viscosity: tuple[Array, Array] | None = None
+    stored: Array | float = 0.0
 
     def entries(self, scheme: BoxScheme) -> list[tuple[int, int, Array]]:
         """Rows of dG/dp as (dj, di, value); those of cells that the scheme holds have its diagonal alone."""
         held = np.zeros((1, 1), dtype=bool) if scheme.held is None else scheme.held
         west, east, south, north = (np.where(held, 0.0, a) for a in self.other)
-        centre = np.where(held, scheme.diagonal, sum(self.own))
+        centre = np.where(held, scheme.diagonal, sum(self.own) + self.stored)
         return [(0, 0, centre), (0, -1, west), (0, 1, east), (-1, 0, south), (1, 0, north)]
 
 
@@ -75,4 +77,6 @@ def tangent(problem: LubricationProblem, law: Law | None, constant: LubricationP
     half = 0.5 * drho * unit
     mu = np.full(grid.box, 0.5 * law.barus * unit)
     at_wall = sides(grid, ("closed", "mirror"))[1]  # where the point's own pressure stands for the one beyond
-    return Tangent(own, other, half * dragged[1], half * dragged[0], (mu * (1.0 + at_wall), mu) if law.barus else None)
+    viscosity = (mu * (1.0 + at_wall), mu) if law.barus else None
+    stored = 0.0 if s.storage is None else s.storage * (1.0 - r.reshape(grid.box)) * drho * unit
+    return Tangent(own, other, half * dragged[1], half * dragged[0], viscosity, stored)

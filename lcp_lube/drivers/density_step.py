@@ -1,0 +1,148 @@
+"""A time step of a fluid whose density follows the pressure, by Newton's method on the step as a whole.
+
+`coupling` holds the densities while a film is solved, which takes several films a step, and dozens where a cell gains more by
+compression than flows through it. Here the law and what cells store by it are linearised exactly (`film.tangent`):
+
+    J = dG/dp where the film is full, -B where it is not,       z -> z - J^-1 G(z),    p = max(z, 0), r = max(-z, 0)
+
+What the last step leaves of G goes into the densities that are stored, so that mass is conserved to rounding. They are then off
+the law by `coupling`: a small part of what those foreseen were off by.
+"""
+
+from dataclasses import dataclass, replace
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from ..base.parallel import Array
+from ..problems.film.effects import Answer, FaceFactors, answer, factors
+from ..problems.film.fluid import Law
+from ..problems.film.model import Model
+from ..problems.film.tangent import tangent
+from ..problems.solution import Fields, Outcome, Solution, Step
+from ..scenes.scene import Solvable
+from ..solvers.relaxation import relaxation
+from .ask import Ask
+from .linearised import Entries, Linear
+from .loop import SETTLED, Frozen
+
+LEFT, MOST_LEFT = 0.01, 5e-5  # of what the densities foreseen are off by, and of a density: what may be left
+WHY = "density: Newton's method on each step as a whole, the law linearised exactly"
+SWEEPS = 16  # once two steps have not halved what is left
+IN_VAIN = 8  # steps that do not halve what is left, after which `coupling` takes over
+
+
+def applies(scene: Solvable, ask: Ask) -> bool:
+    """Whether it is such a step, from the one before, by Newton's method."""
+    model: Model = scene.model  # type: ignore[attr-defined]
+    alone = model.law is not None and model.law.dowson_higginson and not model.effects and not model.grooves
+    plain = ask.method == "active-set" and not ask.certify and model.scheme == "face"
+    return alone and plain and model.stored is not None and ask.start is not None and "method" in ask.start.settings
+
+
+def solve(scene: Any, ask: Ask) -> Solution | None:
+    """The film at the step's end, with the settings of its start; None where Newton's method does not find it. Collective."""
+    begun, near = perf_counter(), ask.start
+    film = _Film(scene, ask)
+    assert near is not None  # as `applies` found
+    reduce, unit = film.base.reduce, film.base.p_unit
+    u = near.problem.p_unit / unit  # type: ignore[attr-defined]
+    at = film.at(np.where((near.fields["r"] > 0) & ~(near.fields["p"] > 0), -near.fields["r"], near.fields["p"] * u))
+    sweeps = ask.options.get("sweeps", 0)
+    settled = SETTLED * ask.stopping_for((1e-8, 1e-8)).eps1
+    exact = ask.stopping is not None or scene.model.stored.exact
+    steps: list[Step] = []
+    allowed = settled if exact else max(settled, min(LEFT * at.size, MOST_LEFT))
+    least, vain = np.inf, 0
+    while not (steps and at.size <= allowed):
+        vain = 0 if at.size < 0.5 * least else vain + 1
+        least = min(least, at.size)
+        if vain == IN_VAIN or not np.isfinite(at.size):
+            film.base.destroy()
+            return None
+        at = film.swept(at, sweeps or SWEEPS * (vain > 1))
+        d = film.step(at)
+        at = film.at(at.z - d)
+        steps.append(Step(at.size, reduce.max(np.abs(d)), 1.0, 1))
+    fields, found = at.fields, film.closed(at)
+    found.more_measures["coupling"] = at.size
+    certificate = found.certify(fields, near.settings["eps1"])
+    times = {"setup": 0.0, "assembly": 0.0, "linear": 0.0, "total": perf_counter() - begun}
+    why = [WHY, *(one for one in near.settings["why"] if not one.startswith(("coupling", WHY)))]
+    details = {key: value for key, value in near.settings["details"].items() if key not in ("fluid_solves", "coupling_work")}
+    settings = {**near.settings, "why": why, "details": details}
+    message = f"densities off by {at.size:.1e} after {len(steps)} steps"
+    return Solution(found, fields, Outcome.CONVERGED, message, certificate, steps, settings, times).judged()
+
+
+@dataclass(frozen=True)
+class _At:
+    """z; the film with the densities at z, and their factors; what is left of its balances, and which density that is, at most
+    `size`."""
+
+    z: Array
+    answer: Answer
+    by: FaceFactors
+    G: Array
+    off: Array
+    size: float
+
+    @property
+    def fields(self) -> Fields:
+        return {"p": np.maximum(self.z, 0.0), "r": np.maximum(-self.z, 0.0)}
+
+
+class _Film:
+    """The film at any z. Collective, as its methods."""
+
+    def __init__(self, scene: Any, ask: Ask):
+        model = scene.model
+        self.law: Law = model.law
+        self.base: Any = Frozen(scene, self.law).build(ask.comm)
+        self.p_sides = tuple(side.p if side.kind == "open" else 0.0 for side in model.sides)
+        self._densities = [float(self.law.density(np.array(p))) for p in self.p_sides]
+        held = self.base.held
+        self._free = True if held is None else ~held.mask.ravel()
+
+    def at(self, z: Array) -> _At:
+        p, r = np.maximum(z, 0.0), np.maximum(-z, 0.0)
+        pressure = p * self.base.p_unit
+        cells = {"density": self.law.density(pressure)}
+        with np.errstate(all="ignore"):
+            by = factors(self.base, cells, self._densities)
+            found = answer(self.base, self.law, cells, by, pressure, r, self.p_sides)
+            G = found.problem.balance(p, r)
+            off = np.where(self._free, G / (self.base.scheme.storage.ravel() * (1.0 - r)), 0.0)
+        return _At(z, found, by, G, off, self.base.reduce.max(np.abs(off)))
+
+    def swept(self, at: _At, sweeps: int) -> _At:
+        """With fronts put right by sweeps, if that brings anything: where they run by several cells a step."""
+        sweep = relaxation(at.answer.problem) if sweeps else None
+        if sweep is None:
+            return at
+        new = sweep(at.fields, sweeps)
+        other = self.at(new["p"] - new["r"])
+        return other if other.size < at.size else at
+
+    def step(self, at: _At) -> Array:
+        """J^-1 G."""
+        film = at.answer.problem
+        linear = Linear(film, (at.z < 0.0) & self._free, self.entries(at))
+        (d,) = linear.solve([at.G])
+        linear.destroy()
+        film.free_matrices()
+        return d
+
+    def closed(self, at: _At) -> Any:
+        """The film with densities stored that leave nothing of G."""
+        stored = at.by.values["stored"] - at.off.reshape(at.answer.grid.box)
+        by, cells = replace(at.by, values={**at.by.values, "stored": stored}), {"density": stored.ravel()}
+        problem = answer(self.base, self.law, cells, by, at.answer.p, at.answer.r, self.p_sides).problem
+        problem.cells, problem.entries = cells, self.entries(at)
+        return problem
+
+    def entries(self, at: _At) -> Entries:
+        """Of dG/dp."""
+        film, fields = at.answer.problem, at.fields
+        return tangent(film, self.law, self.base, fields["p"], fields["r"]).entries(film.scheme)
