@@ -7,14 +7,16 @@ solves, each started from the nearest answer. On large grids the search begins o
 """
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import atan2, cos, exp, inf, log, prod, sin
 from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, NotFound
 from ..problems.film.model import Model
+from ..problems.film.turned import TurnedProblem
 from ..problems.solution import Outcome, Solution
 from ..scenes.balance import BalanceTable
 from ..scenes.scene import Scene, Solvable, as_scene
@@ -23,10 +25,12 @@ from .chain import added
 from .compose import Inner
 from .levels import level_shapes
 from .root import Search
+from .turned import Mirrored
 
 MOST_SOLVES = 30  # on a grid
 RANGE = {"eccentricity": 1e4, "h_offset": 100.0}  # unless one is given: of e/(1 - e) about 1, of the film about the scene's
 COARSE_TOL = 1e-3  # a coarse grid's load is no better
+FEWEST, NARROWEST = 25, 3  # points of a coarse grid, and across
 ONE_GRID = 1_000  # points up to which a coarser grid saves no time
 
 
@@ -128,6 +132,9 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     shapes = [scene.shape]
     if prod(scene.shape) > ONE_GRID and nested is not False:
         shapes = [shape for shape in level_shapes(scene.shape) if shape == scene.shape or prod(shape) > ONE_GRID]
+    elif near is None and nested is not False and getattr(scene, "turning", None) is None:  # a level, from a cold start
+        half = tuple((n - 1) // 2 for n in scene.shape)
+        shapes = [half, scene.shape] if min(half) >= NARROWEST and prod(half) >= FEWEST else shapes
     known = near.settings.get("balance", {}).get("value") if near is not None else None
     unknown = variable(scene.with_shape(shapes[0]), table, known)
     t, slope, solves, work, found = unknown.start, unknown.slope, 0, 0.0, False
@@ -170,23 +177,30 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
 
 
 def exact_slope(scene: Any, solution: Solution, unknown: Variable, t: float, W: float) -> float | None:
-    """d log W/dt by the stiffness of a film that carries W, if t displaces a wall and no effects act; else None. Collective."""
+    """d log W/dt by the stiffness of a film that carries W, if t displaces a wall and no effects but a fluid's law act; else
+    None. Collective."""
     model, turning = getattr(scene, "model", None), getattr(scene, "turning", None)
-    if not isinstance(model, Model) or model.effects or model.law is not None or model.U < 0:
+    if not isinstance(model, Model) or model.effects:
         return None
     from ..scenes.thrust import ThrustScene  # here, as above
     from .coefficients import coefficients
 
     key = unknown.key.rpartition(".")[2]
-    if key == "eccentricity" and turning is not None and turning.widest is not None:
+    if key == "eccentricity" and turning is not None and turning.widest is not None and model.law is None and model.U >= 0:
         (one,) = coefficients(scene, solution)
         fx, fy = turning.force(solution.problem, solution.fields["p"])
         e, along = unknown.to_value(t), atan2(-fy, -fx) - turning.widest
         move = turning.c * e * (1.0 - e) * np.array([-cos(along), sin(along)])  # away from the widest gap, in the load's axes
         return float(one.K[0] @ move) / W
     if turning is None and (key == "h_offset" or (key == "h_min" and isinstance(scene, ThrustScene))):
-        (one,) = coefficients(scene, solution)
-        return -float(one.K[0, 0]) * exp(t) / W
+        alike = 1
+        if isinstance(turned := solution.problem, TurnedProblem):
+            alike = scene.pads if isinstance(scene, ThrustScene) else 1
+            scene, fields = Mirrored(scene), turned.there(solution.fields)
+            solution = replace(solution, problem=turned.moving, fields=fields)
+        with suppress(NotFound):
+            (one,) = coefficients(scene, solution)
+            return -alike * float(one.K[0, 0]) * exp(t) / W
     return None
 
 

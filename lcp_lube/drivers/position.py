@@ -176,7 +176,13 @@ def _on_grid(
                 inverse = _inverse(jacobian)
             elif before is not None:
                 inverse = _secant(inverse, before[2], left - before[1])
-            step = np.clip(-inverse @ left, [-LONGEST[0], -LONGEST[1]], LONGEST)
+            step = -inverse @ left
+            if before is not None and not at.model.effects:  # what residuals bend by along the step before
+                size = float(before[2] @ before[2])
+                bend = (before[1] - left + jacobian @ before[2]) * (float(step @ before[2]) / size) ** 2
+                bent = inverse @ bend
+                step = step - bent if np.abs(bent).max() < 0.5 * np.abs(step).max() else step
+            step = np.clip(step, [-LONGEST[0], -LONGEST[1]], LONGEST)
         before = (q, left, step)
         q = q + step
         q[0] = min(max(q[0], -WIDEST), WIDEST)
