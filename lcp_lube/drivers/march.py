@@ -22,6 +22,7 @@ from ..problems.grid import Grid
 from ..problems.solution import Fields
 
 LONGEST, SHORTEST, SAFETY = 1.5, 0.2, 0.9  # a step in parts of the one before
+ROUNDED = 2.0**-48  # of what the film could hold: an error of sums of contents that is rounding
 
 
 @dataclass(frozen=True)
@@ -118,7 +119,7 @@ class March:
         size = 0.5 * (self.grid.spacing[1] if self.grid.dim == 2 else 1.0)
         moving, own = (problem.moving, problem.there(fields)) if isinstance(problem, TurnedProblem) else (problem, fields)
         into += [flow / size for flow in supply_flows(moving, own["p"], own["r"])]
-        volume = self._sum(contents)
+        contents, volume = self._rounded(formula, problem, contents, sum(into))
         rate = formula.weight * volume - formula.old(self.volumes)
         self.flowed += dt * sum(into)
         self.stored += dt * rate
@@ -135,6 +136,15 @@ class March:
             "inflow": size * sum(max(a, 0.0) for a in into),
             "outflow": -size * sum(min(a, 0.0) for a in into),
         }
+
+    def _rounded(self, formula: Formula, problem: LubricationProblem, contents: Array, into: float) -> tuple[Array, float]:
+        """Contents and their sum, without what 1 - r has lost by rounding: of an almost empty film that counts. Collective."""
+        volume, scheme = self._sum(contents), problem.scheme
+        due = (formula.old(self.volumes) + into) / formula.weight
+        whole = scheme.flow_unit * self.grid.reduce.sum(np.abs(scheme.storage)) / formula.weight
+        if volume > 0.0 and 0.0 < abs(due - volume) <= ROUNDED * whole:
+            return contents * (due / volume), due
+        return contents, volume
 
     @property
     def defect(self) -> float:

@@ -97,7 +97,7 @@ def test_density_costs_no_more_steps_than_none(film):
     else:
         data |= {"U": 5.0, "n": 60, "film": {"shape": "journal", "c": 2e-5, "eccentricity": 0.5}}
         data["motion"] = {"t_end": 0.02, "steps": 40, "journal": ["0.5+0.1*sin(314*t)", "0.1*sin(314*t)"]}
-    solution, by_loop = solve(load_scene(data)), solve(load_scene(data), method="din")
+    solution, by_loop = solve(load_scene(data)), solve(load_scene(data), method="din", stopping={"eps1": 1e-8})
     assert solution.converged and solution.mass_defect < 1e-10 and solution.mass_defect_run < 1e-10
     assert any("as a whole" in reason for reason in solution.settings["why"])
     counts = [row["iterations"] for row in solution.history[4:]]

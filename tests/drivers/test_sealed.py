@@ -32,6 +32,16 @@ def test_what_a_sealed_film_holds_it_keeps(name):
     assert found["fas"] == pytest.approx(found["active-set"], rel=1e-3)
 
 
+@pytest.mark.parametrize("fill", [1e-2, 1e-5])
+def test_an_almost_empty_film_loses_nothing_by_rounding(fill):
+    """Where 1 - r is next to nothing it has few digits, of which a march would lose some in every step."""
+    scene = WEDGE | FLUID | SIDES["closed line"] | {"film": {"shape": "linear", "h_start": 3e-5, "h_end": 1e-5}}
+    with solve(load_scene(scene | {"motion": MOTION | {"fill": fill, "steps": 60}})) as s:
+        assert s.converged and s.mass_defect_run <= 1e-10, s.message
+        volumes = np.array([row["volume"] for row in s.history])
+        assert np.ptp(volumes) <= 1e-12 * volumes[0]
+
+
 def test_what_is_known_exactly():
     """A wall that comes and goes over a film with void enough moves nothing; nor does a journal in the middle of its ring."""
     plates = WEDGE | FLUID | SIDES["closed"] | {"U": 0.0, "film": {"shape": "formula", "unit": "um", "h": "2 + 0.4*sin(300*t)"}}
