@@ -141,6 +141,7 @@ class March:
         """Contents and their sum, without what 1 - r has lost by rounding: of an almost empty film that counts. Collective."""
         volume, scheme = self._sum(contents), problem.scheme
         due = (formula.old(self.volumes) + into) / formula.weight
+        assert scheme.storage is not None  # as a time step has
         whole = scheme.flow_unit * self.grid.reduce.sum(np.abs(scheme.storage)) / formula.weight
         if volume > 0.0 and 0.0 < abs(due - volume) <= ROUNDED * whole:
             return contents * (due / volume), due
