@@ -86,10 +86,8 @@ class Run:
         if loose and ask.options.get("rest", REST):
             ask = replace(ask, options={"rest": REST, **ask.options}, stopping=ask.stopping or {"eps1": EPS1})
         self.ask = replace(ask, method=chosen.method, implied=not named)
-        self.steps: list[Step] = []
-        self.certificates: list[Certificate] = []
-        self.times_s: dict[str, float] = {}
-        self.history: list[dict[str, Any]] = []
+        self.steps, self.certificates = list[Step](), list[Certificate]()
+        self.times_s, self.history = dict[str, float](), list[dict[str, Any]]()
         self.lengths = [np.inf, 0.0]
         self.rescuer: str | None = None
         self.last: Solution | None = None
@@ -98,6 +96,8 @@ class Run:
         self.step, self.solves = table.step or FIRST * table.t_end, 0
         if not self.file.restore(self, self.march.grid):
             self._begin(first, ask)
+        for k in range(len(self.history)):  # of a march that is taken up
+            self._sweeps(self.history[max(0, k + 1 - RECENT) : k + 1])
 
     def _given(self, t: float) -> tuple[float, ...] | None:
         """Where what moves is, if anything does."""
@@ -195,7 +195,7 @@ class Run:
             self.seen.accept(problem, solution.fields, march.t, dt)
         row = self._row(solution, dt, flows, place, solves)
         self.history.append(row)
-        self._sweeps()
+        self._sweeps(self.history)
         self.lengths = [min(self.lengths[0], dt), max(self.lengths[1], dt)]
         if self.watch is not None:
             before = march.fields[1] if len(march.fields) > 1 else None
@@ -250,9 +250,9 @@ class Run:
             self.last.destroy()
         self.last = solution
 
-    def _sweeps(self) -> None:
+    def _sweeps(self, history: list[dict[str, Any]]) -> None:
         """Fronts that run by several cells a step are put right by sweeps, which a few steps alone would not pay for."""
-        late = self.history[-RECENT:]
+        late = history[-RECENT:]
         many = len(late) == RECENT and sum(row["solves"] for row in late) * MANY < sum(row["iterations"] for row in late)
         if many and self.may_sweep:
             self.may_sweep = False

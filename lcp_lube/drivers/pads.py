@@ -31,7 +31,8 @@ MOST_SOLVES = 80
 THINNER, THICKER = 0.7, 3.0  # parts of a film anywhere by which a step may change it
 THINNEST = 1e-5  # film over the clearance, below which no load is looked for: a difference quotient's step is a tenth of it
 NEAR = 0.05  # a step in parts of the coordinates' sizes
-NUDGES, NUDGE = 8, 0.5  # of a pad without stiffness: how often its inlet is opened, and by how much of its size of tilt
+NUDGES, NUDGE = 12, 0.5  # of a pad without stiffness: how often its inlet is opened, and by how much of its size of tilt
+SHRINK = 0.5  # of a nudge beside the one before: in a lightly loaded bearing a wide one upsets the other pads
 
 
 def applies(scene: Solvable, ask: Ask) -> bool:
@@ -77,7 +78,7 @@ def _from(bearing: Bearing, q: Array, scene: Solvable, ask: Ask, inner: Inner) -
             for k in bearing.pitches:
                 opens = bearing.free[k] and not K[k, k] > 0 and nudges[k] < NUDGES
                 closes = bearing.free[k] and nudges[k] >= NUDGES and abs(off[k]) > counts[k]
-                nudge[k] = NUDGE * bearing.sizes[k] * (opens - 1.0 * closes)
+                nudge[k] = NUDGE * bearing.sizes[k] * (opens * SHRINK ** int(nudges[k]) - 1.0 * closes)
             nudges += nudge > 0
             found = met and not nudge.any()
             if found and not again and (nudges >= NUDGES).any():
