@@ -156,7 +156,7 @@ def test_the_threshold_of_stability():
 
 @pytest.mark.parametrize("ranks", [2, 3])
 def test_ranks(cli, ranks):
-    words = ("coefficients", "two_groove_journal", "--set", "nx=110", "--set", "ny=11", "--frequency", "0,100", "--json")
+    words = ("coefficients", "two_groove_journal", "--set", "nx=72", "--set", "ny=7", "--frequency", "0,100", "--json")
     alone, together = cli(*words), cli(*words, ranks=ranks)
     assert alone.status == together.status == 0
     for a, b in zip(alone.json["coefficients"], together.json["coefficients"], strict=True):

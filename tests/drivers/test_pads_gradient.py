@@ -55,12 +55,12 @@ def test_against_differences_of_solves(name, changes, quantities, keys, tol):
             a = values_of(placed(scene, solution))[key] if key != "balance.load" else scene.balance.load
             d = 5e-5 * (abs(a) or 1e-5)
             ends = []
-            for k in (-2, -1, 1, 2):
+            for k in (-1, 1):
                 with answer(with_values(scene, {key: a + k * d}), solution) as other:
                     ends.append({one.quantity: told(other, one.quantity) for one in found})
             for one in found:
-                low2, low, high, high2 = (end[one.quantity] for end in ends)
-                slope = (8.0 * (high - low) - (high2 - low2)) / (12.0 * d)
+                low, high = (end[one.quantity] for end in ends)
+                slope = (high - low) / (2.0 * d)
                 least = 1e-10 * abs(one.value) / d
                 assert one.gradient[key] == pytest.approx(slope, rel=tol, abs=least), (one.quantity, key)
 

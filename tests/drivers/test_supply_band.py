@@ -137,7 +137,7 @@ def test_an_orifices_pressure_lies_between_the_bands_ends(ring, K, backflow):
     solution.destroy()
 
 
-@pytest.mark.parametrize("words", ["hybrid_journal --nx 96", "ring_journal"])
+@pytest.mark.parametrize("words", ["hybrid_journal --nx 96", "ring_journal --nx 72 --ny 15"])
 def test_on_several_ranks(cli, words):
     one, three = (cli("solve", *words.split(), "--certify", "--json", ranks=ranks).json for ranks in (1, 3))
     assert one["certified"] and three["certified"], (one["certified_message"], three["certified_message"])
