@@ -102,7 +102,7 @@ class Loop:
 
     def vector(self, cells: Cells) -> Array:
         """Fields as one vector, in which equal steps are equal relative changes of coefficients."""
-        parts = {"viscosity": np.log, "warmth": np.log, "lift": lambda a: a / self.h, "contact": lambda a: a / self.base.p_unit}
+        parts = {"viscosity": np.log, "warmth": np.log, "lift": lambda a: _thick(a / self.h), "contact": lambda a: a / self.base.p_unit}
         return np.concatenate([parts.get(name, lambda a: a)(cells[name]) for name in self.names])  # type: ignore[operator]
 
     def split(self, x: Array) -> list[Array]:
@@ -115,7 +115,7 @@ class Loop:
         for name in {"viscosity", "warmth"} & set(found):
             found[name] = np.exp(np.clip(found[name], -WIDEST, WIDEST))
         if "lift" in found:
-            found["lift"] = self.h * np.maximum(found["lift"], LEAST_LIFT)
+            found["lift"] = self.h * np.maximum(_lift(found["lift"]), LEAST_LIFT)
         if "contact" in found:
             found["contact"] = self.base.p_unit * np.maximum(found["contact"], 0.0)
         return found
@@ -246,6 +246,17 @@ class Loop:
         snes.solve(None, x)
         for obj in (snes, f):
             obj.destroy()
+
+
+def _thick(lift: Array) -> Array:
+    """log(1 + lift), where pressure goes by a power of the film, as it does; below half of the rigid film its tangent's."""
+    return np.where(lift > -0.5, np.log1p(np.maximum(lift, -0.5)), 2.0 * lift + 1.0 - np.log(2.0))
+
+
+def _lift(x: Array) -> Array:
+    """The other way round."""
+    thin = x < -np.log(2.0)
+    return np.where(thin, 0.5 * (x - 1.0 + np.log(2.0)), np.expm1(np.minimum(np.where(thin, 0.0, x), WIDEST)))
 
 
 def held(scene: Any, solution: Solution) -> Any:

@@ -22,8 +22,10 @@ from ..scenes.scene import Solvable
 from .ask import Ask
 from .attitude import half_film_attitude
 from .chain import Chain
-from .coefficients import coefficients
+from .coefficients import coefficients, motions_of, summed
 from .compose import Inner
+from .impedance import stiffness
+from .loop import held
 
 MOST_SOLVES = 25  # on a grid
 COARSEST, COARSE_TOL = (36, 7), 1e-2  # fewest points around and across, and how well a coarse grid's place is worth knowing
@@ -137,8 +139,8 @@ def _on_grid(
 ) -> tuple[Solution, Array, int, bool]:
     """Newton's method on one grid: solution, t and attitude, number of solves, whether the place was found. Collective.
 
-    A step that makes residuals larger is taken again, half as long. Where effects act, whose part in the stiffness is unknown,
-    Broyden's method goes on from there, and begins anew where such a step was long.
+    A step that makes residuals larger, or leads to where no film is found, is taken again, half as long. Where effects act,
+    whose part in the stiffness is unknown, Broyden's method goes on from there, and begins anew where such a step was long.
     """
     chain, given = Chain(ask, inner), scene.attitude_deg is not None
     q, inverse, before = np.array([t, phi]), None, None  # before : place, residual and step
@@ -147,7 +149,12 @@ def _on_grid(
         at = scene.model_copy(update={"eccentricity": eccentricity(scene, t, phi), "attitude_deg": math.degrees(phi)})
         solution = chain.solve(at)
         if not solution.converged:
-            return solution, q, count, False
+            if before is None or count == most or np.abs(before[2]).max() < SHORTEST:
+                return solution, q, count, False
+            solution.destroy()
+            chain, before = Chain(replace(ask, start=None), inner), (before[0], before[1], 0.5 * before[2])
+            q = before[0] + before[2]
+            continue
         force = np.array(solution.problem.quantities(solution.fields)["force"])
         W = float(np.hypot(*force))
         off = math.atan2(-force[1], -force[0])
@@ -211,10 +218,17 @@ def _moves(scene: Any, t: float, phi: float) -> Array:
 
 
 def _stiffness(at: Any, solution: Solution, along: float) -> Array:
-    """K in the axes of the load, where effects act that of the film without them. Collective."""
-    (one,) = coefficients(without(at, named(at)) if at.model.effects else at, solution)
+    """K in the axes of the load, where effects act that of the film with its coefficients held. Collective."""
+    if at.model.effects and not solution.settings.get("supply_pressures"):
+        frozen: Any = held(at, solution)
+        problem: Any = frozen.build(solution.problem.grid.petsc_comm)
+        motions = motions_of(at.turning, False, 0.5 * at.model.lengths[-1])
+        K = summed(stiffness, frozen, frozen.constant, problem, solution.fields, motions)
+        problem.destroy()
+        return K  # type: ignore[no-any-return]
+    K = coefficients(without(at, named(at)) if at.model.effects else at, solution)[0].K
     turn = np.array([[math.cos(along), -math.sin(along)], [math.sin(along), math.cos(along)]])
-    return turn @ one.K @ turn.T  # type: ignore[no-any-return]
+    return turn @ K @ turn.T  # type: ignore[no-any-return]
 
 
 def _inverse(jacobian: Array) -> Array:

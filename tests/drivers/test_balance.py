@@ -276,3 +276,18 @@ def test_the_range_may_have_a_unit():
     for vary, ends in (("h_offset", ["1 s", "2 s"]), ("film.journal.eccentricity", ["1um", "2um"])):
         with pytest.raises(InputError, match="is needed, not a"):
             load_scene("pocketed_pad", {"balance.load": 2e3, "balance.vary": vary, "balance.range": ends})
+
+
+@pytest.mark.parametrize("load, eccentricity", [(63721.4, 0.806), (25000.0, 0.69)])
+def test_a_hot_journal_is_found(load, eccentricity):
+    """Oil much thinner than what is supplied: the stiffness is that of the film with its own viscosities, and a place without
+    a steady temperature is left."""
+    data = {
+        "family": "grooved_journal", "D_mm": 157.26, "clearance_um": 67.58, "speed_rpm": 3377, "L_over_D": 1.004,
+        "grooves_deg": [], "nx": 60, "ny": 11, "p_end": 13041.0, "balance": {"load": load},
+        "temperature": {"oil": "ISO VG 68", "T_in": 308.11, "exchange": 595.1},
+    }  # fmt: skip
+    with solve(data, model="full") as s:
+        found = s.settings["balance"]
+        assert s.converged and found["solves"] <= 12
+        assert found["value"] == pytest.approx(eccentricity, rel=0.05) and found["carried"] == pytest.approx(load, rel=2e-6)
