@@ -60,7 +60,8 @@ class FirstOrder:
         pressures = [float(P) for P in solution.settings.get("supply_pressures", ())]
         self.scene = placed(self.scene, solution)
         bare = without(self.scene, named(scene))
-        self.equations = eq = Equations(bare, grid.petsc_comm, pressures)
+        own = None if self.kept else solution.problem  # solved without effects, as it is here
+        self.equations = eq = Equations(bare, grid.petsc_comm, pressures, solved=own)
         self.base, (self.p, self.r) = eq.constant, fields_of(solution)
         self.h = self.base.scheme.h.ravel()
         every = self._physics(named(scene))[1]

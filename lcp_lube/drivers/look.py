@@ -115,7 +115,8 @@ class Look:
             self.record = {"reason": f"no answer without effects: {first.message}"}
             return
         try:
-            quantity = _quantity(first, self.ask.quantity, self.scene)[1]
+            balance = first.settings.get("balance")
+            quantity = self.ask.quantity or (balance["vary"] if balance else DEFAULT_QUANTITY[0])  # that every film has
             film = FirstOrder(self.scene, first, self._free, quantity)
         except InputError:
             self.kept, self.effects, self.record, self.work = _by_solving(self.scene, self.names, self.ask, self.inner)

@@ -102,7 +102,8 @@ class Loop:
 
     def vector(self, cells: Cells) -> Array:
         """Fields as one vector, in which equal steps are equal relative changes of coefficients."""
-        parts = {"viscosity": np.log, "warmth": np.log, "lift": lambda a: _thick(a / self.h), "contact": lambda a: a / self.base.p_unit}
+        parts = {"viscosity": np.log, "warmth": np.log, "lift": lambda a: _thick(a / self.h)}
+        parts["contact"] = lambda a: a / self.base.p_unit
         return np.concatenate([parts.get(name, lambda a: a)(cells[name]) for name in self.names])  # type: ignore[operator]
 
     def split(self, x: Array) -> list[Array]:

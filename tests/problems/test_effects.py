@@ -107,7 +107,8 @@ def test_very_soft_walls_settle(softness):
     """Many times as thick as the rigid film is what the wall makes of it: its logarithm is nearly linear in the pressure's."""
     film = [{"shape": "sinusoid", "h_min": 1e-5, "h_max": 4e-5}]
     fluid = {"mu": 0.1, "p_supply": 1e5}
-    data = {"family": "bearing", "dimension": 2, "L": 0.03, "width": 0.03, "U": 0.5, "nx": 47, "ny": 23, "fluid": fluid, "film": film}
+    data = {"family": "bearing", "dimension": 2, "L": 0.03, "width": 0.03, "U": 0.5, "nx": 47, "ny": 23}
+    data |= {"fluid": fluid, "film": film}
     with solve({**data, "elastic": {"compliance": softness * 1e-10}}) as s:
         assert s.converged and s.fluid_solves <= 40
         assert s.deflection_max > 0.5 * softness * 1e-5

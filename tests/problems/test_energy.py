@@ -178,6 +178,7 @@ def test_laws_pass_through_their_points():
         ({"law": "vogel", "T": [300.0, 320.0], "mu": [0.1, 0.05]}, "3 values each are needed for law = vogel"),
         ({"law": "walther", "T": [320.0, 300.0], "mu": [0.1, 0.05]}, "T rising and mu falling"),
         ({"law": "vogel", "T": [300.0, 320.0, 340.0], "mu": [0.1, 0.09, 0.01]}, "no law of Vogel's"),
+        ({"law": "walther", "T": [300.0, 320.0], "mu": [1e-4, 5e-5]}, "Walther's law is for kinematic viscosities above 0.3"),
         ({"law": "exponential"}, "law, T and mu go together"),
         ({"beta": 0.03, "specific_heat": -1.0}, "temperature.specific_heat = -1.0: allowed is greater than 0"),
         ({"oil": "ISO VG 32"}, "fluid.mu = 0.05 and the viscosities of"),

@@ -112,7 +112,9 @@ class Walther:
 
     @classmethod
     def through(cls, T: Sequence[float], nu: Sequence[float], rho: float) -> "Walther":
-        """From kinematic viscosities in mm2/s at two temperatures."""
+        """From kinematic viscosities in mm2/s at two temperatures. Raises InputError for those below the law's least."""
+        if not min(nu) > 1.0 - WALTHER:
+            raise InputError(f"{min(nu):.4g} mm2/s: Walther's law is for kinematic viscosities above {1.0 - WALTHER:g} mm2/s")
         y = [log10(log10(one + WALTHER)) for one in nu]
         B = (y[0] - y[1]) / (log10(T[1]) - log10(T[0]))
         return cls(y[0] + B * log10(T[0]), B, rho)
