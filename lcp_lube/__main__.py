@@ -10,7 +10,7 @@ from .base.ranks import run_on
 from .cli.arguments import parse, parser_of_all
 from .cli.completion import complete
 from .cli.words import split
-from .errors import InputError
+from .errors import InputError, NotFound
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -57,6 +57,10 @@ def main(argv: list[str] | None = None) -> int:
     except MemoryError:
         short = InputError("not enough memory; fewer points or more ranks are needed")
         return _refuse(short, alone=not alarm.all_arrive())
+    except NotFound as error:  # all ranks have it, as they looked for it together
+        if alarm.rank == 0:
+            print(f"lcp-lube: {error}", file=sys.stderr, flush=True)
+        return 1
     except KeyboardInterrupt as interrupt:
         alone = not alarm.all_arrive()
         if alone or alarm.rank == 0:

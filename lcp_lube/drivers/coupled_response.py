@@ -166,7 +166,8 @@ class CoupledResponse:
             def apply(shell, pc: PETSc.PC, v: PETSc.Vec, out: PETSc.Vec) -> None:
                 done = v.array_r.reshape(len(parts), size).copy()
                 for y in done:
-                    y[:n] = self._linear.solve([y[:n]])[0]
+                    y[:n] = z = self._linear.solve([y[:n]])[0]
+                    y[n:] -= self._along(np.concatenate([z, 0.0 * y[n:]]))[0][n:]  # what the effects make of the film's answer
                 out.setArray(done.ravel())
 
         sizes = (len(parts) * size, None)
