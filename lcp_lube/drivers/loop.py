@@ -21,7 +21,8 @@ from .ask import Ask, Start
 from .chain import added
 from .compose import Inner
 
-MOST_SOLVES = 100
+MOST_SOLVES, LONG = 100, 300  # films; and while the least change has fallen to a tenth within as many as
+PATIENCE = 50
 SETTLED = 0.1  # of eps1: relative change of the coefficients at which they count as found
 MEMORY = 30  # answers that Anderson's method combines; -coupling_snes_anderson_m changes it
 CYCLE = 25  # steps after which it begins anew: its least squares see no changes 1e-8 of the largest that they remember
@@ -190,9 +191,13 @@ class Loop:
         x.setArray(begin)
         self.begun = begin
         best, last, near = (np.inf, begin), (begin + 1.0, begin), False
+        mark = (np.inf, 0)  # a least change, and the films after which it was found
+
+        def ends() -> bool:
+            return self.solves >= (LONG if self.solves - mark[1] < PATIENCE else MOST_SOLVES)
 
         def residual(snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
-            nonlocal best, last
+            nonlocal best, last, mark
             before = x.array_r.copy()
             if self.base.reduce.max(np.abs(before - last[0])) > 0.0:  # not those that the cycle before has ended with
                 self.last = before
@@ -202,16 +207,18 @@ class Loop:
                 last, self.change = (before, after), self.base.reduce.max(np.abs(after))
                 if self.change < best[0]:
                     best = self.change, before
+                if best[0] <= 0.1 * mark[0]:
+                    mark = best[0], self.solves
             f.setArray(np.clip(last[1], -LONGEST, LONGEST))
 
         def ended(snes: PETSc.SNES, it: int, norms: tuple[float, float, float]) -> int:
             if not np.isfinite(self.change):
                 return int(PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN)
-            if self.change > AWAY * best[0] or self.solves >= MOST_SOLVES:
+            if self.change > AWAY * best[0] or ends():
                 return int(PETSc.SNES.ConvergedReason.DIVERGED_DTOL)
             return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS) if self.change <= (tol if near else NEAR) else 0
 
-        while self.solves < MOST_SOLVES and self.change > tol:  # NaN: no film
+        while not ends() and self.change > tol:  # NaN: no film
             self._cycle(comm, x, residual, ended, MEMORY if near else FEW)
             near = not near
             if best[0] < self.change < np.inf:

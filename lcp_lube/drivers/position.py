@@ -32,6 +32,7 @@ COARSEST, COARSE_TOL = (36, 7), 1e-2  # fewest points around and across, and how
 SEEN = 0.5  # a mesh in parts of the stretch sqrt(2 (1 - s)) on which the film is thin, at most
 MOST_COARSE = 8  # solves on a grid that is not the last
 LONGEST = (2.0, 0.4)  # of a step in t and in the attitude (rad)
+MOST_FAILED = 4  # solves without an answer on a grid, from each of which half of the step is taken
 SHORTEST = 1e-4  # of a step that was halved
 FAR = 0.1  # a step along secants, which are too long to be trusted if it makes residuals larger
 WIDEST = 14.0  # of t: s from 1e-6 to 1 - 1e-6
@@ -143,13 +144,14 @@ def _on_grid(
     whose part in the stiffness is unknown, Broyden's method goes on from there, and begins anew where such a step was long.
     """
     chain, given = Chain(ask, inner), scene.attitude_deg is not None
-    q, inverse, before = np.array([t, phi]), None, None  # before : place, residual and step
+    q, inverse, before, failed = np.array([t, phi]), None, None, 0  # before : place, residual and step
     for count in range(1, most + 1):
         t, phi = map(float, q)
         at = scene.model_copy(update={"eccentricity": eccentricity(scene, t, phi), "attitude_deg": math.degrees(phi)})
         solution = chain.solve(at)
         if not solution.converged:
-            if before is None or count == most or np.abs(before[2]).max() < SHORTEST:
+            failed += 1
+            if before is None or count == most or failed > MOST_FAILED:
                 return solution, q, count, False
             solution.destroy()
             chain, before = Chain(replace(ask, start=None), inner), (before[0], before[1], 0.5 * before[2])
