@@ -137,7 +137,7 @@ def test_a_number_that_is_zero_has_a_step_that_is_seen(cli):
 
 
 def test_of_a_very_soft_wall():
-    """GMRES on film and wall side by side breaks down there; with the wall's answer to the film's in its preconditioner it is found."""
+    """GMRES with the film's inverse alone breaks down there; with the wall's answer to the film's beside it it does not."""
     film = [{"shape": "sinusoid", "h_min": 8e-6, "h_max": 3e-5}]
     data = {"family": "bearing", "dimension": 2, "L": 0.02, "width": 0.025, "U": 1.3, "nx": 60, "ny": 24, "film": film}
     data |= {"fluid": {"mu": 0.08, "p_supply": 1e5}, "elastic": {"compliance": 2e-10}}
