@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ...base.parallel import Array
 from ...errors import InputError
-from .cavity import cavity_sign
+from .cavity import cavitated
 from .fronts import across, line_fronts
 
 if TYPE_CHECKING:
@@ -47,12 +47,12 @@ def front_curves(problem: LubricationProblem, p: Array, r: Array) -> list[Array]
 def _crossings(problem: LubricationProblem, p: Array, r: Array) -> Array:
     """Of this rank: j and i of the lower or left point of an edge, whether it lies along y (1) or has a rupture (-1), else 0,
     x and y, m; shape (crossings, 5)."""
-    grid, found = problem.grid, line_fronts(problem, p, r)
+    grid, cavity = problem.grid, cavitated(problem.reduce, p, r)
+    found = line_fronts(problem, p, r, cavity)
     x, y = grid.x[0], grid.y[:, 0]
     rows = []
     for (j, i, places), kind in ((found.ruptures, -1.0), (found.reformations, 0.0)):
         rows.append(np.stack([j + grid.y_start, i + grid.x_start - 1, np.full(j.size, kind), places, y[j]], axis=1))
-    cavity = cavity_sign(problem.reduce, p, r) < 0
     for (j, i, back), lower in zip(across(grid, p, cavity), (1, 0), strict=True):
         at = y[j] + (1 - 2 * lower) * back
         rows.append(np.stack([j + grid.y_start - lower, i + grid.x_start, np.ones(j.size), x[i], at], axis=1))

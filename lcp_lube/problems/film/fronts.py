@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from ...base.parallel import Array
 from ..grid import Grid
 from ..strips import each_strip, ghosted, places_of
-from .cavity import cavitated
 from .reynolds import Film, sides
 from .strip import line_weights, stream_weights
 
@@ -37,18 +36,19 @@ class Fronts:
     shift: Array
 
 
-def line_fronts(problem: LubricationProblem, p: Array, r: Array) -> Fronts:
+def line_fronts(problem: LubricationProblem, p: Array, r: Array, dry: NDArray[np.bool_]) -> Fronts:
     """Where cavities begin and end along the flow, placed inside the cells in which they do. Collective.
 
     Rupture: where U h = Q, Q being the flow along the line (p = p' = 0 there; in 1D the one flow of the discrete solution, in
     2D what leaves the first cell of the cavity), within the cell or one beside it: the discrete front may be late. Reformation:
     the face between cavity and full film lacks the flow U h r + k p of a full one, k p if the film were full from the last
-    point of the cavity on; begun a part k p/(k p + U h r) of the way upstream the film presses back as much.
+    point of the cavity on; begun a part k p/(k p + U h r) of the way upstream the film presses back as much. dry : where the
+    film is `cavitated`.
     """
     grid, film, s = problem.grid, problem.film, problem.scheme
     start, steps = grid.origin[0], grid.steps(0)
     behind, ahead = steps[:-1], steps[1:]
-    cavity = grid.ghosted(cavitated(problem.reduce, p, r), outside=0.0)[1:-1] > 0
+    cavity = grid.ghosted(dry, outside=0.0)[1:-1] > 0
     opens = [kind == "open" for kind in grid.ends[0]]
     if grid.x_start == 0 and opens[0]:
         cavity[:, 0] = problem.r_in > 0
@@ -107,13 +107,13 @@ def fronts(problem: LubricationProblem, found: Fronts | None) -> tuple[list[floa
     return first, second
 
 
-def cavitated_area(problem: LubricationProblem, found: Fronts | None, p: Array, r: Array) -> float:
+def cavitated_area(problem: LubricationProblem, found: Fronts | None, p: Array, dry: NDArray[np.bool_]) -> float:
     """Area of the cavities, m2 (1D: length, m): cells of their points, and what lies between these and the fronts. Collective.
 
-    Across the flow a front lies where the pressure beside it, followed by its slope, is zero.
+    Across the flow a front lies where the pressure beside it, followed by its slope, is zero. dry : as in `line_fronts`.
     """
     grid = problem.grid
-    cavity = cavitated(problem.reduce, p, r).reshape(grid.box)
+    cavity = dry.reshape(grid.box)
     frames = [ghosted(grid, field, 0.0) for field in (cavity, p)] if found is not None and grid.dim == 2 else []
 
     def add_up(rows: slice) -> tuple[float, float]:
@@ -125,8 +125,7 @@ def cavitated_area(problem: LubricationProblem, found: Fronts | None, p: Array, 
         more += float(np.sum(found.shift[rows, None] * line_weights(part) * stretch)) * dy
         if grid.dim == 2:
             width, steps = part.widths(0) * grid.spacing[0] * stretch, part.steps(1)[:, None]
-            dry, pressures = (frame(rows) for frame in frames)
-            fronts_across = _across(dry, pressures, steps)
+            fronts_across = _across(frames[0](rows), frames[1](rows), steps)
             for (j, i, back), step in zip(fronts_across, (steps[:-1, 0], steps[1:, 0]), strict=True):
                 more += float(np.sum((0.5 * step[j] - back) * np.broadcast_to(width, part.box)[j, i]))
             for end, rim, p_side in zip(sides(part)[2:], grid.rims(1), problem.p_sides[2:], strict=True):

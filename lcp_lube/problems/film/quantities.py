@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from ...base.parallel import Array
 from .cavity import cavitated
@@ -65,13 +66,15 @@ def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any
     cavity = cavitated(reduce, p, r)
     min_h, min_h_at = thinnest(problem)
     known = known_of(problem)
-    read = _read(problem, p_pa, r, p)
+    read = _read(problem, p_pa, r, p, cavity)
     if known is not None:
         off = reduce.max(np.abs(p_pa - known.p_pa)), reduce.max(np.abs(r - known.r))
         most = reduce.max(known.p_pa)
         same = off[0] <= SAME * most + LEAST and off[1] <= SAME
         exact = off[0] <= ROUNDING * most and off[1] <= ROUNDING  # read by itself, the discrete solution would say the same
-        discrete = read if exact else _read(problem, known.p_pa, known.r, known.p_pa / problem.p_unit)
+        there = known.p_pa / problem.p_unit
+        dry = cavitated(reduce, there, known.r)
+        discrete = read if exact else _read(problem, known.p_pa, known.r, there, dry)
         read = read.corrected(discrete, known.line, same)
     ruptures, reformations, flow = read.ruptures, read.reformations, read.flow
     rupture, reformation = first_cavity(grid, ruptures, reformations)
@@ -134,14 +137,14 @@ class _Read:
         )
 
 
-def _read(problem: LubricationProblem, p_pa: Array, r: Array, p: Array) -> _Read:
-    """p_pa in Pa, p in units of p_unit. Collective."""
-    ends = line_fronts(problem, p, r) if problem.U else None
+def _read(problem: LubricationProblem, p_pa: Array, r: Array, p: Array, cavity: NDArray[np.bool_]) -> _Read:
+    """p_pa in Pa, p in units of p_unit; cavity : where they are `cavitated`. Collective."""
+    ends = line_fronts(problem, p, r, cavity) if problem.U else None
     return _Read(
         *largest_pressure(problem, p_pa),
         friction(problem, p_pa, r),
         side_flows(problem, p, r),
-        cavitated_area(problem, ends, p, r),
+        cavitated_area(problem, ends, p, cavity),
         *fronts(problem, ends),
     )
 

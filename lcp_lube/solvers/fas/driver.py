@@ -35,6 +35,7 @@ SCALED = 1e-3  # the most by which all pressures and voids are scaled (`Fas._bal
 CLOSE = 1e-6  # ||G|| below which a ring that is hardly fed is not what has stalled
 FED = 3e-5  # of the certificate's tolerance: the flow that a film with supplies may lose, 3e-12 in parts of what flows
 BORDER = 4  # lines on either side of the border between two ranks
+SLOWER, LEAST_FALL = 2.5, 0.04  # times what the last F cycle left is what a V cycle leaves in its place; at least that
 
 
 @dataclass(frozen=True)
@@ -73,14 +74,14 @@ class Fas(Cycles):
         driven = 2.0 * problem.reduce.max(np.array([float(k[1:-1, 1:-1].mean()) for k in (first.kx, first.ky)]))
         self._unit = 1.0 / driven if driven > 0.0 else 1.0
         self._begin(start is not None)
+        self._fields: Fields | None = None  # p and r of z as it is, where they have been asked for
         self._c_norm = problem.reduce.norm(problem.scheme.c) if problem.held is None else self._norms()[0]
         h = problem.scheme.h
         # An edge of a supply may lie as near to a side as one likes: what drives the film there has no scale for the rest.
         self._extreme = problem.held is not None or problem.reduce.max(h) > EXTREME * problem.reduce.min(h)
-        self._correction = 0.0
+        self._correction, self._rest, self._share = 0.0, self.eps1, 0.1
         if start is not None:
             self.z = start["p"] + problem.scheme.b_C.ravel() * start["r"]
-        self._rest, self._share = self.eps1, 0.1
         self.norm = self._first = self._norm()
         if start is not None and problem.scheme.storage is not None:
             self._rest = max(self.eps1, min(options.rest * self.norm, self.eps1**0.5))
@@ -93,7 +94,7 @@ class Fas(Cycles):
 
     @z.setter
     def z(self, value: Array) -> None:
-        level = self._levels[0]
+        level, self._fields = self._levels[0], None
         self._finest.put(level, self.problem.grid, level.z, value)
         if level.held is not None:
             level.z[level.held] = level.given
@@ -104,8 +105,9 @@ class Fas(Cycles):
 
     @property
     def fields(self) -> Fields:
-        p, r = self._loops.pressure_and_void(self._own(), self.problem.scheme, self.problem.grid)
-        return {"p": p.ravel(), "r": r.ravel()}
+        if self._fields is None:
+            self._fields = self._loops.pressure_and_void(self._own(), self.problem.scheme, self.problem.grid)
+        return self._fields
 
     def _norms(self) -> tuple[float, float]:
         """||G|| and the size of its terms; before the first step of a film with supplies, what sides and supplies drive."""
@@ -156,7 +158,7 @@ class Fas(Cycles):
         ------
         StalledError : ||G|| has stalled.
         """
-        anew = self._taken == 0
+        anew, self._fields = self._taken == 0, None
         if self._stalled and self.norm > self.eps1:
             if not self._retreat():
                 if not self.norm < 1.0:
@@ -172,7 +174,7 @@ class Fas(Cycles):
                 self._tools.right_sides(self._levels[: self._depth], self._harmonic)
                 self._full_multigrid()
             else:
-                self._cycle(0, self.options.cycle)
+                self._cycle(0, self._kind())
         self._count()
         with self.stages("norm"):
             if self._levels[0].carry is not None and self.problem.held is None:
@@ -191,9 +193,15 @@ class Fas(Cycles):
             )
         return Step(self.norm, size, 1.0, enough=self._rest > self.eps1 and self.norm <= self._rest)
 
+    def _kind(self) -> str:
+        """Of the next cycle: a V cycle in place of an F cycle where that will do, as the last one."""
+        level, expected = self._levels[0], SLOWER * max(self.norm / (self._recent[-1] or inf), LEAST_FALL) * self.norm
+        last = expected <= self.eps1 and level.carry is None and level.held is None
+        return "V" if last and self.options.cycle == "F" else self.options.cycle
+
     def destroy(self) -> None:
         super().destroy()
-        self._levels = []
+        self._levels, self._fields = [], None
 
     def _retreat(self) -> bool:
         """Do without the coarsest grids, on which the film's cavities are too small to be seen; false if that has been tried.
@@ -215,15 +223,12 @@ class Fas(Cycles):
         if k + 1 < self._depth:
             coarse = self._levels[k + 1]
             where = (level.first, level.by_x, level.by_y, self._harmonic)
-            self._loops.interpolate(level.z, coarse.part(self._seen(coarse, coarse.z)), level.kx, level.ky, *where)
+            coarse.put_sides(*(p / self.problem.p_unit for p in self.problem.p_sides))
+            self._loops.interpolate(level.z, coarse.part(coarse.seen(coarse.z)), level.kx, level.ky, *where)
+            coarse.put_sides()
             level.share(level.z)
         if level.held is not None:
             level.z[level.held] = level.given
-
-    @staticmethod
-    def _seen(coarse: Any, z: Array) -> Array:
-        """A coarse grid's values as the finer one has them, whose cells store less void."""
-        return z if coarse.scale is None else np.where(z < 0.0, z / coarse.scale, z)
 
     def _solve_coarsest(self, k: int) -> None:
         level = self._levels[k]
@@ -248,7 +253,7 @@ class Fas(Cycles):
     def _ascend(self, k: int) -> None:
         o, level, coarse = self.options, self._levels[k], self._levels[k + 1]
         where = (level.first, level.by_x, level.by_y)
-        new, old = (coarse.part(self._seen(coarse, z)) for z in (coarse.z, coarse.old))
+        new, old = (coarse.part(coarse.seen(z)) for z in (coarse.z, coarse.old))
         fine = (level.z, new, old, level.kx, level.ky)
         at_supplies = None if level.held is None else level.z[level.held]
         rules = (self._harmonic, self._truncation, level.periodic[0], self._unit)

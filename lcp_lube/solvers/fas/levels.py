@@ -111,6 +111,19 @@ class Level:
             np.concatenate(self.comm.allgather(np.ascontiguousarray(a[self.y0 + 1 : end])), out=a[1:-1])
         return self.share(a)
 
+    def put_sides(self, west: float = 0.0, east: float = 0.0, south: float = 0.0, north: float = 0.0) -> None:
+        """Pressures of the sides into z's frame, for interpolation; while it is swept there is 0, as c has what they push."""
+        if not self.periodic[0]:
+            self.z[1:-1, 0], self.z[1:-1, -1] = west, east
+        if not self.periodic[1] and (not self.split or self.y0 == 0):
+            self.z[0, 1:-1] = south
+        if not self.periodic[1] and (not self.split or self.y1 == self.ny):
+            self.z[-1, 1:-1] = north
+
+    def seen(self, z: Array) -> Array:
+        """Values as the finer level has them, whose cells store less void."""
+        return z if self.scale is None else np.where(z < 0.0, z / self.scale, z)
+
     @property
     def split(self) -> bool:
         """Whether other ranks hold other lines."""

@@ -12,6 +12,7 @@ from ...base.crew import FEWEST, crew
 from ...base.parallel import Array
 from ...problems.film.reynolds import BoxScheme
 from ...problems.grid import Grid
+from ...problems.solution import Fields
 from ...problems.strips import each_strip
 from . import kernels, transfer
 from .waiting import LINE, SLOTS
@@ -54,12 +55,12 @@ def restrict(z: Array, kx: Array, ky: Array, c: Array, out: Array, *others: Any)
     crew().rows(lambda start, end: transfer.restrict(*(z, kx, ky, c, out, *others, start, end)), out.shape[0], z.size)
 
 
-def pressure_and_void(z: Array, scheme: BoxScheme, grid: Grid) -> tuple[Array, Array]:
+def pressure_and_void(z: Array, scheme: BoxScheme, grid: Grid) -> Fields:
     """p and r of the owned points."""
     p, r = np.empty(z.shape), np.empty(z.shape)
 
     each_strip(grid, lambda rows: kernels.pressure_and_void(z[rows], scheme.rows(rows).b_C, p[rows], r[rows]))
-    return p, r
+    return {"p": p.ravel(), "r": r.ravel()}
 
 
 def _by_rows(task: Any, z: Array) -> list[Any]:
