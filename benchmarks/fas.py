@@ -29,6 +29,7 @@ import numpy as np
 from mpi4py import MPI
 
 from lcp_lube import load_scene, solve
+from lcp_lube.base.crew import crew
 from lcp_lube.base.options import recipe
 from lcp_lube.base.resumable import ResumableCsv
 from lcp_lube.base.stages import Stages
@@ -208,23 +209,28 @@ def points(film: str, n: int, variant: str, repeats: int) -> Values:
 
 
 def bytes_moved(film: str, n: int, variant: str, repeats: int) -> Values:
-    """One, or three sweeps of the finest grid, against the time that its 40 bytes a point and sweep take (copying arrays)."""
+    """One, or three sweeps of the finest grid, against the time that its 40 bytes a point and sweep take (copying arrays); by
+    several threads by the clock, against as many that copy."""
     problem = problem_of(film, n)
     run, _ = cycles(problem, 1e-3, 2)
-    level, sweep, count = run._levels[0], run._kernels.sweep, int(variant.split()[0])
+    level, sweep, count, own = run._levels[0], run._loops.sweep, int(variant.split()[0]), crew().threads
+    clock, part = (perf_counter if own > 1 else thread_time), 8_000_000 // own
     source, target = np.ones(8_000_000), np.zeros(8_000_000)
 
     def best(call: Callable[[], Any]) -> float:
         seconds = []
         for _ in range(7):
-            begin = thread_time()
+            begin = clock()
             call()
-            seconds.append(thread_time() - begin)
+            seconds.append(clock() - begin)
         return min(seconds)
 
-    per_byte = best(lambda: np.copyto(target, source)) / (24 * source.size)  # read, written, and read before it is written
-    seconds = best(lambda: sweep(level.z, level.kx, level.ky, level.c, count, False))
-    values = {"cpu_s": seconds, "ns_per_point": 1e9 * seconds / n**2, "outcome": "measured"}
+    def copy(k: int) -> None:
+        np.copyto(target[k * part : (k + 1) * part], source[k * part : (k + 1) * part])
+
+    per_byte = best(lambda: crew().run(copy, own)) / (24 * part * own)  # read, written, and read before it is written
+    seconds = best(lambda: sweep(level.z, level.kx, level.ky, level.c, count, False, level.carry, False))
+    values = {"wall_s" if own > 1 else "cpu_s": seconds, "ns_per_point": 1e9 * seconds / n**2, "outcome": "measured"}
     moved = 40 * n**2 * per_byte
     values["ratio_cpu"] = seconds / moved
     values["message"] = f"{1e-9 / per_byte:.1f} GB/s; {seconds / moved / count:.2f} of the time of {count} passes' bytes"
@@ -290,7 +296,7 @@ def cases(experiment: str, quick: bool) -> Iterator[tuple[str, int, str]]:
         for n in (63,) if quick else (255, 511, 1023, 2047, 4095):
             yield "problem4", n, "to 1e-6"
     elif experiment == "bytes":
-        for variant in ("1 sweep", "3 sweeps in one pass"):
+        for variant in ("1 sweep", "3 sweeps in one pass", "3 sweeps by 2 threads"):
             yield "problem4", 127 if quick else 2047, variant
     elif experiment in ("ranks", "threads"):
         for variant in ("1", "2"):
@@ -306,7 +312,8 @@ def child(experiment: str, case: tuple[str, int, str], repeats: int) -> Values:
     command = [sys.executable, __file__, "--job", json.dumps([experiment, *case]), "--repeats", str(repeats)]
     if experiment == "ranks" and case[2] != "1":
         command = [shutil.which("mpiexec") or "mpiexec", "-n", case[2], *command]
-    environment = {"OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": case[2] if experiment == "threads" else "1"}
+    threads = case[2] if experiment == "threads" else "2" if "2 threads" in case[2] else "1"
+    environment = {"OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": threads}
     done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, **environment})
     if done.returncode:
         return {"outcome": "failed", "message": (done.stderr.strip().splitlines() or ["nothing said"])[-1]}

@@ -163,7 +163,8 @@ def box_scheme(grid: Grid, film: Film, **data: Any) -> BoxScheme:
     ]
     stores = [] if box.storage is None else [box.storage]
     smallest = float(np.min([reduce.min(a) for a in (box.h, *ends, np.array(conducting), *stores)]))  # NaN stays NaN
-    largest = max(*map(reduce.max, faces), reduce.largest(box.b_C), reduce.largest(box.c))
+    voids = np.array([np.max(np.abs(part.b_C)) for _, part in box.in_strips(grid)])
+    largest = max(*map(reduce.max, faces), reduce.max(voids), reduce.largest(box.c))
     if not (smallest > 1 / LARGE and largest < LARGE):
         with np.errstate(all="ignore"):
             check_film(grid, film)

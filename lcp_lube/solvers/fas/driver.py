@@ -126,7 +126,7 @@ class Fas(Cycles):
         drive next to nothing beside the wall, the certificate sees more of it than ||G|| does: then eps1 times the ratio of
         its mass defect or residual to a tenth of what may be.
         """
-        residual, terms = self._norms()
+        residual, terms = self._norms() if self._taken or self.problem.held else (self._c_norm, self._c_norm)  # z = 0
         norm = float(residual / (max(self._c_norm, 16 * EPS * terms / self.eps1) or 1.0))
         self.certificate = None
         if not norm <= self._rest:
