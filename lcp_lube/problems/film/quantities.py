@@ -171,19 +171,22 @@ def thinnest(problem: LubricationProblem) -> tuple[float, list[float] | None]:
     ends = [np.array([start, start + length]) for start, length in zip(grid.origin, grid.lengths, strict=False)]
     places = [(ends[0], y)] + ([(x, ends[1]), (ends[0], ends[1])] if grid.dim == 2 else [])
     films = [(problem.scheme.h, x, y)] + [(film(a[None, :], b[:, None]), a, b) for a, b in places]
-    thickness, place = max((largest_of(problem, -h, a, b) for h, a, b in films), key=lambda found: found[0])
+    thickness, place = max((largest_of(problem, h, a, b, True) for h, a, b in films), key=lambda found: found[0])
     return -thickness, place
 
 
-def largest_of(problem: LubricationProblem, values: Array, x: Array, y: Array) -> tuple[float, list[float] | None]:
-    """Largest of values over y (rows) and x (columns) and its place; NaN: nowhere. Collective.
+def largest_of(
+    problem: LubricationProblem, values: Array, x: Array, y: Array, opposite: bool = False
+) -> tuple[float, list[float] | None]:
+    """Largest of values, or of their opposites, over y (rows) and x (columns) and its place; NaN: nowhere. Collective.
 
     Of equals, to within the tolerance of a solve, the first in x and then y, whatever the ranks.
     """
-    largest = problem.reduce.max(values)
+    largest = -problem.reduce.min(values) if opposite else problem.reduce.max(values)
     if not np.isfinite(largest):
         return largest, None
-    near = values >= largest - 1e-9 * abs(largest)
+    least = largest - 1e-9 * abs(largest)
+    near = values <= -least if opposite else values >= least
     column = int(np.argmax(near.any(axis=0)))
     row = int(np.argmax(near[:, column]))
     own = (float(x[column]), float(y[row])) if near.any() else (np.inf, np.inf)
