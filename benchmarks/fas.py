@@ -3,8 +3,9 @@
     python benchmarks/fas.py [EXPERIMENT ...] [--quick] [--repeats 3] [--results DIR]
 
 Experiments: factors, linear, points, bytes, options, ranks, threads, small (see EXPERIMENTS); rows go to
-benchmarks/results/fas.csv, and cases that stand there already are not run again. Every case is a process of its own. Seconds
-are medians, by the clock and of the processor; on a machine that others use (`load`) the second ones are to be trusted.
+benchmarks/results/fas.csv, and cases that stand there already are not run again: another --results begins anew. Every case
+is a process of its own. Seconds are medians, by the clock and of the processor; on a machine that others use (`load`) the
+second ones are to be trusted. --tables prints the rows of the tables in docs/nonlinear_multigrid.md.
 """
 
 import argparse
@@ -320,12 +321,25 @@ def child(experiment: str, case: tuple[str, int, str], repeats: int) -> Values:
     return json.loads(done.stdout.splitlines()[-1])
 
 
+def tables(rows: list[dict[str, str]]) -> Iterator[str]:
+    """Lines of the two tables of docs/nonlinear_multigrid.md that follow from rows by film and grid."""
+    of = {(row["experiment"], row["film"], int(row["n"])): row for row in rows}
+    for film in FILMS:
+        found = [of.get(("factors", film, n)) for n in (127, 255, 511, 1023, 2047, 4095)]
+        cells = [f"{float(row['factor']):.2f} ({row['cycles']})" if row and row["factor"] else "" for row in found]
+        yield f"| {film} | {' | '.join(cells)} |"
+    for name, column in (("cycles to 1e-6", "cycles"), ("ns a point, all of it", "ns_per_point")):
+        found = [of.get(("points", "problem4", n)) for n in (255, 511, 1023, 2047, 4095)]
+        yield f"| {name} | {' | '.join(f'{float(row[column]):.0f}' if row else '' for row in found)} |"
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("experiments", nargs="*", help=f"any of {', '.join(EXPERIMENTS)}; default all")
     parser.add_argument("--quick", action="store_true", help="small grids, in a csv file of their own")
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--results", type=Path, default=Path(__file__).parent / "results")
+    parser.add_argument("--tables", action="store_true", help="print the rows of the tables in the docs, and run nothing")
     parser.add_argument("--job", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.job:
@@ -339,6 +353,9 @@ def main() -> None:
         if name not in EXPERIMENTS:
             parser.error(f"{name}: allowed are {', '.join(EXPERIMENTS)}")
     store = ResumableCsv(arguments.results / f"fas{'_quick' * arguments.quick}.csv", [*KEY, *COLUMNS], KEY, signed=True)
+    if arguments.tables:
+        print("\n".join(tables(store.rows)))
+        return
     for experiment in arguments.experiments or EXPERIMENTS:
         for film, n, variant in cases(experiment, arguments.quick):
             key = {"experiment": experiment, "film": film, "n": n, "variant": variant}
