@@ -76,10 +76,9 @@ class Fas(Cycles):
         self._begin(start is not None)
         self._fields: Fields | None = None  # p and r of z as it is, where they have been asked for
         self._c_norm = problem.reduce.norm(problem.scheme.c) if problem.held is None else self._norms()[0]
-        h = problem.scheme.h
+        h, self._correction, self._rest, self._share = problem.scheme.h, 0.0, self.eps1, 0.1
         # An edge of a supply may lie as near to a side as one likes: what drives the film there has no scale for the rest.
         self._extreme = problem.held is not None or problem.reduce.max(h) > EXTREME * problem.reduce.min(h)
-        self._correction, self._rest, self._share = 0.0, self.eps1, 0.1
         if start is not None:
             self.z = start["p"] + problem.scheme.b_C.ravel() * start["r"]
         self.norm = self._first = self._norm()
