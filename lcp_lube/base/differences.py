@@ -59,10 +59,15 @@ def differences(f: Callable[[float], Array], a: float, scale: float, sizes: Arra
         return slope, kinks
 
     d = QUICK * scale
-    if all(at(m * d) is not None for m in (-1, 0, 1)):
-        low, here, high = (known[m * d] for m in (-1, 0, 1))
-        noise = 10.0 * ROUNDING * sizes / d
-        slope, bend = (high - low) / (2.0 * d), np.abs(high - 2.0 * here + low) / d  # type: ignore[operator]
+    low, here, high = at(-d), at(0.0), at(d)
+    if here is not None and (low is None) != (high is None):  # values to one side
+        d = d if low is None else -d
+        low, here, high = here, at(d), at(2.0 * d)
+    if low is not None and here is not None and high is not None:
+        ahead, behind, noise = high - here, here - low, 10.0 * ROUNDING * sizes / abs(d)
+        one_sided = known.get(0.0) is low
+        slope = (3.0 * behind - ahead) / (2.0 * d) if one_sided else (ahead + behind) / (2.0 * d)
+        noise, bend = noise * (2.0 if one_sided else 1.0), np.abs(ahead - behind) / abs(d)
         none = np.abs(slope) <= noise
         if (bend <= BENT * np.abs(slope) + noise).all() and not (none.any() and stepped(none)[1].any()):
             return told(np.where(none, 0.0, slope), np.zeros_like(slope))

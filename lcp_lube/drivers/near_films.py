@@ -4,7 +4,7 @@ A problem's coefficients and its balance cost several times what its film at the
 viscosity, a speed or a pressure of a side costs nothing, as the balance is linear in them.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import fields
 from functools import cached_property
@@ -15,7 +15,7 @@ import numpy as np
 from ..base.parallel import Array
 from ..problems.film import forces
 from ..problems.film.model import Model
-from ..problems.film.weighed import Weighed, can
+from ..problems.film.weighed import ByFaces, Weighed, can
 from ..registry import SMALL
 from ..scenes.scene import Scene
 from .equations import Equations
@@ -55,8 +55,18 @@ class NearFilms:
     def _own(self) -> Array | None:
         return self._weighed.sums(self.model.gap)
 
+    @cached_property
+    def _by_faces(self) -> tuple[ByFaces, Array] | None:
+        """Of this film, and what they leave of its own lambda' G; None where it has edges."""
+        own, p_sides = self.model, self.equations.constant.p_sides
+        faces = self._weighed.by_faces(own.gap, own.mu, own.U, p_sides)
+        if faces is None or (here := faces.sums(own.gap)) is None or (G := self._balances(own, p_sides)) is None:
+            return None
+        return faces, G - here
+
     def lagrangians(self, scene: Scene) -> Array | None:
-        """L of every quantity; None where it is not that of another film on this grid."""
+        """L of every quantity; None where it is not that of another film on this grid. Of a film without edges that alone is
+        changed, to first order: it is for derivatives."""
         if not self.known or not isinstance(getattr(scene, "model", None), Model):
             return None
         eq, own = self.equations, self.model
@@ -64,19 +74,32 @@ class NearFilms:
         model: Model = film.model
         if model.U <= 0.0 or model.effects or not self._alike(model, film.shape):
             return None
-        sums = self._own if _same(model.gap, own.gap) else self._weighed.sums(model.gap)
-        if sums is None:
+        p_sides = tuple(side.p if side.kind == "open" else 0.0 for side in model.sides)
+        if (G := self._balances(model, p_sides)) is None:
             return None
         lean, near = copy(eq), copy(eq.constant)
-        p_sides = tuple(side.p if side.kind == "open" else 0.0 for side in model.sides)
         near.mu, near.U, near.p_c, near.p_sides = model.mu, model.U, model.p_c, p_sides  # type: ignore[assignment]
         near.shaft, near.extras, near.film, lean.constant = model.shaft, model.extras, model.film, near
         near.levers = model.levers
         before = (eq.constant.p_sides, eq.constant.p_c, (own.shaft, own.levers))
         same = before[:2] == (near.p_sides, near.p_c) and _same(before[2], (near.shaft, near.levers))
-        report = lean.report(self.numbers if same else lean.numbers(self.p, self.r, self.wanted, self.numbers))
-        G = ((sums[:, 0] + sums[:, 2:] @ np.array(p_sides)) / model.mu + model.U * sums[:, 1]) / eq.constant.scheme.flow_unit
-        return np.array([report[name] for name in self.lambdas]) - G
+        told = {} if same else forces.totals(near, self.p, wanted=self.wanted)
+        told = {name: told.get(name, value) if name in self.wanted else value for name, value in self.numbers.items()}
+        report = lean.report(told)
+        return np.array([report[name] for name in self.lambdas]) - G / eq.constant.scheme.flow_unit
+
+    def _balances(self, model: Model, p_sides: Sequence[float]) -> Array | None:
+        """lambda' G, m2/s; None for a film that is not positive."""
+        own, sums = self.model, self._own
+        if not _same(model.gap, own.gap):
+            alone = (model.mu, model.U, p_sides) == (own.mu, own.U, self.equations.constant.p_sides)
+            faces = self._by_faces if alone else None
+            if faces is not None and (found := faces[0].sums(model.gap)) is not None:
+                return faces[1] + found
+            sums = self._weighed.sums(model.gap)
+        if sums is None:
+            return None
+        return (sums[:, 0] + sums[:, 2:] @ np.array(p_sides)) / model.mu + model.U * sums[:, 1]  # type: ignore[no-any-return]
 
     def _alike(self, model: Model, shape: tuple[int, ...]) -> bool:
         own = self.model

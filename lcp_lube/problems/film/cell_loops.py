@@ -137,3 +137,31 @@ def loop_cubes(h: Array, columns: Array, lines: Array, slopes: bool) -> Array:
         for i in range(h.shape[1]):
             out[j, i] = (columns[i] * lines[j]) * (3.0 * h[j, i] ** 2 if slopes else h[j, i] * h[j, i] ** 2)
     return out
+
+
+@kernel
+def loop_by_faces(
+    w: Array, p: Array, r: Array, k_x: Array, k_y: Array, wall: Array, void: Array, out: Array, across: Array, before: Array,
+    wall_at_face: bool, void_at_face: bool,
+) -> None:  # fmt: skip
+    """Add to the arrays of x faces, y faces and of the points before x faces what w' G changes by with the film there.
+
+    As `loop_by_film`, of each w, shape (several, lines, columns), without a frame: of the balances of these cells alone.
+    """
+    ny, nx = w.shape[1:]
+    for j in range(ny):
+        for n in range(w.shape[0]):
+            for i in range(nx):
+                a, here = w[n, j, i], p[j + 1, i + 1]
+                leaving = a * (wall[j, i + 1] * wall_at_face - void[j, i + 1] * void_at_face * r[j + 1, i + 1])
+                out[n, j, i + 1] += a * k_x[j, i + 1] * (here - p[j + 1, i + 2]) + leaving
+                across[n, j, i] -= a * k_y[j, i] * (p[j, i + 1] - here)
+                across[n, j + 1, i] += a * k_y[j + 1, i] * (here - p[j + 2, i + 1])
+                carried = void[j, i + 1] * (not void_at_face) * r[j + 1, i + 1]
+                before[n, j, i + 1] += a * (wall[j, i + 1] * (not wall_at_face) - carried)
+            for i in range(nx):
+                a, here = w[n, j, i], p[j + 1, i + 1]
+                entering = a * (wall[j, i] * wall_at_face - void[j, i] * void_at_face * r[j + 1, i])
+                out[n, j, i] -= a * k_x[j, i] * (p[j + 1, i] - here) + entering
+                carried = void[j, i] * (not void_at_face) * r[j + 1, i]
+                before[n, j, i] -= a * (wall[j, i] * (not wall_at_face) - carried)

@@ -74,7 +74,6 @@ class Weighed:
         from .cell_loops import loop_by_film
 
         out, grid = np.zeros(self.grid.box), self.grid
-        at = dict(zip(("west", "east", "south", "north"), p_sides, strict=True))
         weights = ghosted(grid, w, 0.0)
         for rows, part, k_x, k_y, wall, void in self._strips(gap, slopes=True):
             west, east, south, north = (np.broadcast_to(mask, part.box) for mask in sides(part, ("open", "closed", "mirror")))
@@ -83,22 +82,39 @@ class Weighed:
             before = np.array([np.where(west[0], 1.0, 0.0), np.ones(part.box[1])])  # of what the film at the point before is
             of_wall, of_void = before if self.scheme == "upwind" else along, along if self.scheme == "face" else before
             shares = (along, across, of_wall, of_void)
-            p = np.array(self._p(rows))
-            for line, mask, p_side in (
-                (p[1:-1, 0], west[:, 0], at["west"]),
-                (p[1:-1, -1], east[:, -1], at["east"]),
-                (p[0, 1:-1], south[0], at["south"]),
-                (p[-1, 1:-1], north[-1], at["north"]),
-            ):
-                line[mask] = p_side
+            p = self._framed(rows, part, p_sides)
             loop_by_film(weights(rows), p, self._r(rows), k_x / mu, k_y / mu, U * wall, U * void, *shares, out[rows])
         return out
+
+    def _framed(self, rows: slice, part: Grid, p_sides: Sequence[float]) -> Array:
+        """p with a frame that has the sides' pressures."""
+        west, east, south, north = (np.broadcast_to(mask, part.box) for mask in sides(part, ("open", "closed", "mirror")))
+        p = np.array(self._p(rows))
+        lines = ((p[1:-1, 0], west[:, 0]), (p[1:-1, -1], east[:, -1]), (p[0, 1:-1], south[0]), (p[-1, 1:-1], north[-1]))
+        for (line, mask), p_side in zip(lines, p_sides, strict=True):
+            line[mask] = p_side
+        return p
+
+    def by_faces(self, gap: Any, mu: float, U: float, p_sides: Sequence[float]) -> "ByFaces | None":
+        """What w' G changes by with the film where the coefficients take it; None for one with edges."""
+        from .cell_loops import loop_by_faces
+
+        if _cut(Around(gap, self.grid)):
+            return None
+        (ny, nx), count = self.grid.box, len(self.rows)
+        along, across, before = (np.zeros((count, *shape)) for shape in ((ny, nx + 1), (ny + 1, nx), (ny, nx + 1)))
+        at_faces = self.scheme != "upwind", self.scheme == "face"
+        for rows, part, k_x, k_y, wall, void in self._strips(gap, slopes=True):
+            w, p = np.array([row[rows] for row in self.rows]), self._framed(rows, part, p_sides)
+            out = along[:, rows], across[:, rows.start : rows.stop + 1], before[:, rows]
+            loop_by_faces(w, p, self._r(rows), k_x / mu, k_y / mu, U * wall, U * void, *out, *at_faces)
+        return ByFaces(self.grid, (along, across) if all(at_faces) else (along, across, before))
 
     def _strips(self, gap: Any, slopes: bool = False) -> Iterator[Strip]:
         """Lines, their places, conductances at mu = 1 of the x and y faces, and at U = 1 what the wall drags through x faces
         and what if all is void; slopes : their derivatives by a film that is everywhere thicker by as much."""
         grid, film = self.grid, Around(gap, self.grid)
-        cut = bool(jumps_of(film, "x") or jumps_of(film, "y"))
+        cut = _cut(film)
         raised = film
         if cut and slopes:
             step = STEP * float(np.max(np.abs(gap(grid.x, grid.y[:1]))))
@@ -142,3 +158,35 @@ class Weighed:
             return k_x, k_y, at_face, at_face
         before = weight * np.broadcast_to(film(x_nodes[None, :-1], y), h_x.shape)
         return k_x, k_y, at_face if self.scheme == "nodal" else before, before
+
+
+def _cut(film: Any) -> bool:
+    return bool(jumps_of(film, "x") or jumps_of(film, "y"))
+
+
+class ByFaces:
+    """Sums of films without edges times what w' G changes by with them: to first order w' G itself. Collective."""
+
+    def __init__(self, grid: Grid, slopes: Sequence[Array]):
+        self.grid = grid
+        x_nodes, x_faces = grid.nodes_and_faces(0)
+        y_faces = grid.nodes_and_faces(1)[1]
+        places = ((x_faces, grid.y), (x_nodes[1:-1], y_faces[:, None]), (x_nodes[:-1], grid.y))
+        self._parts = [(slope, slope.sum(axis=1), *place) for slope, place in zip(slopes, places, strict=False)]
+
+    def sums(self, gap: Any) -> Array | None:
+        """Of each w; None for a film that has edges, or is not positive."""
+        film = Around(gap, self.grid)
+        total, bad = np.zeros(self._parts[0][0].shape[0] + 1), _cut(film)
+        for slope, by_column, x, y in () if bad else self._parts:
+            if film(x[None, :], y[:2]).shape[0] == 1:  # of x alone
+                h = film(x[None, :], y[:1])
+                total[:-1] += (by_column * h).sum(axis=1)
+            else:
+                h = np.broadcast_to(film(x[None, :], y), slope.shape[1:])
+                flat = h.ravel()  # with it einsum is several times as fast
+                total[:-1] += [np.einsum("i,i->", one.ravel(), flat) for one in slope]
+            bad = bad or not (h > 0.0).all()
+        total[-1] = float(bad)
+        total = self.grid.comm.allreduce(total)
+        return None if total[-1] else total[:-1]

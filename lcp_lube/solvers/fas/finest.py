@@ -1,5 +1,7 @@
 """The finest grid of the nonlinear multigrid: a problem's own, whose coefficients are not stored twice."""
 
+from typing import Any
+
 import numpy as np
 
 from ...base.parallel import Array
@@ -99,7 +101,7 @@ def own(level: Level, grid: Grid, a: Array) -> Array:
     return a[slice(grid.y_start + 1, grid.y_end + 1) if level.comm is None else slice(1, -1), columns]
 
 
-def put(level: Level, grid: Grid, into: Array, values: Array) -> None:
+def put(level: Level, grid: Grid, into: Any, values: Any) -> None:
     """This rank's values into an array of the finest level, and its frame. Collective."""
     box = values.reshape(grid.box)
     into[1:-1, 1:-1] = whole(grid, box) if level.comm is None and grid.comm.size > 1 else box

@@ -13,193 +13,19 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ...base.parallel import Array
-from ...problems.film.lubrication import LubricationProblem
-from . import finest, frozen_kernels, frozen_transfer, held, levels, transfer
+from . import finest, frozen_kernels
+from .frozen_cycles import Cycles
 
-SWEEPS = 1  # before and after the coarse grid
-COARSEST = 3  # sweeps of the coarsest grid, in numbers of its points a side, where it has more than FEW points
-FEW = 64
 # Of J' less is asked: a derivative has about the relative error of lambda, 1e-7 beside the 1e-6 that is promised of it.
-RTOL, TRANSPOSED, MOST = 1e-9, 1e-7, 60
+RTOL, TRANSPOSED, MOST = 1e-9, 5e-8, 60
 AGREES, LEAST = 1e-7, 1e-13  # l' (J z) and b' z, relative: cycles go on until they do, down to the least residual
 
 
-class Frozen:
-    """J or J' of one problem, and one F cycle for it as a preconditioner, on a rank's points. Collective, as its methods.
-
-    Attributes
-    ----------
-    work : cycles times right-hand sides so far.
-    """
-
-    def __init__(
-        self,
-        problem: LubricationProblem,
-        cavity: NDArray[np.bool_],
-        M: Array | None = None,
-        given: NDArray[np.bool_] | None = None,
-    ):
-        """M : what cavitated cells store of a unit of void, in J's units; None: nothing is asked at a frequency.
-        given : points whose rows are those of the identity, as those of supplies are with A's diagonal."""
-        self.problem, self.grid, self.cavity, self.work = problem, problem.grid, cavity, 0
-        first, grid = finest.finest(problem), problem.grid
-        scheme = problem.scheme
-        self.held = given if scheme.held is None else scheme.held.ravel()
-        if given is not None:
-            mask = np.zeros_like(first.z)
-            finest.put(first, grid, mask, given.astype(float))
-            held.hold(first, mask, mask)
-        self._over = (
-            None if self.held is None else np.where(self.held, 1.0 / scheme.diagonal.ravel() if given is None else 1.0, 0.0)
-        )
-        self.leaves = -problem.scheme.b_C.ravel()  # q of a unit of void, with what a time step stores of it
-        self.stored = M = None if first.void else M
-        if M is not None:
-            first.void = np.zeros_like(first.z), np.zeros_like(first.z)
-            for into, values in zip(first.void, (self.leaves, M), strict=True):
-                finest.put(first, grid, into, values)
-        self.levels = levels.hierarchy(first, True)
-        full = np.zeros_like(first.z)
-        finest.put(first, grid, full, np.where(cavity, 0.0, 1.0))
-        self.full = [full > 0.0]
-        for fine, coarse in zip(self.levels[:-1], self.levels[1:], strict=True):
-            values = np.zeros_like(coarse.z)
-            transfer.inject(full, coarse.part(values), fine.first, fine.by_x, fine.by_y)
-            full = coarse.gather(values)
-            self.full.append(full > 0.0)
-        self.free = [None if level.held is None else ~level.held for level in self.levels]
-
-    def of(self, several: int, transposed: bool, nu: float = 0.0) -> None:
-        """Take so many right-hand sides, 1 or 2; at nu > 0 they are one, real and imaginary."""
-        self.several, self.transposed = several, transposed
-        self.z, self.c, self.rest = ([np.zeros((several, *level.z.shape)) for level in self.levels] for _ in range(3))
-        self.passed: list[tuple[Array | None, Array | None]] = [(level.carry, None) for level in self.levels]
-        if self.stored is not None:
-            self.passed = [(None, None)] * len(self.levels)
-        if nu:
-            for k, level in enumerate(self.levels):
-                leaves, stored = level.void  # type: ignore[misc]
-                part = leaves / (leaves + 1j * nu * stored + levels.LEAST)
-                self.passed[k] = np.ascontiguousarray(part.real), np.ascontiguousarray(part.imag)
-        self.inverse = None if nu else self._inverse()
-
-    def _inverse(self) -> Array | None:
-        """Of the coarsest grid's J or J', where it is small."""
-        level = self.levels[-1]
-        n, shape = level.nx * level.ny, (level.ny, level.nx)
-        if n > FEW or level.split:
-            return None
-        units = np.zeros((n, *level.z.shape))
-        units[:, 1:-1, 1:-1] = np.eye(n).reshape(n, *shape)
-        for one in units:
-            level.share(one)
-        out, free, none = np.zeros_like(units), self.free[-1], np.zeros_like(units)
-        data = units, self.full[-1], free, level.kx, level.ky, none, self.passed[-1][0]
-        if self.transposed:
-            frozen_kernels.transposed_residual(*data, out)
-        else:
-            frozen_kernels.residual(*data, None, out)
-        J = -out[:, 1:-1, 1:-1].reshape(n, n).T
-        if free is not None:
-            held = ~free[1:-1, 1:-1].ravel()
-            J[held], J[:, held], J[held, held] = 0.0, 0.0, 1.0
-        with np.errstate(all="ignore"):
-            scale = np.abs(J).max(axis=1)  # rows of a pressure and of void differ by much
-            try:
-                inverse = np.linalg.inv(J / scale[:, None]) / scale
-            except np.linalg.LinAlgError:
-                return None
-        return inverse if np.isfinite(inverse).all() else None
-
-    def mult(self, mat: PETSc.Mat | None, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """J x or J' x."""
-        np.negative(self._rest(x.array_r, self.free[0]), out=y.array)
-
-    def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """What one cycle makes of a right-hand side x."""
-        self._put(self.c[0], x.array_r)
-        self.z[0][:] = 0.0
-        self._run(0, "F")
-        self.work += self.several
-        self._own(self.z[0], y.array)
-
-    def _put(self, into: Array, values: Array) -> None:
-        for one, part in zip(into, values.reshape(self.several, -1), strict=True):
-            finest.put(self.levels[0], self.grid, one, part)
-
-    def _own(self, a: Array, out: Array | None = None) -> Array:
-        out = np.empty(len(a) * self.grid.local_size) if out is None else out
-        for one, into in zip(a, out.reshape(len(a), *self.grid.box), strict=True):
-            into[:] = finest.own(self.levels[0], self.grid, one)
-        return out
-
-    def _rest(self, x: Array, free: NDArray[np.bool_] | None) -> Array:
-        """-J x, at free points."""
-        self._put(self.z[0], x)
-        self.c[0][:] = 0.0
-        return self._own(self._residual(0, free))
-
-    def _residual(self, k: int, free: NDArray[np.bool_] | None) -> Array:
-        level, out = self.levels[k], self.rest[k]
-        data = self.z[k], self.full[k], free, level.kx, level.ky, self.c[k], self.passed[k][0]
-        if self.transposed:
-            frozen_kernels.transposed_residual(*data, out)
-        else:
-            frozen_kernels.residual(*data, self.passed[k][1], out)
-        return out
-
-    def _run(self, k: int, kind: str) -> None:
-        level, z, full = self.levels[k], self.z[k], self.full[k]
-        if k + 1 == len(self.levels) and self.inverse is not None:
-            inside = (slice(1, -1), slice(1, -1))
-            for one, c in zip(z, self.c[k], strict=True):
-                one[inside] = (self.inverse @ c[inside].ravel()).reshape(level.ny, level.nx)
-                level.share(one)
-            return
-        if k + 1 == len(self.levels):
-            for s in range(COARSEST * max(level.nx, level.ny)):
-                self._sweep(k, s % 2 == 1)
-            return
-        coarse, where = self.levels[k + 1], (level.first, level.by_x, level.by_y)
-        for _ in range(SWEEPS):
-            self._sweep(k, False)
-        c, rest = self.c[k + 1], self.rest[k] if self.transposed else self._residual(k, self.free[k])
-        c[:], self.z[k + 1][:] = 0.0, 0.0
-        for n in range(self.several):
-            into = coarse.part(c[n])
-            if self.transposed:
-                data = full, self.free[k], level.kx, level.ky, self.c[k][n], self.passed[k][0]
-                frozen_transfer.restrict(z[n], *data, into, *where, level.periodic[0])
-                coarse.collect(c[n])
-                c[n] *= self.full[k + 1]
-            else:
-                transfer.restrict(z[n], level.kx, level.ky, rest[n], into, *where, True, level.periodic[0], False, None)
-                coarse.collect(c[n])
-        self._run(k + 1, kind)
-        if kind == "F" and k + 2 < len(self.levels):
-            self._run(k + 1, "V")
-        for n, found in enumerate(self.z[k + 1]):
-            seen = coarse.part(found if self.transposed else found * self.full[k + 1])
-            frozen_transfer.correct(z[n], full, seen, level.kx, level.ky, *where, level.periodic[0], not self.transposed)
-            if level.held is not None:
-                z[n][level.held] = 0.0
-            level.share(z[n])
-        for _ in range(SWEEPS):
-            self._sweep(k, True)
-
-    def _sweep(self, k: int, down: bool) -> None:
-        level, z = self.levels[k], self.z[k]
-        data = z, self.full[k], self.free[k], level.kx, level.ky, self.c[k], down, self.passed[k][0]
-        if self.transposed:
-            frozen_kernels.transposed_sweep(*data)
-        else:
-            frozen_kernels.sweep(*data, self.passed[k][1])
-        for one in z:
-            level.share(one)
+class Frozen(Cycles):
+    """Solves with J, J + i nu M or J' of one problem. Collective, as its methods."""
 
     def solve(self, rows: Sequence[Array], transposed: bool = False, nu: float = 0.0, z: Array | None = None) -> Any:
         """(J + i nu M)^-1 b, complex, or J^-1 b, J'^-1 b for each b; None where cycles stall. Collective.
@@ -249,13 +75,17 @@ class Frozen:
         rtol, started, forced = TRANSPOSED if self.transposed else RTOL, [0.0], None if z is None else self._forced(z)
 
         def ended(ksp: PETSc.KSP, its: int, norm: float) -> int:
-            started[0] = started[0] if its else norm
+            started[0] = started[0] or norm
             reason = PETSc.KSP.ConvergedReason
             if not np.isfinite(norm) or its > MOST:
                 return int(reason.DIVERGED_MAX_IT)
             if norm > rtol * started[0]:
                 return int(reason.ITERATING)
-            if z is None or self._agree(ksp.buildSolution(seen).array_r.reshape(b.shape), forced, b, z):  # type: ignore[arg-type]
+            if z is None:
+                return int(reason.CONVERGED_RTOL)
+            answer = ksp.buildSolution(seen)
+            started[0] = min(started[0], answer.norm()) if its else started[0]
+            if norm <= rtol * started[0] and self._agree(answer.array_r.reshape(b.shape), forced, b, z):  # type: ignore[arg-type]
                 return int(reason.CONVERGED_RTOL)
             return int(reason.ITERATING if norm > LEAST * started[0] else reason.DIVERGED_BREAKDOWN)
 
@@ -266,6 +96,10 @@ class Frozen:
             ksp.getPC().setPythonContext(self)
             ksp.setConvergenceTest(ended)
             rhs.setArray(b.ravel())
+            if self.transposed and np.isfinite(first := self.nested(b)).all():
+                x.setArray(first)
+                ksp.setInitialGuessNonzero(True)
+                started[0] = x.norm()  # nearly that of M b
             ksp.solve(rhs, x)
             return x.array_r.reshape(b.shape) * sizes.reshape(-1, 1) if ksp.getConvergedReason() > 0 else None
         finally:

@@ -7,7 +7,7 @@ from ...base.compiled import kernel
 from ...base.parallel import Array
 from .fronts import reforms
 from .frozen_kernels import Mask, transposed_row
-from .transfer import coarse_rows, interpolate_row, mix, restrict_row, share, west_shares
+from .transfer import coarse_rows, interpolate_row, mix, share, west_shares
 
 
 @kernel
@@ -17,8 +17,11 @@ def sides_of(ky: Array, full: Mask, m: int, out: Array, ring: bool) -> None:
     Where the film reforms, what flows back into the cavity returns: a point between that and a coarse point in the full film
     is corrected as the latter.
     """
+    fronts = 0
     for i in range(1, out.size - 1):
         out[i] = share(ky[m, i], ky[m + 1, i], True)
+        fronts += full[m, i] & (full[m - 1, i] != full[m + 1, i])
+    for i in range(1, out.size - 1 if fronts else 1):
         if full[m, i]:
             if not full[m - 1, i] and full[m + 1, i] and reforms(full, m - 1, i, ring):  # type: ignore[arg-type]
                 out[i] = 0.0
@@ -62,26 +65,55 @@ def restrict(
 ) -> None:  # fmt: skip
     """Add to `out` what c - J' l of the full points gives to the coarse ones: `correct` with fronts, transposed."""
     nx, size = l.shape[1] - 2, out.shape[1]
-    w, line, part, v = np.zeros(size - 1), np.zeros(size), np.zeros(nx + 2), np.zeros(nx + 2)
-    here = np.zeros(nx + 2)
+    w, v, here = np.zeros(size - 1), np.zeros(nx + 2), np.zeros(nx + 2)
     for m in range(1, l.shape[0] - 1):
         transposed_row(l, full, free, kx, ky, c, carry, m, here)
+        fronts = 0
         for i in range(1, nx + 1):
-            if not full[m, i]:
-                here[i] = 0.0
+            here[i] *= full[m, i]
+        for i in range(1, nx + 1):
+            fronts += full[m, i] > full[m, i - 1]
         if by_x:
             west_shares(kx[m], True, w)
-            for i in range(1, nx, 2):
+            for i in range(1, nx if fronts else 1, 2):
                 if full[m, i] and not full[m, i - 1] and full[m, i + 1]:
                     here[i + 1] += here[i]
                     here[i] = 0.0
         row, last = coarse_rows(y0 + m - 1, y0, m, by_y)
         if last > row:
             sides_of(ky, full, m, v, ring)
-            for i in range(1, nx + 1):
-                part[i] = v[i] * here[i]
-                here[i] -= part[i]
-            restrict_row(part, w, by_x, ring, line)
-            out[row] += 0.5 * line
-        restrict_row(here, w, by_x, ring, line)
-        out[last] += 0.5 * line if by_y else line
+            deal(here, v, w, by_x, ring, out[row], out[last])
+        else:
+            deal_to_one(here, w, by_x, ring, 0.5 if by_y else 1.0, out[last])
+
+
+@kernel
+def deal(r: Array, v: Array, w: Array, by_x: bool, ring: bool, south: Array, north: Array) -> None:
+    """Half of what a line between two coarse ones, zero in the frame, gives to the points of these, v of it to the south."""
+    if not by_x:
+        for i in range(1, r.size - 1):
+            part = v[i] * r[i]
+            south[i] += 0.5 * part
+            north[i] += 0.5 * (r[i] - part)
+        return
+    for k in range(1, south.size - 1):
+        west, east = 0.5 * (1.0 - w[k - 1]) * r[2 * k - 1], 0.5 * w[k] * r[2 * k + 1]
+        part = v[2 * k] * (0.5 * r[2 * k]) + (v[2 * k - 1] * west + v[2 * k + 1] * east)
+        south[k] += part
+        north[k] += 0.5 * r[2 * k] + (west + east) - part
+    if ring:  # what goes to the frame belongs to the last point
+        first = 0.5 * w[0] * r[1]
+        south[-2] += v[1] * first
+        north[-2] += (1.0 - v[1]) * first
+
+
+@kernel
+def deal_to_one(r: Array, w: Array, by_x: bool, ring: bool, part: float, out: Array) -> None:
+    """That part of what a line on a coarse one gives to its points."""
+    if not by_x:
+        out += part * r
+        return
+    for k in range(1, out.size - 1):
+        out[k] += part * (r[2 * k] + ((1.0 - w[k - 1]) * r[2 * k - 1] + w[k] * r[2 * k + 1]))
+    if ring:
+        out[-2] += part * w[0] * r[1]
