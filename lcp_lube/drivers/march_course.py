@@ -59,8 +59,10 @@ def _pressures(problem: Any, p: Array) -> tuple[float, ...]:
 def check_march(scene: Scene) -> None:
     """Raise InputError for a march whose derivatives are not known, with the reason."""
     model: Any = scene.models()(0.0, None)  # type: ignore[attr-defined]
+    dense = model.law is not None and model.law.dowson_higginson
     for found, what in (
-        (bool(model.effects) or (model.law is not None and model.law.dowson_higginson), "effects and densities that change"),
+        (bool(model.effects), "effects"),
+        (dense and bool(model.supplies or getattr(scene, "grooves_deg", ())), "what supplies a fluid whose density changes"),
         (any(one.open for one in model.supplies) and scene.motion.free, "supplies that follow beside a journal that is free"),  # type: ignore[attr-defined]
         (model.U < 0, "a wall that moves to smaller x (give the mirror image, with -U)"),
         (hasattr(scene, "observer"), "events"),
@@ -110,12 +112,18 @@ class Course:
         return March(self.grid, self.table.scheme == "bdf2", dts=before).formula(steps[n - 1].dt)
 
     def content(self, n: int) -> Array:
-        """h (1 - r) at the end of step n; those of the last few are kept."""
+        """h (1 - r), times the density, at the end of step n; those of the last few are kept."""
         if n not in self.known:
             kept = self.kept(n)
             self.known = {k: a for k, a in self.known.items() if abs(k - n) <= 2}
-            self.known[n] = contents(self.grid, self.film(n), None if kept is None else {"r": kept.r})
+            film = contents(self.grid, self.film(n), None if kept is None else {"r": kept.r})
+            self.known[n] = film * self.density(n)
         return self.known[n]
+
+    def density(self, n: int) -> Any:
+        """At the end of step n, over that at p_c."""
+        kept, law = self.kept(n), self.first.law
+        return 1.0 if kept is None or law is None else law.density(kept.p)
 
     def at(self, n: int, shift: Any = 0.0, pressures: Sequence[float] = ()) -> Equations:
         """G and Q of step n; n = 0: of the steady film that it begins with. pressures : of the supplies, other than its own."""

@@ -108,9 +108,9 @@ class MarchGradient:
         forces = FORCES if self.course.table.free and n else ()
         slopes = {part: eq.slope(p, r, part) for part in dict.fromkeys([*(q for one in parts.values() for q in one), *forces])}
         later = self._later(n)
-        left = np.where(
-            cavity, 2.0 * grid.spacing[0] * point_weights(grid) * mean_film(grid, self.course.film(n).film).ravel(), 0.0
-        )
+        of_full = 0.0 if eq.law is None else (1.0 - r) * eq.law.density_slope(p) * eq.constant.p_unit
+        left = 2.0 * grid.spacing[0] * point_weights(grid) * mean_film(grid, self.course.film(n).film).ravel()
+        left *= np.where(cavity, 1.0, of_full)  # of the content, by z
         rows = {
             name: right_side(slopes, parts.get(name, {}), cavity)
             + left * sum(part * self.lambdas[name][m] / self.units[m] for m, part in later)
@@ -144,7 +144,7 @@ class MarchGradient:
         weight, inertia = course.formula(n).weight, course.table.mass * course.scene.turning.c
         h = mean_film(course.grid, course.film(n).film)
         d = NUDGE * course.grid.reduce.min(h) / course.scene.turning.c
-        size = 2.0 * course.grid.spacing[0] * point_weights(course.grid) * (1.0 - kept.r)
+        size = 2.0 * course.grid.spacing[0] * point_weights(course.grid) * (1.0 - kept.r) * course.density(n)
         by_place = []  # of G, h and the numbers told, by X and Y
         for shift in np.eye(2) * d:
             ends = []

@@ -182,7 +182,7 @@ def _given(problem: LubricationProblem, tangent: Tangent, cells: NDArray[np.bool
     grid, s = problem.grid, problem.scheme
     size = volume_unit(problem)
     rows = np.where(cells.reshape(grid.box), size, 0.0)
-    dp = rows * sum(tangent.own)
+    dp = rows * (sum(tangent.own) + tangent.stored)
     east, west, north, south = 1, 0, 3, 2  # of `around`: a row's part by its neighbour's p is that neighbour's
     for other, from_there in zip(tangent.other, (east, west, north, south), strict=True):
         dp = dp + np.nan_to_num(around(grid.ghosted((rows * other).ravel()))[from_there])
