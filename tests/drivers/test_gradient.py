@@ -259,6 +259,14 @@ def test_edges_across_the_lines_have_no_derivative():
     assert found.gradient["taper"] == pytest.approx((depths[1] - depths[-1]) / (2e-4 * scene.taper), rel=1e-6)
 
 
+def test_round_rims_have_no_derivative():
+    """They are looked for at places between two points: by their size nothing changes next to it (the load's slope was told 0)."""
+    scene = load_scene("dimpled_pad", {"nx": 30, "ny": 29, "film.dimples.form": "round"})
+    with solve(scene) as solution:
+        (found,) = gradients(scene, solution, ["load"], ["film.dimples.size", "film.dimples.depth"])
+    assert "on this grid" in found.held["film.dimples.size"] and set(found.gradient) == {"film.dimples.depth"}
+
+
 def test_cells_about_to_change_are_counted():
     """A film at rest without pressures: p = r = 0 everywhere; and two points that tie for the largest pressure."""
     scene = load_scene("problem1", n=21, U=0.0)

@@ -103,6 +103,11 @@ class DimpleArray:
         centres = start + (end - start) * (np.arange(self.columns) + 0.5) / self.columns
         return tuple(np.concatenate([centres + k * self.size for k in (-0.5, 0.0, 0.5)]))
 
+    @property
+    def oblique(self) -> bool:
+        """Whether edges run across the lines of points (`edges.oblique`)."""
+        return self.form == "round"
+
     def rim(self, x: Array, y: Array) -> Array:
         """Distance (m) from the rim of the nearest round recess, negative inside it."""
         across, along = _distance(x, *self.x, self.columns), _distance(y, *self.y, self.rows)
