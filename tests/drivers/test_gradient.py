@@ -260,7 +260,7 @@ def test_edges_across_the_lines_have_no_derivative():
 
 
 def test_round_rims_have_no_derivative():
-    """They are looked for at places between two points: by their size nothing changes next to it (the load's slope was told 0)."""
+    """They are looked for at places between two points: by their size L has steps alone (a load was told to have slope 0)."""
     scene = load_scene("dimpled_pad", {"nx": 30, "ny": 29, "film.dimples.form": "round"})
     with solve(scene) as solution:
         (found,) = gradients(scene, solution, ["load"], ["film.dimples.size", "film.dimples.depth"])
