@@ -1,6 +1,5 @@
 """Accuracy asked for: grids from coarse to fine, until the estimated relative error of a quantity is below a tolerance."""
 
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import count
@@ -35,7 +34,6 @@ FEW_PAIRS = 200  # of a film whose load is estimated from each two grids: these 
 ALGEBRAIC = 1e-3  # ||F|| relative to the tolerance: with many small cavities it leaves up to 60 times itself in a load
 ALLOWED = (1e-10, 0.5)  # tolerances
 SOON = 3e-3  # a tolerance below which most films in 2D end on grids for multigrid
-LOOPS = "lcp_lube.solvers.fas.loops"  # multigrid's, which take as long to load as ten small grids to solve
 WHOLE = {True: 20_000, False: 1500}  # points up to which looking for symmetries costs what it saves, by multigrid or directly
 HOPELESS = 1_000_000  # points on which an estimate that has not come down is taken to stay up
 PATIENCE = 6  # grids without a better estimate: rounding dominates
@@ -95,7 +93,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     told = Values(line, pairs)
     levels: list[dict[str, Any]] = []
     times: dict[str, float] = {}
-    end, soon = "", tol < SOON or LOOPS in sys.modules
+    end, soon = "", tol < SOON
     while not end:
         level_begin, before = perf_counter(), solution
         near = ask.start if before is None else _start(before, prod(shape)) if ask.nested is not False else None
