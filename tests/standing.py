@@ -45,8 +45,15 @@ def ask(path: str, words: list[str]) -> None:
     child = told(connection)
     if child == 0:
         os.execv(sys.executable, [sys.executable, *words])
+
+    def forward(number: int, _: object) -> None:
+        try:  # noqa: SIM105  contextlib takes time to import
+            os.kill(child, number)
+        except ProcessLookupError:  # it has ended, and its status is on the way
+            pass
+
     for number in FORWARDED:
-        _signal.signal(number, lambda number, _: os.kill(child, number))
+        _signal.signal(number, forward)
     status = told(connection)
     if status < 0:
         if -status in FORWARDED:
