@@ -27,10 +27,9 @@ from .ask import Ask, Start
 from .compose import Inner
 from .coupling_file import CouplingFile
 from .levels import level_shapes
-from .loop import SETTLED, Loop
+from .loop import Loop, settled
 
 ROUNDED = 2.0**-50  # relative error of p made of q, at most
-IN_TIME = (1e-2, 5e-5)  # of what a time step changes, and at most: change of its coefficients at which they count as found
 NESTED_ABOVE = 2_000  # points from which the fields are first found on coarser grids
 
 
@@ -53,7 +52,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     InputError : a scheme that has no faces where densities or lifts could act.
     """
     model: Model = scene.model  # type: ignore[attr-defined]
-    if not model.effects and not (model.law and model.law.dowson_higginson):
+    if not model.effects and not model.dense:
         loop = Loop(scene, _reduced(ask, model.law), inner)
         loop.film({})
         loop.change = 0.0
@@ -77,7 +76,7 @@ def _settled_on(scene: Solvable, ask: Ask, inner: Inner, file: CouplingFile) -> 
             coarse = _coarser(scene, inside, inner, loop, file)
             known = _taken(loop, coarse.problem) if coarse is not None else None
         begin = loop.vector(known or neutral(loop.effects, loop.h.size))
-    loop.settle(begin, _settled(ask, loop), lambda: file.save(loop))
+    loop.settle(begin, settled(ask, loop.model.stored, loop.moved), lambda: file.save(loop))
     if loop.solution is None or (ask.certify and loop.answer is not None):  # all of its films were taken from the file
         loop.again(ask.certify)
     if coarse is not None:
@@ -133,17 +132,6 @@ def _coarser(scene: Solvable, ask: Ask, inner: Inner, loop: Loop, file: Coupling
     return found
 
 
-def _settled(ask: Ask, loop: Loop) -> float:
-    """Relative change of the coefficients at which they count as found: by the eps1 asked for, not by a method's own.
-
-    In a time step as far as its formula's error makes sense of it, a part of what the step changes: nothing is lost by that, as
-    what cells store has the very density that flows.
-    """
-    stored, settled = loop.model.stored, SETTLED * ask.stopping_for((1e-8, 1e-8)).eps1
-    in_time = stored is not None and not stored.exact and ask.stopping is None
-    return max(settled, min(IN_TIME[0] * loop.moved, IN_TIME[1])) if in_time else settled
-
-
 def _loose(ask: Ask) -> dict:
     """A start's tolerances."""
     given = ask.stopping_for((1e-8, 1e-8))
@@ -174,9 +162,9 @@ def _told(ask: Ask, loop: Loop) -> Solution:
                 problem.more_measures |= told.measures
                 failure = failure or told.failure
         problem.more_measures["coupling"] = loop.change
-        if failure and loop.change <= _settled(ask, loop):
+        if failure and loop.change <= settled(ask, loop.model.stored, loop.moved):
             outcome, message = Outcome.NO_SOLUTION, failure
-        elif solution.converged and not loop.change <= _settled(ask, loop):
+        elif solution.converged and not loop.change <= settled(ask, loop.model.stored, loop.moved):
             outcome = Outcome.MAX_ITERATIONS
             message = f"the coefficients still change by {loop.change:.1e} after {loop.solves} films ({', '.join(loop.names)})"
         elif not solution.converged:

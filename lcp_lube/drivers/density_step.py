@@ -25,9 +25,8 @@ from ..scenes.scene import Solvable
 from ..solvers.relaxation import relaxation
 from .ask import Ask
 from .linearised import Entries, Linear
-from .loop import SETTLED, Frozen
+from .loop import Frozen, settled
 
-LEFT, MOST_LEFT = 0.01, 5e-5  # of what the densities foreseen are off by, and of a density: what may be left
 WHY = "density: Newton's method on each step as a whole, the law linearised exactly"
 SWEEPS = 16  # once two steps have not halved what is left
 IN_VAIN = 8  # steps that do not halve what is left, after which `coupling` takes over
@@ -36,7 +35,7 @@ IN_VAIN = 8  # steps that do not halve what is left, after which `coupling` take
 def applies(scene: Solvable, ask: Ask) -> bool:
     """Whether it is such a step, from the one before, by Newton's method."""
     model: Model = scene.model  # type: ignore[attr-defined]
-    alone = model.law is not None and model.law.dowson_higginson and not model.effects and not model.grooves
+    alone = model.dense and not model.effects and not model.grooves
     plain = ask.method == "active-set" and not ask.certify and model.scheme == "face"
     return alone and plain and model.stored is not None and ask.start is not None and "method" in ask.start.settings
 
@@ -50,10 +49,8 @@ def solve(scene: Any, ask: Ask) -> Solution | None:
     u = near.problem.p_unit / unit  # type: ignore[attr-defined]
     at = film.at(np.where((near.fields["r"] > 0) & ~(near.fields["p"] > 0), -near.fields["r"], near.fields["p"] * u))
     sweeps = ask.options.get("sweeps", 0)
-    settled = SETTLED * ask.stopping_for((1e-8, 1e-8)).eps1
-    exact = ask.stopping is not None or scene.model.stored.exact
     steps: list[Step] = []
-    allowed = settled if exact else max(settled, min(LEFT * at.size, MOST_LEFT))
+    allowed = settled(ask, scene.model.stored, at.size)  # the first densities are those foreseen
     least, vain = np.inf, 0
     while not (steps and at.size <= allowed):
         vain = 0 if at.size < 0.5 * least else vain + 1
@@ -100,7 +97,7 @@ class _Film:
         model = scene.model
         self.law: Law = model.law
         self.base: Any = Frozen(scene, self.law).build(ask.comm)
-        self.p_sides = tuple(side.p if side.kind == "open" else 0.0 for side in model.sides)
+        self.p_sides = model.p_sides
         self._densities = [float(self.law.density(np.array(p))) for p in self.p_sides]
         held = self.base.held
         self._free = True if held is None else ~held.mask.ravel()

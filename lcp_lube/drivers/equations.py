@@ -75,7 +75,7 @@ class Equations:
         self.scene, self.turned = scene, model.U < 0
         film: Any = Mirrored(scene) if self.turned else scene
         model = film.model
-        self.law, self._p_sides = model.law, tuple(side.p if side.kind == "open" else 0.0 for side in model.sides)
+        self.law, self._p_sides = model.law, model.p_sides
         film = Frozen(film, self.law) if self.law else film
         self.model: Model = film.constant if self.law else model
         places = None if near is None or near.grid.even else followed(near.grid, near.model, self.model)

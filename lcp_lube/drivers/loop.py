@@ -14,6 +14,7 @@ from ..problems.film.effects import Answer, Cells, Compressible, Effect, FaceFac
 from ..problems.film.fluid import Law
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
+from ..problems.film.stored import Stored
 from ..problems.grid import EVEN
 from ..problems.solution import Solution
 from ..scenes.scene import Derived, Solvable
@@ -24,6 +25,7 @@ from .compose import Inner
 MOST_SOLVES, LONG = 100, 300  # films; and while the least change has fallen to a tenth within as many as
 PATIENCE = 50
 SETTLED = 0.1  # of eps1: relative change of the coefficients at which they count as found
+IN_TIME = (1e-2, 5e-5)  # the same in a time step: of what it changes, and at most
 MEMORY = 30  # answers that Anderson's method combines; -coupling_snes_anderson_m changes it
 CYCLE = 25  # steps after which it begins anew: its least squares see no changes 1e-8 of the largest that they remember
 FEW, NEAR, AWAY = 1, 0.3, 30.0  # answers combined while a coefficient changes by more than NEAR; AWAY: times the least change
@@ -84,7 +86,7 @@ class Loop:
             raise InputError(f"{scene.name}: scheme = {self.model.scheme}: {what} needs scheme = face")
         self.frozen = Frozen(scene, self.law, None, all(effect.even for effect in self.effects))
         self.base = self.frozen.build(ask.comm)
-        self.p_sides = tuple(side.p if side.kind == "open" else 0.0 for side in self.model.sides)
+        self.p_sides = self.model.p_sides
         self.h = self.base.scheme.h.ravel()
         self.names = list(neutral(self.effects, 0))
         self.solution: Solution | None = None  # the last one
@@ -254,6 +256,17 @@ class Loop:
         snes.solve(None, x)
         for obj in (snes, f):
             obj.destroy()
+
+
+def settled(ask: Ask, stored: Stored | None, moved: float) -> float:
+    """Relative change of the coefficients at which they count as found: by the eps1 asked for, not by a method's own.
+
+    In a time step, which is expected to change them by `moved`, as far as its formula's error makes sense of it, a part of
+    that: nothing is lost by it, as what cells store has the very density that flows.
+    """
+    found = SETTLED * ask.stopping_for((1e-8, 1e-8)).eps1
+    in_time = stored is not None and not stored.exact and ask.stopping is None
+    return max(found, min(IN_TIME[0] * moved, IN_TIME[1])) if in_time else found
 
 
 def _thick(lift: Array) -> Array:

@@ -59,10 +59,12 @@ def _pressures(problem: Any, p: Array) -> tuple[float, ...]:
 def check_march(scene: Scene) -> None:
     """Raise InputError for a march whose derivatives are not known, with the reason."""
     model: Any = scene.models()(0.0, None)  # type: ignore[attr-defined]
-    dense = model.law is not None and model.law.dowson_higginson
     for found, what in (
         (bool(model.effects), "effects"),
-        (dense and bool(model.supplies or getattr(scene, "grooves_deg", ())), "what supplies a fluid whose density changes"),
+        (
+            model.dense and bool(model.supplies or getattr(scene, "grooves_deg", ())),
+            "what supplies a fluid whose density changes",
+        ),
         (any(one.open for one in model.supplies) and scene.motion.free, "supplies that follow beside a journal that is free"),  # type: ignore[attr-defined]
         (model.U < 0, "a wall that moves to smaller x (give the mirror image, with -U)"),
         (hasattr(scene, "observer"), "events"),

@@ -80,7 +80,7 @@ class Run:
         if chosen.method == "active-set":  # the steps before have the front to within a cell or two: see `_sweeps`
             self.may_sweep = "sweeps" not in ask.options
             ask = replace(ask, options={"sweeps": 0, **ask.options})
-        coupled = bool(first.effects) or (first.law is not None and first.law.dowson_higginson)
+        coupled = bool(first.effects) or first.dense
         self.march.curved = coupled
         loose = chosen.method == "fas" and self.rotor is None and not coupled  # those want an answer to the last digit
         if loose and ask.options.get("rest", REST):

@@ -74,8 +74,7 @@ class NearFilms:
         model: Model = film.model
         if model.U <= 0.0 or model.effects or not self._alike(model, film.shape):
             return None
-        p_sides = tuple(side.p if side.kind == "open" else 0.0 for side in model.sides)
-        if (G := self._balances(model, p_sides)) is None:
+        if (G := self._balances(model, p_sides := model.p_sides)) is None:
             return None
         lean, near = copy(eq), copy(eq.constant)
         near.mu, near.U, near.p_c, near.p_sides = model.mu, model.U, model.p_c, p_sides  # type: ignore[assignment]

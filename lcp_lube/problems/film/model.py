@@ -107,6 +107,16 @@ class Model:
         return fed or not self.U or self.sides[0].kind != "periodic"
 
     @property
+    def p_sides(self) -> tuple[float, ...]:
+        """Pressures of the sides, Pa above p_c; 0 where none is given."""
+        return tuple(side.p if side.kind == "open" else 0.0 for side in self.sides)
+
+    @property
+    def dense(self) -> bool:
+        """Whether the density follows the pressure."""
+        return self.law is not None and self.law.dowson_higginson
+
+    @property
     def film(self) -> Film:
         """The gap, asked beyond a side that is not open only for what lies inside."""
         dims = len(self.lengths)
@@ -175,7 +185,6 @@ class Model:
             return TurnedProblem(self.mirrored.build(shape, comm), self.exact)
         west = self.sides[0]
         shared, grid = grid is not None, grid or self.grid(shape, comm)
-        p_sides = tuple(side.p if side.kind == "open" else 0.0 for side in self.sides)
         film = self.film
         exact = self.integrals and grid.dim == 1 and self.scheme == "face" and not self.mean_cubes and not self.stored
         integrals = line_integrals(grid, film) if exact and "mirror" not in grid.ends[0] else None
@@ -188,7 +197,7 @@ class Model:
             mu=self.mu,
             U=self.U,
             p_unit=self.p_unit,
-            p_sides=p_sides,  # type: ignore[arg-type]
+            p_sides=self.p_sides,  # type: ignore[arg-type]
             p_c=self.p_c,
             film=film,
             exact=self.exact,
@@ -209,9 +218,8 @@ class Model:
     @property
     def _data(self) -> dict[str, Any]:
         """What the box scheme is told beside grid and film."""
-        p_sides = tuple(side.p if side.kind == "open" else 0.0 for side in self.sides)
         given = {name: getattr(self, name) for name in ("mu", "U", "scheme", "p_unit", "mean_cubes")}
-        return {**given, "p_sides": p_sides, "r_in": self.sides[0].r, "stored": self.stored}
+        return {**given, "p_sides": self.p_sides, "r_in": self.sides[0].r, "stored": self.stored}
 
     def film_slopes(self, problem: LubricationProblem) -> BoxScheme:
         """Derivatives of the coefficients of a problem that was built from this (U >= 0) by its film. Collective.
