@@ -15,7 +15,7 @@ import numpy as np
 
 from ...base.compiled import kernel
 from ...base.parallel import Array
-from .waiting import await_part, write
+from .waiting import await_part, fetch, write
 
 
 @kernel
@@ -42,88 +42,105 @@ def sweep(
     ny, nx = z.shape[0] - 2, z.shape[1] - 2
     step, first = (-1, ny) if down else (1, 1)
     parts = 1 if done is None else done.shape[0]
-    own = 1 if part else 0  # column 0 of what follows is the last one of the part before
-    at, taken = nx * part // parts - own, 0
-    n = nx * (part + 1) // parts - at
-    t, over, g = np.zeros((3, n)), np.zeros((5, n)), np.zeros((5, n))
+    start, end, taken = nx * part // parts + 1, nx * (part + 1) // parts + 1, 0
+    at = start - 1 if part else start  # the first column of what follows: the last one of the part before
+    t, over, g = np.zeros((3, nx + 2)), np.zeros((5, nx + 2)), np.zeros((5, nx + 2))
     for before in range(0, count, 3):
         fused = min(count - before, 3)
         for s in range(ny + 2 * (fused - 1)):
+            m = first + step * s
             if s < ny:
-                m = first + step * s
-                diagonals(kx[m, at:], ky[m, at:], ky[m + 1, at:], over[s % 5], g[s % 5])
+                diagonals(kx, ky, m, at, end, over, g, s % 5)
             if done is not None:
                 await_part(done, part + 1, taken - 1)
                 await_part(done, part - 1, taken + 1)
             for k in range(fused):
                 if 0 <= s - 2 * k < ny:
-                    arriving(z, kx, ky, c, first + step * (s - 2 * k), t[k], at, carry)
+                    arriving(z, kx, ky, c, m - 2 * k * step, at, end, t, k, carry)
                     if west is not None and part:
-                        t[k, 0] = west[part - 1, taken % west.shape[1], k]
+                        t[k, at] = west[part - 1, taken % west.shape[1], k]
                     if carry is not None:
-                        pass_on_part(t[k], g[(s - 2 * k) % 5], carry[first + step * (s - 2 * k)])
+                        pass_on_part(t, k, g, (s - 2 * k) % 5, carry, m - 2 * k * step, end)
             if carry is None:
-                pass_on(t[0], t[1], t[2], g[s % 5], g[(s - 2) % 5], g[(s - 4) % 5])
+                pass_on(t, g, s % 5, (s - 2) % 5, (s - 4) % 5, z, kx, ky, c, m + step, m + 2 * step, at, end)
             for k in range(fused):
                 if 0 <= s - 2 * k < ny:
-                    settle(t[k, own:], over[(s - 2 * k) % 5, own:], z[first + step * (s - 2 * k), at + own :], ring)
+                    settle(t, k, over, (s - 2 * k) % 5, z, m - 2 * k * step, start, end, ring)
             if done is not None and west is not None:
-                west[part, taken % west.shape[1], :3] = t[:, -1]
+                west[part, taken % west.shape[1], :3] = t[:, end - 1]
                 taken += 1
                 write(done, part, taken)
 
 
 @kernel
-def diagonals(k_x: Array, k_S: Array, k_N: Array, over: Array, g: Array) -> None:
-    """Of a row: one over the sum of each point's conductances, and what part of its west neighbour's t they make arrive."""
-    for i in range(over.size):
-        over[i] = 1.0 / ((k_x[i + 1] + k_x[i + 2]) + (k_S[i + 1] + k_N[i + 1]))
-    for i in range(1, g.size):
-        g[i] = k_x[i + 1] * over[i - 1]
+def diagonals(kx: Array, ky: Array, m: int, at: int, end: int, over: Array, g: Array, slot: int) -> None:
+    """Of row m, columns at to end - 1: one over the sum of each point's conductances, and what part of its west neighbour's t
+    they make arrive.
+
+    Rows are told by their numbers, as a view of a row costs as much as some hundred points; columns are unsigned, as only
+    loops in which no index can count from the end are turned into vector instructions.
+    """
+    for i in range(np.uint32(at), np.uint32(end)):
+        over[slot, i] = 1.0 / ((kx[m, i] + kx[m, i + 1]) + (ky[m, i] + ky[m + 1, i]))
+    for i in range(np.uint32(at + 1), np.uint32(end)):
+        g[slot, i] = kx[m, i] * over[slot, i - 1]
 
 
 @kernel
-def arriving(z: Array, kx: Array, ky: Array, c: Array, m: int, t: Array, at: int, carry: Array | None = None) -> None:
-    """What arrives at the points of row m from column `at` on, from all sides but west; at the first one from there too."""
-    k_x, source, z_S, here, z_N = kx[m, at:], c[m, at:], z[m - 1, at:], z[m, at:], z[m + 1, at:]
-    k_S, k_N = ky[m, at:], ky[m + 1, at:]
-    for i in range(t.size):
-        t[i] = (source[i + 1] + k_x[i + 2] * max(here[i + 2], 0.0)) + (
-            k_S[i + 1] * max(z_S[i + 1], 0.0) + k_N[i + 1] * max(z_N[i + 1], 0.0)
+def arriving(
+    z: Array, kx: Array, ky: Array, c: Array, m: int, at: int, end: int, t: Array, k: int, carry: Array | None
+) -> None:
+    """What arrives at these points from all sides but west; at the first one from there too."""
+    for i in range(np.uint32(at), np.uint32(end)):
+        t[k, i] = (c[m, i] + kx[m, i + 1] * max(z[m, i + 1], 0.0)) + (
+            ky[m, i] * max(z[m - 1, i], 0.0) + ky[m + 1, i] * max(z[m + 1, i], 0.0)
         )
-    t[0] += z[m, at] * (kx[m, at + 1] if z[m, at] > 0.0 else 1.0 if carry is None else carry[m, at])
+    west = z[m, at - 1]
+    t[k, at] += west * (kx[m, at] if west > 0.0 else 1.0 if carry is None else carry[m, at - 1])
 
 
 @kernel
-def pass_on(t1: Array, t2: Array, t3: Array, g1: Array, g2: Array, g3: Array) -> None:
-    """Add to each point's t what arrives from the west: void as it is, of a pressure t over the diagonal what the face lets."""
-    w1, w2, w3 = t1[0], t2[0], t3[0]
-    for i in range(1, t1.size):
+def pass_on(
+    t: Array, g: Array, g1: int, g2: int, g3: int,
+    z: Array, kx: Array, ky: Array, c: Array, after: int, beyond: int, at: int, end: int,
+) -> None:  # fmt: skip
+    """Add to each point's t what arrives from the west: void as it is, of a pressure t over the diagonal what the face lets.
+
+    Each step waits for the one before. Meanwhile memory is asked for what the next row, `after`, needs.
+    """
+    w1, w2, w3 = t[0, at], t[1, at], t[2, at]
+    for i in range(np.uint32(at + 1), np.uint32(end)):
+        if i % 8 == 1:
+            fetch(z, beyond, i)
+            fetch(kx, after, i)
+            fetch(ky, beyond, i)
+            fetch(c, after, i)
         if min(w1, w2, w3) > 0.0:  # nearly always all are the same: a branch, which is foreseen, and no choices in the chain
-            w1, w2, w3 = t1[i] + w1 * g1[i], t2[i] + w2 * g2[i], t3[i] + w3 * g3[i]
+            w1, w2, w3 = t[0, i] + w1 * g[g1, i], t[1, i] + w2 * g[g2, i], t[2, i] + w3 * g[g3, i]
         elif max(w1, w2, w3) <= 0.0:
-            w1, w2, w3 = t1[i] + w1, t2[i] + w2, t3[i] + w3
+            w1, w2, w3 = t[0, i] + w1, t[1, i] + w2, t[2, i] + w3
         else:
-            w1 = t1[i] + w1 * (g1[i] if w1 > 0.0 else 1.0)
-            w2 = t2[i] + w2 * (g2[i] if w2 > 0.0 else 1.0)
-            w3 = t3[i] + w3 * (g3[i] if w3 > 0.0 else 1.0)
-        t1[i], t2[i], t3[i] = w1, w2, w3
+            w1 = t[0, i] + w1 * (g[g1, i] if w1 > 0.0 else 1.0)
+            w2 = t[1, i] + w2 * (g[g2, i] if w2 > 0.0 else 1.0)
+            w3 = t[2, i] + w3 * (g[g3, i] if w3 > 0.0 else 1.0)
+        t[0, i], t[1, i], t[2, i] = w1, w2, w3
 
 
 @kernel
-def pass_on_part(t: Array, g: Array, carry: Array) -> None:
+def pass_on_part(t: Array, k: int, g: Array, slot: int, carry: Array, m: int, end: int) -> None:
     """The same for one row whose cells store void."""
-    for i in range(1, t.size):
-        t[i] += t[i - 1] * (g[i] if t[i - 1] > 0.0 else carry[i])
+    for i in range(np.uint32(2), np.uint32(end)):
+        t[k, i] += t[k, i - 1] * (g[slot, i] if t[k, i - 1] > 0.0 else carry[m, i - 1])
 
 
 @kernel
-def settle(t: Array, over: Array, z: Array, ring: bool) -> None:
+def settle(t: Array, k: int, over: Array, slot: int, z: Array, m: int, start: int, end: int, ring: bool) -> None:
     """Each point's balance solved: a pressure where something arrives, else the flow of void."""
-    for i in range(t.size):
-        z[i + 1] = t[i] * (over[i] if t[i] > 0.0 else 1.0)
+    for i in range(np.uint32(start), np.uint32(end)):
+        z[m, i] = t[k, i] * (over[slot, i] if t[k, i] > 0.0 else 1.0)
     if ring:
-        z[0], z[t.size + 1] = z[t.size], z[1]
+        nx = z.shape[1] - 2
+        z[m, 0], z[m, nx + 1] = z[m, nx], z[m, 1]
 
 
 @kernel

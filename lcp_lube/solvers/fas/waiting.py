@@ -1,7 +1,9 @@
-"""How the threads of a sweep wait for one another: numbers that one writes and another reads, in the order of the work."""
+"""How the threads of a sweep wait for one another, by numbers that one writes and another reads in the order of the work; and
+how memory is asked for rows before their turn."""
 
 from typing import Any
 
+from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
@@ -41,8 +43,26 @@ def _place(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
     return builder.gep(numbers.data, [at])
 
 
+@intrinsic
+def _fetch(context: Any, rows: Any, m: Any, i: Any) -> Any:
+    """Have what follows rows[m, i] brought near, which need not be there."""
+
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        array = context.make_array(signature.args[0])(context, builder, arguments[0])
+        row = builder.mul(arguments[1], builder.extract_value(array.strides, 0))
+        byte, number = ir.IntType(8).as_pointer(), ir.IntType(32)
+        place = builder.gep(builder.bitcast(array.data, byte), [builder.add(row, builder.mul(arguments[2], row.type(8)))])
+        kind = ir.FunctionType(ir.VoidType(), [byte, number, number, number])
+        prefetch = builder.module.declare_intrinsic("llvm.prefetch", [byte], kind)
+        builder.call(prefetch, [place, number(0), number(2), number(1)])  # to be read, from the second cache, data
+        return context.get_dummy_value()
+
+    return types.void(rows, types.intp, types.intp), code
+
+
 read: Any = _read
 write: Any = _write
+fetch: Any = _fetch
 
 
 @kernel
