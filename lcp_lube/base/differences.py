@@ -59,7 +59,7 @@ def differences(f: Callable[[float], Array], a: float, scale: float, sizes: Arra
         return slope, kinks
 
     d = QUICK * scale
-    low, here, high = at(-d), at(0.0), at(d)
+    low, high, here = at(-d), at(d), at(0.0)
     if here is not None and (low is None) != (high is None):  # values to one side
         d = d if low is None else -d
         low, here, high = here, at(d), at(2.0 * d)
@@ -103,7 +103,7 @@ def differences(f: Callable[[float], Array], a: float, scale: float, sizes: Arra
 
 def _chord(at: Callable[[float], Array | None], d: float) -> Array:
     """Slope between a - d and a + d, or from a on where one of them has no value; NaN where neither has."""
-    low, here, high = at(-d), at(0.0), at(d)
+    low, high, here = at(-d), at(d), at(0.0)
     if low is not None and high is not None:
         return (high - low) / (2.0 * d)
     if here is None or (low is None and high is None):

@@ -110,7 +110,7 @@ class FilmGradient:
         """rows' dG/dh, dealt to the points."""
         constant = self.adjoint.equations.constant
         if self.adjoint.equations.law is None and can(constant, self.model, SMALL):
-            weighed, unit = Weighed(constant, self.model.scheme, self.adjoint.p, self.adjoint.r, []), constant.scheme.flow_unit
+            weighed, unit = Weighed(constant, self.model.scheme, self.adjoint.p, self.adjoint.r), constant.scheme.flow_unit
             return weighed.by_film(self.model.gap, rows / unit, constant.mu, constant.U, constant.p_sides)
         grid, s, adjoint = self.problem.grid, self.slopes, self.adjoint
         w = rows.reshape(grid.box)

@@ -1,10 +1,11 @@
 """L of a film's integrals at scenes near by, without their problems: what another film or fluid changes of lambda' G alone.
 
-A problem's coefficients and its balance cost several times what its film at the faces does (`problems/film/weighed`), and a
+A problem's coefficients and its balance cost many times what its film at the faces does (`problems/film/by_faces`), and a
 viscosity, a speed or a pressure of a side costs nothing, as the balance is linear in them.
+Barus' law has another q, as p is held.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from copy import copy
 from dataclasses import fields
 from functools import cached_property
@@ -14,18 +15,23 @@ import numpy as np
 
 from ..base.parallel import Array
 from ..problems.film import forces
+from ..problems.film.by_faces import ByFaces
+from ..problems.film.fluid import Law
 from ..problems.film.model import Model
-from ..problems.film.weighed import ByFaces, Weighed, can
+from ..problems.film.weighed import can
+from ..problems.grid import Grid
+from ..problems.strips import moved
 from ..registry import SMALL
 from ..scenes.scene import Scene
-from .equations import Equations
+from .equations import Equations, followed
 from .turned import Mirrored
 
-FREE = {"gap", "mu", "U", "p_unit", "p_c", "sides", "exact", "extras", "shaft", "levers", "places"}  # what may differ
+FREE = {"gap", "mu", "U", "p_unit", "p_c", "sides", "exact", "extras", "shaft", "levers", "law"}  # what may differ
+FREE |= {"lengths", "polar", "places"}  # where its lines of points lie
 
 
 class NearFilms:
-    """lambda' G, and the numbers that are integrals of the pressure, of films on one grid. Collective, as its method.
+    """lambda' G, and the numbers that are integrals of the pressure, of films on as many points. Collective, as its method.
 
     Parameters
     ----------
@@ -44,74 +50,69 @@ class NearFilms:
         self.equations, self.model, self.p, self.r = equations, equations.model, p, r
         self.lambdas, self.numbers = lambdas, numbers
         self.wanted = {part for one in parts.values() for part in one}
-        alone = equations.law is None and can(equations.constant, self.model, SMALL)
+        constant = not (equations.law and equations.law.dowson_higginson)
+        alone = constant and can(equations.constant, self.model, SMALL)
         self.known = alone and self.wanted <= set(forces.weights(equations.constant))
 
     @cached_property
-    def _weighed(self) -> Weighed:
-        return Weighed(self.equations.constant, self.model.scheme, self.p, self.r, list(self.lambdas.values()))
+    def _own(self) -> ByFaces:
+        return self._by_faces(self.equations.law or Law())
+
+    def _by_faces(self, law: Law) -> ByFaces:
+        problem, rows = self.equations.constant, list(self.lambdas.values())
+        return ByFaces(problem, self.model.scheme, law.reduced(self.p), self.r, rows)
 
     @cached_property
-    def _own(self) -> Array | None:
-        return self._weighed.sums(self.model.gap)
-
-    @cached_property
-    def _by_faces(self) -> tuple[ByFaces, Array] | None:
-        """Of this film, and what they leave of its own lambda' G; None where it has edges."""
-        own, p_sides = self.model, self.equations.constant.p_sides
-        faces = self._weighed.by_faces(own.gap, own.mu, own.U, p_sides)
-        if faces is None or (here := faces.sums(own.gap)) is None or (G := self._balances(own, p_sides)) is None:
-            return None
-        return faces, G - here
+    def _here(self) -> Array | None:
+        return self._own.sums(self.model.gap, self.equations.grid)
 
     def lagrangians(self, scene: Scene) -> Array | None:
-        """L of every quantity; None where it is not that of another film on this grid. Of a film without edges that alone is
-        changed, to first order: it is for derivatives."""
+        """L of every quantity; None where it is not that of another film at these points."""
         if not self.known or not isinstance(getattr(scene, "model", None), Model):
             return None
-        eq, own = self.equations, self.model
+        eq = self.equations
         film: Any = Mirrored(scene) if eq.turned else scene
         model: Model = film.model
-        if model.U <= 0.0 or model.effects or not self._alike(model, film.shape):
+        if model.U <= 0.0 or model.effects or model.dense or not self._alike(model) or film.shape != eq.grid.shape:
             return None
-        if (G := self._balances(model, p_sides := model.p_sides)) is None:
+        grid, law, p_sides = self._grid(model), model.law or Law(), model.p_sides
+        sums = None if grid is None else self._sums(model.gap, law, grid)
+        if grid is None or sums is None:
             return None
+        q_sides = [float(law.reduced(np.array(p))) for p in p_sides]
+        G = (sums[:, 0] + sums[:, 2:] @ np.array(q_sides)) / model.mu + model.U * sums[:, 1]
         lean, near = copy(eq), copy(eq.constant)
+        near.grid = grid
         near.mu, near.U, near.p_c, near.p_sides = model.mu, model.U, model.p_c, p_sides  # type: ignore[assignment]
         near.shaft, near.extras, near.film, lean.constant = model.shaft, model.extras, model.film, near
-        near.levers = model.levers
-        before = (eq.constant.p_sides, eq.constant.p_c, (own.shaft, own.levers))
-        same = before[:2] == (near.p_sides, near.p_c) and _same(before[2], (near.shaft, near.levers))
+        near.levers, own = model.levers, self.model
+        same = (eq._p_sides, eq.constant.p_c) == (p_sides, near.p_c) and grid is eq.grid
+        same = same and _same((own.shaft, own.levers), (near.shaft, near.levers))
         told = {} if same else forces.totals(near, self.p, wanted=self.wanted)
         told = {name: told.get(name, value) if name in self.wanted else value for name, value in self.numbers.items()}
         report = lean.report(told)
         return np.array([report[name] for name in self.lambdas]) - G / eq.constant.scheme.flow_unit
 
-    def _balances(self, model: Model, p_sides: Sequence[float]) -> Array | None:
-        """lambda' G, m2/s; None for a film that is not positive."""
-        own, sums = self.model, self._own
-        if not _same(model.gap, own.gap):
-            alone = (model.mu, model.U, p_sides) == (own.mu, own.U, self.equations.constant.p_sides)
-            faces = self._by_faces if alone else None
-            if faces is not None and (found := faces[0].sums(model.gap)) is not None:
-                return faces[1] + found
-            sums = self._weighed.sums(model.gap)
-        if sums is None:
-            return None
-        return (sums[:, 0] + sums[:, 2:] @ np.array(p_sides)) / model.mu + model.U * sums[:, 1]  # type: ignore[no-any-return]
+    def _sums(self, gap: Any, law: Law, grid: Grid) -> Array | None:
+        if (law.barus or None) != ((self.equations.law and self.equations.law.barus) or None):
+            return self._by_faces(law).sums(gap, grid)
+        if grid is self.equations.grid and _same(gap, self.model.gap):
+            return self._here
+        return self._own.sums(gap, grid)
 
-    def _alike(self, model: Model, shape: tuple[int, ...]) -> bool:
+    def _grid(self, model: Model) -> Grid | None:
+        """The points where another film has them; None where edges came or went."""
+        own, grid = self.model, self.equations.grid
+        if (model.lengths, model.polar, model.edges) == (own.lengths, own.polar, own.edges) and model.places is own.places:
+            return grid
+        places = model.lines(grid.shape) if grid.even else followed(grid, own, model)
+        return None if places is None else moved(grid, model.lengths, places, model.polar)
+
+    def _alike(self, model: Model) -> bool:
         own = self.model
-        grid = self.equations.grid
-        places = model.lines(shape) if shape == grid.shape else ()
         sides = [(side.kind, side.r) for side in model.sides] == [(side.kind, side.r) for side in own.sides]
         rest = all(_same(getattr(model, one.name), getattr(own, one.name)) for one in fields(Model) if one.name not in FREE)
-        lines = len(places) == 2 and all(_lines(a, b) for a, b in zip(places, grid.places, strict=True))
-        return sides and rest and lines and not getattr(model.gap, "rims", ())
-
-
-def _lines(a: Array | None, b: Array | None) -> bool:
-    return a is b if a is None or b is None else np.array_equal(a, b)
+        return sides and rest and not getattr(model.gap, "rims", ())
 
 
 def _same(a: Any, b: Any) -> bool:

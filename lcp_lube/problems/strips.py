@@ -1,13 +1,13 @@
 """Lines of a grid taken together, a few at a time: what is made of them and not kept fits the cache, and takes no memory."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.crew import FEWEST, crew
-from .grid import Grid
+from .grid import Grid, Places, Polar
 
 STRIP, LARGEST = 16_384, 65_536  # points: of the strips of a small grid; and of a large one, which has PARTS at least
 PARTS = 24
@@ -36,6 +36,15 @@ def places_of(grid: Grid, rows: slice) -> Grid:
     part.y_start, part.y_end = grid.y_start + rows.start, grid.y_start + rows.stop
     part._owned, part.box = [grid._owned[0], (part.y_start, part.y_end)], (rows.stop - rows.start, grid.box[1])
     return part
+
+
+def moved(grid: Grid, lengths: Sequence[float], places: Places, polar: Polar | None) -> Grid:
+    """A grid's points, on their ranks, elsewhere, as `places_of` has some of them."""
+    other = places_of(grid, slice(0, grid.box[0]))
+    other.lengths, other.places, other.polar = tuple(map(float, lengths)), places, polar
+    other.spacing = tuple(length / meshes for length, meshes in zip(other.lengths, grid.meshes, strict=True))
+    other._around = tuple(other._with_neighbours(side) for side in range(grid.dim))
+    return other
 
 
 def ghosted(grid: Grid, owned: NDArray, outside: float) -> Callable[[slice], NDArray]:

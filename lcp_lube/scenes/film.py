@@ -9,8 +9,8 @@ from pydantic import Field
 
 from ..errors import InputError
 from ..problems.film.profile import read_profile
-from ..problems.film.shapes import Along, Block, DimpleArray, Herringbone, Journal, RandomSurface, Scaled, Shape
-from ..problems.film.views import Travelling
+from ..problems.film.shapes import Along, Block, DimpleArray, Herringbone, Journal, RandomSurface, Shape
+from ..problems.film.views import Scaled, Travelling
 from ..registry import SHAPES
 from .film_scene import Extent
 from .formula import Formula

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lcp_lube import InputError, load_scene, solve
-from lcp_lube.problems.film.edges import face_film
+from lcp_lube.problems.film.edges import face_film, pairs
 from lcp_lube.problems.film.model import Model, Side
 from lcp_lube.problems.film.shapes import Block, Sum
 from lcp_lube.problems.grid import Grid
@@ -97,16 +97,16 @@ def test_pieces_side_by_side_and_in_series():
     def step(t, s):
         return np.where(t + 0.0 * s < 1.3, 1.0, 2.0)
 
-    nodes, faces, lines = np.array([0.0, 1.0, 2.0, 3.0]), np.array([0.5, 1.5, 2.5]), np.array([0.0, 1.0])
-    cubes, films = face_film(step, nodes, faces, lines, [1.3], [], np.ones(3))
+    nodes, faces, lines = pairs(np.array([0.0, 1.0, 2.0, 3.0])), np.array([0.5, 1.5, 2.5]), np.array([0.0, 1.0])
+    cubes, films = face_film(step, nodes, faces, lines, [1.3], [], np.ones((2, 2)))
     series = 1.0 / (0.3 + 0.7 / 8)
     np.testing.assert_allclose(cubes, [[1.0, series, 8.0]] * 2, rtol=1e-14)
     np.testing.assert_allclose(films, [[1.0, series * (0.3 + 0.7 / 4), 2.0]] * 2, rtol=1e-14)
-    cubes, films = face_film(lambda t, s: step(s, t), nodes, faces, lines, [], [1.3], np.ones(3))
+    cubes, films = face_film(lambda t, s: step(s, t), nodes, faces, lines, [], [1.3], np.ones((2, 2)))
     np.testing.assert_allclose(cubes, [[1.0] * 3, [0.8 + 0.2 * 8] * 3], rtol=1e-14)
     np.testing.assert_allclose(films, [[1.0] * 3, [0.8 + 0.2 * 2] * 3], rtol=1e-14)
     narrow = lambda t, s: np.where((t > 1.2) & (t < 1.6), 2.0, 1.0) + 0 * s  # noqa: E731
-    two = face_film(narrow, nodes, faces, lines, [1.2, 1.6], [], np.ones(3))
+    two = face_film(narrow, nodes, faces, lines, [1.2, 1.6], [], np.ones((2, 2)))
     np.testing.assert_allclose(two[0][0], [1.0, 1.0 / (0.6 + 0.4 / 8), 1.0], rtol=1e-14)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.parallel import Array
-from .edges import jumps_of
+from .edges import jumps_of, level
 from .shapes import Shape
 from .turning import Turning
 
@@ -75,6 +75,10 @@ class Bore:
         if self.dam is not None and axis == "y":
             found += [0.5 * (self.turning.B - self.dam.width), 0.5 * (self.turning.B + self.dam.width)]
         return tuple(float(t) for t in found)
+
+    @property
+    def level(self) -> bool:
+        return not (self.tilt or self.tilt_across or self.barrel) and all(map(level, self.parts))
 
 
 @dataclass(frozen=True)

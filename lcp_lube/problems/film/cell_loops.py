@@ -85,27 +85,6 @@ def loop_drag(
 
 
 @kernel
-def loop_weighed(weights: Array, p: Array, r: Array, k_x: Array, k_y: Array, wall: Array, void: Array, out: Array) -> None:
-    """Add to `out`, shape (weights, 2, columns), sums of weights times what the pressure and what the wall makes leave cells.
-
-    weights : shape (several, lines, columns). p, r : with a frame of neighbours. The others : at the faces.
-    """
-    ny, nx = weights.shape[1:]
-    flow, dragged = np.zeros(nx), np.zeros(nx)
-    for j in range(ny):
-        for i in range(nx):
-            here = p[j + 1, i + 1]
-            flow[i] = (k_x[j, i + 1] * (here - p[j + 1, i + 2]) - k_x[j, i] * (p[j + 1, i] - here)) + (
-                k_y[j + 1, i] * (here - p[j + 2, i + 1]) - k_y[j, i] * (p[j, i + 1] - here)
-            )
-            dragged[i] = (wall[j, i + 1] - void[j, i + 1] * r[j + 1, i + 1]) - (wall[j, i] - void[j, i] * r[j + 1, i])
-        for n in range(weights.shape[0]):
-            for i in range(nx):
-                out[n, 0, i] += weights[n, j, i] * flow[i]
-                out[n, 1, i] += weights[n, j, i] * dragged[i]
-
-
-@kernel
 def loop_by_film(
     w: Array, p: Array, r: Array, k_x: Array, k_y: Array, wall: Array, void: Array,
     along: Array, across: Array, of_wall: Array, of_void: Array, out: Array,
@@ -130,38 +109,34 @@ def loop_by_film(
 
 
 @kernel
-def loop_cubes(h: Array, columns: Array, lines: Array, slopes: bool) -> Array:
-    """h^3, or 3 h^2, times what belongs to each column and line."""
+def loop_cubes(h: Array, columns: Array, lines: Array) -> Array:
+    """3 h^2 times what belongs to each column and line."""
     out = np.empty_like(h)
     for j in range(h.shape[0]):
         for i in range(h.shape[1]):
-            out[j, i] = (columns[i] * lines[j]) * (3.0 * h[j, i] ** 2 if slopes else h[j, i] * h[j, i] ** 2)
+            out[j, i] = (columns[i] * lines[j]) * (3.0 * h[j, i] ** 2)
     return out
 
 
 @kernel
 def loop_by_faces(
-    w: Array, p: Array, r: Array, k_x: Array, k_y: Array, wall: Array, void: Array, out: Array, across: Array, before: Array,
-    wall_at_face: bool, void_at_face: bool,
+    w: Array, p: Array, r: Array, along: Array, across: Array, wall: Array, void: Array,
 ) -> None:  # fmt: skip
-    """Add to the arrays of x faces, y faces and of the points before x faces what w' G changes by with the film there.
+    """Add to the arrays of x faces, of y faces and again of x faces what w' G grows by with what each face conducts and drags.
 
-    As `loop_by_film`, of each w, shape (several, lines, columns), without a frame: of the balances of these cells alone.
+    w : of some lines of cells. p, r : with a frame of neighbours. wall, void : of what drags oil, and less of the void with it.
     """
-    ny, nx = w.shape[1:]
+    ny, nx = w.shape
     for j in range(ny):
-        for n in range(w.shape[0]):
-            for i in range(nx):
-                a, here = w[n, j, i], p[j + 1, i + 1]
-                leaving = a * (wall[j, i + 1] * wall_at_face - void[j, i + 1] * void_at_face * r[j + 1, i + 1])
-                out[n, j, i + 1] += a * k_x[j, i + 1] * (here - p[j + 1, i + 2]) + leaving
-                across[n, j, i] -= a * k_y[j, i] * (p[j, i + 1] - here)
-                across[n, j + 1, i] += a * k_y[j + 1, i] * (here - p[j + 2, i + 1])
-                carried = void[j, i + 1] * (not void_at_face) * r[j + 1, i + 1]
-                before[n, j, i + 1] += a * (wall[j, i + 1] * (not wall_at_face) - carried)
-            for i in range(nx):
-                a, here = w[n, j, i], p[j + 1, i + 1]
-                entering = a * (wall[j, i] * wall_at_face - void[j, i] * void_at_face * r[j + 1, i])
-                out[n, j, i] -= a * k_x[j, i] * (p[j + 1, i] - here) + entering
-                carried = void[j, i] * (not void_at_face) * r[j + 1, i]
-                before[n, j, i] -= a * (wall[j, i] * (not wall_at_face) - carried)
+        for i in range(nx):
+            a, here = w[j, i], p[j + 1, i + 1]
+            along[j, i + 1] += a * (here - p[j + 1, i + 2])
+            across[j, i] -= a * (p[j, i + 1] - here)
+            across[j + 1, i] += a * (here - p[j + 2, i + 1])
+            wall[j, i + 1] += a
+            void[j, i + 1] -= a * r[j + 1, i + 1]
+        for i in range(nx):
+            a = w[j, i]
+            along[j, i] -= a * (p[j + 1, i] - p[j + 1, i + 1])
+            wall[j, i] -= a
+            void[j, i] += a * r[j + 1, i]

@@ -45,6 +45,16 @@ def oblique(film: Any) -> bool:
     return bool(getattr(film, "oblique", False)) or any(map(oblique, inside))
 
 
+def level(film: Any) -> bool:
+    """Whether a film is the same along y from jump to jump, as far as it tells."""
+    return bool(getattr(film, "level", False))
+
+
+def pairs(a: Array) -> Array:
+    """Each of them but the last with its next one, shape (2, a.size - 1)."""
+    return np.array([a[:-1], a[1:]])
+
+
 @dataclass(frozen=True)
 class Around:
     """A film on a grid, that goes on beyond periodic sides: what lies behind one is what lies within the other, edges too."""
@@ -70,6 +80,10 @@ class Around:
         return [t + m * self.grid.lengths[k] for t in found for m in (-1, 0, 1)] if around else found
 
     @property
+    def level(self) -> bool:
+        return level(self.film)
+
+    @property
     def rims(self) -> Sequence[Any]:
         return [lambda x, y, rim=rim: rim(*self._inside(x, y)) for rim in getattr(self.film, "rims", ())]
 
@@ -88,12 +102,12 @@ def face_film(
 
     Parameters
     ----------
-    film : h(t, s) in m for arrays that broadcast. nodes, faces : t of the points (one more than faces) and of the faces, m.
-    lines : s of the lines of points. steps : distances before, between and behind them, half-way along which cells end.
+    film : h(t, s) in m for arrays that broadcast. nodes : t of the points before and behind each face, shape (2, faces), m.
+    faces : t of the faces. lines : s of the lines of points. steps : distances before and behind each of them, half-way along
+        which cells end, shape (2, lines).
     jumps, jumps_across : t and s of the film's edges, m. period : round a ring, whose last point lies before the first.
     """
-    ends = np.where(nodes[1:] < nodes[:-1], nodes[1:] + period, nodes[1:])
-    columns, pieces = _pieces(nodes[:-1], ends, jumps)
+    columns, pieces = _pieces(nodes[0], np.where(nodes[1] < nodes[0], nodes[1] + period, nodes[1]), jumps)
 
     def along(s: Array) -> tuple[Array, Array]:
         h = np.broadcast_to(film(faces[None, :], s[:, None]), (s.size, faces.size))
@@ -110,11 +124,11 @@ def face_film(
         return cubes, films
 
     cubes, films = along(lines)
-    rows, strips = _pieces(lines - 0.5 * steps[:-1], lines + 0.5 * steps[1:], jumps_across)
+    rows, strips = _pieces(lines - 0.5 * steps[0], lines + 0.5 * steps[1], jumps_across)
     if rows.size:
         cubes[rows] = films[rows] = 0.0
         for a, b in pairwise(strips):
-            share = ((b - a) / (0.5 * (steps[:-1] + steps[1:])[rows]))[:, None]
+            share = ((b - a) / (0.5 * (steps[0] + steps[1])[rows]))[:, None]
             part_cubes, part_films = along(0.5 * (a + b))
             cubes[rows] += share * part_cubes
             films[rows] += share * part_films

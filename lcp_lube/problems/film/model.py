@@ -148,11 +148,11 @@ class Model:
         """Where the lines of points of a grid lie (`Grid.places`): on edges, where scheme 'face' can make use of it in 2D."""
         if self.places is not None:
             return self.places
-        x, y = (on_edges(n, *edges) for n, edges in zip(shape, self._edges, strict=True)) if self._edges else EVEN
+        x, y = (on_edges(n, *edges) for n, edges in zip(shape, self.edges, strict=True)) if self.edges else EVEN
         return (None if self.grooves else x), y  # grooves are columns of an even grid
 
     @property
-    def _edges(self) -> list[tuple[float, list[str], list[float]]]:
+    def edges(self) -> list[tuple[float, list[str], list[float]]]:
         """Length, kinds of the ends and edges of each side of a film whose lines of points lie on edges."""
         if self.scheme != "face" or self.mean_cubes or len(self.lengths) == 1:
             return []
@@ -169,7 +169,7 @@ class Model:
         """Meshes a side from which a line of points lies on each straight edge."""
         if self.grooves or self.places is not None:
             return ()
-        return tuple(max(1, stretches(*edges)[1].size) for edges in self._edges)
+        return tuple(max(1, stretches(*edges)[1].size) for edges in self.edges)
 
     def build(self, shape: Sequence[int], comm: PETSc.Comm | None = None, grid: Grid | None = None) -> LubricationProblem:
         """The discrete problem on (nx,) or (nx, ny) points, or on a grid that others use too. Collective.

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...base.parallel import Array
-from .edges import jumps_of, marks_of
+from .edges import jumps_of, level, marks_of
 
 Shape = Callable[[Array, Array], Array]
 EDGE = 1e-12  # relative: a point so near an edge is on it, whatever its coordinate's rounding; edges belong to the recess
@@ -54,6 +54,11 @@ class Along:
         parts = np.append(np.arange(np.ceil(extrema)) / extrema, 1.0)
         return tuple(self.start + (self.end - self.start) * parts)
 
+    @property
+    def level(self) -> bool:
+        """Whether it is the same along y from jump to jump, as all `level`s tell."""
+        return self.axis == "x"
+
 
 @dataclass(frozen=True)
 class Block:
@@ -62,6 +67,8 @@ class Block:
     height: float
     x: tuple[float, float]
     y: tuple[float, float]
+
+    level: ClassVar[bool] = True
 
     def __call__(self, x: Array, y: Array) -> Array:
         return np.where(_within(x, *self.x) & _within(y, *self.y), self.height, 0.0)
@@ -120,6 +127,10 @@ class DimpleArray:
         centres = start + (end - start) * (np.arange(count) + 0.5) / count
         return tuple(np.concatenate([centres - 0.5 * self.size, centres + 0.5 * self.size]))
 
+    @property
+    def level(self) -> bool:
+        return self.form == "square" or not np.isfinite(self.y).all()
+
 
 @dataclass(frozen=True)
 class Journal:
@@ -129,6 +140,8 @@ class Journal:
     eccentricity: float
     L: float
     widest: float = 0.0
+
+    level: ClassVar[bool] = True
 
     def __call__(self, x: Array, y: Array) -> Array:
         half = np.cos(np.pi * (x - self.widest) / self.L)  # keeps its digits next to h_min
@@ -212,18 +225,6 @@ class RandomSurface:
 
 
 @dataclass(frozen=True)
-class Scaled:
-    """A function of x, y in metres and t in seconds, in other units than metres: a formula."""
-
-    function: Callable[[Array, Array, float], Array]
-    unit: float
-    t: float = 0.0
-
-    def __call__(self, x: Array, y: Array) -> Array:
-        return self.unit * self.function(x, y, self.t)
-
-
-@dataclass(frozen=True)
 class Sum:
     """The film: parts added up, and cut from below at `floor` where that is given."""
 
@@ -247,6 +248,10 @@ class Sum:
     def jumps(self, axis: str) -> tuple[float, ...]:
         """x or y (m) of the straight lines across which the film jumps."""
         return tuple(t for part in self.parts for t in jumps_of(part, axis))
+
+    @property
+    def level(self) -> bool:
+        return all(map(level, self.parts))
 
     @property
     def rims(self) -> tuple[Shape, ...]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...base.parallel import Array
 from ..grid import Grid
-from .edges import Around, face_film, jumps_of
+from .edges import Around, face_film, jumps_of, pairs
 from .integrals import LineIntegrals
 from .rims import rims_across_x, rims_across_y
 
@@ -46,7 +46,7 @@ def coefficients_of(
         own = slice(grid.x_start, grid.x_end + 1)
         cubes_x, h_face = dx / integrals.parts[2][None, own], integrals.films[None, own]
     elif x_jumps or y_jumps:
-        cubes_x, h_face = face_film(film, x_nodes, x_faces, y[:, 0], x_jumps, y_jumps, across, period[0])
+        cubes_x, h_face = face_film(film, pairs(x_nodes), x_faces, y[:, 0], x_jumps, y_jumps, pairs(across), period[0])
     else:
         cubes_x = cubes(h_face.T, h_x.T).T
     if rims:
@@ -56,7 +56,8 @@ def coefficients_of(
     if grid.dim == 2:
         y_nodes, y_faces = grid.nodes_and_faces(1)
         if x_jumps or y_jumps:
-            turned = face_film(lambda t, s: film(s, t), y_nodes, y_faces, x[0], y_jumps, x_jumps, dx, period[1])
+            nodes, steps = pairs(y_nodes), pairs(dx)
+            turned = face_film(lambda t, s: film(s, t), nodes, y_faces, x[0], y_jumps, x_jumps, steps, period[1])
             cubes_y = turned[0].T
         else:
             h_y = np.broadcast_to(film(x, y_nodes[:, None]), (ny + 2, nx)) if mean_cubes else h_x

@@ -1,5 +1,6 @@
 """Films seen otherwise: mirrored, moved along, with something added. Edges, rims and kinks are seen with them."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -8,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from ...base.parallel import Array
 from ..grid import Grid
-from .edges import jumps_of, marks_of
+from .edges import jumps_of, level, marks_of
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,10 @@ class MirroredFilm(View):
     """h(L - x, y) of a film over [0, L]."""
 
     L: float
+
+    @property
+    def level(self) -> bool:
+        return level(self.film)
 
     def own(self, x: Array) -> Array:
         turned = self.L - x
@@ -113,6 +118,18 @@ class Raised(View):
 
     def __call__(self, x: ArrayLike, y: ArrayLike | None = None, /) -> Array:
         return super().__call__(x, y) + self.by  # type: ignore[return-value]
+
+
+@dataclass(frozen=True)
+class Scaled:
+    """A function of x, y in metres and t in seconds, in other units than metres: a formula."""
+
+    function: Callable[[Array, Array, float], Array]
+    unit: float
+    t: float = 0.0
+
+    def __call__(self, x: Array, y: Array) -> Array:
+        return self.unit * self.function(x, y, self.t)
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,4 @@
-"""Sums of a film's balances times weights, strip by strip: its coefficients are made of the film and not kept.
-
-With G_i the balance of a point (`reynolds`), w' G is P(h)/mu + U D(h): what the pressures and what the wall makes leave the
-cells. Another film at the same fields costs its values at the faces. So does what w' G changes by with the film everywhere.
-"""
+"""What sums of a film's balances times weights change by with the film everywhere, strip by strip: no coefficient is kept."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -33,41 +29,17 @@ def can(problem: LubricationProblem, model: Model, least: int = MANY) -> bool:
 
 
 class Weighed:
-    """w' G of the films that a problem could have, at its fields. Collective, as its methods.
+    """w' G at a problem's fields, w of the owned points. Collective, as its methods.
 
     Parameters
     ----------
-    p : Pa above p_c, r : owned points. rows : the weights w, each of the owned points.
+    p : Pa above p_c, r : owned points.
     """
 
-    def __init__(self, problem: LubricationProblem, scheme: str, p: Array, r: Array, rows: Sequence[Array]):
-        self.scheme = scheme
-        self.grid, self.rows = problem.grid, [row.reshape(problem.grid.box) for row in rows]
+    def __init__(self, problem: LubricationProblem, scheme: str, p: Array, r: Array):
+        self.scheme, self.grid = scheme, problem.grid
         enters = problem.r_in if self.grid.ends[0][0] == "open" else 0.0
         self._p, self._r = ghosted(self.grid, p, 0.0), ghosted(self.grid, r, enters)
-
-    def sums(self, gap: Any) -> Array | None:
-        """P in m2/s Pa s, D in m, and by what P grows with the pressure of each side: shape (weights, 6); None for a film that
-        is not positive."""
-        from .cell_loops import loop_weighed
-
-        out, by_side = np.zeros((len(self.rows), 2, self.grid.box[1])), np.zeros((len(self.rows), 4))
-        positive = True
-        for rows, part, k_x, k_y, wall, void in self._strips(gap):
-            positive = positive and bool((wall > 0.0).all() and (void > 0.0).all())
-            w = np.array([row[rows] for row in self.rows])
-            loop_weighed(w, self._p(rows), self._r(rows), k_x, k_y, wall, void, out)
-            at_west, at_east, at_south, at_north = (mask.any() for mask in sides(part))
-            for k, at, edge, k_edge in (
-                (0, at_west, w[:, :, 0], k_x[:, 0]),
-                (1, at_east, w[:, :, -1], k_x[:, -1]),
-                (2, at_south, w[:, 0], k_y[0]),
-                (3, at_north, w[:, -1], k_y[-1]),
-            ):
-                if at:
-                    by_side[:, k] -= edge @ k_edge
-        total = self.grid.comm.allreduce(np.append(np.concatenate([out.sum(axis=2), by_side], axis=1), float(not positive)))
-        return None if total[-1] else total[:-1].reshape(len(self.rows), 6)
 
     def by_film(self, gap: Any, w: Array, mu: float, U: float, p_sides: Sequence[float]) -> Array:
         """What w' G changes by with the film at each owned point, that between two points being their mean, m/s."""
@@ -75,7 +47,7 @@ class Weighed:
 
         out, grid = np.zeros(self.grid.box), self.grid
         weights = ghosted(grid, w, 0.0)
-        for rows, part, k_x, k_y, wall, void in self._strips(gap, slopes=True):
+        for rows, part, k_x, k_y, wall, void in self._strips(gap):
             west, east, south, north = (np.broadcast_to(mask, part.box) for mask in sides(part, ("open", "closed", "mirror")))
             along = np.array([np.where(west[0], 1.0, 0.5), np.where(east[0], 1.0, 0.5)])
             across = np.array([np.where(south[:, 0], 1.0, 0.5), np.where(north[:, 0], 1.0, 0.5)])
@@ -95,38 +67,21 @@ class Weighed:
             line[mask] = p_side
         return p
 
-    def by_faces(self, gap: Any, mu: float, U: float, p_sides: Sequence[float]) -> "ByFaces | None":
-        """What w' G changes by with the film where the coefficients take it; None for one with edges."""
-        from .cell_loops import loop_by_faces
-
-        if _cut(Around(gap, self.grid)):
-            return None
-        (ny, nx), count = self.grid.box, len(self.rows)
-        along, across, before = (np.zeros((count, *shape)) for shape in ((ny, nx + 1), (ny + 1, nx), (ny, nx + 1)))
-        at_faces = self.scheme != "upwind", self.scheme == "face"
-        for rows, part, k_x, k_y, wall, void in self._strips(gap, slopes=True):
-            w, p = np.array([row[rows] for row in self.rows]), self._framed(rows, part, p_sides)
-            out = along[:, rows], across[:, rows.start : rows.stop + 1], before[:, rows]
-            loop_by_faces(w, p, self._r(rows), k_x / mu, k_y / mu, U * wall, U * void, *out, *at_faces)
-        return ByFaces(self.grid, (along, across) if all(at_faces) else (along, across, before))
-
-    def _strips(self, gap: Any, slopes: bool = False) -> Iterator[Strip]:
-        """Lines, their places, conductances at mu = 1 of the x and y faces, and at U = 1 what the wall drags through x faces
-        and what if all is void; slopes : their derivatives by a film that is everywhere thicker by as much."""
+    def _strips(self, gap: Any) -> Iterator[Strip]:
+        """Lines, their places, and derivatives by a film that is everywhere thicker by as much: of conductances of the x and y
+        faces at mu = 1, and at U = 1 of what the wall drags through x faces and what if all is void."""
         grid, film = self.grid, Around(gap, self.grid)
-        cut = _cut(film)
-        raised = film
-        if cut and slopes:
+        cut = bool(jumps_of(film, "x") or jumps_of(film, "y"))
+        if cut:
             step = STEP * float(np.max(np.abs(gap(grid.x, grid.y[:1]))))
             raised = Around(Raised(gap, 1j * step), grid)
         for rows in in_strips(grid):
             part = places_of(grid, rows)
             if cut:
                 k_x, k_y, _, wall, void = coefficients_of(part, raised, 1.0 / 6.0, 1.0, self.scheme, False, (), None, None)
-                if slopes:
-                    k_x, k_y, wall, void = (np.imag(a) / step for a in (k_x, k_y, wall, void))
+                k_x, k_y, wall, void = (np.imag(a) / step for a in (k_x, k_y, wall, void))
             else:
-                k_x, k_y, wall, void = self._smooth(part, film, slopes)
+                k_x, k_y, wall, void = self._smooth(part, film)
             first, last = (part.ends[1][k] in ("closed", "mirror") for k in (0, 1))
             if first and part.y_start == 0:
                 k_y[0] = 0.0
@@ -134,7 +89,7 @@ class Weighed:
                 k_y[-1] = 0.0
             yield rows, part, k_x, k_y, wall, void
 
-    def _smooth(self, part: Grid, film: Around, slopes: bool) -> tuple[Array, Array, Array, Array]:
+    def _smooth(self, part: Grid, film: Around) -> tuple[Array, Array, Array, Array]:
         """As `strip.coefficients_of`, of a film without edges."""
         from .cell_loops import loop_cubes
 
@@ -146,47 +101,8 @@ class Weighed:
         along = line_weights(part) / part.stretch(y) / 6.0
         across = part.spacing[0] * part.stretch(y_faces)[:, None] / (6.0 * (part.steps(1) * part.spacing[1])[:, None])
         k_x, k_y = (
-            loop_cubes(np.ascontiguousarray(h), columns, lines.ravel(), slopes)
+            loop_cubes(np.ascontiguousarray(h), columns, lines.ravel())
             for h, columns, lines in ((h_x, 1.0 / part.steps(0), along), (h_y, part.widths(0), across))
         )
-        weight = stream_weights(part)
-        if slopes:
-            same = np.broadcast_to(weight, h_x.shape).copy()
-            return k_x, k_y, same, same
-        at_face = weight * h_x
-        if self.scheme == "face":
-            return k_x, k_y, at_face, at_face
-        before = weight * np.broadcast_to(film(x_nodes[None, :-1], y), h_x.shape)
-        return k_x, k_y, at_face if self.scheme == "nodal" else before, before
-
-
-def _cut(film: Any) -> bool:
-    return bool(jumps_of(film, "x") or jumps_of(film, "y"))
-
-
-class ByFaces:
-    """Sums of films without edges times what w' G changes by with them: to first order w' G itself. Collective."""
-
-    def __init__(self, grid: Grid, slopes: Sequence[Array]):
-        self.grid = grid
-        x_nodes, x_faces = grid.nodes_and_faces(0)
-        y_faces = grid.nodes_and_faces(1)[1]
-        places = ((x_faces, grid.y), (x_nodes[1:-1], y_faces[:, None]), (x_nodes[:-1], grid.y))
-        self._parts = [(slope, slope.sum(axis=1), *place) for slope, place in zip(slopes, places, strict=False)]
-
-    def sums(self, gap: Any) -> Array | None:
-        """Of each w; None for a film that has edges, or is not positive."""
-        film = Around(gap, self.grid)
-        total, bad = np.zeros(self._parts[0][0].shape[0] + 1), _cut(film)
-        for slope, by_column, x, y in () if bad else self._parts:
-            if film(x[None, :], y[:2]).shape[0] == 1:  # of x alone
-                h = film(x[None, :], y[:1])
-                total[:-1] += (by_column * h).sum(axis=1)
-            else:
-                h = np.broadcast_to(film(x[None, :], y), slope.shape[1:])
-                flat = h.ravel()  # with it einsum is several times as fast
-                total[:-1] += [np.einsum("i,i->", one.ravel(), flat) for one in slope]
-            bad = bad or not (h > 0.0).all()
-        total[-1] = float(bad)
-        total = self.grid.comm.allreduce(total)
-        return None if total[-1] else total[:-1]
+        same = np.broadcast_to(stream_weights(part), h_x.shape).copy()
+        return k_x, k_y, same, same

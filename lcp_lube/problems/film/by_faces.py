@@ -1,0 +1,161 @@
+"""Sums of a film's balances times weights as sums over the faces: what another film there makes of them, without a problem.
+
+With G_i the balance of a point (`reynolds`), w' G is linear in the conductances and films C, H of the faces (`edges`):
+
+    w' G = sum of C k (w_i - w_j)(p_i - p_j)/(6 mu)  +  U sum of H s (w_i - w_j)(1 - r_i),
+
+k and s being products of what a column and what a line of the grid has. Where a film is the same along y from edge to edge, the
+lines between two edges are added up once, and another film costs its values on one of them.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.parallel import Array
+from ..grid import Grid
+from ..strips import STRIP, ghosted, in_strips
+from .edges import Around, face_film, jumps_of, level, pairs
+from .lubrication import LubricationProblem
+from .reynolds import sides
+from .strip import line_weights, stream_weights
+
+NEAR = 1e-6  # of a cell: an edge so near it counts as inside
+Rows = NDArray[np.int64]
+
+
+class ByFaces:
+    """w' G of the films that a problem could have, at its fields. Collective, as its methods.
+
+    Parameters
+    ----------
+    q : owned points, Pa above p_c; of Barus' law the reduced pressure. r : owned points. rows : the weights w.
+    """
+
+    def __init__(self, problem: LubricationProblem, scheme: str, q: Array, r: Array, rows: Sequence[Array]):
+        from .cell_loops import loop_by_faces
+
+        self.grid = grid = problem.grid
+        (ny, nx), self.count = grid.box, len(rows)
+        at_face, before = scheme != "upwind", scheme != "face"  # where the wall's film is taken, and where the void's
+        along, wall, void = (np.zeros((self.count, ny, nx + 1)) for _ in range(3))
+        across, w = np.zeros((self.count, ny + 1, nx)), np.array([row.reshape(grid.box) for row in rows])
+        void = wall if at_face != before else void
+        enters = problem.r_in if grid.ends[0][0] == "open" else 0.0
+        frames = ghosted(grid, q, 0.0), ghosted(grid, r, enters)
+        for lines in in_strips(grid):
+            faces = slice(lines.start, lines.stop + 1)
+            p, r = (frame(lines) for frame in frames)
+            for k in range(self.count):
+                loop_by_faces(w[k, lines], p, r, along[k, lines], across[k, faces], wall[k, lines], void[k, lines])
+        for end, owned in ((0, grid.y_start == 0), (-1, grid.y_end == grid.shape[1])):
+            if owned and grid.ends[1][end] in ("closed", "mirror"):
+                across[:, end] = 0.0
+        self._along, self._across = along, across
+        self._at_face, self._before = wall if at_face else None, void if before else None
+        west, east, south, north = (float(mask.any()) for mask in sides(grid))
+        self._beside = -west * w[:, :, :1], -east * w[:, :, -1:]
+        self._ends = -south * w[:, 0], -north * w[:, -1]
+        self._known: dict[bytes, list[Any]] = {}
+
+    def sums(self, gap: Any, grid: Grid) -> Array | None:
+        """What the pressures (m2/s Pa s) and the wall (m) make of each, and by what it grows with each side's pressure: shape
+        (weights, 6); None for a film that is not positive. grid : the problem's, or the same points elsewhere."""
+        film, (y_nodes, y_faces) = Around(gap, grid), grid.nodes_and_faces(1)
+        cut = [jumps_of(film, axis) for axis in "xy"]
+        y, across = grid.y[:, 0], pairs(grid.steps(1))
+        lines, faces = np.arange(y.size), np.arange(y_faces.size)
+        if level(film):
+            lines = _alike(cut[1], y - 0.5 * across[0], y + 0.5 * across[1])
+            faces = _alike(cut[1], *pairs(y_nodes))
+        out, positive = np.zeros((self.count, 6)), True
+        of_lines, of_faces = self._parts(grid, lines, faces)
+        for some, rows in _strips(lines, grid.box[1]):
+            C, H, before = _along(film, grid, y[rows], across[:, rows], cut)
+            positive = positive and all(bool((a > 0.0).all()) for a in (C, H, before))
+            C = C / grid.steps(0)
+            for k, part, films in zip((0, 1, 1, 2, 3), of_lines, (C, H, before, C[:, :1], C[:, -1:]), strict=True):
+                if part is not None:
+                    out[:, k] += _total(part, some, films)
+        for some, rows in _strips(faces, grid.box[1]):
+            C = _across(film, grid, pairs(y_nodes)[:, rows], y_faces[rows], cut) * grid.widths(0)
+            positive = positive and bool((C > 0.0).all())
+            out[:, 0] += _total(of_faces, some, C)
+            for k, end, here in ((4, 0, some.start == 0), (5, -1, some.stop == faces.size)):
+                out[:, k] += here * _weights(grid)[1][end] * (self._ends[end] @ C[end])
+        total = grid.comm.allreduce(np.append(out, float(not positive)))
+        return None if total[-1] else total[:-1].reshape(out.shape)
+
+    def _parts(self, grid: Grid, lines: Rows, faces: Rows) -> list[Any]:
+        """The sums' parts of rows that are alike, with the weights that are left; those of the problem's grid are kept."""
+        key = lines.tobytes() + faces.tobytes()
+        if grid is self.grid and key in self._known:
+            return self._known[key]
+        pressed, across = _weights(grid)
+        dragged = stream_weights(grid)[:, 0]
+        of_lines = [(self._along, pressed), (self._at_face, dragged), (self._before, dragged)]
+        of_lines += [(one, pressed) for one in self._beside]
+        found = [[None if a is None else _added(a, b, lines) for a, b in of_lines], _added(self._across, across, faces)]
+        if grid is self.grid:
+            self._known[key] = found
+        return found
+
+
+def _weights(grid: Grid) -> tuple[Array, Array]:
+    """What conductances have of the lines, and of the faces between them."""
+    y_faces = grid.nodes_and_faces(1)[1]
+    across = grid.spacing[0] * grid.stretch(y_faces) / (6.0 * grid.steps(1) * grid.spacing[1])
+    return (line_weights(grid) / grid.stretch(grid.y) / 6.0)[:, 0], across
+
+
+def _alike(jumps: Sequence[float], low: Array, high: Array) -> Rows:
+    """The first of each run of intervals with no jump in or between them."""
+    places, slack = np.unique(np.asarray(jumps, dtype=float)), NEAR * np.abs(high - low)
+    below = np.searchsorted(places, low - slack)
+    alone = (np.searchsorted(places, high + slack) > below) | (high <= low)
+    new = np.append(True, alone[1:] | alone[:-1] | (below[1:] != below[:-1]))
+    return np.flatnonzero(new)
+
+
+def _added(a: Array, weights: Array, first: Rows) -> tuple[Array, Array]:
+    """Runs of rows added up with their weights, shape (weights, runs, columns); rows that are all apart stay as they are."""
+    if first.size == weights.size:
+        return a, weights
+    runs = [slice(*ends) for ends in pairs(np.append(first, weights.size)).T]
+    return np.array([[np.einsum("j,ji->i", weights[run], one[run]) for run in runs] for one in a]), np.ones(first.size)
+
+
+def _strips(rows: Rows, columns: int) -> Iterator[tuple[slice, Rows]]:
+    """Some of the rows at a time."""
+    many = max(1, STRIP // columns)
+    return ((slice(k, min(k + many, rows.size)), rows[k : k + many]) for k in range(0, rows.size, many))
+
+
+def _total(part: tuple[Array, Array], some: slice, films: Array) -> Array:
+    a, weights = part
+    return np.array([weights[some] @ np.einsum("ji,ji->j", one[some], films) for one in a])
+
+
+def _along(film: Around, grid: Grid, y: Array, across: Array, cut: Sequence[Any]) -> tuple[Array, Array, Array]:
+    """C and H of the x faces of some lines, and the film at the points before them (`strip.coefficients_of`)."""
+    nodes, faces = grid.nodes_and_faces(0)
+    shape = y.size, faces.size
+    before = np.broadcast_to(film(nodes[None, :-1], y[:, None]), shape)
+    if cut[0] or cut[1]:
+        period = grid.lengths[0] if grid.periodic[0] else 0.0
+        return *face_film(film, pairs(nodes), faces, y, cut[0], cut[1], across, period), before
+    h = np.broadcast_to(film(faces[None, :], y[:, None]), shape)
+    return h * h * h, h, before
+
+
+def _across(film: Around, grid: Grid, nodes: Array, faces: Array, cut: Sequence[Any]) -> Array:
+    """C of some lines of y faces."""
+    x = grid.x[0]
+    if cut[0] or cut[1]:
+        period = grid.lengths[1] if grid.periodic[1] else 0.0
+        turned = face_film(lambda t, s: film(s, t), nodes, faces, x, cut[1], cut[0], pairs(grid.steps(0)), period)
+        return turned[0].T
+    h = np.broadcast_to(film(x[None, :], faces[:, None]), (faces.size, x.size))
+    return np.asarray(h * h * h)
