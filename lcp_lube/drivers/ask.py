@@ -19,12 +19,14 @@ from ..solvers.newton import Monitor, Stopping
 class Start:
     """Fields near the answer, and the problem of the same kind, on any grid, that they belong to.
 
-    settings : those of the solution that they come from.
+    settings : those of the solution that they come from. made : what the effects that are solved for make of the fields, if
+        these are those of the film without effects: channel by channel (`problems.film.effects`).
     """
 
     problem: Problem
     fields: Fields
     settings: Mapping[str, Any] = field(default_factory=dict)
+    made: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True)

@@ -70,6 +70,8 @@ def _settled_on(scene: Solvable, ask: Ask, inner: Inner, file: CouplingFile) -> 
     loop, coarse = Loop(scene, _reduced(inside, scene.model.law), inner), None  # type: ignore[attr-defined]
     if file.holds(loop):
         begin = file.restore(loop)
+    elif (made := getattr(loop.ask.start, "made", None)) is not None:
+        begin, loop.given = loop.vector(neutral(loop.effects, loop.h.size)), [loop.vector(made)]
     else:
         known = _known(loop)
         if known is None:
@@ -90,7 +92,8 @@ def _reduced(ask: Ask, law: Law | None) -> Ask:
         return ask
     near, found = ask.start.problem, ask.start.fields
     unit = near.p_unit  # type: ignore[attr-defined]
-    return replace(ask, start=Start(near, {**found, "p": law.reduced(found["p"] * unit) / unit}, ask.start.settings))
+    in_q = {**found, "p": law.reduced(found["p"] * unit) / unit}
+    return replace(ask, start=Start(near, in_q, ask.start.settings, getattr(ask.start, "made", None)))
 
 
 def _known(loop: Loop) -> Cells | None:

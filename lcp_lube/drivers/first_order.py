@@ -15,10 +15,10 @@ import numpy as np
 
 from ..base.parallel import Array
 from ..errors import InputError
-from ..problems.film.effects import CHANNELS, Answer, Cells, Compressible, Effect, answer, factors, neutral
+from ..problems.film.effects import Answer, Cells, Compressible, Effect, answer, factors, neutral
 from ..problems.film.fluid import Law
 from ..problems.solution import Solution
-from ..scenes.effects.named import named, without
+from ..scenes.effects.named import FLUID, named, without
 from ..scenes.values import values_of
 from .adjoint import Adjoint, Implicit, conditions_of
 from .coefficients import placed
@@ -28,6 +28,7 @@ from .turned import Mirrored
 
 STEP = 1e-4  # of an effect: its derivative is a difference of two values of L
 THINNEST = -0.9  # of the rigid film, of a lift
+SOME = 1e-300  # Pa
 
 
 class FirstOrder:
@@ -47,7 +48,6 @@ class FirstOrder:
         grid = solution.problem.grid
         self.scene, self.kept = scene.with_shape(grid.shape), list(kept)
         self._fields: dict[tuple[str, ...], Cells] = {}
-        self._known: dict[tuple[str, ...], tuple[Law, tuple[Effect, ...]]] = {}
         bare = without(self.scene, named(scene))
         if found is None:
             found = Implicit([], [], np.zeros((0, 0)), {})
@@ -64,6 +64,9 @@ class FirstOrder:
         self.equations = eq = Equations(bare, grid.petsc_comm, pressures, solved=own)
         self.base, (self.p, self.r) = eq.constant, fields_of(solution)
         self.h = self.base.scheme.h.ravel()
+        model = (Mirrored(self.scene) if eq.turned else self.scene).model
+        self.whole, acting = model.law or Law(), [name for name in named(scene) if name not in FLUID]
+        self.acts: dict[str, Effect] = dict(zip(acting, model.effects, strict=True))
         every = self._physics(named(scene))[1]
         if any(getattr(effect, "even_lines", False) for effect in every) and not self.base.grid.even:
             raise InputError(f"scene {scene.name}: an effect of it needs even lines")
@@ -80,42 +83,59 @@ class FirstOrder:
         self.value = eq.report(numbers).get(quantity)
         if quantity in found.found:
             self.value = values_of(self.scene)[quantity]
+        self.cavity, _ = cavity_of(eq, self.p, self.r)
+        self.linear = Linear(eq.constant, self.cavity, given=eq.held)
         self.lambdas = self._adjoints()
         self.start = self._lagrangians(self.cells)
 
     def change(self, name: str) -> tuple[float | None, float]:
         """dQ/Q by an effect that was not solved for, or by Barus' law, and the largest change of a coefficient. Collective."""
-        sign = -1.0 if name in self.kept else 1.0
+        d, sign = self._change(name)
         with np.errstate(all="ignore"):
-            if sign < 0.0:
-                d = {"viscosity": -np.log(self.law.viscosity(self.p))}
-            else:
-                after = self._made([*self.kept, name])
-                d = {key: self._over(key, after[key], self.cells[key]) for key in after}
             slopes = (self._lagrangians(self._moved(d, STEP), STEP) - self.start) / STEP
             total = self.found.total(self.quantity, name, dict(zip(self.lambdas, slopes, strict=True)))
-        size = max((self.base.reduce.max(np.abs(change)) for key, change in d.items() if key != "contact"), default=0.0)
+        largest = {key: self.base.reduce.max(np.abs(change)) for key, change in d.items()}
+        if "contact" in largest:
+            largest["contact"] /= max(self.base.reduce.max(self.p), SOME)
+        size = max(largest.values(), default=0.0)
         if not self.value or not np.isfinite(total / self.value) or total / self.value > 100.0:
             return None, size
         return expm1(sign * total / self.value), size
 
+    def second(self, name: str) -> float:
+        """dQ/Q by an effect that was not solved for, to second order; NaN where there is none. Collective.
+
+        L has no slope by the fields, so that L at z + z', J z' = -dG, with all of the effect has the second order too. What is
+        found for the scene is held, but for its first order.
+        """
+        eq, (d, _) = self.equations, self._change(name)
+        with np.errstate(all="ignore"):
+            self._film(self.cells)
+            before = self._balance(self.p, self.r)
+            self._film(self._moved(d, STEP), STEP)
+            (dz,) = self.linear.solve([(before - self._balance(self.p, self.r)) / STEP])
+            p = np.where(self.cavity, self.p, self.p + dz * eq.constant.p_unit)
+            moved = self._lagrangians(self._moved(d, 1.0), 1.0, p, np.where(self.cavity, self.r - dz, self.r)) - self.start
+            return self.found.total(self.quantity, name, dict(zip(self.lambdas, moved, strict=True))) / (self.value or np.nan)
+
+    def _change(self, name: str) -> tuple[Cells, float]:
+        """What an effect changes, d, and its sign: -1 for one that was solved for, Barus' law."""
+        if name in self.kept:
+            return {"viscosity": -np.log(self.law.viscosity(self.p))}, -1.0
+        after = self._made([*self.kept, name])
+        with np.errstate(all="ignore"):
+            return {key: self._over(key, after[key], self.cells[key]) for key in after}, 1.0
+
     def made(self, names: Sequence[str]) -> Cells:
-        """The fields that effects make of this answer, each by itself: a start for the loop that solves for them."""
-        out = neutral(self._physics(names)[1], self.h.size)
-        for one in (self._made([*self.kept, name]) for name in names if name not in self.kept):
-            for key in out:
-                out[key] = out[key] * one[key] if CHANNELS[key] else out[key] + one[key]
-        return out
+        """The fields that effects make of this answer: what the loop that solves for them has of its first film."""
+        made = self._made(names)
+        return {key: made[key] for key in neutral(self._physics(names)[1], 0)}
 
     def _physics(self, names: Sequence[str]) -> tuple[Law, tuple[Effect, ...]]:
         """The law of pressure and the effects, in the order in which the loop has them, of these names."""
-        key = tuple(sorted(names))
-        if key not in self._known:
-            one = without(self.scene, [name for name in named(self.scene) if name not in names])
-            model = (Mirrored(one) if self.equations.turned else one).model
-            law = model.law or Law()
-            self._known[key] = law, (*((Compressible(law),) if law.dowson_higginson else ()), *model.effects)
-        return self._known[key]
+        dense = self.whole.dowson_higginson and "density" in names
+        law = replace(self.whole, barus=self.whole.barus if "barus" in names else 0.0, dowson_higginson=dense)
+        return law, (*((Compressible(law),) if dense else ()), *(self.acts[name] for name in self.acts if name in names))
 
     def _made(self, names: Sequence[str]) -> Cells:
         key = tuple(sorted(names))
@@ -162,26 +182,27 @@ class FirstOrder:
 
     def _adjoints(self) -> dict[str, Array]:
         eq, p, r = self.equations, self.p, self.r
-        cavity, _ = cavity_of(eq, p, r)
         rows = []
         for weights in self.parts.values():
             slopes = {part: eq.slope(p, r, part) for part in weights}
-            rows.append(right_side(slopes, weights, cavity))
-        linear = Linear(eq.constant, cavity, given=eq.held)
-        try:
-            z = unknowns(cavity, p, r, eq.constant.p_unit)
-            return dict(zip(self.parts, linear.solve_transposed(rows, z), strict=True))
-        finally:
-            linear.destroy()
+            rows.append(right_side(slopes, weights, self.cavity))
+        z = unknowns(self.cavity, p, r, eq.constant.p_unit)
+        return dict(zip(self.parts, self.linear.solve_transposed(rows, z), strict=True))
 
-    def _lagrangians(self, cells: Cells, t: float = 0.0) -> Array:
-        eq, p, r = self.equations, self.p, self.r
+    def _balance(self, p: Array, r: Array) -> Array:
+        eq = self.equations
+        G = eq.balance(p, r) / self.base.scheme.flow_unit
+        return G if eq.held is None else np.where(eq.held, 0.0, G)
+
+    def _lagrangians(self, cells: Cells, t: float = 0.0, p: Array | None = None, r: Array | None = None) -> Array:
+        """L of all numbers with these coefficients, at the answer's fields or others."""
+        eq, p, r = self.equations, self.p if p is None else p, self.r if r is None else r
         self._film(cells, t)
         report = eq.report(eq.numbers(p, r, {part for weights in self.parts.values() for part in weights}, self.numbers))
-        G = eq.balance(p, r) / self.base.scheme.flow_unit
-        G = G if eq.held is None else np.where(eq.held, 0.0, G)
+        G = self._balance(p, r)
         return np.array([report[name] - eq.grid.reduce.dot(one, G) for name, one in self.lambdas.items()])
 
     def destroy(self) -> None:
+        self.linear.destroy()
         self.equations.constant = self.base
         self.equations.destroy()

@@ -125,7 +125,7 @@ class Look:
         self.found = film.found
         self.effects = {name: change for name, (change, _) in changes.items() if change is not None}
         self.sizes = {name: size for name, (_, size) in changes.items()}
-        small = [name for name in self.names if abs(self.effects.get(name, 1.0)) < self.limit]
+        small = [name for name in self.names if self._small(film, name)]
         self.kept = [name for name in self.names if name in FREE or name not in small]
         acting = DOUBT if not film.found.found else INFINITE
         self.doubtful = [name for name in self.names if name not in self.kept and not self._sure(name, acting)]
@@ -135,8 +135,9 @@ class Look:
             self.solution, self.first = first, None
         elif own and self.ask.start is None:
             solved: Any = getattr(first.problem, "moving", first.problem)
-            solved.cells = film.made(self.kept)
-            self.ask = replace(self.ask, start=Start(first.problem, first.fields, self._foretold(first.settings)))
+            solved.cells = made = film.made(self.kept)
+            itself = None if film.found.found else made  # else the loop's first film is at another place
+            self.ask = replace(self.ask, start=Start(first.problem, first.fields, self._foretold(first.settings), itself))
         film.destroy()
 
     def _foretold(self, settings: Any) -> Any:
@@ -151,6 +152,16 @@ class Look:
         else:
             value *= exp(grows)
         return {**settings, "balance": {**balance, "value": value}}
+
+    def _small(self, film: FirstOrder, name: str) -> bool:
+        """Whether an effect by itself does not count: to second order, where its square could."""
+        first, size = self.effects.get(name, 1.0), self.sizes[name]
+        if abs(first) + DOUBT * size * size < self.limit:
+            return True
+        if abs(first) >= self.limit or name in FREE:
+            return False
+        self.effects[name] = second = film.second(name)
+        return abs(second) + abs(second - first) * size < self.limit
 
     def _sure(self, name: str, acting: float) -> bool:
         """Whether an effect could not count by acting on those that are kept."""
@@ -167,7 +178,7 @@ class Look:
         for name in self.doubtful:
             change, self.sizes[name] = film.change(name)
             self.effects[name] = self.effects[name] if change is None else change
-            if change is None or not self._sure(name, ACTING):
+            if change is None or not self._small(film, name) or not self._sure(name, ACTING):
                 more.append(name)
         film.destroy()
         self.work += solution.problem.unknowns

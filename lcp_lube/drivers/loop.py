@@ -101,7 +101,7 @@ class Loop:
         self.start: Solution | Start | None = ask.start
         self.begun = self.last = np.zeros(0)  # the vectors of fields that the loop began with, and of the last film's
         self.log: list[Array] = []  # what the effects have made of each film's answer
-        self.given: list[Array] = []  # those that an earlier run has found: they are taken instead of films
+        self.given: list[Array] = []  # those that were found before, by an earlier run say: they are taken instead of films
 
     def vector(self, cells: Cells) -> Array:
         """Fields as one vector, in which equal steps are equal relative changes of coefficients."""
@@ -134,7 +134,7 @@ class Loop:
         solves, work = self.solves, self.work
         self.ask = replace(self.ask, certify=certify)
         self.film(self.cells(self.last))
-        self.solves, self.work = solves, work
+        self.solves, self.work = solves, work or self.work  # 0: all of its answers were given
 
     def film(self, cells: Cells) -> bool:
         """Solve the film with these coefficients; whether it has an answer, which is then `answer`."""

@@ -34,7 +34,8 @@ def applies(scene: Solvable, ask: Ask) -> bool:
 def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     """The mirror image's solution, turned back. Collective."""
     if ask.start is not None and isinstance(near := ask.start.problem, TurnedProblem):
-        ask = replace(ask, start=Start(near.moving, near.there(ask.start.fields), ask.start.settings))
+        made = getattr(ask.start, "made", None)  # in the mirror image's frame
+        ask = replace(ask, start=Start(near.moving, near.there(ask.start.fields), ask.start.settings, made))
     solution = inner(Mirrored(scene), ask)
     assert isinstance(solution.problem, LubricationProblem)  # as `applies` found
     problem = TurnedProblem(solution.problem, scene.model.exact)  # type: ignore[attr-defined]

@@ -97,7 +97,7 @@ class Answer:
     cells: Cells
     law: Law
     base: LubricationProblem
-    memory: dict[int, Any] = field(default_factory=dict)  # what an effect found, by its id
+    memory: dict[Any, Any] = field(default_factory=dict)  # what an effect found, by its id
 
     @property
     def grid(self) -> Grid:

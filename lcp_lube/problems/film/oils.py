@@ -10,9 +10,10 @@ of 100, by the equations of ASTM D2270, which begin at 2 mm2/s: for grades 2, 3 
 heat of a mineral oil are typical values, not the grade's.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import exp, log, log10
+from typing import Protocol
 
 import numpy as np
 
@@ -47,7 +48,12 @@ THIN = (2, 3, 5)  # grades of ISO 3448 without a viscosity index
 NAMES = [f"ISO VG {grade}" for grade in GRADES]
 
 
-Viscosity = Callable[[Array], Array]  # mu(T), Pa s, of temperatures in K
+class Viscosity(Protocol):
+    """mu(T), Pa s, of temperatures in K; T(mu) the other way round, inf or NaN where none is so hot."""
+
+    def __call__(self, T: Array) -> Array: ...
+
+    def T(self, mu: Array) -> Array: ...
 
 
 @dataclass(frozen=True)
@@ -60,6 +66,9 @@ class Exponential:
 
     def __call__(self, T: Array) -> Array:
         return self.mu_1 * np.exp(-self.beta * (np.asarray(T) - self.T_1))
+
+    def T(self, mu: Array) -> Array:
+        return self.T_1 - np.log(mu / self.mu_1) / np.float64(self.beta)
 
     @classmethod
     def through(cls, T: Sequence[float], mu: Sequence[float]) -> "Exponential":
@@ -76,6 +85,9 @@ class Vogel:
 
     def __call__(self, T: Array) -> Array:
         return self.a * np.exp(self.b / (np.asarray(T) - self.c))
+
+    def T(self, mu: Array) -> Array:
+        return self.c + self.b / np.log(np.maximum(mu / self.a, 1.0))
 
     @classmethod
     def through(cls, T: Sequence[float], mu: Sequence[float]) -> "Vogel":
@@ -110,6 +122,9 @@ class Walther:
             nu = 10.0 ** (10.0 ** (self.A - self.B * np.log10(np.asarray(T)))) - WALTHER
         return np.maximum(nu, 1e-3) * 1e-6 * self.rho
 
+    def T(self, mu: Array) -> Array:
+        return 10.0 ** ((self.A - np.log10(np.log10(mu / (1e-6 * self.rho) + WALTHER))) / self.B)
+
     @classmethod
     def through(cls, T: Sequence[float], nu: Sequence[float], rho: float) -> "Walther":
         """From kinematic viscosities in mm2/s at two temperatures. Raises InputError for those below the law's least."""
@@ -129,6 +144,9 @@ class Roelands:
 
     def __call__(self, T: Array) -> Array:
         return np.exp(self.a * (np.asarray(T) - ROELANDS_T) ** -self.s - ROELANDS_MU)
+
+    def T(self, mu: Array) -> Array:
+        return ROELANDS_T + (self.a / (np.log(mu) + ROELANDS_MU)) ** (1.0 / self.s)
 
     @classmethod
     def through(cls, T: Sequence[float], mu: Sequence[float]) -> "Roelands":

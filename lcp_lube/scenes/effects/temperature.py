@@ -103,7 +103,9 @@ class Heat(Effect):
         return "T", self.table.T_in
 
     def apply(self, at: Answer, out: Cells) -> None:
-        factor = self.law(self._ahead(at)) / self.mu
+        if ("ahead", id(self)) not in at.memory:
+            at.memory["ahead", id(self)] = self.law(self._ahead(at)) / self.mu
+        factor = at.memory["ahead", id(self)]
         out["viscosity"] *= factor
         out["warmth"] *= factor
 
@@ -126,7 +128,8 @@ class Heat(Effect):
             with np.errstate(invalid="ignore"):
                 T = bisect(lambda T: table.T_in + gain * by_heat(T) - T, np.array([coldest]), np.array([oils.HIGHEST]))
             return np.full(at.p.size, T[0])
-        T = bisect(lambda T: law(T) - old, np.full(old.shape, coldest), np.full(old.shape, oils.HIGHEST))
+        with np.errstate(all="ignore"):
+            T = np.clip(np.nan_to_num(law.T(old), nan=oils.HIGHEST), coldest, oils.HIGHEST)
         for _ in range(NEWTON):
             ratio, slope = law(T) / old, (law(T + NEAR) - law(T - NEAR)) / (2.0 * NEAR * old)
             falls = np.maximum(-slope, 0.0) * flow.sheared.ravel()
