@@ -29,7 +29,7 @@ from .plan import FEW, SMALL
 from .rungs import ASYMPTOTIC, finer, first_shape, round_ring, rungs_up
 from .values import Values, carried, sought
 
-FEW_KNOWN = 64  # points of the first grid of a line whose number is known: no coarser grid is cheaper
+FEW_KNOWN = 128  # points of the first grid of a line whose number is known: no coarser grid is cheaper
 FEW_PAIRS = 200  # of a film whose load is estimated from each two grids: these are solved by elimination
 ALGEBRAIC = 1e-3  # ||F|| relative to the tolerance: with many small cavities it leaves up to 60 times itself in a load
 ALLOWED = (1e-10, 0.5)  # tolerances
@@ -87,7 +87,10 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     first, unit = round_ring(scene, first, finest)
     kinds = [model.sides[2 * k : 2 * k + 2] if isinstance(model, Model) else () for k in range(len(first))]
     meshes = [n + 1.0 - sum(1.0 - OFFSET[side.kind] for side in ends) for n, ends in zip(first, kinds, strict=True)]
-    rung = next(k for k in count() if ask.mpi.size == 1 or finer(first, meshes, k, unit)[-1] >= 2 * ask.mpi.size)
+    ranks = ask.mpi.size
+    rung = next(k for k in count() if ranks == 1 or finer(first, meshes, k, unit)[-1] >= 2 * ranks)
+    if line and first[0] < FEW_KNOWN and (finest is None or finer(first, meshes, rung + 1, unit)[0] <= finest[0]):
+        rung += 1
     shape = finer(first, meshes, rung, unit)
     solution: Solution | None = None
     told = Values(line, pairs)

@@ -49,7 +49,7 @@ def finer(shape: tuple[int, ...], meshes: Sequence[float], rung: int, unit: int 
 
 def rungs_up(estimates: Sequence[float], tol: float, known: bool, dim: int, pairs: bool = False) -> int:
     """How many rungs the next grid lies above this one: the first that reaches the tolerance, if an estimate below ASYMPTOTIC
-    (of three grids, or of one whose error is known) falls by second order; at most JUMP doublings of the points a side.
+    (of three grids, or of one whose error is known) falls by second order; of three at most JUMP doublings of the points a side.
 
     pairs : two grids give an estimate, best with half the spacing on the second; twice the points once, where that may do.
     """
@@ -57,7 +57,8 @@ def rungs_up(estimates: Sequence[float], tol: float, known: bool, dim: int, pair
         return 1 if estimates[-1] < NEAR * tol and not min(estimates[:-1], default=inf) < NEAR * tol else dim
     if not (known or len(estimates) >= 3) or not estimates[-1] < ASYMPTOTIC:
         return 1
-    return min(max(1, ceil(0.5 * dim * log2(estimates[-1] / tol) - NEARLY)), dim * JUMP)
+    up = max(1, ceil(0.5 * dim * log2(estimates[-1] / tol) - NEARLY))
+    return up if known else min(up, dim * JUMP)
 
 
 def round_ring(scene: Solvable, first: tuple[int, ...], finest: tuple[int, ...] | None = None) -> tuple[tuple[int, ...], int]:

@@ -39,7 +39,7 @@ class LineIntegrals:
     Parameters
     ----------
     film : h(x, y) in m for arrays that broadcast. points : x of two points and more, ascending, m. edges : x of the film's
-        jumps and kinks, m; those outside are not heeded.
+        jumps and kinks, m; those outside are not heeded. fine : the points are ends of panels that need no halving.
 
     Attributes
     ----------
@@ -50,10 +50,10 @@ class LineIntegrals:
     InputError : a film that is not positive somewhere between the points.
     """
 
-    def __init__(self, film: Callable[[Array, Array], Array], points: Array, edges: Iterable[float] = ()):
+    def __init__(self, film: Callable[[Array, Array], Array], points: Array, edges: Iterable[float] = (), fine: bool = False):
         self.film, self.points = film, points
         self.known: dict[tuple[float, ...], Any] = {}  # `line.known_of` by what else it needs
-        self.ends = self._panels(np.asarray(list(edges), dtype=float))
+        self.ends = points if fine else self._panels(np.asarray(list(edges), dtype=float))
         self.at_gauss = _gauss_points(self.ends[:-1], self.ends[1:])  # shape (panels, 8)
         self.h = self.film_at(self.at_gauss)
         self.first = np.searchsorted(self.ends, points)  # the panel behind each point

@@ -156,7 +156,7 @@ def solve_line(
     k, x_f = k[apart], x_f[apart]
     points = np.insert(x, k + 1, x_f)
     whole = np.insert(~dry, k + 1, True)
-    return Line(LineIntegrals(line.film, points), np.insert(p, k + 1, 0.0), whole, mu, U, Q, r_in > 0.0)
+    return Line(LineIntegrals(line.film, points, fine=True), np.insert(p, k + 1, 0.0), whole, mu, U, Q, r_in > 0.0)
 
 
 def solve_points(
