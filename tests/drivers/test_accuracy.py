@@ -127,7 +127,7 @@ def test_the_force_of_a_shaft_is_as_large_as_its_extrapolated_load():
 def test_no_grid_finer_than_needed():
     """The grid before the last one was not known to be good enough; a coarser tolerance ends sooner."""
     sizes = []
-    for tol in (1e-1, 1e-2, 1e-3, 1e-4):
+    for tol in (1e-1, 1e-3, 1e-5, 1e-6):
         solution = solve(load_scene("problem1"), accuracy=tol)
         solution.destroy()
         estimates = [level["estimate"] for level in solution.levels]
@@ -135,7 +135,7 @@ def test_no_grid_finer_than_needed():
         assert all(estimate > tol for estimate in estimates[:-1])
         sizes.append(solution.levels[-1]["nx"])
     assert sizes == sorted(sizes)
-    assert sizes[0] < sizes[-1] <= 400
+    assert sizes[0] < sizes[-1] <= 2000
 
 
 @pytest.mark.parametrize("scene, tol", [("problem4", 1e-2), ("journal", 1e-2)])
