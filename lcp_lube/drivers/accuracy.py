@@ -93,12 +93,13 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         rung += 1
     shape = finer(first, meshes, rung, unit)
     solution: Solution | None = None
+    before: Solution | None = None
     told = Values(line, pairs)
     levels: list[dict[str, Any]] = []
     times: dict[str, float] = {}
     end, soon = "", tol < SOON
     while not end:
-        level_begin, before = perf_counter(), solution
+        level_begin, before, earlier = perf_counter(), solution, before
         near = ask.start if before is None else _start(before, prod(shape)) if ask.nested is not False else None
         stopping = _stopping(ask.stopping, tol, before)
         halved = ask.reduction and (len(shape) == 1 or prod(shape) > WHOLE[soon])
@@ -113,9 +114,9 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
             found = {**sought(solution), **solution.numbers}  # what is sought is the number where the load is given
             quantity = quantity or next((name for name in (*sought(solution), *DEFAULT_QUANTITY) if name in found), "")
             value = find_value(found, quantity, scene)
-        best = told.add(solution, before, prod(problem.grid.meshes) ** (1.0 / len(first)), quantity, value)
-        if before is not None:
-            before.destroy()
+        best = told.add(solution, before, earlier, prod(problem.grid.meshes) ** (1.0 / len(first)), quantity, value)
+        if earlier is not None:
+            earlier.destroy()
         # Where the last grid will be one for multigrid (second order: points as 1/error) its loops serve those before it too.
         soon = soon or inf > best.relative > 3 * FEW / problem.grid.size * tol
         levels.append(
@@ -138,6 +139,8 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
             if not (end := _no_room(solution, shape, finest, best.relative, tol)):
                 rung += up
                 break
+    if before is not None:
+        before.destroy()
     assert solution is not None and quantity is not None  # for the type checker: there is a first grid
     if solution.converged and not best.relative <= tol:
         solution.outcome = Outcome.ACCURACY

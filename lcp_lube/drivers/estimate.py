@@ -45,7 +45,7 @@ EXPECTED = 1.0 / 3.0  # of what corrections before lead one to expect of the las
 SPAN = 12.0  # over the square of finest over coarsest grid: factor of n
 ENOUGH = 3.9  # finest over coarsest of grids that are enough without those before
 INTEGRALS = ("load", "pressure_integral")  # whose change from grid to grid is at most that of the pressure
-PAIR, BESIDE, SHARE = 1.2, 3.0, 0.3  # factors of an error from two grids, of these and of others, and of the pressure's change
+PAIR, BESIDE, SHARE = 1.5, 3.0, 0.3  # factors of an error from two grids, of these and of others, and of the pressure's change
 CLEAN = 0.01  # what moves of w leave over the last correction
 QUADRATURE = 1e-9  # relative: what a line's quadrature may leave
 ANSWER = (1.0, 10.0)  # least and greatest answer to what is misplaced: relative change over share of Int h^-3
@@ -111,21 +111,23 @@ def estimate(values: Sequence[float], misplaced: Sequence[float], finer: Sequenc
     return Estimate(last, max(of_grid, film))
 
 
-def of_pair(values: Sequence[float], misplaced: Sequence[float], finer: Sequence[float], change: float, name: str) -> Estimate:
+def of_pair(
+    values: Sequence[float], misplaced: Sequence[float], finer: Sequence[float], change: float, name: str, other: int = -2
+) -> Estimate:
     """The best value and its error from two grids, and from how far the pressure changed between them.
 
-    Values can agree by chance, pressures everywhere do not: the integral of |p_k - p_(k-1)| is never less than the change of
-    an integral of p. By second order the last grid's error is the change over (d_(k-1)/d_k)^2 - 1.
+    Values can agree by chance, pressures in all parts of a film do not: what its integrals over parts change by is never less,
+    added up, than the change of the whole one. By second order the last grid's error is the change over (d_j/d_k)^2 - 1.
 
     Parameters
     ----------
-    values, misplaced, finer : as in `estimate`. change : that integral over the quantity, or over the integral of p for a
-        quantity that is none of p.
+    values, misplaced, finer : as in `estimate`. change : that sum over the quantity, or for a quantity that is no integral of p
+        the integral of |p_k - p_j| over that of p. other : number of the grid j that the last one is compared with.
     """
     if name in NOISY or len(values) < 2:
         return Estimate(values[-1], inf)
     factor, least = (PAIR, 1.0) if name in INTEGRALS else (BESIDE, SHARE)
-    step, to_come = values[-1] - values[-2], 1.0 / ((finer[-1] / finer[-2]) ** 2 - 1.0)
+    step, to_come = values[-1] - values[other], 1.0 / ((finer[-1] / finer[other]) ** 2 - 1.0)
     error = factor * to_come * max(abs(step), least * change * abs(values[-1]))
     film = _of_film(np.abs(np.diff(values)), misplaced, values[-1])
     return (

@@ -2,14 +2,13 @@
 
 from collections.abc import Sequence
 from fractions import Fraction
-from math import ceil, inf, lcm, log2, prod
+from math import ceil, lcm, log2, prod
 
 from ..scenes.scene import Solvable
 
 COARSEST = {1: 12, 2: 4}  # points a side at least on the first grid
 FEW = {1: 12, 2: 100}  # points of the first grid at least: coarser ones cost as much, and tell less
 JUMP, NEARLY = 1, 0.5  # doublings of the points a side at once, and part of a rung that is not worth one more
-NEAR = 1.7  # times the tolerance: an estimate for which twice the points will do
 ASYMPTOTIC = 0.1  # an estimate below it falls by second order at best
 MOST_ROUND, SAME = 720, 1e-9  # meshes that a turn is thought in to find edges, and by how much of a turn they may be off
 
@@ -49,13 +48,14 @@ def finer(shape: tuple[int, ...], meshes: Sequence[float], rung: int, unit: int 
 
 def rungs_up(estimates: Sequence[float], tol: float, known: bool, dim: int, pairs: bool = False) -> int:
     """How many rungs the next grid lies above this one: the first that reaches the tolerance, if an estimate below ASYMPTOTIC
-    (of three grids, or of one whose error is known) falls by second order; of three at most JUMP doublings of the points a side.
+    (of three grids, or of one whose error is known) falls by second order; of several at most JUMP doublings of the points a
+    side.
 
-    pairs : two grids give an estimate, best with half the spacing on the second; twice the points once, where that may do.
+    pairs : two grids give an estimate, best with half the spacing on the second.
     """
-    if pairs:
-        return 1 if estimates[-1] < NEAR * tol and not min(estimates[:-1], default=inf) < NEAR * tol else dim
-    if not (known or len(estimates) >= 3) or not estimates[-1] < ASYMPTOTIC:
+    if pairs and not (len(estimates) >= 2 and estimates[-1] < ASYMPTOTIC):
+        return dim
+    if not (known or pairs or len(estimates) >= 3) or not estimates[-1] < ASYMPTOTIC:
         return 1
     up = max(1, ceil(0.5 * dim * log2(estimates[-1] / tol) - NEARLY))
     return up if known else min(up, dim * JUMP)

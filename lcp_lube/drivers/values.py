@@ -11,12 +11,15 @@ from ..base.parallel import Array
 from ..problems.film.forces import totals
 from ..problems.film.line import known_of
 from ..problems.film.lubrication import LubricationProblem
+from ..problems.film.strip import stream_weights
 from ..problems.film.turned import TurnedProblem
 from ..problems.solution import Fields, Problem, Solution
 from ..problems.transfer import interpolated
 from .estimate import INTEGRALS, QUADRATURE, Estimate, estimate, follow, known_line, misplaced_film, of_pair, scalars
 
 LEAST_PAIR = 0.25  # weight of the estimate of two grids beside that of all: in the exponent, halved by each grid more
+APART = 1.8  # spacings of two grids over one another, at least, where two such are there: nearer ones tell little
+BLOCKS = 6  # parts of a side over which the change of the pressure is integrated
 SMALL = 10_000  # points up to which one rank takes the numbers where they are asked for
 
 
@@ -45,10 +48,15 @@ class Values:
         self._sizes: list[float] = []
         self._misplaced: list[float] = []
         self._converged = False  # on the last grid
-        self._change = (inf, inf)  # of the pressure from the grid before: its integral over the load, and over that of p
+        self._other, self._change = -2, (inf, inf)  # of the pressure from that grid on: `_change`
 
-    def add(self, solution: Solution, before: Solution | None, size: float, quantity: str, value: float) -> Estimate:
-        """One grid more, so many meshes a side, and this value of the quantity there; its best value. Collective."""
+    def add(
+        self, solution: Solution, before: Solution | None, earlier: Solution | None, size: float, quantity: str, value: float
+    ) -> Estimate:
+        """One grid more, so many meshes a side, and this value of the quantity there; its best value. Collective.
+
+        before, earlier : the answers on the last grid, and on that before it.
+        """
         problem = solution.problem
         if self._is_line and before is None:
             self.line = known_line(problem)
@@ -59,7 +67,9 @@ class Values:
         self._sizes.append(size)
         # Of what quadrature does not tell nothing is known.
         self._misplaced.append(misplaced_film(problem) if self.line is None else inf)
-        self._change = _change(solution, before, quantity) if self._pairs else (inf, inf)
+        self._other = -3 if earlier is not None and size < APART * self._sizes[-2] else -2
+        other = earlier if self._other == -3 else before
+        self._change = _change(solution, other, quantity) if self._pairs else (inf, inf)
         self.best = self._best(quantity, self._own)
         return self.best
 
@@ -72,11 +82,11 @@ class Values:
         of_all, (by_load, by_all) = estimate(values, self._misplaced, self._sizes, name), self._change
         if not isfinite(by_load) or (name not in INTEGRALS and len(values) > 2):
             return of_all
-        pair = of_pair(values, self._misplaced, self._sizes, by_load if name in INTEGRALS else by_all, name)
+        pair = of_pair(values, self._misplaced, self._sizes, by_load if name in INTEGRALS else by_all, name, self._other)
         if not isfinite(of_all.error):
             return pair
         weight = max(0.5 ** (len(values) - 2), LEAST_PAIR)
-        return replace(pair, error=pair.error**weight * of_all.error ** (1.0 - weight))
+        return replace(pair, error=pair.error**weight * min(of_all.error, pair.error) ** (1.0 - weight))
 
     def _truth(self, name: str) -> float:
         """A number of a line that is known; NaN where there is none. Collective."""
@@ -129,14 +139,26 @@ def _numbers(solution: Solution) -> dict[str, float]:
 
 
 def _change(solution: Solution, before: Solution | None, quantity: str) -> tuple[float, float]:
-    """The integral of |p - p of the grid before| at its points, over the integral asked for and over that of p. Collective."""
+    """How far the pressure has changed from the grid before, at the points of that. Collective.
+
+    Returns
+    -------
+    by_load : the change of its integrals over BLOCKS x BLOCKS parts of the film, without signs, over the quantity: errors that
+        cancel within a dimple do not count, those that do so by chance across the film do. by_all : of |p - p'| over that of p.
+    """
     problem, told = solution.problem, quantity in INTEGRALS and solution.converged
     if before is None or not (told and before.converged) or not isinstance(problem, LubricationProblem):
         return inf, inf
     coarse: Any = before.problem
-    there = interpolated(problem.grid, coarse.grid, solution.fields["p"] * problem.p_unit)
+    grid = coarse.grid
+    there = interpolated(problem.grid, grid, solution.fields["p"] * problem.p_unit)
     p = before.fields["p"] * coarse.p_unit
-    sides, changed, whole = (_integral(coarse, values, INTEGRALS[1]) for values in (0.0 * p, np.abs(there - p), p))
-    changed -= sides  # what the given pressures add
-    own = abs(_integral(coarse, p, quantity))
-    return changed / own if own else inf, changed / whole if whole else inf
+    changed = (there - p).reshape(grid.box) * (grid.cell * stream_weights(grid)) * grid.widths(0)
+    column, row = (
+        np.arange(*ends) * BLOCKS // n
+        for ends, n in zip(((grid.x_start, grid.x_end), (grid.y_start, grid.y_end)), grid.shape, strict=True)
+    )
+    blocks = np.bincount((BLOCKS * row[:, None] + column).ravel(), changed.ravel(), BLOCKS**2)
+    by_blocks, own = float(np.sum(np.abs(grid.comm.allreduce(blocks)))), abs(_integral(coarse, p, quantity))
+    by_points, whole = coarse.reduce.sum(np.abs(changed)), _integral(coarse, p, INTEGRALS[1])
+    return by_blocks / own if own else inf, by_points / whole if whole else inf
