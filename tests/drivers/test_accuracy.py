@@ -16,9 +16,9 @@ from lcp_lube.registry import scene_names
 from lcp_lube.scenes.scene import load_scene
 
 
-def estimated(values, misplaced):
+def estimated(values, misplaced, name=""):
     """From grids whose spacing halves."""
-    return estimate(values, misplaced, [2.0**k for k in range(len(values))])
+    return estimate(values, misplaced, [2.0**k for k in range(len(values))], name)
 
 
 def exact_scenes():
@@ -233,14 +233,14 @@ def test_rungs():
 
 
 def test_grids_that_an_estimate_leaves_out():
-    """None before three values, nor while they are far off; at most half the spacing at once."""
+    """None before three values, nor while they are far off; at most half the spacing at once, but where the error is known."""
     assert rungs_up([math.inf, math.inf], 1e-2, False, 2) == 1
     assert rungs_up([math.inf, math.inf, 9e-2], 1e-2, False, 2) == 2
     assert rungs_up([math.inf, math.inf, 1.1e-2], 1e-2, False, 2) == 1
-    assert rungs_up([5e-2], 1e-2, True, 1) == 1
+    assert rungs_up([5e-2], 1e-2, True, 1) == 1 and rungs_up([1e-4], 1e-8, True, 1) == 7
     assert rungs_up([math.inf], 1e-2, False, 2, True) == rungs_up([math.inf, 5e-2], 1e-2, False, 2, True) == 2
-    assert rungs_up([math.inf, 1.5e-2], 1e-2, False, 2, True) == 1  # twice the points, once
-    assert rungs_up([math.inf, 1.5e-2, 1.1e-2], 1e-2, False, 2, True) == 2
+    assert rungs_up([math.inf, 1.4e-2], 1e-2, False, 2, True) == 1  # twice the points
+    assert rungs_up([math.inf, 1.5e-2, 1.1e-2], 1e-2, False, 2, True) == 1
 
 
 def known_numbers(problem):
@@ -275,11 +275,31 @@ def test_numbers_of_a_ladder_are_taken_when_they_are_asked_for():
 def test_estimate_of_two_grids():
     """Values that agree by chance have an estimate by what the pressure changed; the answer has 3/4 of the correction."""
     found = of_pair([1.0, 1.3], [0.0, 0.0], [16.0, 32.0], 0.1, "load")
-    assert found.value == pytest.approx(1.375) and found.error == pytest.approx(1.2 * 0.3 / 3) and found.extrapolated
-    assert of_pair([1.0, 1.0], [0.0, 0.0], [16.0, 32.0], 0.1, "load").error == pytest.approx(1.2 * 0.1 / 3)
+    assert found.value == pytest.approx(1.375) and found.error == pytest.approx(1.5 * 0.3 / 3) and found.extrapolated
+    assert of_pair([1.0, 1.0], [0.0, 0.0], [16.0, 32.0], 0.1, "load").error == pytest.approx(1.5 * 0.1 / 3)
+    far = of_pair([1.0, 1.2, 1.3], [0.0] * 3, [16.0, 23.0, 32.0], 0.1, "load", -3)  # with the grid of twice the spacing
+    assert far.value == found.value and far.error == found.error
     assert of_pair([1.0, 1.0], [0.0, 0.0], [16.0, 32.0], 0.1, "friction").error == pytest.approx(3 * 0.03 / 3)
     assert of_pair([1.0], [0.0], [16.0], 0.1, "load").error == math.inf
     assert of_pair([1.0, 1.1], [0.0, 0.0], [16.0, 32.0], 0.1, "cavitated_area").error == math.inf
+
+
+def test_errors_of_areas_are_a_sample():
+    """The root mean square of corrections of order 3/2; none where the values agree."""
+    off = [0.4, -0.2, 0.1, -0.05]
+    found = estimated([1 + one for one in off], [0.0] * 4, "cavitated_area")
+    moves = np.diff(off) / (2**1.5 - 1) * np.array([2**-3.0, 2**-1.5, 1.0])
+    assert found.error == pytest.approx(1.8 * np.sqrt(np.mean(moves**2))) and found.extrapolated
+    assert abs(found.value - 1) <= found.error <= 4 * abs(found.value - 1)
+    assert estimated([1.0, 1.0, 1.0], [0.0] * 3, "cavitated_area").relative == 0.0
+
+
+@pytest.mark.parametrize("form, truth", [("square", 6.1975), ("round", 7.0775)])
+def test_pads_whose_errors_cancel_in_each_dimple(form, truth):
+    """Pressures change twenty times as much as the load: 1 % of it needs no more than 160 points a side."""
+    with solve(load_scene("dimpled_pad", {"film.dimples.form": form}), accuracy=1e-2, quantity="pressure_integral") as solution:
+        assert solution.converged and solution.problem.grid.shape[0] <= 160
+        assert abs(solution.numbers["pressure_integral"] / truth - 1) <= solution.settings["accuracy_estimate"]
 
 
 def test_textured_slider_of_narrow_rims():
