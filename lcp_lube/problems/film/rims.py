@@ -55,27 +55,42 @@ def cut_faces(
     j, i = np.nonzero(cut)
     t = a[i, None] + d[i, None] * ((np.arange(IN_SERIES) + 0.5) / IN_SERIES)
     looks = ((np.arange(SIDE_BY_SIDE) + 0.5) / SIDE_BY_SIDE)[:, None] * width[j] + low[j]
-    thinnest, thickest = np.full(i.size, np.inf), np.zeros(i.size)
+    dry_first, dry_last = cavity[j, i], cavity[j, i + 1]
+    cubes, films = _in_series(film, t, looks)
+    some = np.flatnonzero(dry_first | dry_last)  # a full face resists all along: only beside a cavity a part may do it alone
+    if not some.size:
+        return cut, cubes, films
+    t, looks, j, i, dry_first, dry_last = t[some], looks[:, some], j[some], i[some], dry_first[some], dry_last[some]
+    thinnest, thickest = np.full(some.size, np.inf), np.zeros(some.size)
     for s in looks:
         h = np.real(film(t, s[:, None]))
         thinnest, thickest = np.minimum(thinnest, h.min(axis=1)), np.maximum(thickest, h.max(axis=1))
     between = thinnest + THIN * (thickest - thinnest)
     first, last = (np.real(film(nodes[i + k], lines[j])) > between for k in (0, 1))  # whether the points lie in the recess
-    dry_first, dry_last = cavity[j, i], cavity[j, i + 1]
     void = np.where(first == last, dry_first & dry_last, np.where(last, dry_last, dry_first & np.bool_(not along_flow)))
-    cubes, films = np.zeros(i.size), np.zeros(i.size)
-    for s in looks:
-        h = film(t, s[:, None])  # complex, where its derivative is asked for
-        thin = np.real(h) <= between[:, None]
+
+    def resists(h: Array) -> Flags:
+        thin = np.real(h) <= between[void, None]
         if along_flow:  # the film before the first place where it becomes thick
             thin = np.logical_and.accumulate(thin, axis=1)
-            alone = void & thin[:, 0] & (np.real(h[:, -1]) > between)
+            alone = thin[:, 0] & (np.real(h[:, -1]) > between[void])
         else:
-            alone = void & thin.any(axis=1)
-        resists = thin | ~alone[:, None]
-        resistance, drag = (np.mean(np.where(resists, h**-power, 0.0), axis=1) for power in (3.0, 2.0))
-        cubes, films = cubes + 1.0 / resistance / SIDE_BY_SIDE, films + drag / resistance / SIDE_BY_SIDE
+            alone = thin.any(axis=1)
+        return thin | ~alone[:, None]
+
+    cubes[some[void]], films[some[void]] = _in_series(film, t[void], looks[:, void], resists)
     return cut, cubes, films
+
+
+def _in_series(film: Shape, t: Array, looks: Array, resists: Callable[[Array], Flags] | None = None) -> tuple[Array, Array]:
+    """C and H of faces: means over lines of looks, on each of which what `resists` (None: all of it) does so in series."""
+    cubes, films = 0.0, 0.0
+    for s in looks:
+        h = film(t, s[:, None])  # complex, where its derivative is asked for
+        drag = 1.0 / h**2 if resists is None else np.where(resists(h), 1.0 / h**2, 0.0)
+        resistance = np.mean(drag / h, axis=1)
+        cubes, films = cubes + 1.0 / resistance / SIDE_BY_SIDE, films + np.mean(drag, axis=1) / resistance / SIDE_BY_SIDE
+    return np.asarray(cubes), np.asarray(films)
 
 
 def rims_across_x(
