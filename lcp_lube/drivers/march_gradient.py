@@ -32,6 +32,7 @@ from .compose import solve
 from .equations import MISFIT, Equations, cavity_of, right_side, unknowns
 from .linearised import Linear
 from .march_course import Course, Trace, check_march
+from .march_films import MarchFilms
 
 MEAN = "mean_"  # of a quantity: its mean over the march, of the steps' ends
 STEP = 1e-3  # of a supply's pressure, in which G and what it is told by are linear
@@ -201,14 +202,21 @@ class MarchGradient:
         """Q minus what the adjoints make of all equations, of a scene near by, what was solved for held. Collective."""
         total = dict.fromkeys(self.names, 0.0)
         start = np.array(course.table.velocity, dtype=float)  # of a free journal, which is held later
+        quick = None if self._films is None else self._films.sums(course)
         for n in range(0 if self.trace.begun is not None else 1, len(self.trace.steps) + 1):
+            asked = self._asked(n)
+            if quick is not None and n and not asked:
+                continue
             eq, kept, dot = course.at(n), course.kept(n), course.grid.reduce.dot
             assert kept is not None
-            asked = self._asked(n)
             numbers = eq.numbers(kept.p, kept.r, None if asked else FORCES if course.table.free else ())
-            told, G = eq.report(numbers), self._scaled(n, eq)
+            told = eq.report(numbers)
             for name, (base, share) in asked.items():
                 total[name] += share * told[base]
+            if quick is not None and n:
+                eq.destroy()
+                continue
+            G = self._scaled(n, eq)
             rest = np.zeros(4)
             if course.table.free and n:
                 formula, places = course.formula(n), [np.array(course.place(k)) for k in range(max(n - 2, 0), n + 1)][::-1]
@@ -222,7 +230,11 @@ class MarchGradient:
                 total[name] -= dot(self.lambdas[name][n], G) + float(self.journal[name][n] @ rest)
                 total[name] -= float(self.fed[name][n] @ off)
             eq.destroy()
-        return np.array([total[name] for name in self.names])
+        return np.array([total[name] for name in self.names]) - (0.0 if quick is None else quick)
+
+    @cached_property
+    def _films(self) -> MarchFilms | None:
+        return MarchFilms(self.course, self.lambdas, self.units) if MarchFilms.can(self.course) else None
 
     @cached_property
     def speeds(self) -> list[Array]:

@@ -6,8 +6,8 @@ import pytest
 from lcp_lube import solve
 from lcp_lube.drivers import rotor, supplies
 from lcp_lube.drivers.gradient import check, gradients
-from lcp_lube.drivers.march_course import Trace
-from lcp_lube.drivers.march_gradient import means
+from lcp_lube.drivers.march_course import Course, Trace
+from lcp_lube.drivers.march_gradient import MarchGradient, means
 from lcp_lube.errors import InputError
 from lcp_lube.scenes.scene import load_scene
 from lcp_lube.scenes.values import values_of, with_values
@@ -125,3 +125,25 @@ def test_by_the_speed_of_a_texture_the_mean_of_both_sides_is_the_limit_of_differ
         errors.append(np.array([abs(one.gradient["U"] / slope - 1) for one, slope in zip(found, slopes, strict=True)]))
     assert found[0].one_sided["U"] > 1e-2 * abs(found[0].gradient["U"])
     assert errors[0].max() > 1e-5 > errors[1].max()  # a kink is found by differences of L, to some 1e-6
+
+
+def test_films_near_by_of_a_march_have_the_lagrangians_of_their_problems():
+    """Also where edges that travel cut faces, and with void from one step to the next."""
+    film = [{"shape": "constant", "h": 5e-6}, {"shape": "dimples", "moves": True, "depth": 5e-6, "size": 1.7e-3, "columns": 4}]
+    motion = {"t_end": 0.01, "steps": 4}
+    scene, trace = load_scene("moving_texture", {"n": 31, "fluid.barus": 2e-8, "film": film, "motion": motion}), Trace()
+    with solve(scene, watch=trace) as solution:
+        adjoint = MarchGradient(scene, solution, ["load", "friction"], trace)
+        courses = {}
+        for key in ("L", "U", "film.dimples.size", "fluid.barus", "fluid.p_supply"):
+            value = values_of(scene)[key]
+            some = [with_values(scene, {key: value * (1.0 + part)}) for part in (1e-5, -1e-5)]
+            courses[key] = [Course(one, trace, adjoint.comm, adjoint.course) for one in some]
+        quick = {key: [adjoint.lagrangians(course) for course in pair] for key, pair in courses.items()}
+        assert adjoint._films is not None and all(adjoint._films.sums(course) is not None for course in courses["L"])
+        adjoint.__dict__["_films"] = None
+        sizes = np.array(list(adjoint.sizes.values()))
+        for key, pair in courses.items():
+            slow = [adjoint.lagrangians(course) for course in pair]
+            assert (np.abs(quick[key][0] - quick[key][1] - (slow[0] - slow[1])) <= 1e-13 * sizes).all(), key
+        adjoint.destroy()
