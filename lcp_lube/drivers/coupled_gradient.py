@@ -11,13 +11,15 @@ y' and a, none of them of a solve.
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from ..base.differences import APART, CHORD, KINK, SLIGHT, WIDTHS
 from ..base.parallel import Array
 from ..errors import InputError, nearest
-from ..problems.film.cavity import VOID
+from ..problems.film.edges import oblique
 from ..problems.film.forces import PIVOT, totals
 from ..problems.film.grooves import GroovedProblem
 from ..problems.film.supplies import Supply, supply_flows
@@ -37,6 +39,12 @@ LARGER, ROUNDING = 10, 1e-14  # powers of ten by which a step from zero may grow
 CENTRAL = {1: 2 / 3, -1: -2 / 3, 2: -1 / 12, -2: 1 / 12}
 ONWARD = {0: -25 / 12, 1: 4.0, 2: -3.0, 3: 4 / 3, 4: -1 / 4}
 STENCILS: tuple[dict[int, float], ...] = (CENTRAL, ONWARD, {-m: -w for m, w in ONWARD.items()})
+# What the derivative to the right has more than that to the left; of what bends nothing is left.
+KINKED = {0: -3.0, 1: 2.0, -1: 2.0, 2: -0.5, -2: -0.5}
+MEAN = {1: 1.0, -1: -1.0, 2: -0.25, -2: 0.25}  # and the mean of both, bends that differ from side to side left out too
+SEEN = 1e-5  # of the equations' derivative: a kink of them that is smaller is not looked at
+FINER, GROWS = 0.1, 3.0  # steps so much smaller make the difference across a jump so much larger
+State = tuple[Array, Array, dict[str, float]]  # R, what sources and film disagree by, and the numbers
 
 
 class CoupledGradient(CoupledResponse):
@@ -47,11 +55,11 @@ class CoupledGradient(CoupledResponse):
     InputError : no converged solution, a quantity without a derivative.
     """
 
-    def __init__(self, scene: Scene, solution: Solution, quantities: Sequence[str]):
+    def __init__(self, scene: Scene, solution: Solution, quantities: Sequence[str], flip: bool = False):
         if not solution.converged:
             raise InputError(f"{scene.name}: {solution.outcome.sentence}: no solution, no derivatives")
         self.scene: Any = placed(scene, solution)
-        super().__init__(self.scene, solution, [])
+        super().__init__(self.scene, solution, [], flip)
         self.found, self.conditions = conditions_of(scene, solution)
         self.report = self._numbers(self.loop, 0.0 * self.p, self.x)
         for name in (*quantities, *self.conditions):
@@ -59,8 +67,7 @@ class CoupledGradient(CoupledResponse):
                 known = nearest(name, self.report) or f"; of this scene they are known of {', '.join(self.report)}"
                 raise InputError(f"quantity {name}: no derivative{known}")
         self.names = [name for name in dict.fromkeys([*quantities, *self.conditions]) if name not in self.found]
-        switching = (np.abs(self.p) <= VOID * self.p_max) & (np.abs(self.r) <= VOID) & ~self.given
-        self.switching = int(self.loop.base.reduce.sum(switching.astype(float)))
+        self.switching = int(self.loop.base.reduce.sum(self.changing.astype(float)))
         self.ties: dict[str, int] = {}
 
     @property
@@ -111,37 +118,101 @@ class CoupledGradient(CoupledResponse):
         return R, np.array(off)
 
     def slopes(self, key: str) -> tuple[dict[str, float], dict[str, float]]:
-        """dQ/da by quantity and condition, what was found held; kinks are not told. Collective.
+        """dQ/da and the difference between both sides by quantity and condition, what was found held. Collective.
+
+        Kinks by the number, and those that the fields come to along y', make a difference to first order: by one more solve,
+        with the difference of R's derivatives. Where R or Q jumps the slope is that of a chord, and the difference inf.
 
         Raises
         ------
         InputError : no scene on either side.
         """
-        a, base = self.value(key), self.loop.base
-        d = self._step(key, a)
-        known: dict[int, tuple[Array, Array, dict[str, float]]] = {}
+        d = self._step(key, self.value(key))
+        stencil, known = self._around(key, d)
+        slope, kink = self._total(known, stencil, d)
+        least = {name: ROUNDING * abs(value) / d for name, value in self.report.items()}
+        out = {name: one if abs(one) > least[name] else 0.0 for name, one in slope.items()}
+        if stencil is not CENTRAL:
+            return out, {}
+        jumps = {name: abs(one) for name, one in kink.items() if abs(one) > KINK * abs(out[name]) + 10.0 * least[name]}
+        if jumps:
+            mean, closer = self._total(self._around(key, FINER * d)[1], MEAN, FINER * d)
+            steps = [name for name, one in jumps.items() if abs(closer[name]) > GROWS * one]
+            out |= {name: mean[name] for name in jumps}
+            if steps:
+                chord = self._chord(key, CHORD * d / STEP)
+                out |= {name: chord[name] for name in steps}
+                jumps |= dict.fromkeys(steps, np.inf)
+        if oblique(self.loop.model.gap):  # many steps, though it may seem smooth next to a
+            chords = [out, *(self._chord(key, width * CHORD * d / STEP) for width in WIDTHS)]
+            for name in self.names:
+                values = [one[name] for one in chords]
+                if np.ptp(values) > max(APART * np.abs(values).max(), SLIGHT * abs(self.report[name]) * STEP / d):
+                    out[name], jumps[name] = np.nan, np.inf
+        return out, jumps
+
+    def _chord(self, key: str, width: float) -> dict[str, float]:
+        """Mean slopes from so far below to so far above."""
+        ends = {m: self._beside(key, self.value(key) + m * width) for m in (-1, 1)}
+        return self._total(ends, {-1: -0.5, 1: 0.5}, width)[0]
+
+    def _around(self, key: str, d: float) -> tuple[dict[int, float], dict[int, State]]:
+        """A stencil of scenes that there are, and what they have at the solution's state; that of the scene itself too."""
+        a, known = self.value(key), {0: self._here}
         for stencil in STENCILS:
             try:
                 for m in stencil:
                     known[m] = known.get(m) or self._beside(key, a + m * d)
-                break
+                return stencil, known
             except InputError as error:
                 refused = error
-        else:
-            raise refused
-        R_a = np.sum([w * known[m][0] for m, w in stencil.items()], axis=0) / d
+        raise refused
+
+    def _total(self, known: dict[int, State], stencil: dict[int, float], d: float) -> tuple[dict[str, float], dict[str, float]]:
+        """dQ/da, and by a stencil of four places around a the difference between both sides, from what scenes beside have."""
+        R, off, own = self._weighed(known, stencil, d)
+        y = self._settled(-R, 0.0, 0.0, off=off)
+        slope, along = self._numbers_along(y)
+        total = {name: own[name] + slope[name] for name in self.names}
+        if len(stencil) != len(CENTRAL):
+            return total, {}
+        kinks, apart, own = self._weighed(known, KINKED, d)
+        t = self._reach(y)
+        states = {m: self._system(m * t * y[: self.n], self.x + m * t * y[self.n :], self.loop.base) for m in KINKED}
+        kinks = kinks + np.sum([w * states[m][0] for m, w in KINKED.items()], axis=0) / t
+        given = np.sum([w * states[m][2][0] for m, w in KINKED.items()], axis=0) / t
+        largest = self.loop.base.reduce.max
+        more = dict.fromkeys(self.names, 0.0)
+        if largest(np.abs(kinks)) > SEEN * largest(np.abs(R)):
+            more = self._numbers_along(self._settled(-kinks, given, 0.0, off=apart))[0]
+        return total, {name: own[name] + along[name] + more[name] for name in self.names}
+
+    def _weighed(self, known: dict[int, State], stencil: dict[int, float], d: float) -> State:
+        """R, misfits and numbers of scenes beside this one, summed by a stencil's weights over the step."""
+        R = np.sum([w * known[m][0] for m, w in stencil.items()], axis=0) / d
         off = np.sum([w * known[m][1] for m, w in stencil.items()], axis=0) / d
-        y = self._settled(-R_a, 0.0, 0.0, off=off)
-        z, x = y[: self.n], y[self.n :]
-        size = base.reduce.max(np.abs(np.concatenate([np.where(self.cavity, 1.0, 1.0 / self.p_max) * z, x])))
-        t = STEP / size if size > 0.0 else 1.0
-        moved = {m: self._numbers(self.loop, m * t * z, self.x + m * t * x) for m in CENTRAL}
-        out = {}
-        for name in self.names:
-            own = sum(w * known[m][2][name] for m, w in stencil.items()) / d
-            total = own + sum(w * moved[m][name] for m, w in CENTRAL.items()) / t
-            out[name] = total if abs(total) * d > ROUNDING * abs(self.report[name]) else 0.0
-        return out, {}
+        return R, off, {name: sum(w * known[m][2][name] for m, w in stencil.items()) / d for name in self.names}
+
+    def _reach(self, y: Array) -> float:
+        """How far along a direction differences go."""
+        by_size = np.concatenate([np.where(self.cavity, 1.0, 1.0 / self.p_max) * y[: self.n], y[self.n :]])
+        return STEP / (self.loop.base.reduce.max(np.abs(by_size)) or STEP)
+
+    def _numbers_along(self, y: Array) -> tuple[dict[str, float], dict[str, float]]:
+        """The numbers' derivatives along a direction, and by how much they differ to both sides."""
+        t = self._reach(y)
+        at = {m: self._numbers(self.loop, m * t * y[: self.n], self.x + m * t * y[self.n :]) for m in CENTRAL} | {
+            0: self.report
+        }
+
+        def of(stencil: dict[int, float]) -> dict[str, float]:
+            return {name: sum(w * at[m][name] for m, w in stencil.items()) / t for name in self.names}
+
+        return of(CENTRAL), of(KINKED)
+
+    @cached_property
+    def _here(self) -> State:
+        return *self._rest(self.loop), self.report
 
     def _step(self, key: str, a: float) -> float:
         """A small change of a number; of one that is zero one that changes the equations by more than rounding does."""
@@ -156,7 +227,7 @@ class CoupledGradient(CoupledResponse):
                 d *= 10.0
         return d
 
-    def _beside(self, key: str, value: float) -> tuple[Array, Array, dict[str, float]]:
+    def _beside(self, key: str, value: float) -> State:
         """R, what sources and film disagree by, and the numbers of the scene with another value, at the solution's state."""
         scene: Any = with_values(self.scene, {key: value})
         if self.free:

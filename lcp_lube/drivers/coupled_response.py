@@ -20,7 +20,7 @@ from petsc4py import PETSc
 
 from ..base.parallel import Array
 from ..errors import NotFound
-from ..problems.film.cavity import cavity_sign
+from ..problems.film.cavity import VOID, cavity_sign
 from ..problems.film.contact import areas
 from ..problems.film.effects import Answer, answer, factors
 from ..problems.film.flows import point_weights
@@ -42,10 +42,10 @@ class CoupledResponse:
 
     Parameters
     ----------
-    gaps : the film for each motion, by its coordinate e.
+    gaps : the film for each motion, by its coordinate e. flip : points that are about to change count to the other side.
     """
 
-    def __init__(self, scene: Any, solution: Solution, gaps: Sequence[Any]):
+    def __init__(self, scene: Any, solution: Solution, gaps: Sequence[Any], flip: bool = False):
         problem: Any = solution.problem
         grid, comm = problem.grid, problem.grid.petsc_comm
         self.supplies = problem.held.supplies if problem.held is not None else ()
@@ -62,6 +62,8 @@ class CoupledResponse:
         self.cavity = (cavity_sign(problem.reduce, self.p, self.r) < 0) & ~self.given
         self.x = loop.vector(problem.cells) if loop.names else np.zeros(0)
         self.p_max = base.reduce.max(np.abs(self.p)) or 1.0
+        self.changing = (np.abs(self.p) <= VOID * self.p_max) & (np.abs(self.r) <= VOID) & ~self.given
+        self.cavity ^= self.changing & flip
         at = self._answer(np.zeros(self.n), self.x, base)
         self._size = 2.0 * grid.spacing[0] / self.unit * point_weights(grid)
         self._linear = Linear(at.problem, self.cavity, given=columns if columns.any() else None, factored=True)

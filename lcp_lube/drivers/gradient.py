@@ -105,7 +105,7 @@ def gradients(
     InputError : a quantity without a derivative, a key that is no number, a solution that is none, a scene without a film.
     """
     first = _gradients(scene, solution, quantities, keys, trace=trace)
-    if motion_of(scene) is not None or _coupled(scene) or not any(one.switching for one in first):
+    if motion_of(scene) is not None or not any(one.switching for one in first):
         return first
     other = _gradients(scene, solution, quantities, keys, flip=True)
     out = []
@@ -150,7 +150,7 @@ def _gradients(
     if motion_of(scene) is not None:
         adjoint = MarchGradient(scene, solution, quantities, trace)
     elif _coupled(scene):
-        adjoint = CoupledGradient(scene, solution, quantities)
+        adjoint = CoupledGradient(scene, solution, quantities, flip)
     else:
         adjoint = Adjoint(scene, solution, quantities, flip)
     try:

@@ -148,3 +148,32 @@ def test_of_a_very_soft_wall():
     with solve(data, model="full") as s:
         found = s.gradient("load", ["elastic.compliance"])["elastic.compliance"]
     assert found == pytest.approx((loads[1] - loads[0]) / 2e-13, rel=1e-4)
+
+
+def slopes_to_both_sides(scene, solution, key, d):
+    f = {0: solution.load}
+    for k in (-2, -1, 1, 2):
+        with answer(with_values(scene, {key: values_of(scene)[key] + k * d}), solution) as other:
+            f[k] = other.load
+    return [side * (-1.5 * f[0] + 2.0 * f[side] - 0.5 * f[2 * side]) / d for side in (-1, 1)]
+
+
+def test_kinks_and_jumps_are_told():
+    """A pocket's edges on points: by the first a load has a slope to each side, by the second it jumps."""
+    heat, edges = {"beta": 0.03, "T_in": 320.0}, ["film.pocket.x.1", "film.pocket.x.2"]
+    scene = load_scene("pocketed_pad", n=49, temperature=heat, elastic={"compliance": 1e-13})
+    with answer(scene) as solution:
+        (one,) = gradients(scene, solution, ["load"], [*edges, "fluid.mu"])
+        below, above = slopes_to_both_sides(scene, solution, edges[0], 1e-7)
+        onto, behind = slopes_to_both_sides(scene, solution, edges[1], 1e-7)
+    assert one.gradient[edges[0]] == pytest.approx(0.5 * (below + above), rel=1e-5)
+    assert one.one_sided == {edges[0]: pytest.approx(abs(above - below), rel=1e-3), edges[1]: np.inf}
+    assert abs(onto) > 20 * abs(behind)
+
+
+def test_cells_about_to_change_are_counted_with_effects():
+    """A film at rest that no pressure fills: p = r = 0 everywhere."""
+    scene = load_scene("problem1", n=21, U=0.0, roughness={"sigma": 1e-6})
+    with solve(scene) as solution:
+        (one,) = gradients(scene, solution, ["pressure_integral"], ["p_a"])
+    assert one.switching == 21 and one.switching_gap >= 0.0
