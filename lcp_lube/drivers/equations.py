@@ -17,7 +17,6 @@ from ..base.parallel import Array
 from ..errors import InputError, nearest
 from ..problems.film import slopes
 from ..problems.film.cavity import VOID, cavitated
-from ..problems.film.edges import jumps_of
 from ..problems.film.forces import attitude, weights
 from ..problems.film.grooves import GroovedProblem
 from ..problems.film.line import known_fields
@@ -236,8 +235,7 @@ def followed(grid: Grid, before: Model, after: Model) -> Places | None:
 def _knots(model: Model, side: int, periodic: bool) -> Array:
     """The edges that lines of a grid follow, and the two ends."""
     axis, L = "xy"[side], model.lengths[side]
-    edges = [*jumps_of(model.gap, axis), *(t for s in model.supplies for t in s.region.edges(axis))]
-    within = np.unique([t for t in edges if 0.0 < t < L])
+    within = np.unique([t for t in model.edges_along(axis) if 0.0 < t < L])
     if not within.size:
         return np.array([0.0, L])
     ends = (within[-1] - L, within[0] + L) if periodic else (0.0, L)

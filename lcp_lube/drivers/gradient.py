@@ -29,7 +29,7 @@ from .march_course import Trace, check_march
 from .march_gradient import MarchGradient
 
 BY_STEPS = "no derivative on this grid: it changes by steps, whose mean slope is another over other widths"
-STEPWISE = "the edges of grooves lie on points of the grid: the answer changes by steps"
+STEPWISE = "the lines of points go with the edges of grooves, and their number between two by steps"
 FOUND = "it was found, and follows the other numbers"
 
 

@@ -109,9 +109,8 @@ def films_of(scene: Solvable, ring: LubricationProblem, fields: Fields) -> Itera
     comm, films = ring.grid.comm, pad_films(scene)
     groups, some, mine = _dealt(scene, films, comm)
     taken = _taken(ring.grid, fields, films, mine, PETSc.Comm(some), comm)
-    dx = ring.grid.lengths[0] / ring.grid.shape[0]
     yield SideBySide(
-        comm, some, [SolvedFilm(at, films[k][1], own, (films[k][0].first - 0.5) * dx) for k, (at, own) in taken.items()]
+        comm, some, [SolvedFilm(at, films[k][1], own, float(films[k][0].around[0])) for k, (at, own) in taken.items()]
     )
     for problem, _ in taken.values():
         problem.destroy()

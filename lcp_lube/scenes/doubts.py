@@ -12,8 +12,6 @@ DENSITY = 900.0  # kg/m3, of an oil
 TURBULENT = 1000.0  # Reynolds number of the gap
 STEEL = 3e9  # Pa: more than any bearing surface stands
 LONG = 100.0  # times the pad: a profile in another unit
-MOVED = 0.005  # part of a film between grooves by which an edge is off
-FINER = 8  # times the points: as far as a grid is looked for that has points on all edges
 SAMPLES = 33  # points a side at which the film is looked at
 
 
@@ -26,7 +24,7 @@ def doubts(scene: Scene) -> list[str]:
     for k, part in enumerate(film if isinstance(film, list) else [], start=1):
         name = f"film {k} ({part.shape})"
         found += [f"{name}: {text}" for text in _of_a_shape(part, model.lengths)]
-    return found + _of_profiles(model) + _of_grooves(scene, model)
+    return found + _of_profiles(model)
 
 
 def too_high(quantities: dict[str, Any]) -> list[str]:
@@ -71,25 +69,6 @@ def _of_a_shape(part: Any, lengths: tuple[float, ...]) -> list[str]:
                 place = f"{start:g} to {end:g}" if isinstance(span, tuple) else f"{start:g}"
                 found.append(f"{name} = {place} m lies outside the pad, 0 to {length:g} m")
     return found
-
-
-def _of_grooves(scene: Any, model: Any) -> list[str]:
-    """Edges of pads and grooves are points of the grid: those that lie between points are moved."""
-    if not model.grooves:
-        return []
-    nx, edges = scene.shape[0], np.array(scene.edges_deg)
-
-    def off(n: int) -> float:
-        """Degrees."""
-        meshes = edges * n / 360.0
-        return float(np.max(np.abs(meshes - np.round(meshes)))) * 360.0 / n
-
-    shortest = min(pad.n for pad, _ in model.pads(scene.shape)) * 360.0 / nx
-    if off(nx) <= MOVED * shortest:
-        return []
-    better = next((n for n in range(nx + 1, FINER * nx) if off(n) < 1e-6), None)
-    more = f"; with nx = {better} all lie on points" if better else ""
-    return [f"nx = {nx}: edges of pads or grooves lie between points, and are moved by up to {off(nx):.2g} degrees{more}"]
 
 
 def _of_profiles(model: Any) -> list[str]:

@@ -7,7 +7,6 @@ from typing import Annotated
 from pydantic import Field
 
 from ..problems.film.bore import Bore, Dam
-from ..problems.film.grooves import Groove
 from ..problems.film.model import Model
 from ..problems.film.supplies import Patch, Supply
 from .balance import BalanceTable
@@ -116,17 +115,7 @@ class GroovedJournalScene(ShaftScene, WithEffects):
 
     @property
     def edges_deg(self) -> list[float]:
-        """Of the grooves, from the first one's first edge on, degrees."""
         return [at - self.grooves_deg[0] + edge for at in self.grooves_deg for edge in (0.0, self.groove_deg)]
-
-    @property
-    def grooves(self) -> tuple[Groove, ...]:
-        """Their columns: edges on points of the grid, exactly where groove_deg and the middles are whole numbers of meshes."""
-        nx = self.shape[0]
-        meshes = nx / 360.0
-        count = max(1, round(self.groove_deg * meshes) + 1)
-        middle = self.grooves_deg[0] if self.grooves_deg else 0.0
-        return tuple(Groove(round((at - middle) * meshes) % nx, count, self.p_groove) for at in self.grooves_deg)
 
     def _model(self) -> Model:
         model = super()._model()

@@ -61,7 +61,7 @@ def models_of(scene: Any) -> Models:
 
 def _fixed(model: Model, shape: Any) -> Any:
     """What a march is about: none of it can change."""
-    grooves, c = [(one.first, one.count) for one in model.grooves], getattr(model.shaft, "c", None)
+    grooves, c = [(one.start, one.end) for one in model.grooves], getattr(model.shaft, "c", None)
     sides = [side.kind for side in model.sides]
     return shape, model.lengths, model.polar, model.p_c, sides, grooves, c, len(model.supplies)
 

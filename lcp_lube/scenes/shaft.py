@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any, Self
 
+import numpy as np
 from pydantic import Field, field_validator
 
 from ..problems.film.grooves import Groove
@@ -90,9 +91,15 @@ class ShaftScene(FilmScene):
         raise NotImplementedError
 
     @property
-    def grooves(self) -> tuple[Groove, ...]:
-        """The columns of points that have p_groove; edges of grooves are points of the grid."""
+    def edges_deg(self) -> list[float]:
+        """Where the grooves begin and end, one behind the other, degrees from `start`."""
         raise NotImplementedError
+
+    @property
+    def grooves(self) -> tuple[Groove, ...]:
+        """What has p_groove."""
+        x = (np.radians(self.edges_deg) + math.pi / self.shape[0]) * (0.5 * self.D)
+        return tuple(Groove(float(a), float(b), self.p_groove) for a, b in zip(x[::2], x[1::2], strict=True))
 
     def _model(self) -> Model:
         turning, ends = self.turning, Side(p=self.p_end)

@@ -4,16 +4,18 @@ import math
 from dataclasses import replace
 from typing import Annotated
 
+import numpy as np
 from pydantic import Field
 
 from ..problems.film.bore import PadBore, PadLever
-from ..problems.film.grooves import Groove
 from ..problems.film.model import Model
 from .balance import BalanceTable
 from .effects.table import WithEffects
 from .scene import Finite, NotNegative, Positive
 from .shaft import ShaftScene
 from .units import measured, metres
+
+NARROWEST = 0.01  # gap between two pads, degrees
 
 
 class TiltingPadScene(ShaftScene, WithEffects):
@@ -49,10 +51,9 @@ class TiltingPadScene(ShaftScene, WithEffects):
             raise ValueError(f"nx = {self.shape[0]}: pads of {self.pad_deg:g} degrees need {needed} points around")
         turn = [*self.pivots_deg[1:], self.pivots_deg[0] + 360.0]
         least = min(b - a for a, b in zip(self.pivots_deg, turn, strict=True))
-        if least - self.pad_deg < 360.0 / self.shape[0] * (1 - 1e-9):
-            most, mesh = least - 360.0 / self.shape[0], f" with nx = {self.shape[0]}, whose mesh is wider than the gap"
-            apart = f"pads {least:g} degrees apart " + ("overlap" if self.pad_deg >= least else f"touch{mesh}")
-            raise ValueError(f"pad_deg = {self.pad_deg:g}: {apart}; at most {most:g} is allowed")
+        if least - self.pad_deg < NARROWEST * (1 - 1e-9):
+            apart = f"pads {least:g} degrees apart " + ("overlap" if self.pad_deg >= least else "touch")
+            raise ValueError(f"pad_deg = {self.pad_deg:g}: {apart}; at most {least - NARROWEST:g} is allowed")
         if self.tilts is not None and len(self.tilts) != len(self.pivots_deg):
             raise ValueError(f"tilts = {self.tilts}: {len(self.pivots_deg)} values are needed, one a pad")
         if self.balance is not None and self.balance.vary not in (None, "eccentricity"):
@@ -85,26 +86,19 @@ class TiltingPadScene(ShaftScene, WithEffects):
 
     def _model(self) -> Model:
         """With the levers of the pads' moments."""
-        nx, above, levers = self.shape[0], min(self.p_groove, self.p_end), []
-        for k, (pivot, behind) in enumerate(zip(self.pivots_deg, self.grooves, strict=True)):
-            before = self.grooves[k - 1]
-            first = before.first + before.count
-            levers.append(PadLever(self.turning, math.radians(pivot), first, (behind.first - first) % nx, nx, above))
-        return replace(super()._model(), levers=tuple(levers))
+        model, L = super()._model(), math.pi * self.D
+        x, above, levers = model.columns(self.shape), min(self.p_groove, self.p_end), []
+        steps = np.remainder(np.diff(x, append=x[:1]), L)  # behind each column
+        for k, (pivot, behind) in enumerate(zip(self.pivots_deg, model.grooves, strict=True)):
+            before = model.grooves[k - 1]
+            west, (east, _) = sum(before.columns(x, L)) - 1, behind.columns(x, L)
+            own, others = steps[[west % x.size, east - 1]], steps[[west - 1, east]]
+            start, length = before.end % L, (behind.start - before.end) % L
+            levers.append(PadLever(self.turning, math.radians(pivot), start, length, tuple(own / (own + others)), above))
+        return replace(model, levers=tuple(levers))
 
     @property
     def edges_deg(self) -> list[float]:
-        """Of the pads, from the first one's outlet on, degrees."""
-        return [at - self.pivots_deg[0] - edge for at in self.pivots_deg for edge in (0.0, self.pad_deg)]
-
-    @property
-    def grooves(self) -> tuple[Groove, ...]:
-        """The columns between the pads, whose edges are points of the grid: that behind pad k is the k-th."""
-        nx, meshes = self.shape[0], self.shape[0] / 360.0
-        first = self.pivots_deg[0] + (1.0 - self.pivot_part) * self.pad_deg
-        out = []
-        for at, behind in zip(self.pivots_deg, [*self.pivots_deg[1:], self.pivots_deg[0] + 360.0], strict=True):
-            start = round((at + (1.0 - self.pivot_part) * self.pad_deg - first) * meshes)
-            end = round((behind - self.pivot_part * self.pad_deg - first) * meshes)
-            out.append(Groove(start % nx, max(1, end - start + 1), self.p_groove))
-        return tuple(out)
+        turn = [*self.pivots_deg[1:], self.pivots_deg[0] + 360.0]
+        pairs = zip(self.pivots_deg, turn, strict=True)
+        return [edge - self.pivots_deg[0] for at, behind in pairs for edge in (at, behind - self.pad_deg)]

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ...base.parallel import Array
 from .edges import jumps_of, level
+from .lines import SAME
 from .shapes import Shape
 from .turning import Turning
 
@@ -119,20 +120,22 @@ class PadBore:
 
 @dataclass(frozen=True)
 class PadLever:
-    """Rise of the film by a pad's tilt about its pivot (rad), for its moment: on the pad alone, half at the points beside it.
+    """Rise of the film by a pad's tilt about its pivot (rad), for its moment: on the pad alone.
 
-    The pad has n columns of the ring's nx from `first` on; the columns beside it are in the grooves. above : the pressure on
-    the back of the pad, Pa above p_c.
+    start, length : of the pad, m; points on its two edges are in the grooves. shares : the parts of their cells that are the
+    pad's. above : the pressure on the back of the pad, Pa above p_c.
     """
 
     turning: Turning
     pivot: float
-    first: int
-    n: int
-    nx: int
+    start: float
+    length: float
+    shares: tuple[float, float]
     above: float
 
     def __call__(self, x: Array, y: Array) -> Array:
-        column = (np.floor(x * (self.nx / self.turning.length)) - self.first) % self.nx
-        share = np.where(column < self.n, 1.0, np.where((column == self.n) | (column == self.nx - 1), 0.5, 0.0))
+        L, slack = self.turning.length, SAME * self.turning.length
+        way = np.remainder(x - self.start + slack, L) - slack
+        share = np.where(way <= slack, self.shares[0], np.where(way < self.length - slack, 1.0, self.shares[1]))
+        share = np.where(way > self.length + slack, 0.0, share)
         return -share * self.turning.R * np.sin(self.turning.theta(x) - self.pivot)

@@ -19,34 +19,48 @@ from .lubrication import LubricationProblem
 
 @dataclass(frozen=True)
 class Groove:
-    """Columns first to first + count - 1 of the grid, counted round, hold the pressure p (Pa above p_c)."""
+    """From x = start on, counted round as far as x = end (m), the film holds the pressure p (Pa above p_c).
 
-    first: int
-    count: int
+    Lines of points lie on its edges (`Model.lines`); of other lines, even ones of a march say, the nearest stand for them.
+    """
+
+    start: float
+    end: float
     p: float
+
+    def columns(self, x: Array, period: float) -> tuple[int, int]:
+        """The first of its columns, of those at x (m) round a ring, and how many it has."""
+        beside = [np.abs(np.remainder(x - at + 0.5 * period, period) - 0.5 * period) for at in (self.start, self.end)]
+        first, last = (int(np.argmin(away)) for away in beside)
+        return first, (last - first) % x.size + 1
 
 
 @dataclass(frozen=True)
 class Pad:
-    """The film between two grooves: n columns from `first` on, and the pressures at its west and east side."""
+    """The film between two grooves: n columns from `first` on, and the pressures at its west and east side.
+
+    around : x of its points and of the grooves' points beside them, m; it ascends beyond the ring's end.
+    """
 
     first: int
     n: int
     west: float
     east: float
+    around: Array
 
 
-def pads_between(nx: int, grooves: tuple[Groove, ...]) -> list[Pad]:
-    """The films between the grooves of a ring of nx columns, one behind the other; ValueError where none is left."""
-    ordered = sorted(grooves, key=lambda groove: groove.first)
-    pads = []
-    for k, groove in enumerate(ordered):
-        behind = ordered[(k + 1) % len(ordered)]
-        start = groove.first + groove.count
-        n = (behind.first - start) % nx if len(ordered) > 1 else nx - groove.count
-        if n < 1 or groove.count < 1 or sum(g.count for g in ordered) >= nx:
+def pads_between(x: Array, period: float, grooves: tuple[Groove, ...]) -> list[Pad]:
+    """The films between the grooves of a ring with columns at x, one behind the other; ValueError where none is left."""
+    ordered = sorted((*groove.columns(x, period), groove.p) for groove in grooves)
+    pads, nx = [], x.size
+    for k, (first, count, p) in enumerate(ordered):
+        behind, _, p_behind = ordered[(k + 1) % len(ordered)]
+        start = first + count
+        n = (behind - start) % nx if len(ordered) > 1 else nx - count
+        if n < 1 or sum(count for _, count, _ in ordered) >= nx:
             raise ValueError("grooves that overlap, or leave no point of the grid between them")
-        pads.append(Pad(start % nx, n, groove.p, behind.p))
+        columns = np.arange(start - 1, start + n + 1)
+        pads.append(Pad(start % nx, n, p, p_behind, x[columns % nx] + period * (columns // nx)))
     return pads
 
 
@@ -60,7 +74,8 @@ class GroovedProblem(LubricationProblem):
         """For each groove, whether an owned point lies in it."""
         grid = self.grid
         number = np.broadcast_to(np.arange(grid.x_start, grid.x_end)[None, :], grid.box).ravel()
-        return [(number - groove.first) % grid.shape[0] < groove.count for groove in self.grooves]
+        each = (groove.columns(grid.lines[0], grid.lengths[0]) for groove in self.grooves)
+        return [(number - first) % grid.shape[0] < count for first, count in each]
 
     def groove_flows(self, p: Array, r: Array) -> list[float]:
         """Volume flow that each groove gives to the film, m3/s (1D: m2/s). Collective."""

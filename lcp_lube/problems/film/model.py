@@ -8,16 +8,17 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
+from ...base.parallel import Array
 from ...errors import InputError
 from ..facts import Facts
-from ..grid import EVEN, Grid, Places, Polar
+from ..grid import EVEN, Grid, Places, Polar, some_places
 from .edges import jumps_of
 from .effects import Effect
 from .exact import ExactSolution
 from .fluid import Law
 from .grooves import Groove, GroovedProblem, Pad, pads_between
 from .integrals import line_integrals
-from .lines import on_edges, stretches
+from .lines import SAME, on_edges, stretches
 from .lubrication import LubricationProblem
 from .reynolds import BoxScheme, Film, box_scheme, coefficients
 from .stored import Stored
@@ -28,6 +29,7 @@ from .views import FromHere, Inside, MirroredFilm, Raised
 
 NAMES = ("west", "east", "south", "north")
 STEP = 1e-30  # relative, of a complex step: nothing is subtracted, so no digits are lost however small it is
+RING = ("periodic", "periodic")
 OPPOSITE = dict(zip(NAMES, ("east", "west", "north", "south"), strict=True))
 
 
@@ -146,19 +148,30 @@ class Model:
 
     def lines(self, shape: Sequence[int]) -> Places:
         """Where the lines of points of a grid lie (`Grid.places`): on edges, where scheme 'face' can make use of it in 2D."""
-        if self.places is not None:
-            return self.places
+        if self.places is not None:  # a coarser grid of a part: evenly
+            x, y = (None if a is None or a.size != n else a for a, n in zip(self.places, (*shape, 1), strict=False))
+            return x, y
         x, y = (on_edges(n, *edges) for n, edges in zip(shape, self.edges, strict=True)) if self.edges else EVEN
-        return (None if self.grooves else x), y  # grooves are columns of an even grid
+        if x is None and self.grooves:  # even, or with too few lines for what lies between the grooves as well
+            x = on_edges(shape[0], self.lengths[0], RING, self._groove_edges)
+        return x, y
+
+    def edges_along(self, axis: str) -> list[float]:
+        """x or y (m) of the straight lines at which the film, a supply or a groove ends."""
+        ends = self._groove_edges if axis == "x" else []
+        return [*jumps_of(self.gap, axis), *(t for one in self.supplies for t in one.region.edges(axis)), *ends]
+
+    @property
+    def _groove_edges(self) -> list[float]:
+        return [at % self.lengths[0] for groove in self.grooves for at in (groove.start, groove.end)]
 
     @property
     def edges(self) -> list[tuple[float, list[str], list[float]]]:
         """Length, kinds of the ends and edges of each side of a film whose lines of points lie on edges."""
         if self.scheme != "face" or self.mean_cubes or len(self.lengths) == 1:
             return []
-        edges = [[*jumps_of(self.gap, axis), *(t for one in self.supplies for t in one.region.edges(axis))] for axis in "xy"]
         kinds = [[side.kind for side in self.sides[2 * k : 2 * k + 2]] for k in (0, 1)]
-        return list(zip(self.lengths, kinds, edges, strict=True))
+        return list(zip(self.lengths, kinds, map(self.edges_along, "xy"), strict=True))
 
     def grid(self, shape: Sequence[int], comm: PETSc.Comm | None = None) -> Grid:
         """(nx,) or (nx, ny) points. Collective."""
@@ -236,17 +249,23 @@ class Model:
         slopes = BoxScheme(**{name: a if name == "h" else a / flow_unit for name, a in changes.items()}, flow_unit=flow_unit)
         return hold(grid, slopes, self.supplies, self.p_unit)[0] if self.supplies else slopes
 
+    def columns(self, shape: Sequence[int]) -> Array:
+        """x of all columns of points of a ring, m."""
+        x = self.lines(shape)[0]
+        return some_places(shape[0], self.lengths[0], RING, shape[0]) if x is None else x
+
     def pads(self, shape: Sequence[int]) -> list[tuple[Pad, "Model"]]:
         """The films between the grooves on a ring of nx columns, whose points they keep."""
-        dx = self.lengths[0] / shape[0]
-        films, places = [], (None, self.lines(shape)[1]) if len(shape) == 2 else None
-        for pad in pads_between(shape[0], self.grooves):
-            lengths = ((pad.n + 1) * dx, *self.lengths[1:])
-            sides = (Side(p=pad.west), Side(p=pad.east), *self.sides[2:])
+        films, y = [], self.lines(shape)[1]
+        for pad in pads_between(self.columns(shape), self.lengths[0], self.grooves):
             # Its x = 0 is the last column of the groove before it.
-            gap = FromHere(self.gap, (pad.first - 0.5) * dx, self.lengths[0])
+            x = pad.around - pad.around[0]
+            lengths = (float(x[-1]), *self.lengths[1:])
+            sides = (Side(p=pad.west), Side(p=pad.east), *self.sides[2:])
+            gap = FromHere(self.gap, float(pad.around[0]), self.lengths[0])
             stored = self.stored.starting(pad.first) if self.stored else None
-            changed: dict[str, Any] = {"grooves": (), "levers": (), "places": places, "stored": stored}
+            even = np.allclose(np.diff(x), x[-1] / (pad.n + 1), rtol=SAME, atol=0.0)
+            changed: dict[str, Any] = {"grooves": (), "levers": (), "places": (None if even else x[1:-1], y), "stored": stored}
             film = replace(self, lengths=lengths, sides=sides, gap=gap, exact=None, **changed)
             films.append((pad, film))
         return films
