@@ -155,8 +155,11 @@ def _across(cavity: Array, frame: Array, steps: Array) -> Across:
         j, i = places_in(dry[beside : beside + full.shape[0], 1:-1] & full)
         step, far = steps[j + beside // 2, 0], steps[j + beyond // 2, 0]
         here = frame[j + 1, i + 1]
-        rise = (frame[j + beyond, i + 1] - here) / far
-        back = np.where(rise > 0.0, np.minimum(here / np.where(rise > 0.0, rise, 1.0), step), 0.5 * step)
+        rise = (frame[j + beyond, i + 1] - here) / far * step
+        # In parts of `here`: what falls as steeply reaches zero before the cavity's point, at the latest there; a ridge of
+        # pressure one line wide ends half-way. Between them no jump: beside a supply the slope is rounding.
+        part = np.divide(rise, here, out=np.full_like(rise, np.inf), where=here > 0.0)
+        back = step * np.where(part > 1.0, 1.0 / np.maximum(part, 1.0), np.clip(1.0 + 0.5 * part, 0.5, 1.0))
         out.append((j, i, back))
     return out
 

@@ -77,8 +77,8 @@ def _counts(stretches: Array, cut: Array, total: int) -> NDArray[np.int64] | Non
         found.append((largest, counts * (total // coarse)))
     if not found:
         return None
-    allowed = 1.0 + SAME if found[0][0] <= 1.0 + SAME else max(found[0][0], UNEVEN)
-    return next(counts for largest, counts in reversed(found) if largest <= allowed)
+    allowed = 1.0 if found[0][0] <= 1.0 + SAME else max(found[0][0], UNEVEN)
+    return next(counts for largest, counts in reversed(found) if largest <= allowed + SAME)
 
 
 def _shared_out(stretches: Array, cut: Array, total: int, mirrored: bool) -> NDArray[np.int64]:
@@ -87,11 +87,12 @@ def _shared_out(stretches: Array, cut: Array, total: int, mirrored: bool) -> NDA
     One cell after the other goes where that falls most for its price: the least of a sum of convex terms.
     """
     size = stretches.size
+    stretches = np.round(stretches / stretches.sum(), 9)  # of like ones the first gets more, not the longer one by rounding
     half = (size + 1) // 2 if mirrored else size  # those behind the middle follow
     lone = np.arange(half) == half - 1 if mirrored and size % 2 else np.full(half, not mirrored)
     price = np.where(lone, 1, 2)
     step = 2 // price if mirrored else price  # the number of cells in the middle keeps its parity
-    counts = np.maximum(1, (stretches[:half] * (total / stretches.sum())).astype(int) - 3)
+    counts = np.maximum(1, (stretches[:half] * total).astype(int) - 3)
     if mirrored and size % 2:
         counts[-1] += (total - int(price @ counts)) % 2
 
