@@ -171,7 +171,7 @@ class Herringbone:
     def __call__(self, x: Array, y: Array) -> Array:
         L, width = self.lengths
         off = np.abs(y - 0.5 * width)
-        phase = _phase((x + off / np.tan(self.angle)) / L, self.count)
+        phase = np.remainder(((x + off / np.tan(self.angle)) / L + EDGE) * self.count, 1.0)
         return np.where((phase < self.ratio) & (off >= 0.5 * self.land * width), self.depth, 0.0)
 
 
@@ -193,7 +193,7 @@ class SpiralGrooves:
 
     def __call__(self, x: Array, y: Array) -> Array:
         theta, r = x / self.polar[1], self.polar[0] + y
-        phase = _phase((theta + np.log(r) / np.tan(self.angle)) / (2.0 * np.pi), self.count)
+        phase = np.remainder(((theta + np.log(r) / np.tan(self.angle)) / (2.0 * np.pi) + EDGE) * self.count, 1.0)
         return np.where((phase < self.ratio) & _within(r, *self.between), self.depth, 0.0)
 
     def jumps(self, axis: str) -> tuple[float, ...]:
@@ -289,12 +289,6 @@ class Sum:
 def _within(t: Array, start: float, end: float) -> NDArray[np.bool_]:
     slack = EDGE * max(abs(v) for v in (start, end, 0.0) if np.isfinite(v))
     return (t >= start - slack) & (t <= end + slack)
-
-
-def _phase(turns: Array, count: int) -> Array:
-    """Place between the beginnings of two of `count` grooves on a turn, from 0 to 1; just before one is on it."""
-    phase: Array = np.remainder((turns + EDGE) * count, 1.0)
-    return phase
 
 
 def _distance(t: Array, start: float, end: float, count: int) -> Array:
