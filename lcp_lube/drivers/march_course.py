@@ -1,6 +1,6 @@
 """A march in time as scenes near by have it: the equations of its steps at the fields that were found."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,6 +13,7 @@ from ..problems.grid import Grid
 from ..scenes.scene import Scene
 from .equations import Equations, followed
 from .march import Formula, March
+from .march_coordinates import Coordinates
 from .marching import Moment, first_film
 from .step import TimeStep, contents
 
@@ -42,7 +43,7 @@ class Trace:
         if not self.steps and moment.before is not None:
             p = moment.before["p"] * problem.p_unit
             self.begun = Kept(0.0, 0.0, p, moment.before["r"].copy(), None, None, _pressures(problem, p))
-        place = np.array([row["journal_x"], row["journal_y"]]) if "journal_x" in row else None
+        place = np.array([row[name] for name in ("journal_x", "journal_y", "h_offset") if name in row])
         p, r = moment.fields["p"] * problem.p_unit, moment.fields["r"].copy()
         self.steps.append(Kept(moment.t, row["dt"], p, r, problem.dry, place, _pressures(problem, p)))
 
@@ -69,7 +70,6 @@ def check_march(scene: Scene) -> None:
         (model.U < 0, "a wall that moves to smaller x (give the mirror image, with -U)"),
         (hasattr(scene, "observer"), "events"),
         (getattr(scene, "pads_follow", False), "pads that follow"),
-        (scene.motion.free and scene.turning is None, "a film whose level is free"),  # type: ignore[attr-defined]
         ((getattr(scene, "motion", None) and scene.motion.fill) not in (None, 1.0), "a film that begins partly filled"),  # type: ignore[attr-defined]
     ):
         if found:
@@ -82,6 +82,12 @@ class Course:
     def __init__(self, scene: Any, trace: Trace, comm: Any, near: "Course | None" = None):
         self.scene, self.trace, self.comm, self.table = scene, trace, comm, scene.motion
         self.models, self._given = scene.models(), scene.motion.course(scene._folder, len(scene.place))
+        coordinates = Coordinates(scene, self.table)
+        journal, free = coordinates.journal, slice(len(scene.place))
+        self.forces = ("force_x", "force_y") if journal else ("load",)
+        self.unit, self.inertia = float(coordinates.unit[0]), float(coordinates.unit[0] * coordinates.mass[0])
+        self.load: Callable[[float], Array] = lambda t: coordinates.loads(t)[free]
+        self.begun = self.table.start_of(scene.place)  # place and speed of what is free
         self.first = first_film(scene, self.models, self.place(0))
         if near is not None and not near.grid.even:
             places = followed(near.grid, near.first, self.first)
@@ -101,7 +107,7 @@ class Course:
         t = self.trace.steps[n - 1].t if n else 0.0
         if not self.table.free:
             return None if self._given is None else self._given(t)
-        e = self.trace.steps[n - 1].place if n else np.array(self.table.position or self.scene.place)
+        e = self.trace.steps[n - 1].place if n else self.begun[0]
         return tuple(map(float, e + shift))
 
     def film(self, n: int, shift: Any = 0.0) -> Any:

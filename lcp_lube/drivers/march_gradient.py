@@ -7,7 +7,8 @@ earlier fields are the contents u = h (1 - r) of cells of size s, d/dt u ~ w_n u
     dQ/da = d/da [ Q - sum over n of lambda_n' G_n ] at held z:
 
 one transposed solve a step and quantity, whatever the number of parameters. A journal that is free adds its place e_n and speed
-v_n, with V_n = v_n - d/dt e and E_n = m c d/dt v - F(z_n) - W: G_n(e_n) makes their adjoints four numbers a step. A supply
+v_n, with V_n = v_n - d/dt e and E_n = m c d/dt v - F(z_n) - W: G_n(e_n) makes their adjoints four numbers a step; a film whose
+level is free adds two. A supply
 whose pressure P_n follows adds what its source and the film disagree by, M_n(z_n, P_n) = 0, and one number a step.
 """
 
@@ -37,7 +38,6 @@ from .march_films import MarchFilms
 MEAN = "mean_"  # of a quantity: its mean over the march, of the steps' ends
 STEP = 1e-3  # of a supply's pressure, in which G and what it is told by are linear
 NUDGE = 1e-5  # of the thinnest film: of the journal's place, for differences
-FORCES = ("force_x", "force_y")  # on a free journal
 HELD = ("t_end", "dt", "tol")
 STEPS = "the steps in time are held"
 
@@ -62,7 +62,7 @@ class MarchGradient:
             solve(scene, Ask(method=solution.settings.get("method", "auto"), implied=True, comm=comm, watch=trace)).destroy()
         self.scene, self.trace, self.comm, self.names = scene, trace, comm, list(dict.fromkeys(quantities))
         self.lambdas: dict[str, list[Any]] = {name: [None] * (len(trace.steps) + 1) for name in self.names}
-        self.journal: dict[str, Array] = {name: np.zeros((len(trace.steps) + 1, 4)) for name in self.names}  # of E and V
+        self.journal: dict[str, Array] = {name: np.zeros((len(trace.steps) + 1, 2 * len(scene.place))) for name in self.names}  # type: ignore[attr-defined]  # of E and V
         self.fed: dict[str, list[Any]] = {name: [np.zeros(0)] * (len(trace.steps) + 1) for name in self.names}  # of supplies
         self.units: dict[int, float] = {}  # of flow, of each step
         self.sizes = dict.fromkeys(self.names, 0.0)
@@ -106,7 +106,7 @@ class MarchGradient:
         parts = {
             name: {part: share * w for part, w in eq.partials(numbers, base).items()} for name, (base, share) in asked.items()
         }
-        forces = FORCES if self.course.table.free and n else ()
+        forces = self.course.forces if self.course.table.free and n else ()
         slopes = {part: eq.slope(p, r, part) for part in dict.fromkeys([*(q for one in parts.values() for q in one), *forces])}
         later = self._later(n)
         of_full = 0.0 if eq.law is None else (1.0 - r) * eq.law.density_slope(p) * eq.constant.p_unit
@@ -130,7 +130,7 @@ class MarchGradient:
         self.units[n], terms = problem.scheme.flow_unit, eq.terms(p, r) / problem.scheme.flow_unit
         found = dict(zip(rows, solved, strict=False))
         if forces:
-            self._place(n, found, solved[-2:], later)
+            self._place(n, found, solved[len(rows) : len(rows) + len(forces)], later)
         if off:
             self._feed(n, found, solved[-len(off) :])
         for name, one in found.items():
@@ -142,12 +142,12 @@ class MarchGradient:
     def _place(self, n: int, found: dict[str, Array], pushed: list[Array], later: list[tuple[int, float]]) -> None:
         """Adjoints of a free journal's E_n and V_n; those of the film with them. pushed : J'^-1 of both forces."""
         course, kept, dot = self.course, self.trace.steps[n - 1], self.course.grid.reduce.dot
-        weight, inertia = course.formula(n).weight, course.table.mass * course.scene.turning.c
+        weight, inertia, free = course.formula(n).weight, course.inertia, len(pushed)
         h = mean_film(course.grid, course.film(n).film)
-        d = NUDGE * course.grid.reduce.min(h) / course.scene.turning.c
+        d = NUDGE * course.grid.reduce.min(h) / course.unit
         size = 2.0 * course.grid.spacing[0] * point_weights(course.grid) * (1.0 - kept.r) * course.density(n)
-        by_place = []  # of G, h and the numbers told, by X and Y
-        for shift in np.eye(2) * d:
+        by_place = []  # of G, h and the numbers told, by X and Y, or by the level
+        for shift in np.eye(free) * d:
             ends = []
             for eq in (course.at(n, shift), course.at(n, -shift)):
                 G = self._scaled(n, eq)
@@ -157,15 +157,15 @@ class MarchGradient:
             (G, h, above), (G_below, h_below, below) = ends
             told = {name: (above[name] - below[name]) / (2.0 * d) for name in above}
             by_place.append(((G - G_below) / (2.0 * d), (h - h_below) / (2.0 * d), told))
-        C = np.array([[dot(one, G) for one in pushed] for G, _, _ in by_place]) + inertia * weight**2 * np.eye(2)
+        C = np.array([[dot(one, G) for one in pushed] for G, _, _ in by_place]) + inertia * weight**2 * np.eye(free)
         for name in self.names:
-            mu, nu = (sum((part * self.journal[name][m, k : k + 2] for m, part in later), np.zeros(2)) for k in (0, 2))
+            mu, nu = (sum((part * self.journal[name][m, k : k + free] for m, part in later), np.zeros(free)) for k in (0, free))
             kept_on = sum((part * self.lambdas[name][m] / self.units[m] for m, part in later), np.zeros(size.size))
             base, share = self._asked(n).get(name, ("", 0.0))
             own = [share * told.get(base, 0.0) - dot(found[name], G) + dot(kept_on, size * h) for G, h, told in by_place]
             one = np.linalg.solve(C, np.array(own) + weight * inertia * mu - nu)
             self.journal[name][n] = *one, *(inertia * (mu - weight * one))
-            found[name] = found[name] + one[0] * pushed[0] + one[1] * pushed[1]
+            found[name] = found[name] + sum(part * answer for part, answer in zip(one, pushed, strict=True))
 
     def _feed(self, n: int, found: dict[str, Array], answers: list[Array]) -> None:
         """Adjoints of step n's supplies; those of the film with them. answers : J'^-1 of what they disagree by."""
@@ -201,7 +201,7 @@ class MarchGradient:
     def lagrangians(self, course: Course) -> Array:
         """Q minus what the adjoints make of all equations, of a scene near by, what was solved for held. Collective."""
         total = dict.fromkeys(self.names, 0.0)
-        start = np.array(course.table.velocity, dtype=float)  # of a free journal, which is held later
+        start, free = course.begun[1], course.forces  # of what is free, which is held later
         quick = None if self._films is None else self._films.sums(course)
         for n in range(0 if self.trace.begun is not None else 1, len(self.trace.steps) + 1):
             asked = self._asked(n)
@@ -209,7 +209,7 @@ class MarchGradient:
                 continue
             eq, kept, dot = course.at(n), course.kept(n), course.grid.reduce.dot
             assert kept is not None
-            numbers = eq.numbers(kept.p, kept.r, None if asked else FORCES if course.table.free else ())
+            numbers = eq.numbers(kept.p, kept.r, None if asked else free if course.table.free else ())
             told = eq.report(numbers)
             for name, (base, share) in asked.items():
                 total[name] += share * told[base]
@@ -217,14 +217,13 @@ class MarchGradient:
                 eq.destroy()
                 continue
             G = self._scaled(n, eq)
-            rest = np.zeros(4)
+            rest = np.zeros(2 * len(free))
             if course.table.free and n:
                 formula, places = course.formula(n), [np.array(course.place(k)) for k in range(max(n - 2, 0), n + 1)][::-1]
-                inertia = course.table.mass * course.scene.turning.c
                 own, at = self.speeds[n], [*self.speeds[1:n][::-1], start]
-                rest[:2] = inertia * (formula.weight * own - formula.old(at)) - course.table.load_at(kept.t)
-                rest[:2] -= numbers["force_x"], numbers["force_y"]
-                rest[2:] = own - (formula.weight * places[0] - formula.old(places[1:]))
+                rest[: len(free)] = course.inertia * (formula.weight * own - formula.old(at)) - course.load(kept.t)
+                rest[: len(free)] -= [numbers[name] for name in free]
+                rest[len(free) :] = own - (formula.weight * places[0] - formula.old(places[1:]))
             off = np.array([value for name, value in told.items() if name.startswith(MISFIT)])
             for name in self.names:
                 total[name] -= dot(self.lambdas[name][n], G) + float(self.journal[name][n] @ rest)
@@ -238,8 +237,8 @@ class MarchGradient:
 
     @cached_property
     def speeds(self) -> list[Array]:
-        """Of a free journal at the end of each step, the first at t = 0, clearances per second."""
-        course, found = self.course, [np.array(self.course.table.velocity, dtype=float)]
+        """Of what is free at the end of each step, the first at t = 0, clearances per second; of a level m/s."""
+        course, found = self.course, [self.course.begun[1]]
         for n in range(1, len(self.trace.steps) + 1):
             places = [np.array(course.place(k)) for k in range(max(n - 2, 0), n + 1)][::-1]
             formula = course.formula(n)

@@ -15,6 +15,7 @@ from lcp_lube.scenes.values import values_of, with_values
 PUSH = ["2000*exp(-400*(mod(50*t,1)-0.1)^2)", "900.0"]
 TEXTURE = {"t_end": 0.01, "steps": 7}
 FREE = {"t_end": 0.002, "steps": 4, "free": True, "mass": 15.0, "load": PUSH}
+AT = {"position": 2e-7, "velocity": 1e-5}
 ON_A_COURSE = {"t_end": 0.002, "steps": 5, "journal": ["0.5 + 0.2*cos(400*t)", "0.2*sin(400*t)"]}
 SUPPLIES = [
     {"x_mm": [12.3, 14.1], "restrictor": "capillary", "K": 1e-11, "p_s": 8e6, "backflow": True},
@@ -46,6 +47,15 @@ CASES = {
         "dynamic_journal",
         {"nx": 16, "ny": 4, "motion": {**FREE, "start": "full", "position": [0.5, 0.5]}},
         ["motion.mass", "motion.position.1", "film.journal.c"],
+    ),
+    "free level": (
+        "moving_texture",
+        {
+            "n": 40,
+            "U": 0.5,
+            "motion": {**TEXTURE, "steps": 5, "free": True, "mass": 3.0, "load": "400*(1+0.3*sin(300*t))", **AT},
+        },
+        ["motion.mass", "motion.position", "motion.velocity", "fluid.mu"],
     ),
     "density, texture": (
         "moving_texture",
