@@ -100,7 +100,7 @@ def _known(loop: Loop) -> Cells | None:
     """The fields that a neighbour's answer was solved with, on this grid."""
     near = loop.ask.start
     known = None if near is None else _taken(loop, near.problem)
-    return loop.foreseen(known, near) if known is not None and loop.model.stored is not None else known  # type: ignore[arg-type]
+    return known if near is None or loop.model.stored is None else loop.foreseen(known, near)
 
 
 def _taken(loop: Loop, problem: object) -> Cells | None:
@@ -173,7 +173,7 @@ def _told(ask: Ask, loop: Loop) -> Solution:
         elif not solution.converged:
             message = f"film {loop.solves} of the coupling: {message}"
     fields = {"p": at.p / problem.p_unit, "r": at.r}
-    problem.cells = at.cells
+    problem.cells = at.cells | {"stored": at.stored}
     certificate = problem.certify(fields, eps1)
     enclosure = _band(loop, solution.enclosure, fields) if ask.certify else None
     solution.destroy()

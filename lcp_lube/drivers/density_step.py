@@ -134,9 +134,10 @@ class _Film:
     def closed(self, at: _At) -> Any:
         """The film with densities stored that leave nothing of G."""
         stored = at.by.values["stored"] - at.off.reshape(at.answer.grid.box)
-        by, cells = replace(at.by, values={**at.by.values, "stored": stored}), {"density": stored.ravel()}
-        problem = answer(self.base, self.law, cells, by, at.answer.p, at.answer.r, self.p_sides).problem
-        problem.cells, problem.entries = cells, self.entries(at)
+        by = replace(at.by, values={**at.by.values, "stored": stored})
+        found = answer(self.base, self.law, at.answer.cells, by, at.answer.p, at.answer.r, self.p_sides)
+        problem = found.problem
+        problem.cells, problem.entries = {**at.answer.cells, "stored": found.stored}, self.entries(at)
         return problem
 
     def entries(self, at: _At) -> Entries:

@@ -12,6 +12,7 @@ from ..errors import InputError
 from ..problems.facts import Facts
 from ..problems.film.effects import Answer, Cells, Compressible, Effect, FaceFactors, answer, factors, neutral
 from ..problems.film.fluid import Law
+from ..problems.film.giving import WIDEST, Giving, filled, lift_of, logarithm
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.stored import Stored
@@ -32,7 +33,6 @@ FEW, NEAR, AWAY = 1, 0.3, 30.0  # answers combined while a coefficient changes b
 LONGEST = 1.0  # relative change of a coefficient in one step, before answers are combined
 LEAST_LIFT = -0.9  # of the rigid film, of an iterate
 STEEPEST = 0.9  # of q, over 1/b, where the pressure is without bound: of an iterate, whose viscosity is then 10 times mu
-WIDEST = 40.0  # of the logarithm of a viscosity over mu, of an iterate
 
 
 @dataclass(frozen=True)
@@ -88,6 +88,9 @@ class Loop:
         self.base = self.frozen.build(ask.comm)
         self.p_sides = self.model.p_sides
         self.h = self.base.scheme.h.ravel()
+        self.giving = Giving.of(self.law, self.model.effects, self.base)
+        if self.giving is not None:
+            self.effects += (self.giving,)
         self.names = list(neutral(self.effects, 0))
         self.solution: Solution | None = None  # the last one
         self.first: Solution | None = None
@@ -105,8 +108,9 @@ class Loop:
 
     def vector(self, cells: Cells) -> Array:
         """Fields as one vector, in which equal steps are equal relative changes of coefficients."""
-        parts = {"viscosity": np.log, "warmth": np.log, "lift": lambda a: _thick(a / self.h)}
+        parts = {"viscosity": np.log, "warmth": np.log, "lift": lambda a: logarithm(a / self.h)}
         parts["contact"] = lambda a: a / self.base.p_unit
+        parts["pressure"] = lambda a: logarithm(a * self.giving.slopes)  # type: ignore[union-attr]
         return np.concatenate([parts.get(name, lambda a: a)(cells[name]) for name in self.names])  # type: ignore[operator]
 
     def split(self, x: Array) -> list[Array]:
@@ -119,7 +123,9 @@ class Loop:
         for name in {"viscosity", "warmth"} & set(found):
             found[name] = np.exp(np.clip(found[name], -WIDEST, WIDEST))
         if "lift" in found:
-            found["lift"] = self.h * np.maximum(_lift(found["lift"]), LEAST_LIFT)
+            found["lift"] = self.h * np.maximum(lift_of(found["lift"]), LEAST_LIFT)
+        if self.giving is not None:
+            found["pressure"] = np.maximum(lift_of(found["pressure"]), 0.0) / self.giving.slopes
         if "contact" in found:
             found["contact"] = self.base.p_unit * np.maximum(found["contact"], 0.0)
         return found
@@ -138,7 +144,8 @@ class Loop:
 
     def film(self, cells: Cells) -> bool:
         """Solve the film with these coefficients; whether it has an answer, which is then `answer`."""
-        by = self.by(cells)
+        plain = self.by(cells)
+        by = plain if self.giving is None else self.giving.linearised(plain, cells, self.h)
         ask = replace(self.ask, start=self.start)
         if self.solves:
             ask = replace(ask, nested=None)
@@ -160,17 +167,20 @@ class Loop:
         if self.beyond and {"viscosity", "lift"} & set(self.names):  # of an iterate: hotter oil, softer walls may carry it
             q = np.minimum(q, STEEPEST / b)
         p = self.law.pressure(q)
+        by = filled(plain, by, q)
         with np.errstate(all="ignore"):
             self.answer = answer(self.base, self.law, cells, by, p, new.fields["r"], self.p_sides)
         return bool(np.isfinite(self.base.reduce.max(p)))
 
-    def foreseen(self, cells: Cells, near: Any) -> Cells:
-        """What the effects make of the fields that a time step is expected to end with; cells: of the step before."""
+    def foreseen(self, known: Cells | None, near: Any) -> Cells:
+        """What the effects make of the fields that a time step is expected to end with; known: of the step before, if any."""
+        cells = known or neutral(self.effects, self.h.size)
         p = self.law.pressure(near.fields["p"] * near.problem.p_unit)
         with np.errstate(all="ignore"):
             self.answer = answer(self.base, self.law, cells, self.by(cells), p, near.fields["r"], self.p_sides)
             found, self.answer = self.made(), None
-        self.moved = self.base.reduce.max(np.abs(self.vector(found) - self.vector(cells)))
+        if known is not None:
+            self.moved = self.base.reduce.max(np.abs(self.vector(found) - self.vector(cells)))
         return found
 
     def made(self) -> Cells:
@@ -267,17 +277,6 @@ def settled(ask: Ask, stored: Stored | None, moved: float) -> float:
     found = SETTLED * ask.stopping_for((1e-8, 1e-8)).eps1
     in_time = stored is not None and not stored.exact and ask.stopping is None
     return max(found, min(IN_TIME[0] * moved, IN_TIME[1])) if in_time else found
-
-
-def _thick(lift: Array) -> Array:
-    """log(1 + lift), where pressure goes by a power of the film, as it does; below half of the rigid film its tangent's."""
-    return np.where(lift > -0.5, np.log1p(np.maximum(lift, -0.5)), 2.0 * lift + 1.0 - np.log(2.0))
-
-
-def _lift(x: Array) -> Array:
-    """The other way round."""
-    thin = x < -np.log(2.0)
-    return np.where(thin, 0.5 * (x - 1.0 + np.log(2.0)), np.expm1(np.minimum(np.where(thin, 0.0, x), WIDEST)))
 
 
 def held(scene: Any, solution: Solution) -> Any:

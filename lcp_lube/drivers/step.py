@@ -42,14 +42,14 @@ class TimeStep(Derived):
 def contents(grid: Grid, model: Model, fields: Fields | None, problem: Any = None) -> Array:
     """h (1 - r) of the owned cells, m, times the density over that at p_c; without fields the full film's. Collective.
 
-    problem : solved by the fields; it knows the densities and lifts that it was solved with.
+    problem : solved by the fields; it knows what its full cells held, of what the film has room for.
     """
     h = mean_film(grid, model.film).ravel()
     if fields is None:
         return h
     moving = getattr(problem, "moving", None)  # of a film that is turned round
     cells = getattr(problem, "cells", {}) if moving is None else {name: problem._here(a) for name, a in moving.cells.items()}
-    return (h + cells.get("lift", 0.0)) * (1.0 - fields["r"]) * cells.get("density", 1.0)
+    return h * (1.0 - fields["r"]) * cells.get("stored", 1.0)
 
 
 def carried(model: Model, content: Array, problem: Any = None) -> Array | None:

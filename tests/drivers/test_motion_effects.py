@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from lcp_lube import load_scene, solve
+from lcp_lube.drivers.loop import Loop
 from lcp_lube.problems.film.fluid import Law
 
 WEDGE = marches.WEDGE | {"n": 24, "motion": {"t_end": 0.02, "steps": 12}}
@@ -120,3 +121,32 @@ def test_a_journal_is_free_in_a_fluid_that_gives_way():
     assert solution.converged, solution.message
     assert solution.mass_defect_run < 1e-10 and max(row["solves"] for row in solution.history) < 15
     solution.destroy()
+
+
+@pytest.mark.parametrize(("method", "dt"), [("active-set", 1e-5), ("active-set", 1e-11), ("fas", 1e-11)])
+def test_steps_of_any_length_settle(method, dt, monkeypatch):
+    """Between soft walls, in a fluid that gives way and gets warm: in two or three films a step, not more in shorter ones."""
+    film, films = Loop.film, [0]
+
+    def counted(*given):
+        films[0] += 1
+        return film(*given)
+
+    monkeypatch.setattr(Loop, "film", counted)
+    wedge = {"shape": "linear", "h_start": 4e-5, "h_end": 2e-5}
+    data: dict[str, Any] = {"family": "bearing", "L": 0.06, "U": 4.0, "n": 60, "film": wedge, "elastic": {"compliance": 1e-13}}
+    data |= {"fluid": {"p_supply": 1e5, "density": "dowson-higginson", "barus": 1.5e-8}}
+    data |= {"temperature": {"oil": "ISO VG 68", "T_in": "50 degC"}}
+    data["motion"] = {"t_end": 8 * dt, "steps": 8, "set": {"h_offset": "2e-6*sin(628*t)"}}
+    if method == "fas":
+        del data["n"]
+        data |= {"dimension": 2, "width": 0.04, "nx": 24, "ny": 12}
+    loads = []
+    for name in dict.fromkeys((method, "active-set")):
+        films[0] = 0
+        with solve(data, method=name) as solution:
+            assert solution.converged, solution.message
+            assert solution.mass_defect < 1e-10 and solution.mass_defect_run < 1e-10
+            loads.append([row["load"] for row in solution.history])
+        assert films[0] <= 3 * 8 + 8  # the steady film's with them
+    assert loads[0] == pytest.approx(loads[-1], rel=1e-6)

@@ -1,6 +1,7 @@
 """What certifies a film's answer: how far it is from balance in every cell, from complementarity, from flow in = flow out."""
 
 from collections.abc import Sequence
+from copy import copy
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -12,7 +13,7 @@ from ..strips import MANY, each_strip, ghosted
 from .graded import GradedJacobian, Pivots, within_reach
 from .reynolds import side_points
 from .stored import storing
-from .supplies import supply_defects, supply_flows
+from .supplies import pressed, supply_defects, supply_flows
 
 if TYPE_CHECKING:
     from .lubrication import LubricationProblem
@@ -57,6 +58,7 @@ def certify(problem: "LubricationProblem", p: Array, r: Array, eps1: float) -> C
     mass_defect: |flow in - flow out| / flow, over the open sides (`mass_defect`);
     p_error: max|p - p*| / max p* where rounding may dominate what the others see (`p_error`).
     """
+    problem = filled(problem, p)
     red, s = problem.reduce, problem.scheme
     # The ends' pressure is the scale where a cavity leaves no point full.
     p_max, driven = max(red.largest(p), max(problem.p_sides) / problem.p_unit), red.norm(s.c)
@@ -81,6 +83,16 @@ def certify(problem: "LubricationProblem", p: Array, r: Array, eps1: float) -> C
         tol=certificate_tol(eps1),
         extremes={"min_p": red.min(p) * problem.p_unit, "min_r": red.min(r)},
     )
+
+
+def filled(problem: "LubricationProblem", p: Array) -> "LubricationProblem":
+    """The problem whose cells store what they do at p, whatever the pressure: it has the same answer."""
+    if problem.scheme.gives is None:
+        return problem
+    (other := copy(problem)).scheme = problem.scheme.filled(p.reshape(problem.grid.box))
+    if problem.held is not None:
+        other.scheme = pressed(other.scheme, problem.held, problem.p_unit)
+    return other
 
 
 def slack(problem: "LubricationProblem", p: Array, r: Array) -> bool:
@@ -214,7 +226,7 @@ def mass_defect(problem: "LubricationProblem", p: Array, r: Array, supplies: Seq
     flows = west, east, south, north = problem.boundary_flows(p, r)
     # Halves of these in m3/s, as are the supplies' flows.
     supplied = [2.0 * flow / (grid.spacing[1] if grid.dim == 2 else 1.0) for flow in supplies]
-    net = abs(west - east + south - north + sum(supplied) - storing(problem, r))
+    net = abs(west - east + south - north + sum(supplied) - storing(problem, p, r))
     inflow = max(west, 0.0) + max(-east, 0.0) + max(south, 0.0) + max(-north, 0.0) + sum(max(q, 0.0) for q in supplied)
     driven = reduce.norm(s.c) > 0  # or else p = 0, and p_unit measures what is left of it
     own, above = p.reshape(grid.box), 0.0 if driven else 1.0
@@ -227,7 +239,7 @@ def mass_defect(problem: "LubricationProblem", p: Array, r: Array, supplies: Seq
     flow = max(inflow, dragged, IDLE * pressed if driven else pressed)
     if s.storage is not None:  # in the middle of a stroke nothing flows: rounding is measured by what is stored
         held = s.flow_unit * reduce.sum(s.storage)
-        flow = max(flow, abs(storing(problem, r)), certificate_tol(0.0) * held)
+        flow = max(flow, abs(storing(problem, p, r)), certificate_tol(0.0) * held)
         pressed += held
     rounding = 8 * UNIT * (pressed + sum(map(abs, [*flows, *supplied]))) + min(UNIT * s.flow_unit * found.inside, UNEVEN * flow)
     excess = net - rounding  # NaN stays NaN

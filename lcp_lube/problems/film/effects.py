@@ -23,7 +23,8 @@ from .supplies import Held, pressed
 
 # A field at the owned points, and its value where nothing has an effect. viscosity: over mu. density: over rho_0. lift: what is
 # added to the film, m. pressure_flow, drag_flow: factors of the flows that pressure and wall drive (roughness below the grid).
-# No coefficients of the film's: contact, pressure of asperities, Pa; warmth, what of the viscosity is the temperature's factor.
+# No coefficients of the film's: contact, pressure of asperities, Pa; warmth, what of the viscosity is the temperature's factor;
+# pressure, in a time step: that at which what cells store is linearised, Pa.
 CHANNELS = {
     "viscosity": 1.0,
     "density": 1.0,
@@ -32,6 +33,7 @@ CHANNELS = {
     "drag_flow": 1.0,
     "contact": 0.0,
     "warmth": 1.0,
+    "pressure": 0.0,
 }
 Cells = dict[str, Array]
 THINNEST = 0.05  # of the rigid film: no lift of an iterate leaves less
@@ -74,6 +76,10 @@ class Effect:
         """Change `out` by what follows from the answer. Collective."""
         raise NotImplementedError
 
+    def yields(self, grid: Grid) -> Array | float:
+        """By how much walls give way where the pressure rises by 1 Pa everywhere, m/Pa. Collective."""
+        return 0.0
+
     def report(self, at: "Answer") -> Report:
         """Numbers and measures of the answer. Collective."""
         return NOTHING
@@ -88,7 +94,8 @@ class Answer:
     """A film's answer as effects see it.
 
     problem : the film with the coefficients that it was solved with. p : Pa above p_c. r : void fraction. cells : those
-    coefficients at the points. law : how viscosity depends on the pressure. base : the rigid, isoviscous film.
+    coefficients at the points; factors : what they make of its scheme. law : how viscosity depends on the pressure.
+    base : the rigid, isoviscous film.
     """
 
     problem: LubricationProblem
@@ -97,6 +104,7 @@ class Answer:
     cells: Cells
     law: Law
     base: LubricationProblem
+    factors: dict[str, Array] = field(default_factory=dict)
     memory: dict[Any, Any] = field(default_factory=dict)  # what an effect found, by its id
 
     @property
@@ -112,6 +120,11 @@ class Answer:
     def h(self) -> Array:
         """Film at the points, m."""
         return self.problem.scheme.h.ravel()
+
+    @property
+    def stored(self) -> Array:
+        """What a full cell holds, of what the rigid film has room for at p_c."""
+        return self.factors["stored"].ravel()
 
     @cached_property
     def speed(self) -> Array:
@@ -137,7 +150,7 @@ class FaceFactors:
     """Factors of a rigid, isoviscous film's scheme on the points of `grid`, each of shape grid.box.
 
     k_W, k_E, k_S, k_N : of the conductances. u_W, u_E : of the wall's flows. mu : viscosity at the east face, over mu.
-    stored : of what a full cell holds, in a time step.
+    stored : of what a full cell holds, in a time step; gives : by how much more for 1 Pa more, if it is not held, 1/Pa.
     """
 
     grid: Grid
@@ -146,7 +159,7 @@ class FaceFactors:
     def on(self, grid: Grid, j: NDArray[np.int64], i: NDArray[np.int64]) -> "FaceFactors":
         """Those of a part of the film, whose points are the lines j and columns i of this one's grid. Collective."""
         take = Pick(self.grid, grid, j, i)
-        found = {name: take(self.values[name].ravel()).reshape(grid.box) for name in FACTORS}
+        found = {name: take(values.ravel()).reshape(grid.box) for name, values in self.values.items()}
         take.destroy()
         return FaceFactors(grid, found)
 
@@ -219,6 +232,7 @@ def scaled(
     stored: dict[str, Any] = {}
     if s.storage is not None:
         stored["storage"] = s.storage * f["stored"]
+        stored["gives"] = s.storage * f["gives"] * problem.p_unit if "gives" in f else None
         c, carried = c + s.storage - stored["storage"], carried - stored["storage"]
     p_sides = p_sides or problem.p_sides
     for conductance, at_side, p_side in zip(k.values(), sides(grid), p_sides, strict=True):
@@ -247,7 +261,7 @@ def answer(
     film = scaled(base, by, mobility, p_sides, held)  # type: ignore[arg-type]
     if "lift" in cells:
         film = film.with_lift(cells["lift"])
-    return Answer(film, p, r, cells, law, base)
+    return Answer(film, p, r, cells, law, base, by.values)
 
 
 def neutral(effects: Sequence[Effect], size: int) -> Cells:

@@ -132,9 +132,7 @@ class LubricationProblem:
         1e9 and more the rounding of A's diagonal is a leak, and where little flows through a ring the rounding of c is one.
         """
         s, flows = self.scheme, self.face_flows(p, r)
-        if s.held is None:
-            return flows
-        return np.where(s.held.ravel(), s.diagonal.ravel() * p - self.c, flows)
+        return flows if s.held is None else np.where(s.held.ravel(), s.diagonal.ravel() * p - self.c, flows)
 
     def face_flows(self, p: Array, r: Array) -> Array:
         """What leaves each point's cell through its faces, and its sources: its balance, were it not held. Collective."""
@@ -157,7 +155,8 @@ class LubricationProblem:
         dragged = (s.couette_E + s.b_E * r[1:-1, 1:-1]) - (s.couette_W - s.b_W * r[1:-1, :-2])
         if s.storage is None or s.kept is None:
             return pressed + dragged - self.sources(rows, s)  # type: ignore[no-any-return]
-        return pressed + dragged + (s.storage * (1.0 - r[1:-1, 1:-1]) - s.kept)  # type: ignore[no-any-return]
+        more = 0.0 if s.gives is None else s.gives * p
+        return pressed + dragged + (s.storage * (1.0 - r[1:-1, 1:-1]) + more - s.kept)  # type: ignore[no-any-return]
 
     @cached_property
     def _at_sides(self) -> tuple[Any, ...]:

@@ -69,6 +69,7 @@ class BoxScheme:
     held: NDArray[np.bool_] | None = None  # cells at a given pressure (`supplies`): their rows of A have the diagonal alone
     storage: Array | None = None  # of a time step: what a full cell comes to store is storage - kept; b_C has -storage in it
     kept: Array | None = None
+    gives: Array | None = None  # and what it stores more by p = 1, where that is linearised: on A's diagonal
 
     def rows(self, rows: slice) -> "BoxScheme":
         """Those of some lines of points."""
@@ -91,6 +92,12 @@ class BoxScheme:
         other = object.__new__(BoxScheme)
         other.__dict__.update(vars(self) | changes)
         return other
+
+    def filled(self, p: Array) -> "BoxScheme":
+        """With what cells store at p held."""
+        assert self.gives is not None and self.storage is not None  # of a time step
+        more = self.gives * p
+        return self.changed(storage=self.storage + more, b_C=self.b_C - more, c=self.c - more, gives=None)
 
     @property
     def arrays(self) -> list[str]:
@@ -117,7 +124,8 @@ class BoxScheme:
     @property
     def diagonal(self) -> Array:
         """A's."""
-        return self.k_W + self.k_E + self.k_S + self.k_N
+        faces = self.k_W + self.k_E + self.k_S + self.k_N
+        return faces if self.gives is None else faces + self.gives
 
     @property
     def coupling(self) -> tuple[Array, Array, Array, Array]:

@@ -68,12 +68,13 @@ class Stored:
         return replace(self, first=self.first + self.step * first)
 
 
-def storing(problem: "LubricationProblem", r: Array) -> float:
+def storing(problem: "LubricationProblem", p: Array, r: Array) -> float:
     """What all cells come to store, as `boundary_flows` has flows; 0 in a steady film. Collective."""
     s = problem.scheme
-    if s.storage is None:
+    if s.storage is None or s.kept is None:
         return 0.0
-    return s.flow_unit * problem.reduce.sum(s.storage * (1.0 - r.reshape(problem.grid.box)) - s.kept)
+    more = 0.0 if s.gives is None else s.gives * p.reshape(problem.grid.box)
+    return s.flow_unit * problem.reduce.sum(s.storage * (1.0 - r.reshape(problem.grid.box)) + more - s.kept)
 
 
 def mean_film(grid: Grid, film: Any) -> Array:

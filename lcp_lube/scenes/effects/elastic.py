@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from ...problems.film.effects import Answer, Cells, Effect, Report
+from ...problems.grid import Grid
 from ..scene import Finite, Positive
 from ..units import measured, metres
 from .table import EffectTable
@@ -39,9 +40,11 @@ class Elastic(GivingWay, EffectTable):
         if self.E is not None and self.E < 1e4:
             raise ValueError(f"E = {self.E:g}: at least 10 kPa is needed (SI units?)")
 
+    def yields(self, grid: Grid) -> float:
+        if self.compliance is not None:
+            return self.compliance
+        assert self.thickness is not None and self.E is not None  # as `check` found
+        return self.thickness * (1.0 + self.nu) * (1.0 - 2.0 * self.nu) / (self.E * (1.0 - self.nu))
+
     def apply(self, at: Answer, out: Cells) -> None:
-        compliance = self.compliance
-        if compliance is None:
-            assert self.thickness is not None and self.E is not None  # as `check` found
-            compliance = self.thickness * (1.0 + self.nu) * (1.0 - 2.0 * self.nu) / (self.E * (1.0 - self.nu))
-        out["lift"] += compliance * (at.p + out.get("contact", 0.0))
+        out["lift"] += self.yields(at.grid) * (at.p + out.get("contact", 0.0))

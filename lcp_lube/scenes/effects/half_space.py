@@ -44,6 +44,9 @@ class Deflection(GivingWay):
     even_lines = True
     kernels: dict[Any, Any] = field(default_factory=dict, compare=False, repr=False)
 
+    def yields(self, grid: Grid) -> Array:
+        return np.maximum(self.of(grid, np.ones(grid.local_size)), 0.0)
+
     def apply(self, at: Answer, out: Cells) -> None:
         out["lift"] += self.of(at.grid, at.p + out.get("contact", 0.0))
 

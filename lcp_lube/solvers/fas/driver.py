@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from ...base.parallel import Array
+from ...problems.film.certify import filled
 from ...problems.film.lubrication import LubricationProblem
 from ...problems.film.stored import storing
 from ...problems.solution import Fields, Step
@@ -75,16 +76,16 @@ class Fas(Cycles):
         self._unit = 1.0 / driven if driven > 0.0 else 1.0
         self._begin(start is not None)
         self._fields: Fields | None = None  # p and r of z as it is, where they have been asked for
-        self._c_norm = problem.reduce.norm(problem.scheme.c) if problem.held is None else self._norms()[0]
+        c = (filled(problem, start["p"]) if start else problem).scheme.c
+        self._c_norm = problem.reduce.norm(c) if problem.held is None else self._norms()[0]
         h, self._correction, self._rest, self._share = problem.scheme.h, 0.0, self.eps1, 0.1
         # An edge of a supply may lie as near to a side as one likes: what drives the film there has no scale for the rest.
         self._extreme = problem.held is not None or problem.reduce.max(h) > EXTREME * problem.reduce.min(h)
         if start is not None:
             self.z = start["p"] + problem.scheme.b_C.ravel() * start["r"]
         self.norm = self._first = self._norm()
-        if start is not None and problem.scheme.storage is not None:
-            self._rest = max(self.eps1, min(options.rest * self.norm, self.eps1**0.5))
-            self._share = 0.5 if options.rest else 0.1
+        if start is not None and problem.scheme.storage is not None and options.rest:
+            self._rest, self._share = max(self.eps1, min(options.rest * self.norm, self.eps1**0.5)), 0.5
 
     @property
     def z(self) -> Array:
@@ -145,7 +146,7 @@ class Fas(Cycles):
         for part in (0.0, 1.0):
             p, r = (1.0 + part) * fields["p"], (1.0 - part) * fields["r"]
             west, east, south, north = self.problem.boundary_flows(p, r)
-            lost.append(west - east + south - north - storing(self.problem, r))
+            lost.append(west - east + south - north - storing(self.problem, p, r))
         part = lost[0] / (lost[0] - lost[1]) if lost[0] != lost[1] else 0.0
         if abs(part) < SCALED:
             self.z = self.z + part * np.abs(self.z)
@@ -181,8 +182,7 @@ class Fas(Cycles):
             self.norm = self._norm()
         if not np.isfinite(self.norm):
             self.z = np.zeros(self.problem.grid.local_size)  # as above
-        if self._taken == 1:
-            self._first = self.norm
+        self._first = self.norm if self._taken == 1 else self._first
         step = self.problem.reduce.comm.allreduce(self._correction) if self._levels[0].comm is not None else self._correction
         size = float(np.sqrt(step))
         if self._extreme and not anew and self.norm <= self.eps1:
@@ -294,7 +294,7 @@ class Fas(Cycles):
                     self._tools.held.sweep(*arrays, level.spans, first + 1, first + BORDER, down, level.carry, ring)
                     continue
                 rows, faces = slice(first, first + BORDER + 2), slice(first, first + BORDER + 3)
-                carry = None if level.carry is None else level.carry[rows]
+                carry = None if level.carry is None else np.ascontiguousarray(level.carry[:, rows])
                 self._kernels.sweep(level.z[rows], level.kx[rows], level.ky[faces], level.c[rows], 1, down, carry, ring)
             level.share(level.z)
         level.work += sweeps * level.nx * (level.z.shape[0] - 2)

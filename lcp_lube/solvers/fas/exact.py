@@ -128,10 +128,10 @@ def newton_step(
                 continue
             d[here] = c[m, i] - G[i]
             k_W, k_E, k_S, k_N = kx[m, i], kx[m, i + 1], ky[m, i], ky[m + 1, i]
-            J[here, b] += k_W + k_E + k_S + k_N if full else 1.0
+            J[here, b] += k_W + k_E + k_S + k_N + (0.0 if carry is None else carry[1, m, i]) if full else 1.0
             if i < nx or ring_x:
                 to = at[m, i + 1 if i < nx else 1]
-                J[to, here - to + b] -= k_E if full else 1.0 if carry is None else carry[m, i]
+                J[to, here - to + b] -= k_E if full else 1.0 if carry is None else carry[0, m, i]
             if full and (i > 1 or ring_x):
                 to = at[m, i - 1 if i > 1 else nx]
                 J[to, here - to + b] -= k_W

@@ -31,9 +31,10 @@ def finest(problem: LubricationProblem) -> Level:
         raise InputError("--method fas: what leaves a cell of this scheme does not enter the next one; use active-set")
     level = level_of(grid, s.k_W, s.k_E, s.k_S, s.k_N, s.c)
     if s.storage is not None:
-        level.void = np.zeros_like(level.z), np.zeros_like(level.z)
-        put(level, grid, level.void[0], -s.b_E)
-        put(level, grid, level.void[1], s.storage)
+        level.void = np.zeros((3, *level.z.shape))
+        for into, values in zip(level.void, (-s.b_E, s.storage, s.gives), strict=True):
+            if values is not None:
+                put(level, grid, into, values)
         carried(level)
     if problem.held is not None:
         mask, pressures = np.zeros_like(level.z), np.zeros_like(level.z)

@@ -24,16 +24,16 @@ def relax_pairs(
         here = z[m, i]
         k_W, k_E, k_S, k_N = kx[m, i], kx[m, i + 1], ky[m, i], ky[m + 1, i]
         t = c[m, i] + k_E * max(z[m, i + 1], 0.0) + k_S * max(z[m - 1, i], 0.0) + k_N * max(z[m + 1, i], 0.0)
-        passed = 1.0 if carry is None else carry[m, i - 1]
+        passed, gives = (1.0, 0.0) if carry is None else (carry[0, m, i - 1], carry[1, m, i])
         t += k_W * west if west > 0.0 else passed * west
         if here > 0.0 and west <= 0.0 and (i > start or (ring and i == 1)):
-            over = k_E + k_S + k_N if carry is None else k_E + k_S + k_N + (1.0 - passed) * k_W
+            over = k_E + k_S + k_N if carry is None else k_E + k_S + k_N + (1.0 - passed) * k_W + gives
             p = (t - passed * k_W * here) / over if over > 0.0 else 0.0
             before = west + k_W * (p - here)
             if p > 0.0 and before <= 0.0:
                 z[m, i - 1 if i > 1 else nx], z[m, i], west = before, p, p
                 continue
-        west = t / (k_W + k_E + k_S + k_N) if t > 0.0 else t
+        west = t / (k_W + k_E + k_S + k_N + gives) if t > 0.0 else t
         z[m, i] = west
     if ring and (start == 1 or end == nx + 1):
         z[m, 0], z[m, nx + 1] = z[m, nx], z[m, 1]

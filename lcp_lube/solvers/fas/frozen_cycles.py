@@ -42,10 +42,10 @@ class Cycles:
             None if self.held is None else np.where(self.held, 1.0 / scheme.diagonal.ravel() if given is None else 1.0, 0.0)
         )
         self.leaves = -problem.scheme.b_C.ravel()  # q of a unit of void, with what a time step stores of it
-        self.stored = M = None if first.void else M
+        self.stored = M = M if first.void is None else None
         if M is not None:
-            first.void = np.zeros_like(first.z), np.zeros_like(first.z)
-            for into, values in zip(first.void, (self.leaves, M), strict=True):
+            first.void = np.zeros((3, *first.z.shape))
+            for into, values in zip(first.void, (self.leaves, M), strict=False):
                 finest.put(first, grid, into, values)
         self.levels = levels.hierarchy(first, True)
         full = np.zeros(first.z.shape, dtype=bool)
@@ -62,12 +62,12 @@ class Cycles:
         self.several, self.transposed = several, transposed
         self.z, self.c, self.rest = ([np.zeros((several, *level.z.shape)) for level in self.levels] for _ in range(3))
         self.nothing = np.zeros_like(self.z[0])
-        self.passed: list[tuple[Array | None, Array | None]] = [(level.carry, None) for level in self.levels]
-        if self.stored is not None:
-            self.passed = [(None, None)] * len(self.levels)
+        self.passed: list[tuple[Array | None, Array | None]] = [(None, None)] * len(self.levels)
+        if self.stored is None:
+            self.passed = [(None if level.carry is None else level.carry[0], None) for level in self.levels]
         if nu:
             for k, level in enumerate(self.levels):
-                leaves, stored = level.void  # type: ignore[misc]
+                leaves, stored, _ = level.void  # type: ignore[misc]
                 part = leaves / (leaves + 1j * nu * stored + levels.LEAST)
                 self.passed[k] = np.ascontiguousarray(part.real), np.ascontiguousarray(part.imag)
         self.inverse = None if nu else self._inverse()

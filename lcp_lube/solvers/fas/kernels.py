@@ -7,8 +7,9 @@ pressure, z < 0 minus the flow of void -b_C r that leaves the cell. With it the 
     G_i = sum of k (p_i - p_neighbour) - q_i + q_west,    p = max(z, 0), q = max(-z, 0):
 
 B has the entries -1 and 1, on every level. In a time step cells store void: z < 0 is minus all that becomes of it, and `carry`,
-its part that leaves for the next cell, takes the 1's place; steady films have carry = None, for which the loops are compiled
-without it. `fronts` has the loops near the cavities' edges, `transfer` those between grids.
+its part that leaves for the next cell, takes the 1's place (carry[0]; carry[1]: what they store more by p = 1, a term on the
+diagonal); steady films have carry = None, for which the loops are compiled without it. `fronts` has the loops near the
+cavities' edges, `transfer` those between grids.
 """
 
 import numpy as np
@@ -50,7 +51,7 @@ def sweep(
         for s in range(ny + 2 * (fused - 1)):
             m = first + step * s
             if s < ny:
-                diagonals(kx, ky, m, at, end, over, g, s % 5)
+                diagonals(kx, ky, m, at, end, over, g, s % 5, carry)
             if done is not None:
                 await_part(done, part + 1, taken - 1)
                 await_part(done, part - 1, taken + 1)
@@ -73,7 +74,7 @@ def sweep(
 
 
 @kernel
-def diagonals(kx: Array, ky: Array, m: int, at: int, end: int, over: Array, g: Array, slot: int) -> None:
+def diagonals(kx: Array, ky: Array, m: int, at: int, end: int, over: Array, g: Array, slot: int, carry: Array | None) -> None:
     """Of row m, columns at to end - 1: one over the sum of each point's conductances, and what part of its west neighbour's t
     they make arrive.
 
@@ -81,7 +82,8 @@ def diagonals(kx: Array, ky: Array, m: int, at: int, end: int, over: Array, g: A
     loops in which no index can count from the end are turned into vector instructions.
     """
     for i in range(np.uint32(at), np.uint32(end)):
-        over[slot, i] = 1.0 / ((kx[m, i] + kx[m, i + 1]) + (ky[m, i] + ky[m + 1, i]))
+        gives = 0.0 if carry is None else carry[1, m, i]
+        over[slot, i] = 1.0 / ((kx[m, i] + kx[m, i + 1]) + (ky[m, i] + ky[m + 1, i]) + gives)
     for i in range(np.uint32(at + 1), np.uint32(end)):
         g[slot, i] = kx[m, i] * over[slot, i - 1]
 
@@ -96,7 +98,7 @@ def arriving(
             ky[m, i] * max(z[m - 1, i], 0.0) + ky[m + 1, i] * max(z[m + 1, i], 0.0)
         )
     west = z[m, at - 1]
-    t[k, at] += west * (kx[m, at] if west > 0.0 else 1.0 if carry is None else carry[m, at - 1])
+    t[k, at] += west * (kx[m, at] if west > 0.0 else 1.0 if carry is None else carry[0, m, at - 1])
 
 
 @kernel
@@ -130,7 +132,7 @@ def pass_on(
 def pass_on_part(t: Array, k: int, g: Array, slot: int, carry: Array, m: int, end: int) -> None:
     """The same for one row whose cells store void."""
     for i in range(np.uint32(2), np.uint32(end)):
-        t[k, i] += t[k, i - 1] * (g[slot, i] if t[k, i - 1] > 0.0 else carry[m, i - 1])
+        t[k, i] += t[k, i - 1] * (g[slot, i] if t[k, i - 1] > 0.0 else carry[0, m, i - 1])
 
 
 @kernel
@@ -150,8 +152,9 @@ def relax(z: Array, kx: Array, ky: Array, c: Array, m: int, start: int, end: int
     for i in range(start, end):
         k_W, k_E, k_S, k_N = kx[m, i], kx[m, i + 1], ky[m, i], ky[m + 1, i]
         t = c[m, i] + k_E * max(z[m, i + 1], 0.0) + k_S * max(z[m - 1, i], 0.0) + k_N * max(z[m + 1, i], 0.0)
-        t += k_W * west if west > 0.0 else west if carry is None else carry[m, i - 1] * west
-        west = t / (k_W + k_E + k_S + k_N) if t > 0.0 else t
+        t += k_W * west if west > 0.0 else west if carry is None else carry[0, m, i - 1] * west
+        gives = 0.0 if carry is None else carry[1, m, i]
+        west = t / (k_W + k_E + k_S + k_N + gives) if t > 0.0 else t
         z[m, i] = west
 
 
@@ -166,7 +169,9 @@ def balance_row(z: Array, kx: Array, ky: Array, m: int, out: Array, carry: Array
         out[i] = (
             (k_W * (p - max(west, 0.0)) + k_E * (p - max(z[m, i + 1], 0.0)))
             + (k_S * (p - max(z[m - 1, i], 0.0)) + k_N * (p - max(z[m + 1, i], 0.0)))
-        ) + (min(here, 0.0) - (min(west, 0.0) if carry is None else carry[m, i - 1] * min(west, 0.0)))
+        ) + (min(here, 0.0) - (min(west, 0.0) if carry is None else carry[0, m, i - 1] * min(west, 0.0)))
+        if carry is not None:
+            out[i] += carry[1, m, i] * p
 
 
 @kernel

@@ -32,8 +32,8 @@ class Level:
     comm : the ranks, None where this one holds the whole grid and need not tell anyone.
     whole : every rank holds the whole grid, though comm has several.
     by_x, by_y : which points the next coarser grid leaves out.
-    carry : of a time step (`kernels`); void : the part of it that b_C r is made of, what leaves and what is stored; scale : z
-        of a cavitated cell over that of the finer grid's, which is smaller.
+    carry : of a time step (`kernels`); void : what it is made of, what of b_C r leaves, what is stored of it, and what cells
+        store more by p = 1; scale : z of a cavitated cell over that of the finer grid's, which is smaller.
     held, given, spans, slips : of a film with supplies (`held`): which points are held, their pressures, the runs of free
         points, and the held points that the next coarser grid sees beside their place.
     """
@@ -53,7 +53,7 @@ class Level:
     by_x: bool = False
     by_y: bool = False
     carry: Array | None = None
-    void: tuple[Array, Array] | None = None
+    void: Array | None = None
     scale: Array | None = None
     held: NDArray[np.bool_] | None = None
     given: Array = field(default_factory=lambda: np.zeros(0))
@@ -154,9 +154,9 @@ class Level:
 
 
 def carried(level: Level) -> None:
-    """What part of a cell's void leaves it, from `void`."""
-    leaves, stored = level.void  # type: ignore[misc]
-    level.carry = leaves / (leaves + stored + LEAST)
+    """What part of a cell's void leaves it, and what it stores more by p = 1, from `void`."""
+    leaves, stored, gives = level.void  # type: ignore[misc]
+    level.carry = np.stack([leaves / (leaves + stored + LEAST), gives])
 
 
 def empty(nx: int, ny: int, y0: int, y1: int, comm: MPI.Comm | None, whole: bool, periodic: tuple[bool, bool]) -> Level:
@@ -205,12 +205,14 @@ def _coarser(fine: Level, harmonic: bool) -> Level | None:
     if fine.held is not None:
         held.coarser(fine, coarse)
     if fine.void is not None:
-        leaves, stored, before = (np.zeros_like(coarse.z) for _ in range(3))
-        for values, into in zip(fine.void, (leaves, before), strict=True):
+        coarse.void, before = np.zeros((3, *coarse.z.shape)), np.zeros_like(coarse.z)
+        leaves, stored, gives = coarse.void
+        for values, into in zip(fine.void, (leaves, before), strict=False):
             transfer.inject(values, coarse.part(into), fine.first, by_x, by_y)
             coarse.gather(into)
-        restrict(fine, coarse, stored, harmonic, fine.void[1])
-        coarse.void = leaves, coarse.share(stored)
+        for values, into in zip(fine.void[1:], (stored, gives), strict=True):
+            restrict(fine, coarse, into, harmonic, values)
+            coarse.share(into)
         carried(coarse)
         coarse.scale = (leaves + stored + LEAST) / (leaves + before + LEAST)
     return coarse
@@ -235,12 +237,12 @@ def solve(level: Level) -> bool:
     if comm is None or not level.split:
         return exact.solve(level.z, level.kx, level.ky, level.c, *level.periodic, level.carry, level.held)
     whole = empty(level.nx, n, 0, n, None, False, level.periodic)
-    whole.carry = None if level.carry is None else np.zeros_like(whole.z)
+    whole.carry = None if level.carry is None else np.zeros((2, *whole.z.shape))
     whole.held = None if level.held is None else np.zeros(whole.z.shape, dtype=bool)
     for name in ("z", "c", "kx", "ky", *(name for name in ("carry", "held") if getattr(whole, name) is not None)):
         mine, out = getattr(level, name), getattr(whole, name)
-        rows = mine[1 if level.y0 else 0 : level.y1 - level.y0 + 1 if level.y1 < n else None]
-        np.concatenate(comm.allgather(np.ascontiguousarray(rows)), out=out)
+        rows = mine[..., 1 if level.y0 else 0 : level.y1 - level.y0 + 1 if level.y1 < n else None, :]
+        np.concatenate(comm.allgather(np.ascontiguousarray(rows)), axis=-2, out=out)
     settled = exact.solve(whole.z, whole.kx, whole.ky, whole.c, *level.periodic, whole.carry, whole.held)
     level.z[:] = whole.z[level.y0 : level.y1 + 2]
     return settled
