@@ -12,10 +12,10 @@ from ..errors import InputError
 from ..problems.facts import Facts
 from ..problems.film.effects import Answer, Cells, Compressible, Effect, FaceFactors, answer, factors, neutral
 from ..problems.film.fluid import Law
-from ..problems.film.giving import WIDEST, Giving, filled, lift_of, logarithm
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.stored import Stored
+from ..problems.film.tangent import WIDEST, Giving, filled, lift_of, logarithm
 from ..problems.grid import EVEN
 from ..problems.solution import Solution
 from ..scenes.scene import Derived, Solvable
@@ -275,7 +275,8 @@ def settled(ask: Ask, stored: Stored | None, moved: float) -> float:
     that: nothing is lost by it, as what cells store has the very density that flows.
     """
     found = SETTLED * ask.stopping_for((1e-8, 1e-8)).eps1
-    in_time = stored is not None and not stored.exact and ask.stopping is None
+    given = ask.stopping is not None and not ask.options.get("rest")
+    in_time = stored is not None and not stored.exact and not given
     return max(found, min(IN_TIME[0] * moved, IN_TIME[1])) if in_time else found
 
 

@@ -82,8 +82,8 @@ class Run:
             ask = replace(ask, options={"sweeps": 0, **ask.options})
         coupled = bool(first.effects) or first.dense
         self.march.curved = coupled
-        loose = chosen.method == "fas" and self.rotor is None and not coupled  # those want an answer to the last digit
-        if loose and ask.options.get("rest", REST):
+        last_digit = self.rotor is not None or any(effect.carried for effect in first.effects)
+        if chosen.method == "fas" and not last_digit and ask.options.get("rest", REST):
             ask = replace(ask, options={"rest": REST, **ask.options}, stopping=ask.stopping or {"eps1": EPS1})
         self.ask = replace(ask, method=chosen.method, implied=not named)
         self.steps, self.certificates = list[Step](), list[Certificate]()

@@ -87,9 +87,12 @@ def certify(problem: "LubricationProblem", p: Array, r: Array, eps1: float) -> C
 
 def filled(problem: "LubricationProblem", p: Array) -> "LubricationProblem":
     """The problem whose cells store what they do at p, whatever the pressure: it has the same answer."""
-    if problem.scheme.gives is None:
+    s = problem.scheme
+    if s.gives is None or s.storage is None:
         return problem
-    (other := copy(problem)).scheme = problem.scheme.filled(p.reshape(problem.grid.box))
+    more = s.gives * p.reshape(problem.grid.box)
+    other = copy(problem)
+    other.scheme = s.changed(storage=s.storage + more, b_C=s.b_C - more, c=s.c - more, gives=None)
     if problem.held is not None:
         other.scheme = pressed(other.scheme, problem.held, problem.p_unit)
     return other

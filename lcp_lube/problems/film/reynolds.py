@@ -93,12 +93,6 @@ class BoxScheme:
         other.__dict__.update(vars(self) | changes)
         return other
 
-    def filled(self, p: Array) -> "BoxScheme":
-        """With what cells store at p held."""
-        assert self.gives is not None and self.storage is not None  # of a time step
-        more = self.gives * p
-        return self.changed(storage=self.storage + more, b_C=self.b_C - more, c=self.c - more, gives=None)
-
     @property
     def arrays(self) -> list[str]:
         """Names of the coefficients and of h."""
