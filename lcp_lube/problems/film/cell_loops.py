@@ -21,6 +21,18 @@ misfit, face = kernel(cell_misfit), kernel(face_drag)
 
 
 @kernel
+def misfit_at(
+    p: Array, r: Array, k_W: Array, k_E: Array, k_S: Array, k_N: Array, b_C: Array, b_W: Array, c: Array,
+    p_max: float, above: float, j: int, i: int,
+) -> Any:  # fmt: skip
+    """`certify.cell_misfit` of a cell; p and r have a frame of neighbours."""
+    return misfit(
+        choose, p[j + 1, i + 1], p[j + 1, i], p[j + 1, i + 2], p[j, i + 1], p[j + 2, i + 1], r[j + 1, i + 1],
+        r[j + 1, i], k_W[j, i], k_E[j, i], k_S[j, i], k_N[j, i], b_C[j, i], b_W[j, i], c[j, i], p_max, above,
+    )  # fmt: skip
+
+
+@kernel
 def loop_misfits(
     p: Array,
     r: Array,
@@ -37,21 +49,19 @@ def loop_misfits(
 ) -> tuple[Array, Array]:
     """`certify.cell_misfits` of cells that are not held."""
     ny, nx = c.shape
-    sums, most = np.zeros((6, nx)), np.zeros((2, nx))  # column by column: vector instructions
-    for j in range(ny):
+    sums, most, here = np.zeros((6, nx)), np.zeros((2, nx)), np.zeros((2, nx))  # column by column: vector instructions
+    for j in range(ny):  # a loop over sums and one over extremes: of both at once the compiler makes no vector instructions
         for i in range(nx):
-            a, b, left, own, carried, inside, worst, gap = misfit(
-                choose, p[j + 1, i + 1], p[j + 1, i], p[j + 1, i + 2], p[j, i + 1], p[j + 2, i + 1], r[j + 1, i + 1],
-                r[j + 1, i], k_W[j, i], k_E[j, i], k_S[j, i], k_N[j, i], b_C[j, i], b_W[j, i], c[j, i], p_max, above,
-            )  # fmt: skip
-            sums[0, i] += a * a
-            sums[1, i] += b * b
-            sums[2, i] += left * left
-            sums[3, i] += own * own
-            sums[4, i] += carried * carried
-            sums[5, i] += inside
-            most[0, i] = worst if worst > most[0, i] or worst != worst else most[0, i]
-            most[1, i] = gap if gap > most[1, i] or gap != gap else most[1, i]
+            found = misfit_at(p, r, k_W, k_E, k_S, k_N, b_C, b_W, c, p_max, above, j, i)
+            for n in range(5):
+                sums[n, i] += found[n] * found[n]
+            sums[5, i] += found[5]
+        for i in range(nx):
+            found = misfit_at(p, r, k_W, k_E, k_S, k_N, b_C, b_W, c, p_max, above, j, i)
+            here[0, i], here[1, i] = found[6], found[7]
+        for n in range(2):
+            for i in range(nx):
+                most[n, i] = here[n, i] if here[n, i] > most[n, i] or here[n, i] != here[n, i] else most[n, i]
     return sums.sum(axis=1), np.array([most[0].max(), most[1].max()])
 
 

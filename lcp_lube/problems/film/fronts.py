@@ -66,7 +66,8 @@ def line_fronts(problem: LubricationProblem, p: Array, r: Array, dry: NDArray[np
     starts = row, i, ruptures
     row, i = places_in(~cavity[:, 1:-1] & cavity[:, :-2])
     pressed = s.k_W[row, i] * p.reshape(grid.box)[row, i]
-    lacking = s.b_W_at(row, i) * grid.ghosted(r, outside=0.0)[row + 1, i]
+    whole = grid.box[1] == grid.shape[0]  # nothing enters the first point of a whole line that is open
+    lacking = s.b_W_at(row, i) * (r.reshape(grid.box)[row, i - 1] if whole else grid.ghosted(r, outside=0.0)[row + 1, i])
     known = pressed + lacking > 0.0
     back = np.where(known & (lacking > 0.0), pressed / np.where(known, pressed + lacking, 1.0), 0.5)
     np.add.at(shift, row, ((0.5 - back) * behind[i]))

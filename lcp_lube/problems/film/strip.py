@@ -36,8 +36,8 @@ def coefficients_of(
     def cubes(at_faces: Array, at_nodes: Array) -> Array:
         """h^3 at the faces, which come first to last along axis 0."""
         if not mean_cubes:
-            return at_faces**3
-        nodal = at_nodes**3
+            return at_faces * at_faces * at_faces  # several times as fast as a power, and the same on any processor
+        nodal = at_nodes * at_nodes * at_nodes
         return 0.5 * (nodal[:-1] + nodal[1:])
 
     x_jumps, y_jumps = ((), ()) if mean_cubes else (jumps_of(film, axis) for axis in "xy")

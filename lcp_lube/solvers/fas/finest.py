@@ -5,30 +5,15 @@ from typing import Any
 import numpy as np
 
 from ...base.parallel import Array
-from ...errors import InputError
 from ...problems.film.lubrication import LubricationProblem
 from ...problems.grid import Grid
-from ...problems.strips import each_strip
-from . import held, kernels
+from . import held
 from .levels import FEWEST_LINES, Level, carried
 
 
 def finest(problem: LubricationProblem) -> Level:
-    """The problem's own grid. Collective.
-
-    Raises
-    ------
-    InputError : the void that leaves a cell is not what enters the next one, which no scheme of this package does.
-    """
+    """The problem's own grid. Collective."""
     grid, s = problem.grid, problem.scheme
-
-    def look_at(rows: slice) -> tuple[float, float]:
-        part = s.rows(rows)
-        return kernels.lost_void(part.b_E, part.b_W, part.b_C)
-
-    lost = each_strip(grid, look_at)
-    if grid.reduce.max(np.array([one for one, _ in lost])) > 1e-12 * grid.reduce.max(np.array([most for _, most in lost])):
-        raise InputError("--method fas: what leaves a cell of this scheme does not enter the next one; use active-set")
     level = level_of(grid, s.k_W, s.k_E, s.k_S, s.k_N, s.c)
     if s.storage is not None:
         level.void = np.zeros((3, *level.z.shape))

@@ -200,17 +200,6 @@ def add_balance(z: Array, kx: Array, ky: Array, c: Array, carry: Array | None, s
 
 
 @kernel
-def lost_void(b_E: Array, b_W: Array, b_C: Array) -> tuple[float, float]:
-    """The largest difference between the void's flow out of a cell and into the next one, and the largest b_C, per void."""
-    lost, most = 0.0, 0.0
-    for j in range(b_C.shape[0]):
-        for i in range(1, b_C.shape[1]):
-            lost = max(lost, abs(b_W[j, i] + b_E[j, i - 1]))
-            most = max(most, abs(b_C[j, i]))
-    return lost, most
-
-
-@kernel
 def pressure_and_void(z: Array, b_C: Array, p: Array, r: Array) -> None:
     """Into p and r those of z, whose frame is left out."""
     for j in range(z.shape[0]):

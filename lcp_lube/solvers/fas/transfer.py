@@ -15,11 +15,11 @@ def share(a: float, b: float, harmonic: bool) -> float:
 
 
 @kernel
-def west_shares(k_x: Array, harmonic: bool, out: Array) -> None:
-    """Weights of the west neighbours of the points of a row between two coarse ones, and behind the last one; x faces k_x."""
-    n = min(out.size, (k_x.size - 1) // 2)
+def west_shares(kx: Array, m: int, harmonic: bool, out: Array) -> None:
+    """Weights of the west neighbours of the points of row m between two coarse ones, and behind the last one."""
+    n = min(out.size, (kx.shape[1] - 1) // 2)
     for k in range(n):
-        out[k] = share(k_x[2 * k + 1], k_x[2 * k + 2], harmonic)
+        out[k] = share(kx[m, 2 * k + 1], kx[m, 2 * k + 2], harmonic)
     out[n:] = 0.5
 
 
@@ -56,17 +56,20 @@ def restrict(
             for i in range(1, nx + 1):
                 r[i] = c[m, i] - r[i]
         else:
-            r[1:-1] = c[m, 1:-1]
+            for i in range(1, nx + 1):
+                r[i] = c[m, i]
         if by_x:
-            west_shares(kx[m], harmonic, w)
+            west_shares(kx, m, harmonic, w)
         restrict_row(r, w, by_x, wrap, coarse)
         j = y0 + m - 1
         if not by_y:
-            out[m] += coarse
+            for k in range(1, n_coarse + 1):
+                out[m, k] += coarse[k]
         elif j % 2 == 1:
             row = (j - 1) // 2 - y0 // 2 + 1
             if start <= row < end:
-                out[row] += 0.5 * coarse
+                for k in range(1, n_coarse + 1):
+                    out[row, k] += 0.5 * coarse[k]
         else:
             row = j // 2 - y0 // 2
             if by_x:
@@ -140,7 +143,7 @@ def correct(
     for m in range(start, end if end else z.shape[0] - 1):
         row, last = coarse_rows(y0 + m - 1, y0, m, by_y)
         if by_x:
-            west_shares(kx[m], harmonic, w)
+            west_shares(kx, m, harmonic, w)
         for k in range(size):
             d[k] = alike(new[row, k], unit) - alike(old[row, k], unit)
         interpolate_row(d, w, by_x, south)
@@ -148,8 +151,8 @@ def correct(
             for k in range(size):
                 d[k] = alike(new[last, k], unit) - alike(old[last, k], unit)
             interpolate_row(d, w, by_x, north)
-            mix(south, north, ky[m], ky[m + 1], harmonic, e)
-            if truncation == 1 and differ(z[m - 1], z[m + 1]):
+            mix(south, north, ky, m, harmonic, e)
+            if truncation == 1 and differ(z, m - 1, m + 1):
                 for i in range(1, nx + 1):
                     if z[m, i] > 0.0:
                         if z[m - 1, i] <= 0.0 and z[m + 1, i] > 0.0 and reforms(z, m - 1, i, ring):
@@ -196,11 +199,11 @@ def coarse_rows(j: int, y0: int, m: int, by_y: bool) -> tuple[int, int]:
 
 
 @kernel
-def differ(a: Array, b: Array) -> bool:
+def differ(z: Array, a: int, b: int) -> bool:
     """Whether two rows are full at different points."""
     count = 0
-    for i in range(a.size):
-        count += (a[i] > 0.0) != (b[i] > 0.0)
+    for i in range(z.shape[1]):
+        count += (z[a, i] > 0.0) != (z[b, i] > 0.0)
     return count > 0
 
 
@@ -216,10 +219,10 @@ def interpolate_row(coarse: Array, w: Array, by_x: bool, out: Array) -> None:
 
 
 @kernel
-def mix(south: Array, north: Array, k_S: Array, k_N: Array, harmonic: bool, out: Array) -> None:
-    """Between two lines, by the conductances of the y faces to them."""
+def mix(south: Array, north: Array, ky: Array, m: int, harmonic: bool, out: Array) -> None:
+    """Row m between two lines, by the conductances of the y faces to them."""
     for i in range(1, out.size - 1):
-        v = share(k_S[i], k_N[i], harmonic)
+        v = share(ky[m, i], ky[m + 1, i], harmonic)
         out[i] = v * south[i] + (1.0 - v) * north[i]
 
 
@@ -235,7 +238,7 @@ def interpolate(
     for m in range(start, end):
         row, last = coarse_rows(y0 + m - 1, y0, m, by_y)
         if by_x:
-            west_shares(kx[m], harmonic, w)
+            west_shares(kx, m, harmonic, w)
         for s in range(2):
             sign = 1.0 - 2.0 * s
             for k in range(size):
@@ -245,7 +248,7 @@ def interpolate(
                 part[k] = max(sign * coarse[last, k], 0.0)
             interpolate_row(part, w, by_x, north)
             if last > row:
-                mix(south, north, ky[m], ky[m + 1], harmonic, flows[s])
+                mix(south, north, ky, m, harmonic, flows[s])
             else:
                 flows[s] = south
         for i in range(1, nx + 1):
