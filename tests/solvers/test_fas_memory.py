@@ -15,8 +15,9 @@ from lcp_lube.solvers.fas.finest import finest
 def test_bytes_a_point(name, changes):
     """Coefficients 40; grids, iterate and fields beside them, and what output takes for a moment: 90 in all, 168 once."""
     n = 599  # so large that strips of lines count little
-    with solve(load_scene(name, {"nx": 360, "ny": 360, **changes}), method="fas"):  # with threads as the large one
-        import lcp_lube.problems.film.cell_loops  # noqa: F401  (what is loaded once)
+    solve(
+        load_scene(name, {"nx": 510, "ny": 510, **changes}), method="fas"
+    ).destroy()  # loads or compiles all that the larger needs
     tracemalloc.start()
     try:
         with solve(load_scene(name, {"nx": n, "ny": n, **changes}), method="fas", memory_check=False) as solution:

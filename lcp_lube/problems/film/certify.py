@@ -154,7 +154,7 @@ def misfits(problem: "LubricationProblem", p: Array, r: Array, p_max: float, abo
     if problem.held is None and grid.size >= MANY and has_numba():
         from .cell_loops import loop_misfits
 
-        look = lambda *given: loop_misfits(*map(np.ascontiguousarray, given[:-3]), *given[-3:])  # noqa: E731
+        look = lambda *given: loop_misfits(*map(np.ascontiguousarray, given[:-3]), *given[-3:])  # type: ignore[arg-type]  # noqa: E731
     sums, most, least = np.zeros(6), np.zeros(2), np.inf
 
     def look_at(rows: slice) -> tuple[Any, list[tuple[Array, Array]]]:

@@ -39,7 +39,7 @@ def correct(
     for m in range(1, z.shape[0] - 1):
         row, last = coarse_rows(y0 + m - 1, y0, m, by_y)
         if by_x:
-            west_shares(kx[m], True, w)
+            west_shares(kx, m, True, w)
         interpolate_row(coarse[row], w, by_x, south)
         if last > row:
             interpolate_row(coarse[last], w, by_x, north)
@@ -48,7 +48,7 @@ def correct(
                 for i in range(1, nx + 1):
                     south[i] = v[i] * south[i] + (1.0 - v[i]) * north[i]
             else:
-                mix(south, north, ky[m], ky[m + 1], True, south)
+                mix(south, north, ky, m, True, south)
         if fronts and by_x:
             for i in range(1, nx, 2):
                 if full[m, i] and not full[m, i - 1] and full[m, i + 1]:
@@ -74,7 +74,7 @@ def restrict(
         for i in range(1, nx + 1):
             fronts += full[m, i] > full[m, i - 1]
         if by_x:
-            west_shares(kx[m], True, w)
+            west_shares(kx, m, True, w)
             for i in range(1, nx if fronts else 1, 2):
                 if full[m, i] and not full[m, i - 1] and full[m, i + 1]:
                     here[i + 1] += here[i]
