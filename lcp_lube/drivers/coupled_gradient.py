@@ -43,7 +43,7 @@ STENCILS: tuple[dict[int, float], ...] = (CENTRAL, ONWARD, {-m: -w for m, w in O
 KINKED = {0: -3.0, 1: 2.0, -1: 2.0, 2: -0.5, -2: -0.5}
 MEAN = {1: 1.0, -1: -1.0, 2: -0.25, -2: 0.25}  # and the mean of both, bends that differ from side to side left out too
 SEEN = 1e-5  # of the equations' derivative: a kink of them that is smaller is not looked at
-FINER, GROWS = 0.1, 3.0  # steps so much smaller make the difference across a jump so much larger
+FINER = 0.1  # steps so much smaller leave a kink as it is, and make what a jump makes of it larger
 State = tuple[Array, Array, dict[str, float]]  # R, what sources and film disagree by, and the numbers
 
 
@@ -137,7 +137,8 @@ class CoupledGradient(CoupledResponse):
         jumps = {name: abs(one) for name, one in kink.items() if abs(one) > KINK * abs(out[name]) + 10.0 * least[name]}
         if jumps:
             mean, closer = self._total(self._around(key, FINER * d)[1], MEAN, FINER * d)
-            steps = [name for name, one in jumps.items() if abs(closer[name]) > GROWS * one]
+            larger = {name: max(one, abs(closer[name])) for name, one in jumps.items()}
+            steps = [name for name, one in larger.items() if abs(closer[name] - kink[name]) > APART * one]
             out |= {name: mean[name] for name in jumps}
             if steps:
                 chord = self._chord(key, CHORD * d / STEP)

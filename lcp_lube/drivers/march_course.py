@@ -66,7 +66,7 @@ def check_march(scene: Scene) -> None:
             model.dense and bool(model.supplies or getattr(scene, "grooves_deg", ())),
             "what supplies a fluid whose density changes",
         ),
-        (any(one.open for one in model.supplies) and scene.motion.free, "supplies that follow beside a journal that is free"),  # type: ignore[attr-defined]
+        (any(one.open for one in model.supplies) and scene.motion.free, "supplies that follow beside what is free"),  # type: ignore[attr-defined]
         (model.U < 0, "a wall that moves to smaller x (give the mirror image, with -U)"),
         (hasattr(scene, "observer"), "events"),
         (getattr(scene, "pads_follow", False), "pads that follow"),
