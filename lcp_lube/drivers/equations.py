@@ -19,7 +19,7 @@ from ..problems.film import slopes
 from ..problems.film.cavity import VOID, cavitated
 from ..problems.film.forces import attitude, weights
 from ..problems.film.grooves import GroovedProblem
-from ..problems.film.line import known_fields
+from ..problems.film.known import known_fields
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.tangent import Tangent, effective, tangent
@@ -138,7 +138,7 @@ class Equations:
         wanted = {FLIPPED.get(name, name) for name in wanted} if wanted is not None and self.turned else wanted
         problem = self.problem(p)
         found = slopes.numbers(problem, p / problem.p_unit, r, wanted)
-        if (fields := known_fields(problem)) is not None:  # a line's numbers are free of the grid's error (`film.line`)
+        if (fields := known_fields(problem)) is not None:  # a line's numbers are free of the grid's error (`film.known`)
             told, discrete = _flat(problem.quantities(fields)), slopes.numbers(problem, fields["p"], fields["r"])
             found = {name: value + (told.get(name, discrete[name]) - discrete[name]) for name, value in found.items()}
         if self.turned:

@@ -35,7 +35,7 @@ from typing import Any
 import numpy as np
 
 from ..problems.film.integrals import line_integrals
-from ..problems.film.line import KINDS, known_fields
+from ..problems.film.known import KINDS, known_fields
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.turned import TurnedProblem

@@ -34,6 +34,7 @@ MOST_SOLVES = 40
 TOLERANCE = 1e-10  # of the largest flow: by how much what a source gives may differ from what the film takes
 DIGITS, ENOUGH = 1e-7, 1e-4  # steps of such parts of the largest pressure may be rounding; the misfit that may be left then
 PATIENCE, GIVE_UP = 2, 8  # such steps that do not halve the misfit, before one that is left is enough; or given up
+DEAF = 1e-9  # of the slope that would end the misfit within P: a flow that follows P less does so by rounding
 FIRST = 0.5  # part of p_s behind a restrictor, to begin with
 LARGE = 60_000  # points of a film in the plane that is not factored
 
@@ -113,8 +114,9 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
                 film += np.outer(flows[free] - last[1] - film @ moved, moved) / (moved @ moved)
             last, slopes = (P[free], flows[free]), film
         matrix = misfit[free, 2:] * slopes + np.diag(misfit[free, 1])
-        flat = np.diag(np.diag(matrix) == 0.0)  # a film that is nowhere full hears nothing of P: ten times as much
-        matrix += flat * np.abs(misfit[free, 0]) / (9.0 * np.maximum(P[free], model.p_unit * 1e-3))
+        steep = np.abs(misfit[free, 0]) / np.maximum(P[free], model.p_unit * 1e-3)
+        flat = np.diag(matrix) <= DEAF * steep  # a film that is nowhere full hears nothing of P: ten times as much
+        matrix += np.diag(np.where(flat, steep / 9.0 - np.diag(matrix), 0.0))
         new_P = np.maximum(P[free] + np.linalg.solve(matrix, -misfit[free, 0]), 0.0)
         if new_P.size == 1:  # the misfit grows with P
             other[int(misfit[free, 0][0] > 0.0)] = P[free][0]

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base.parallel import Array
 from ..problems.film.forces import totals
-from ..problems.film.line import known_of
+from ..problems.film.known import known_of
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.strip import stream_weights
 from ..problems.film.turned import TurnedProblem

@@ -16,7 +16,7 @@ from lcp_lube.drivers.adjoint import Adjoint
 from lcp_lube.drivers.film_gradient import FilmGradient, areas
 from lcp_lube.drivers.goal_error import finer_shape, goal_error
 from lcp_lube.drivers.gradient import gradients
-from lcp_lube.problems.film.line import known_fields
+from lcp_lube.problems.film.known import known_fields
 from lcp_lube.scenes.values import key_of, values_of, with_values
 
 # No two alike: lines are dealt to the stretches between edges, and equal stretches would take turns.

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from lcp_lube import InputError, load_scene, solve
 from lcp_lube.problems.film.exact import exact_solution
 from lcp_lube.problems.film.integrals import LineIntegrals
-from lcp_lube.problems.film.line import known_of, solve_line, solve_points
+from lcp_lube.problems.film.known import known_of
+from lcp_lube.problems.film.line import solve_line, solve_points
 from lcp_lube.problems.film.shapes import Along, Block, Sum
 
 EXACT = ("problem1", "problem2", "problem3", "parabolic_slider", "pocketed_pad", "long_journal")
@@ -102,7 +103,7 @@ class Told:
 def test_the_discrete_solution_is_known(film, n, p_a, p_b, mix):
     """Its balances are zero, it is complementary, and the matrices are M-matrices, any mix of their columns too."""
     problem = FilmScene.of(film, n=n, p_a=p_a, p_b=p_b).build()
-    p, r = solve_points(problem.integrals, MU, U, p_a, p_b)
+    p, r, _ = solve_points(problem.integrals.parts, MU, U, p_a, p_b)
     s = problem.scheme
     assert p.min() >= 0 and r.min() >= 0 and r.max() < 1 and not (p * r).any()
     p = p / problem.p_unit
@@ -202,3 +203,67 @@ def test_dimples_that_overlap_are_refused(changes, cell):
     scene = load_scene({"family": "bearing", "dimension": 2, "L_mm": 10, "U": 1.0, "fluid": {"mu": 0.02}, "film": film})
     with pytest.raises(InputError, match=f"dimples of size 2.1 mm in cells of {cell}.* would overlap"):
         scene.build()
+
+
+WAVE = {"shape": "formula", "unit": "um", "h": "10*(1 + 0.6*cos(20*pi*(x - 0.031)))"}  # of a ring of 0.1 m
+GROOVES = [{"x": [0.0131, 0.0197], "p": 2e5}, {"x": [0.0911, 0.0913], "restrictor": "capillary", "K": 4e-12, "p_s": 3e6}]
+TOLD = ("pressure_integral", "load", "friction", "p_max", "cavitated_area", "rupture", "reformation", "supply_p", "supply_flow")
+
+
+def supplied(n, sides="periodic", supply=GROOVES, U=2.0, **fluid):
+    scene = {"family": "bearing", "L": 0.1, "n": n, "U": U, "scheme": "face", "film": [WAVE], "fluid": {"mu": 0.015, **fluid}}
+    solution = solve({**scene, "sides": {"west": sides, "east": sides}, "supply": supply}, stopping=PRECISE)
+    assert solution.converged, solution.message
+    return solution.quantities
+
+
+@pytest.mark.parametrize("sides, fluid", [("periodic", {}), (1e5, {}), (1e5, {"barus": 2e-9})])
+def test_supplies_on_any_grid(sides, fluid):
+    """A groove between two points, one across several, a pressure that follows: numbers are the film's on coarse grids too."""
+    coarse, fine = (supplied(n, sides, **fluid) for n in (11, 200))
+    for name in TOLD:
+        assert coarse[name] == pytest.approx(fine[name], rel=1e-8), name
+    p, flow = coarse["supply_p"][1], coarse["supply_flow"][1]
+    assert flow == pytest.approx(4e-12 * (3e6 - p), rel=1e-9)
+    given = supplied(300, sides, [GROOVES[0], {"x": GROOVES[1]["x"], "p": p}], **fluid)
+    assert given["supply_flow"][1] == pytest.approx(flow, rel=1e-8)
+
+
+def test_a_ring_with_a_groove_is_the_film_between_its_edges():
+    """Against the line that begins where the groove ends, whose solution `exact` has."""
+    a, b = 0.0231, 0.0297
+    found = supplied(60, supply=[{"x": [a, b], "p": 2e5}])
+
+    def film(x, y=0.0):
+        return 1e-5 * (1.0 + 0.6 * np.cos(20 * np.pi * (np.asarray(x) + b - 0.031)))
+
+    extrema = [t for k in range(-2, 5) if 0 < (t := 0.031 + 0.05 * k - b) < 0.1 - (b - a)]
+    film.breakpoints = lambda: tuple(extrema)
+    exact = exact_solution(film, 0.1 - (b - a), 0.015, 2.0, 2e5, 2e5)
+    assert found["pressure_integral"] == pytest.approx(exact.load + 2e5 * (b - a), rel=1e-9)
+    assert found["p_max"] == pytest.approx(exact.p_max, rel=1e-9)
+    assert found["rupture"] == pytest.approx((exact.rupture + b) % 0.1, rel=1e-9)
+    assert found["reformation"] == pytest.approx((exact.reformation + b) % 0.1, rel=1e-9)
+    back = [supplied(n, supply=[{"x": [a, b], "p": 2e5}], U=-2.0)["friction"] for n in (17, 60)]
+    assert back[0] == pytest.approx(back[1], rel=1e-9)
+
+
+def test_viscosity_by_pressure():
+    """Barus' fluid: p = -log(1 - b q)/b of the constant fluid's q, whose solution is known."""
+    b, sides = 2e-8, {"west": 1e5, "east": 1e5}
+    scene = {"family": "bearing", "film": [WAVE], "L": 0.1, "U": 0.2, "scheme": "face", "sides": sides}
+    found, finer = (
+        solve({**scene, "n": n, "fluid": {"mu": 0.015, "barus": b}}, stopping=PRECISE).quantities for n in (19, 400)
+    )
+    q = -np.expm1(-b * 1e5) / b
+
+    def film(x, y=0.0):
+        return 1e-5 * (1.0 + 0.6 * np.cos(20 * np.pi * (np.asarray(x) - 0.031)))
+
+    film.breakpoints = lambda: (0.031, 0.081)
+    exact = exact_solution(film, 0.1, 0.015, 0.2, q, q)
+    p = -np.log1p(-b * exact.p((np.arange(200_000) + 0.5) * 5e-7)) / b
+    assert found["pressure_integral"] == pytest.approx(np.sum(p) * 5e-7, rel=1e-7)
+    assert found["rupture"] == pytest.approx(exact.rupture, rel=1e-9)
+    for name in ("pressure_integral", "friction", "p_max"):
+        assert found[name] == pytest.approx(finer[name], rel=1e-8)

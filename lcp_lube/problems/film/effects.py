@@ -259,6 +259,7 @@ def answer(
     if held is not None and law.barus:  # back from q
         held = replace(held, supplies=tuple(replace(one, p=float(law.pressure(np.array(one.p)))) for one in held.supplies))
     film = scaled(base, by, mobility, p_sides, held)  # type: ignore[arg-type]
+    film.thick = (base.mu, law) if law.barus and not cells else None
     if "lift" in cells:
         film = film.with_lift(cells["lift"])
     return Answer(film, p, r, cells, law, base, by.values)

@@ -14,7 +14,7 @@ from .reynolds import sides
 from .strip import line_weights, stream_weights
 
 if TYPE_CHECKING:
-    from .line import Known
+    from .known import Known
     from .lubrication import LubricationProblem
 
 Weight = Callable[[Array, Array], Array]
@@ -82,9 +82,11 @@ def totals(
         if name != "pressure_integral":
             out[name] += contact.total(problem, weight)
     if known is not None:
-        for (name, discrete), (above, _) in zip(
+        outside = known.ambient(problem)
+        for (name, discrete), (above, weight) in zip(
             zip(by, integrals(problem, known.p_pa, asked), strict=True), asked, strict=True
         ):
+            above = above if name == "pressure_integral" or hasattr(weight, "above") else outside
             out[name] += known.line.integral(antiderivative(problem, name), above) - discrete
     return out
 

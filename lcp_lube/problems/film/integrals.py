@@ -52,8 +52,11 @@ class LineIntegrals:
 
     def __init__(self, film: Callable[[Array, Array], Array], points: Array, edges: Iterable[float] = (), fine: bool = False):
         self.film, self.points = film, points
-        self.known: dict[tuple[float, ...], Any] = {}  # `line.known_of` by what else it needs
-        self.ends = points if fine else self._panels(np.asarray(list(edges), dtype=float))
+        self.known: dict[tuple[float, ...], Any] = {}  # `known.known_of` by what else it needs
+        self.spans: tuple[Any, ...] | None = None  # between supplies (`spans.Span`)
+        self.ring: tuple[float, float] | None = None  # where a turn begins, and its length, m
+        self.edges = np.asarray(list(edges), dtype=float)
+        self.ends = points if fine else self._panels(self.edges)
         self.at_gauss = _gauss_points(self.ends[:-1], self.ends[1:])  # shape (panels, 8)
         self.h = self.film_at(self.at_gauss)
         self.first = np.searchsorted(self.ends, points)  # the panel behind each point
@@ -108,7 +111,27 @@ class LineIntegrals:
         out.known = {}
         h: Any = self.h + by
         out.parts = np.add.reduceat(self._integrals(self.ends[:-1], self.ends[1:], h), self.first[:-1], axis=1)
+        out.part(None if self.spans is None else tuple(span.lifted(by) for span in self.spans))
         return out
+
+    def part(self, spans: tuple[Any, ...] | None) -> None:
+        """Let supplies part the line: the faces beside them end at their edges. Round a ring the last face is the first one."""
+        self.spans = spans
+        for span in spans or ():
+            self.parts[:, span.faces] = span.parts
+        if self.ring is not None:
+            self.parts[:, -1] = self.parts[:, 0]
+
+    def turned_back(self, x: Array) -> Array:
+        """By how much places (m) lie beyond the turn of a ring that begins at its start; 0 where there is no ring."""
+        return np.zeros_like(x) if self.ring is None else self.ring[1] * np.floor((x - self.ring[0]) / self.ring[1])
+
+    @cached_property
+    def looks(self) -> tuple[Array, Array]:
+        """Places in every panel, its ends from within among them, and the film there, shape (panels, 10)."""
+        low, high = np.nextafter(self.ends[:-1], np.inf), np.nextafter(self.ends[1:], -np.inf)
+        places = np.concatenate([low[:, None], self.at_gauss, high[:, None]], axis=1)
+        return places, self.film_at(places)
 
     @property
     def films(self) -> Array:
@@ -155,7 +178,8 @@ def line_integrals(grid: Grid, film: Any) -> LineIntegrals:
         return LineIntegrals(film, np.concatenate([[start], x, [start + length]]), edges)
     points = np.concatenate([[x[-1] - length], x, [x[0] + length]])
     found = LineIntegrals(film, points, np.concatenate([edges - length, edges, edges + length]))
-    found.parts[:, -1] = found.parts[:, 0]  # the same face, to the last bit
+    found.ring = start, length
+    found.part(None)
     return found
 
 

@@ -10,33 +10,28 @@ p followed upstream from p_b and stopped at zero. It ruptures where U h rises th
 followed upstream, is zero. The discrete equations with the fluxes of `integrals` are solved by the same two lines with the
 points alone in the place of x, and with F less the void that enters, r_in F_1: so their Q and p are known, whoever solves them.
 
-What is read off the fields of a solve is therefore corrected by what the film says minus what the discrete solution says
-(`quantities`): the fields' own error stays in it, the grid's goes.
+`known` puts lines together where supplies part them, and says what the grid gets wrong.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, cached_property
-from typing import TYPE_CHECKING, Any
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...base.parallel import Array
-from ..solution import Fields
 from .cavity import VOID
 from .exact import bisect
+from .fluid import Law
 from .integrals import SAME, LineIntegrals
 
-if TYPE_CHECKING:
-    from .lubrication import LubricationProblem
-
 Flags = NDArray[np.bool_]
+ISOVISCOUS = Law()
 ROUNDING = 4e-15  # of the largest |Z|: a pressure below it is zero
 SETTLED = 1e-15  # relative change of Q
-KINDS = {"open", "closed"}  # ends of a line that is known
 MOST = 200  # looks for the least M: they converge by second order, from far away by halves
 
 
@@ -46,34 +41,59 @@ class Line:
 
     Attributes
     ----------
-    integrals : between points, all places where U h = Q and all fronts among them. p : there, Pa above p_c. full : of each
-        piece between two of them, whether it is full. Q : the equation's flow, m2/s, twice what flows. enters : whether void
-        does at x = 0.
+    integrals : between points, all places where U h = Q and all fronts among them. q : there, Pa above p_c: the pressure, of
+        Barus' fluid the unknown in its place (`fluid`). full : of each piece between two of them, whether it is full. Q : the
+        equation's flow, m2/s, twice what flows. enters : whether void does at x = 0. law : of the viscosity by the pressure.
     """
 
     integrals: LineIntegrals
-    p: Array
+    q: Array
     full: Flags
     mu: float
     U: float
     Q: float
     enters: bool
+    law: Law = ISOVISCOUS
+
+    @property
+    def p(self) -> Array:
+        """At the points, Pa above p_c; not finite where no pressure carries the flow."""
+        return self.law.pressure(self.q)
+
+    @cached_property
+    def _thicker(self) -> Array | float:
+        """mu(p)/mu at the panels' Gauss points."""
+        if not self.law.barus:
+            return 1.0
+        line = self.integrals
+        _, F, J = 6.0 * self.mu * (line.upto(line.at_gauss.ravel()) - line.upto(line.points[:-1])[:, line.interval.repeat(8)])
+        rise = (self.U * F - self.Q * J).reshape(line.at_gauss.shape)
+        full, before = self.full[line.interval, None], self.q[line.interval, None]
+        return 1.0 / np.where(full, 1.0 - self.law.barus * (before + rise), 1.0)
 
     @cached_property
     def slope(self) -> Array:
         """p' at the panels' Gauss points, Pa/m; 0 in cavities."""
         h = self.integrals.h
-        return np.where(self.full[self.integrals.interval, None], 6.0 * self.mu * (self.U - self.Q / h) / h**2, 0.0)
+        rise = self._thicker * (6.0 * self.mu * (self.U - self.Q / h) / h**2)
+        return np.where(self.full[self.integrals.interval, None], rise, 0.0)
 
     def integral(self, antiderivative: Callable[[Array], Array], above: float = 0.0) -> float:
         """Integral of (p - above) w over the line, w by its antiderivative W: sums of p_1 [W] + Int p' (W_2 - W)."""
-        line, W = self.integrals, antiderivative(self.integrals.points)
-        behind = W[line.interval + 1, None] - antiderivative(line.at_gauss)
-        return float(np.sum((self.p[:-1] - above) * np.diff(W)) + np.sum(line.weigh(self.slope * behind)))
+        line = self.integrals
+        x, k = line.points, line.interval
+        back = line.turned_back(0.5 * (x[1:] + x[:-1]))
+        start, end = antiderivative(x[:-1] - back), antiderivative(x[1:] - back)
+        behind = end[k, None] - antiderivative(line.at_gauss - back[k, None])
+        return float(np.sum((self.p[:-1] - above) * (end - start)) + np.sum(line.weigh(self.slope * behind)))
 
     @property
     def friction(self) -> float:
         """Integral of mu U (1 - r)/h + (h/2) p', N/m: of 4 mu U/h - 3 mu Q/h^2 where full, mu Q/h^2 in cavities."""
+        if self.law.barus:
+            h, full = self.integrals.h, self.full[self.integrals.interval, None]
+            shear = np.where(full, self._thicker * (4.0 * self.U - 3.0 * self.Q / h), self.Q / h) / h
+            return float(self.mu * np.sum(self.integrals.weigh(shear)))
         one, two, _ = self.mu * self.integrals.parts
         return float(np.sum(np.where(self.full, 4.0 * self.U * one - 3.0 * self.Q * two, self.Q * two)))
 
@@ -95,8 +115,64 @@ class Line:
         return x[before & ~self.full].tolist(), x[~before & self.full].tolist()
 
 
-def solve_line(
+@dataclass(frozen=True)
+class Flow:
+    """Q of a line, m2/s, and its derivatives by the pressures (of Barus' fluid by q) at its ends, m2/s/Pa."""
+
+    Q: float
+    by_a: float = 0.0
+    by_b: float = 0.0
+
+
+def crossings(line: LineIntegrals, U: float, level: float) -> Array:
+    """Where U h goes through a level."""
+    places, h = line.looks
+    over = level < U * h
+    k, i = np.nonzero(over[:, 1:] != over[:, :-1])
+    sign = np.where(over[k, i], 1.0, -1.0)
+    return bisect(lambda x: sign * (U * line.film_at(x) - level), places[k, i], places[k, i + 1])
+
+
+def line_flow(
     line: LineIntegrals, mu: float, U: float, p_a: float, p_b: float, r_in: float = 0.0, closed: bool = False
+) -> Flow:
+    """What flows; arguments as in `solve_line`."""
+    if closed:
+        return Flow(0.0)
+    J, F = _J_F(line, mu, U, line.ends)
+    least, at = _least((p_a + F[1:]) / J[1:], J[1:])
+    if p_a == 0.0 and (enters := U * float(line.looks[1][0, 0]) * (1.0 - r_in)) < least:
+        least, at = enters, np.inf
+    for _ in range(MOST if U and least else 0):
+        J_x, F_x = _J_F(line, mu, U, crossings(line, U, least))
+        Q, J_Q = _least((p_a + F_x) / J_x, J_x)
+        if not least * (1.0 - SETTLED) > Q:
+            break
+        least, at = Q, J_Q
+    Q_full = float((p_a - p_b + F[-1]) / J[-1])
+    return Flow(Q_full, 1.0 / J[-1], -1.0 / J[-1]) if Q_full <= least * (1.0 + SETTLED) else Flow(least, 1.0 / at)
+
+
+def _least(M: Array, J: Array) -> tuple[float, float]:
+    """The least of M and the J there; inf where there is none."""
+    k = int(np.argmin(M)) if M.size else 0
+    return (float(M[k]), float(J[k])) if M.size else (np.inf, np.inf)
+
+
+def _J_F(line: LineIntegrals, mu: float, U: float, x: Array) -> tuple[Array, Array]:
+    _, two, three = 6.0 * mu * line.upto(x)
+    return three, U * two
+
+
+def solve_line(
+    line: LineIntegrals,
+    mu: float,
+    U: float,
+    p_a: float,
+    p_b: float,
+    r_in: float = 0.0,
+    closed: bool = False,
+    law: Law = ISOVISCOUS,
 ) -> Line:
     """The steady film of a line.
 
@@ -104,41 +180,11 @@ def solve_line(
     ----------
     mu : Pa s. U : m/s, not negative. p_a, p_b : pressures at the first and the last point, Pa above p_c, not negative.
     r_in : void fraction that enters at the first point; 0 unless p_a is. closed : nothing flows, as an end is; p_b is the
-    pressure at the last point all the same.
+    pressure at the last point all the same. law : of Barus' fluid, whose p_a and p_b are q.
     """
-    places = np.concatenate(
-        [np.nextafter(line.ends[:-1], np.inf)[:, None], line.at_gauss, np.nextafter(line.ends[1:], -np.inf)[:, None]], axis=1
-    )
-    h = line.film_at(places)
-
-    def J_F(x: Array) -> tuple[Array, Array]:
-        _, two, three = 6.0 * mu * line.upto(x)
-        return three, U * two
-
-    @cache
-    def crossings(level: float) -> Array:
-        """Where U h goes through a level."""
-        over = level < U * h
-        k, i = np.nonzero(over[:, 1:] != over[:, :-1])
-        sign = np.where(over[k, i], 1.0, -1.0)
-        return bisect(lambda x: sign * (U * line.film_at(x) - level), places[k, i], places[k, i + 1])
-
-    J, F = J_F(line.ends)
-    Q_full = float((p_a - p_b + F[-1]) / J[-1])
-    Q = float(np.min((p_a + F[1:]) / J[1:]))
-    if p_a == 0.0:
-        Q = min(Q, U * float(h[0, 0]) * (1.0 - r_in))
-    if closed:
-        Q_full = Q = 0.0
-    for _ in range(MOST if U and Q else 0):
-        J_x, F_x = J_F(crossings(Q))
-        least = float(np.min((p_a + F_x) / J_x, initial=Q))
-        if not least < Q * (1.0 - SETTLED):
-            break
-        Q = least
-    Q = Q_full if Q_full <= Q * (1.0 + SETTLED) else Q
-    x = np.union1d(line.ends, crossings(Q)) if U else line.ends
-    J, F = J_F(x)
+    Q = line_flow(line, mu, U, p_a, p_b, r_in, closed).Q
+    x = np.union1d(line.ends, crossings(line, U, Q)) if U else line.ends
+    J, F = _J_F(line, mu, U, x)
     Z = F - Q * J
     p = _followed(Z, p_b)
     rise = np.diff(Z)
@@ -148,7 +194,7 @@ def solve_line(
     k = np.flatnonzero(refills)
 
     def below(t: Array) -> Array:
-        J_t, F_t = J_F(t)
+        J_t, F_t = _J_F(line, mu, U, t)
         return Z[k + 1] - (F_t - Q * J_t) - p[k + 1]
 
     x_f = bisect(below, x[k], x[k + 1])
@@ -156,20 +202,30 @@ def solve_line(
     k, x_f = k[apart], x_f[apart]
     points = np.insert(x, k + 1, x_f)
     whole = np.insert(~dry, k + 1, True)
-    return Line(LineIntegrals(line.film, points, fine=True), np.insert(p, k + 1, 0.0), whole, mu, U, Q, r_in > 0.0)
+    found = LineIntegrals(line.film, points, fine=True)
+    found.ring = line.ring
+    return Line(found, np.insert(p, k + 1, 0.0), whole, mu, U, Q, r_in > 0.0, law)
 
 
 def solve_points(
-    line: LineIntegrals, mu: float, U: float, p_a: float, p_b: float, r_in: float = 0.0, closed: bool = False
-) -> tuple[Array, Array]:
-    """p (Pa) and r of the discrete equations at all points but the first and the last; arguments as in `solve_line`."""
-    _, two, three = 6.0 * mu * line.parts
+    parts: Array, mu: float, U: float, p_a: float, p_b: float, r_in: float = 0.0, closed: bool = False
+) -> tuple[Array, Array, Flow]:
+    """p (Pa) and r of the discrete equations at all points but the first and the last, and what flows.
+
+    parts : `LineIntegrals.parts` between the points; the other arguments as in `solve_line`.
+    """
+    _, two, three = 6.0 * mu * parts
     J, F = np.cumsum(three), U * np.cumsum(two) - r_in * U * two[0]
-    Q = 0.0 if closed else min(float(np.min((p_a + F[:-1]) / J[:-1])), float((p_a - p_b + F[-1]) / J[-1]))
-    p = _followed(F - Q * J, p_b)
+    least, at = _least((p_a + F[:-1]) / J[:-1], J[:-1])
+    Q_full = float((p_a - p_b + F[-1]) / J[-1])
+    flow = Flow(Q_full, 1.0 / J[-1], -1.0 / J[-1]) if Q_full <= least else Flow(least, 1.0 / at)
+    flow = Flow(0.0) if closed else flow
+    p = _followed(F - flow.Q * J, p_b)
     with np.errstate(divide="ignore", invalid="ignore"):
-        r = 1.0 - (Q + p[1:] / three[1:]) / (U * line.films[1:])  # beside a full point its pressure drives flow back
-    return p[:-1], np.where((p[:-1] == 0.0) & (U > 0.0), np.maximum(r, 0.0), 0.0)
+        void = 1.0 - (flow.Q + p[1:] / three[1:]) / (
+            U * two[1:] / three[1:]
+        )  # beside a full point its pressure drives flow back
+    return p[:-1], np.where((p[:-1] == 0.0) & (U > 0.0), np.maximum(void, 0.0), 0.0), flow
 
 
 def _followed(Z: Array, p_b: float) -> Array:
@@ -177,38 +233,3 @@ def _followed(Z: Array, p_b: float) -> Array:
     best = np.maximum.accumulate(np.append(-Z[:-1], p_b - Z[-1])[::-1])[::-1]
     p = Z + best
     return np.where(p > ROUNDING * np.max(np.abs(Z)), p, 0.0)
-
-
-@dataclass(frozen=True)
-class Known:
-    """What is known of a line without a solver: the film's own solution, and the discrete one on the owned points (p in Pa)."""
-
-    line: Line
-    p_pa: Array
-    r: Array
-
-
-def known_of(problem: LubricationProblem) -> Known | None:
-    """None for 2D, a film without `integrals`, ends without a pressure or a wall, supplies inside, other equations."""
-    grid, line = problem.grid, problem.integrals
-    if line is None or not problem.plain or problem.U < 0 or problem.held is not None or not {*grid.ends[0]} <= KINDS:
-        return None
-    p_a, p_b, closed = *problem.p_sides[:2], "closed" in grid.ends[0]
-    if grid.ends[0][1] == "closed":  # what the wall brings is pressed back: full, with the slope 6 mu U/h^2 all the way
-        p_b = p_a + 6.0 * problem.mu * problem.U * float(np.sum(line.parts[1]))
-    data: Any = (problem.mu, problem.U, p_a, p_b, problem.r_in, closed)
-    if data not in line.known:
-        with np.errstate(all="ignore"):
-            line.known[data] = solve_line(line, *data), *solve_points(line, *data)
-    known, p, r = line.known[data]
-    p, r = (field[grid.x_start : grid.x_end] for field in (p, r))
-    return Known(known, p, r) if np.isfinite(known.Q) else None
-
-
-def known_fields(problem: LubricationProblem) -> Fields | None:
-    """The discrete solution where no solver is needed for it; None for the films that `known_of` leaves out. Collective."""
-    if (moving := getattr(problem, "moving", None)) is not None:  # a TurnedProblem
-        turned = known_fields(moving)
-        return None if turned is None else problem.here(turned)  # type: ignore[attr-defined, no-any-return]
-    known = known_of(problem)
-    return None if known is None else {"p": known.p_pa / problem.p_unit, "r": known.r}

@@ -48,10 +48,11 @@ class LubricationProblem:
     kind = "lubrication"
     shares_grid = False  # a time step's with those of the others
     plain = True  # whether the coefficients are those of the film alone
-    edged = True  # whether the coefficients know the film's edges inside cells; not where mean_cubes
+    edged = True  # whether the coefficients know edges inside cells; not where mean_cubes
     tops = False  # whether the largest pressure is looked for between the points (`peak`)
     factors: Any = None  # of its faces, that follow from `cells`
     entries: Any = None  # of dG/dp, where that is not A
+    thick: Any = None  # mu and the law of Barus' fluid, where nothing else acts
     contact: Any = None  # of asperities
     levers: Any = ()  # `Model.levers`
     stored: Any = None  # by its cells, in a time step (`stored.Stored`)
@@ -226,14 +227,13 @@ class LubricationProblem:
         """Given pressures (at a corner the mean of its two), the film, and the void: what enters west, none above p_c."""
         if name == "h":
             return np.array(self.film(x, y), dtype=float)
+        grid, shape = self.grid, np.broadcast(x, y).shape
         if name in self.more_fields:
-            return np.full(np.broadcast(x, y).shape, np.nan)
-        grid = self.grid
-        total = count = np.zeros(np.broadcast(x, y).shape)
+            return np.full(shape, np.nan)
+        total = count = np.zeros(shape)
         for k, p in enumerate(open_pressures(self)):
-            if p is not None:
-                at = (x, y)[k // 2] == grid.origin[k // 2] + (k % 2) * grid.lengths[k // 2]
-                total, count = total + np.where(at, p, 0.0), count + at
+            at = (x, y)[k // 2] == grid.origin[k // 2] + (k % 2) * grid.lengths[k // 2]
+            total, count = (total + np.where(at, p, 0.0), count + at) if p is not None else (total, count)
         with np.errstate(invalid="ignore"):
             p_sides = total / count  # NaN where no side has a pressure
         if name == "p":

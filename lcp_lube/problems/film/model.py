@@ -17,12 +17,13 @@ from .effects import Effect
 from .exact import ExactSolution
 from .fluid import Law
 from .grooves import Groove, GroovedProblem, Pad, pads_between
-from .integrals import line_integrals
+from .integrals import LineIntegrals, line_integrals
 from .lines import SAME, on_edges, stretches
 from .lubrication import LubricationProblem
 from .reynolds import BoxScheme, Film, box_scheme, coefficients
+from .spans import supplied
 from .stored import Stored
-from .supplies import Supply, hold
+from .supplies import Held, Supply, hold, owners
 from .turned import TurnedProblem
 from .turning import Shaft
 from .views import FromHere, Inside, MirroredFilm, Raised
@@ -201,9 +202,12 @@ class Model:
         film = self.film
         exact = self.integrals and grid.dim == 1 and self.scheme == "face" and not self.mean_cubes and not self.stored
         integrals = line_integrals(grid, film) if exact and "mirror" not in grid.ends[0] else None
+        if integrals is not None and self.supplies:
+            owner = np.concatenate(grid.comm.allgather(owners(grid, self.supplies).ravel()))
+            integrals.part(supplied(integrals, grid, self.supplies, owner))
         scheme_for = partial(box_scheme, grid, self.gap, **self._data, integrals=integrals)
         scheme = scheme_for()
-        scheme, held = hold(grid, scheme, self.supplies, self.p_unit) if self.supplies else (scheme, None)
+        scheme, held = self._held(grid, scheme, integrals)
         problem = kind(
             grid,
             scheme,
@@ -247,7 +251,13 @@ class Model:
         box = coefficients(grid, moved, **{**self._data, "stored": None}, cavity=problem.dry, integrals=along)
         changes = {name: np.imag(getattr(box, name)) / step for name in box.arrays}
         slopes = BoxScheme(**{name: a if name == "h" else a / flow_unit for name, a in changes.items()}, flow_unit=flow_unit)
-        return hold(grid, slopes, self.supplies, self.p_unit)[0] if self.supplies else slopes
+        return self._held(grid, slopes, integrals)[0]
+
+    def _held(self, grid: Grid, scheme: BoxScheme, integrals: LineIntegrals | None) -> tuple[BoxScheme, Held | None]:
+        """With its supplies."""
+        if not self.supplies:
+            return scheme, None
+        return hold(grid, scheme, self.supplies, self.p_unit, integrals is not None and integrals.spans is not None)
 
     def columns(self, shape: Sequence[int]) -> Array:
         """x of all columns of points of a ring, m."""

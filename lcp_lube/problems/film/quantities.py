@@ -14,7 +14,7 @@ from .cavity import cavitated
 from .flows import friction, side_flows
 from .forces import ambient, corner_flows, forces, open_pressures
 from .fronts import cavitated_area, first_cavity, fronts, line_fronts
-from .line import Line, known_of
+from .known import Known, known_of
 from .peak import Window
 from .supplies import supply_flows
 
@@ -75,14 +75,14 @@ def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any
         there = known.p_pa / problem.p_unit
         dry = cavitated(reduce, there, known.r)
         discrete = read if exact else _read(problem, known.p_pa, known.r, there, dry)
-        read = read.corrected(discrete, known.line, same)
+        read = read.corrected(discrete, known, same)
     ruptures, reformations, flow = read.ruptures, read.reformations, read.flow
     rupture, reformation = first_cavity(grid, ruptures, reformations)
     out: dict[str, Any] = {
         "p_max": read.p_max + problem.p_c,
         "p_max_at": read.p_max_at,
         **forces(problem, p_pa, known),
-        "p_ambient": ambient(problem) + problem.p_c,
+        "p_ambient": (ambient(problem) if known is None else known.ambient(problem)) + problem.p_c,
         "friction": read.friction,
         "p_unit": problem.p_unit,
         "cavitated_fraction": reduce.sum(cavity) / grid.size,
@@ -102,6 +102,8 @@ def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any
     if problem.held is not None:
         out["supply_p"] = [supply.p + problem.p_c for supply in problem.held.supplies]
         out["supply_flow"] = supply_flows(problem, p, r)
+        for name, more in known.more.items() if known is not None else ():
+            out[name] = [value + float(by) for value, by in zip(out[name], more, strict=True)]
     out["friction_coefficient"] = out["friction"] / out["load"] if out["load"] > 0 else None
     out["power_loss"] = out["friction"] * problem.U
     out |= problem.more
@@ -120,18 +122,18 @@ class _Read:
     ruptures: list[float]
     reformations: list[float]
 
-    def corrected(self, discrete: _Read, line: Line, same_fronts: bool) -> _Read:
+    def corrected(self, discrete: _Read, known: Known, same_fronts: bool) -> _Read:
         """With the difference between the line as its film has it and the discrete solution.
 
         same_fronts : the fields are those of the discrete solution, and have the line's fronts.
         """
+        line, flows = known.line, known.side_flows
         top, place = line.largest
-        flows = {"west": -0.5 * line.Q, "east": 0.5 * line.Q}
         return _Read(
             self.p_max + (top - discrete.p_max),
             [place] if np.isfinite(self.p_max) else None,
             self.friction + (line.friction - discrete.friction),
-            {side: value + (flows[side] - discrete.flow[side]) for side, value in self.flow.items()},
+            {side: value + (flows.get(side, discrete.flow[side]) - discrete.flow[side]) for side, value in self.flow.items()},
             self.cavitated_area + (line.cavitated - discrete.cavitated_area),
             *(line.fronts if same_fronts else (self.ruptures, self.reformations)),
         )

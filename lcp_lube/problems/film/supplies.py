@@ -184,10 +184,12 @@ class Held:
         return np.append([supply.p / p_unit for supply in self.supplies], 0.0)[self.owner]
 
 
-def hold(grid: Grid, scheme: BoxScheme, supplies: Sequence[Supply], p_unit: float) -> tuple[BoxScheme, Held]:
+def hold(
+    grid: Grid, scheme: BoxScheme, supplies: Sequence[Supply], p_unit: float, to_edges: bool = False
+) -> tuple[BoxScheme, Held]:
     """The scheme with the supplies' cells held at their pressures. Collective.
 
-    A supply in which no point lies has the point nearest to its middle.
+    to_edges : whether its conductances are those up to the supplies' edges already (`spans`).
 
     Raises
     ------
@@ -195,6 +197,22 @@ def hold(grid: Grid, scheme: BoxScheme, supplies: Sequence[Supply], p_unit: floa
     """
     if not grid.reduce.max(scheme.diagonal) > 0:
         raise InputError(f"grid {'x'.join(map(str, grid.shape))}: a supply holds the film's only point, between closed sides")
+    held = Held(tuple(supplies), owners(grid, supplies))
+    if not to_edges:
+        k = zip(("k_W", "k_E", "k_S", "k_N"), _shares(grid, held), strict=True)
+        scheme = scheme.changed(**{name: getattr(scheme, name) / share for name, share in k})
+    return pressed(scheme.changed(held=held.mask), held, p_unit), held
+
+
+def owners(grid: Grid, supplies: Sequence[Supply]) -> NDArray[np.int64]:
+    """The number of the supply at each owned point, -1 outside. Collective.
+
+    A supply in which no point lies has the point nearest to its middle.
+
+    Raises
+    ------
+    InputError : two supplies that are not held at one pressure have a point in common.
+    """
     owner = np.full(grid.box, -1, dtype=np.int64)
     for number, supply in enumerate(supplies):
         mine = np.broadcast_to(supply.region.inside(grid.x, grid.y), grid.box)
@@ -205,10 +223,7 @@ def hold(grid: Grid, scheme: BoxScheme, supplies: Sequence[Supply], p_unit: floa
         if other >= 0 and (supply.open or supplies[other].open or supply.p != supplies[other].p):
             raise InputError(f"supply {other + 1} and supply {number + 1} overlap: allowed where both hold the same p")
         owner = np.where(mine & (owner < 0), number, owner)
-    held = Held(tuple(supplies), owner)
-    names = ("k_W", "k_E", "k_S", "k_N")
-    k = {name: getattr(scheme, name) / share for name, share in zip(names, _shares(grid, held), strict=True)}
-    return pressed(scheme.changed(**k, held=held.mask), held, p_unit), held
+    return owner
 
 
 def pressed(scheme: BoxScheme, held: Held, p_unit: float) -> BoxScheme:
@@ -262,8 +277,7 @@ def supply_flows(problem: LubricationProblem, p: Array, r: Array) -> list[float]
     """Volume flow that each supply gives to the film, m3/s (1D: m2/s). Collective."""
     if (held := problem.held) is None:
         return []
-    grid = problem.grid
-    given = problem.face_flows(p, r).reshape(grid.box)
+    given = problem.face_flows(p, r).reshape(problem.grid.box)
     unit = volume_unit(problem)
     return [unit * problem.reduce.sum(np.where(held.owner == k, given, 0.0)) for k in range(len(held.supplies))]
 

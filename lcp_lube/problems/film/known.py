@@ -1,0 +1,226 @@
+"""What is known of a film in 1D without a solver: its numbers as the film has them, and the discrete solution, by quadrature.
+
+What is read off the fields of a solve is corrected by what the film says minus what the discrete solution says (`quantities`):
+the fields' own error stays in it, the grid's goes. Supplies part a line into films of their own (`spans`); pressures that
+follow from a flow or a restrictor are found for the film's flows, and for the discrete ones. Barus' fluid is one of constant
+viscosity in q (`fluid`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...base.parallel import Array
+from ..solution import Fields
+from .fluid import Law
+from .integrals import LineIntegrals
+from .line import ISOVISCOUS, Flow, Line, line_flow, solve_line, solve_points
+from .spans import SIDE, Span, whole
+from .supplies import Supply
+
+if TYPE_CHECKING:
+    from .lubrication import LubricationProblem
+
+KINDS = {"open", "closed"}  # ends of a line that is known, if it does not go round
+MOST, DIGITS = 60, 1e-14  # steps for the pressures of supplies, and their last relative change
+
+
+@dataclass(frozen=True)
+class Fed:
+    """The films between what holds a pressure, and the pressures of the supplies, Pa above p_c.
+
+    lines : of all spans. integrals : of the whole. ends : where each supply begins and ends, m. flows : of each span, m2/s, of
+    the equation: twice what flows. ambient : the smallest pressure of a supply.
+    """
+
+    lines: tuple[Line, ...]
+    integrals: LineIntegrals
+    ends: tuple[tuple[float, float], ...]
+    P: Array
+
+    def integral(self, antiderivative: Callable[[Array], Array], above: float = 0.0) -> float:
+        """`Line.integral` of all, supplies among them."""
+        total = sum(line.integral(antiderivative, above) for line in self.lines)
+        for (a, b), p in zip(self.ends, self.P, strict=True):
+            x = np.array([a, b])
+            if (ring := self.integrals.ring) is not None and np.ptp(back := self.integrals.turned_back(x)):
+                x = np.array([a, back[1] + ring[0], back[1] + ring[0], b])  # of an end that is the turn both sides count
+            start, end = x[::2], x[1::2]
+            back = self.integrals.turned_back(0.5 * (start + end))
+            total += (p - above) * float(np.sum(antiderivative(end - back) - antiderivative(start - back)))
+        return total
+
+    @property
+    def friction(self) -> float:
+        """N/m; where a supply is the film is full, without a slope of the pressure."""
+        upto, line = self.integrals.upto, self.lines[0]
+        held = [
+            float(np.diff(upto(np.array(pair))[0])[0]) * line.law.viscosity(p)
+            for pair, p in zip(self.ends, self.P, strict=True)
+        ]
+        return sum(one.friction for one in self.lines) + line.mu * line.U * float(sum(held))
+
+    @property
+    def cavitated(self) -> float:
+        """Length of the cavities, m."""
+        return sum(line.cavitated for line in self.lines)
+
+    @property
+    def largest(self) -> tuple[float, float]:
+        """The largest pressure, Pa above p_c, and its x, m."""
+        top, x = max((line.largest for line in self.lines), key=lambda found: found[0])
+        return top, float(x - self.integrals.turned_back(np.array(x)))
+
+    @property
+    def fronts(self) -> tuple[list[float], list[float]]:
+        """x of all ruptures and reformations, m."""
+        found = zip(*(line.fronts for line in self.lines), strict=True)
+        return tuple(
+            sorted(float(x - self.integrals.turned_back(np.array(x))) for some in part for x in some) for part in found
+        )  # type: ignore[return-value]
+
+
+@dataclass(frozen=True)
+class Known:
+    """A line as its film has it, and the discrete solution on the owned points (p in Pa).
+
+    P : pressures of the supplies by the discrete equations, Pa above p_c. more_Q : by how much more flows than in the
+    discrete solution, of each span, m2/s. spans : that they belong to.
+    """
+
+    line: Fed
+    p_pa: Array
+    r: Array
+    P: Array
+    more_Q: Array
+    spans: tuple[Span, ...]
+
+    @property
+    def more(self) -> dict[str, Array]:
+        """By how much more each supply has and gives than by the discrete equations."""
+        return {"supply_p": self.line.P - self.P, "supply_flow": 0.5 * _given(self.spans, self.more_Q, self.P.size)}
+
+    @property
+    def side_flows(self) -> dict[str, float]:
+        """What flows out of the sides, m2/s: of those that a film reaches."""
+        ends = (
+            ("west", self.spans[0].west, -0.5 * self.line.lines[0].Q),
+            ("east", self.spans[-1].east, 0.5 * self.line.lines[-1].Q),
+        )
+        return {side: flow for side, end, flow in ends if end == SIDE}
+
+    def ambient(self, problem: LubricationProblem) -> float:
+        """As `forces.ambient`, with the pressures of the supplies as the film has them, Pa above p_c."""
+        opens = [p for p, kind in zip(problem.p_sides, problem.grid.ends[0], strict=False) if kind == "open"]
+        return min(opens or self.line.P.tolist())
+
+
+def known_of(problem: LubricationProblem) -> Known | None:
+    """None for 2D, a film without `integrals`, other ends, supplies that are no lines' (`spans.supplied`), other equations."""
+    grid, line, law = problem.grid, problem.integrals, problem.thick
+    if line is None or not (problem.plain or law) or problem.U < 0:
+        return None
+    supplies = problem.held.supplies if problem.held is not None else ()
+    spans = line.spans if supplies else whole(line)
+    if not spans or not ((supplies and grid.periodic[0]) or {*grid.ends[0]} <= KINDS):
+        return None
+    if any(one.open for one in supplies) and len(spans) < len(supplies) + (not grid.periodic[0]):
+        return None  # what flows from a supply to the side that it reaches is the grid's alone
+    mu = problem.mu if law is None else law[0]
+    data: Any = (mu, problem.U, problem.p_sides[:2], problem.r_in, supplies, law)
+    if data not in line.known:
+        with np.errstate(all="ignore"):
+            line.known[data] = _solved(problem, line, spans, supplies, mu, ISOVISCOUS if law is None else law[1])
+    found = line.known[data]
+    if found is None:
+        return None
+    fed, p, r, P, more = found
+    p, r = (field[grid.x_start : grid.x_end] for field in (p, r))
+    if problem.held is not None:
+        p = np.where(problem.held.mask.ravel(), np.append(P, 0.0)[problem.held.owner].ravel(), p)
+    return Known(fed, p, r, P, more, spans)
+
+
+def _solved(
+    problem: LubricationProblem, line: LineIntegrals, spans: Sequence[Span], supplies: Sequence[Supply], mu: float, law: Law
+) -> tuple[Fed, Array, Array, Array, Array] | None:
+    """What `known_of` remembers of a line: the film, p and r at all points, the supplies' pressures there, `Known.more_Q`."""
+    at_sides, walls = problem.p_sides[:2], [kind == "closed" for kind in problem.grid.ends[0]]
+
+    def ends(span: Span, P: Array) -> tuple[float, float, float, bool]:
+        """q at both ends, the void that enters, whether nothing flows."""
+        p = [
+            float(law.reduced(np.asarray(at_sides[k] if end == SIDE else P[end])))
+            for k, end in enumerate((span.west, span.east))
+        ]
+        shut = [wall and end == SIDE for wall, end in zip(walls, (span.west, span.east), strict=True)]
+        if shut[1]:  # what the wall brings is pressed back: full, with the slope 6 mu U/h^2 all the way
+            p[1] = p[0] + 6.0 * mu * problem.U * float(np.sum(span.line.parts[1]))
+        return p[0], p[1], problem.r_in if span.west == SIDE else 0.0, any(shut)
+
+    def of_film(span: Span, P: Array) -> Flow:
+        return line_flow(span.line, mu, problem.U, *ends(span, P))
+
+    def of_points(span: Span, P: Array) -> Flow:
+        return solve_points(span.parts, mu, problem.U, *ends(span, P))[2]
+
+    begin = np.array([one.p for one in supplies])
+    P_film, P = (_balanced(supplies, spans, begin, law, of) for of in (of_film, of_points))
+    if P_film is None or P is None:
+        return None
+    lines = tuple(solve_line(span.line, mu, problem.U, *ends(span, P_film), law) for span in spans)
+    (p, r), more = np.zeros((2, problem.grid.shape[0])), np.zeros(len(spans))
+    for k, (span, one) in enumerate(zip(spans, lines, strict=True)):
+        q, r[span.owned], flow = solve_points(span.parts, mu, problem.U, *ends(span, P))
+        p[span.owned], more[k] = law.pressure(q), one.Q - flow.Q
+        if not (np.isfinite(one.Q) and np.isfinite(one.p).all() and np.isfinite(p).all()):
+            return None
+    held = tuple((one.region.x - one.region.half_x, one.region.x + one.region.half_x) for one in supplies)  # type: ignore[union-attr]
+    return Fed(lines, line, held, P_film), p, r, P, more
+
+
+def _given(spans: Sequence[Span], flows: Array, count: int) -> Array:
+    """Sums over each supply's ends of what flows away from it."""
+    out = np.zeros(count)
+    for span, flow in zip(spans, flows, strict=True):
+        for end, sign in ((span.west, 1.0), (span.east, -1.0)):
+            if end != SIDE:
+                out[end] += sign * flow
+    return out
+
+
+def _balanced(
+    supplies: Sequence[Supply], spans: Sequence[Span], begin: Array, law: Law, flow_of: Callable[[Span, Array], Flow]
+) -> Array | None:
+    """Pressures of the supplies at which each source gives what its films take, by Newton's method; None if it ends nowhere."""
+    P, free = begin, np.array([one.open for one in supplies], dtype=bool)
+    for _ in range(MOST if free.any() else 0):
+        flows = [flow_of(span, P) for span in spans]
+        Q = 0.5 * _given(spans, np.array([flow.Q for flow in flows]), P.size)
+        slopes = np.zeros((P.size, P.size))
+        for span, flow in zip(spans, flows, strict=True):
+            for end, by in ((span.west, flow.by_a), (span.east, flow.by_b)):
+                if end != SIDE:
+                    slopes[:, end] += 0.5 * by * _given([span], np.ones(1), P.size) / law.viscosity(P[end])
+        off = np.array([one.sought(*at) if one.open else (0.0, 1.0, 0.0) for one, *at in zip(supplies, P, Q, strict=True)])
+        try:
+            step = np.linalg.solve(np.diag(off[:, 1]) + off[:, 2:] * slopes, -off[:, 0])
+        except np.linalg.LinAlgError:
+            return None
+        P = np.maximum(P + step, 0.0)
+        if np.max(np.abs(step)) <= DIGITS * np.max(P):
+            return P
+    return P if not free.any() else None
+
+
+def known_fields(problem: LubricationProblem) -> Fields | None:
+    """The discrete solution where no solver is needed for it; None for the films that `known_of` leaves out. Collective."""
+    if (moving := getattr(problem, "moving", None)) is not None:  # a TurnedProblem
+        turned = known_fields(moving)
+        return None if turned is None else problem.here(turned)  # type: ignore[attr-defined, no-any-return]
+    known = known_of(problem)
+    return None if known is None else {"p": known.p_pa / problem.p_unit, "r": known.r}
