@@ -33,11 +33,11 @@ MOST, DIGITS = 60, 1e-14  # steps for the pressures of supplies, and their last 
 class Fed:
     """The films between what holds a pressure, and the pressures of the supplies, Pa above p_c.
 
-    lines : of all spans. integrals : of the whole. ends : where each supply begins and ends, m. flows : of each span, m2/s, of
-    the equation: twice what flows. ambient : the smallest pressure of a supply.
+    lines : of the spans. integrals : of the whole. ends : where each supply begins and ends, m.
     """
 
     lines: tuple[Line, ...]
+    spans: tuple[Span, ...]
     integrals: LineIntegrals
     ends: tuple[tuple[float, float], ...]
     P: Array
@@ -77,11 +77,14 @@ class Fed:
 
     @property
     def fronts(self) -> tuple[list[float], list[float]]:
-        """x of all ruptures and reformations, m."""
-        found = zip(*(line.fronts for line in self.lines), strict=True)
-        return tuple(
-            sorted(float(x - self.integrals.turned_back(np.array(x))) for some in part for x in some) for part in found
-        )  # type: ignore[return-value]
+        """x of all ruptures and reformations, m: a cavity that reaches a supply at p_c ends there."""
+        found: tuple[list[float], list[float]] = [], []
+        for span, line in zip(self.spans, self.lines, strict=True):
+            ends = [line.integrals.points[-1]] if span.east != SIDE and not line.full[-1] else []
+            found[0].extend(line.fronts[0])
+            found[1].extend([*line.fronts[1], *ends])
+        ruptures, reformations = (sorted(float(x - self.integrals.turned_back(np.array(x))) for x in some) for some in found)
+        return ruptures, reformations
 
 
 @dataclass(frozen=True)
@@ -89,7 +92,7 @@ class Known:
     """A line as its film has it, and the discrete solution on the owned points (p in Pa).
 
     P : pressures of the supplies by the discrete equations, Pa above p_c. more_Q : by how much more flows than in the
-    discrete solution, of each span, m2/s. spans : that they belong to.
+    discrete solution, of each span, m2/s.
     """
 
     line: Fed
@@ -97,20 +100,17 @@ class Known:
     r: Array
     P: Array
     more_Q: Array
-    spans: tuple[Span, ...]
 
     @property
     def more(self) -> dict[str, Array]:
         """By how much more each supply has and gives than by the discrete equations."""
-        return {"supply_p": self.line.P - self.P, "supply_flow": 0.5 * _given(self.spans, self.more_Q, self.P.size)}
+        return {"supply_p": self.line.P - self.P, "supply_flow": 0.5 * _given(self.line.spans, self.more_Q, self.P.size)}
 
     @property
     def side_flows(self) -> dict[str, float]:
         """What flows out of the sides, m2/s: of those that a film reaches."""
-        ends = (
-            ("west", self.spans[0].west, -0.5 * self.line.lines[0].Q),
-            ("east", self.spans[-1].east, 0.5 * self.line.lines[-1].Q),
-        )
+        spans, lines = self.line.spans, self.line.lines
+        ends = ("west", spans[0].west, -0.5 * lines[0].Q), ("east", spans[-1].east, 0.5 * lines[-1].Q)
         return {side: flow for side, end, flow in ends if end == SIDE}
 
     def ambient(self, problem: LubricationProblem) -> float:
@@ -142,7 +142,7 @@ def known_of(problem: LubricationProblem) -> Known | None:
     p, r = (field[grid.x_start : grid.x_end] for field in (p, r))
     if problem.held is not None:
         p = np.where(problem.held.mask.ravel(), np.append(P, 0.0)[problem.held.owner].ravel(), p)
-    return Known(fed, p, r, P, more, spans)
+    return Known(fed, p, r, P, more)
 
 
 def _solved(
@@ -180,7 +180,7 @@ def _solved(
         if not (np.isfinite(one.Q) and np.isfinite(one.p).all() and np.isfinite(p).all()):
             return None
     held = tuple((one.region.x - one.region.half_x, one.region.x + one.region.half_x) for one in supplies)  # type: ignore[union-attr]
-    return Fed(lines, line, held, P_film), p, r, P, more
+    return Fed(lines, tuple(spans), line, held, P_film), p, r, P, more
 
 
 def _given(spans: Sequence[Span], flows: Array, count: int) -> Array:
