@@ -21,7 +21,6 @@ from .integrals import LineIntegrals, line_integrals
 from .lines import SAME, on_edges, stretches
 from .lubrication import LubricationProblem
 from .reynolds import BoxScheme, Film, box_scheme, coefficients
-from .spans import supplied
 from .stored import Stored
 from .supplies import Held, Supply, hold, owners
 from .turned import TurnedProblem
@@ -203,6 +202,8 @@ class Model:
         exact = self.integrals and grid.dim == 1 and self.scheme == "face" and not self.mean_cubes and not self.stored
         integrals = line_integrals(grid, film) if exact and "mirror" not in grid.ends[0] else None
         if integrals is not None and self.supplies:
+            from .spans import supplied  # here: of lines alone
+
             owner = np.concatenate(grid.comm.allgather(owners(grid, self.supplies).ravel()))
             integrals.part(supplied(integrals, grid, self.supplies, owner))
         scheme_for = partial(box_scheme, grid, self.gap, **self._data, integrals=integrals)

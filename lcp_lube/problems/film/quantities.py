@@ -14,11 +14,11 @@ from .cavity import cavitated
 from .flows import friction, side_flows
 from .forces import ambient, corner_flows, forces, open_pressures
 from .fronts import cavitated_area, first_cavity, fronts, line_fronts
-from .known import Known, known_of
 from .peak import Window
 from .supplies import supply_flows
 
 if TYPE_CHECKING:
+    from .known import Known
     from .lubrication import LubricationProblem
 
 # Of a 2D film; what is not named has none. In 1D everything is per metre of width.
@@ -65,7 +65,11 @@ def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any
     p_pa = p * problem.p_unit
     cavity = cavitated(reduce, p, r)
     min_h, min_h_at = thinnest(problem)
-    known = known_of(problem)
+    known = None
+    if problem.integrals is not None:
+        from .known import known_of  # here: of lines alone
+
+        known = known_of(problem)
     read = _read(problem, p_pa, r, p, cavity)
     if known is not None:
         off = reduce.max(np.abs(p_pa - known.p_pa)), reduce.max(np.abs(r - known.r))
