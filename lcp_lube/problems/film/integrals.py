@@ -53,7 +53,7 @@ class LineIntegrals:
     def __init__(self, film: Callable[[Array, Array], Array], points: Array, edges: Iterable[float] = (), fine: bool = False):
         self.film, self.points = film, points
         self.known: dict[tuple[float, ...], Any] = {}  # `known.known_of` by what else it needs
-        self.spans: tuple[Any, ...] | None = None  # between supplies (`spans.Span`)
+        self.spans: tuple[Any, ...] | None = None  # between supplies (`known.Span`)
         self.ring: tuple[float, float] | None = None  # where a turn begins, and its length, m
         self.edges = np.asarray(list(edges), dtype=float)
         self.ends = points if fine else self._panels(self.edges)

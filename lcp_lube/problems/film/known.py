@@ -9,24 +9,57 @@ viscosity in q (`fluid`).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...base.parallel import Array
 from ..solution import Fields
 from .fluid import Law
 from .integrals import LineIntegrals
 from .line import ISOVISCOUS, Flow, Line, line_flow, solve_line, solve_points
-from .spans import SIDE, Span, whole
 from .supplies import Supply
 
 if TYPE_CHECKING:
     from .lubrication import LubricationProblem
 
 KINDS = {"open", "closed"}  # ends of a line that is known, if it does not go round
+SIDE = -1  # in the place of a supply's number
 MOST, DIGITS = 60, 1e-14  # steps for the pressures of supplies, and their last relative change
+
+
+@dataclass(frozen=True)
+class Span:
+    """A film between two ends: from a side, or the edge of a supply, to the next.
+
+    Attributes
+    ----------
+    line : with the two ends and the points between them. west, east : numbers of the supplies there, or SIDE. faces : of the
+        line of all points, those between these. parts : what `line.parts` is to the scheme: an end next to a point is at least
+        a part NEAREST of a spacing from it.
+    """
+
+    line: LineIntegrals
+    west: int
+    east: int
+    faces: NDArray[np.int64]
+    parts: Array
+
+    @property
+    def owned(self) -> NDArray[np.int64]:
+        """Numbers of its points, behind all of its faces but the last."""
+        return self.faces[:-1]
+
+    def lifted(self, by: complex) -> Span:
+        line = self.line.lifted(by)
+        return replace(self, line=line, parts=line.parts * (self.parts / self.line.parts))
+
+
+def whole(line: LineIntegrals) -> tuple[Span, ...]:
+    """The only one of a line without supplies."""
+    return (Span(line, SIDE, SIDE, np.arange(line.points.size - 1), line.parts),)
 
 
 @dataclass(frozen=True)
