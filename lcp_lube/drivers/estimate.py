@@ -35,7 +35,6 @@ from typing import Any
 import numpy as np
 
 from ..problems.film.integrals import line_integrals
-from ..problems.film.known import KINDS, known_fields
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.turned import TurnedProblem
@@ -183,6 +182,8 @@ def is_known(scene: Solvable) -> bool:
         return False
     if getattr(scene, "balance", None) is not None or motion_of(scene) is not None:
         return False  # its film, or what it has come from, is not known yet
+    from ..problems.film.known import KINDS  # here: of lines alone
+
     return {side.kind for side in model.sides[:2]} <= KINDS
 
 
@@ -197,6 +198,8 @@ def known_line(problem: Problem) -> tuple[LubricationProblem, Fields] | None:
     if isinstance(line, TurnedProblem):
         solved = line.moving = copy(line.moving)
     solved.integrals = solved.integrals or line_integrals(solved.grid, solved.film)
+    from ..problems.film.known import known_fields  # here: of lines alone
+
     fields = known_fields(line)
     return None if fields is None else (line, fields)
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from ..base.parallel import Array
 from ..problems.film.forces import totals
-from ..problems.film.known import known_of
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.strip import stream_weights
 from ..problems.film.turned import TurnedProblem
@@ -124,6 +123,8 @@ def carried(problem: Problem, fields: Fields, quantity: str) -> float | None:
 def _integral(problem: LubricationProblem, p_pa: Array, quantity: str) -> float:
     """One of INTEGRALS, as `forces` has it. Collective."""
     names = ("force_x", "force_y") if quantity == "load" and problem.shaft is not None else (quantity,)
+    from ..problems.film.known import known_of  # here: of runs to an accuracy alone
+
     found = totals(problem, p_pa, known_of(problem), names)
     return hypot(found["force_x"], found["force_y"]) if len(names) == 2 else found[quantity]
 
