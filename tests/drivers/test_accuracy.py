@@ -296,7 +296,7 @@ def test_errors_of_areas_are_a_sample():
 
 @pytest.mark.parametrize("form, truth", [("square", 6.1975), ("round", 7.0775)])
 def test_pads_whose_errors_cancel_in_each_dimple(form, truth):
-    """Pressures change twenty times as much as the load: 1 % of it needs no more than 160 points a side."""
+    """Pressures change by far more than the load: 1 % of it needs no more than 160 points a side."""
     with solve(load_scene("dimpled_pad", {"film.dimples.form": form}), accuracy=1e-2, quantity="pressure_integral") as solution:
         assert solution.converged and solution.problem.grid.shape[0] <= 160
         assert abs(solution.numbers["pressure_integral"] / truth - 1) <= solution.settings["accuracy_estimate"]
