@@ -96,6 +96,21 @@ def test_effects_are_left_out_and_kept():
     assert "temperature" in strong["kept"] and strong["kept"]["temperature"] < -0.05 and strong["kept"]["barus"] > 0
 
 
+def test_effects_that_cancel():
+    """To first order this viscosity changes nothing: more of it here is less of it there. To second order it counts."""
+    scene = {**PAD, "viscosity": {"factor": "1 + 0.3*sin(62.83*x + 2.555)"}}
+    with solve(scene) as s, solve(scene, model="least") as least:
+        told = s.settings["model"]["kept"]["viscosity"]
+        assert told == pytest.approx(s.load / least.load - 1.0, rel=0.05) and abs(told) > PART * 0.01
+
+
+def test_the_film_that_was_looked_at_is_the_first_of_the_loop():
+    """It takes as many films, that one among them, as a loop that is told which effects count, and fewer of its own."""
+    with solve(SCENES["all laws"]) as s, solve(SCENES["all laws"], model=",".join(s.settings["model"]["kept"])) as named:
+        films = [one.settings["details"]["fluid_solves"] for one in (s, named)]
+        assert films[0] == films[1] and s.load == pytest.approx(named.load, rel=1e-7)
+
+
 def test_least_and_named():
     plain = load_scene({**SCENES["cavity"], "fluid": {"mu": 0.02, "p_supply": 1e5}, "temperature": None})
     with solve(plain) as reference, solve(SCENES["cavity"], model="least") as least:

@@ -5,9 +5,10 @@
     Walther      log10 log10(nu + 0.7) = A - B log10 T,  nu = mu/rho in mm2/s (ASTM D341)
     Roelands     log(mu) + 9.67 = a (T - 138)^-s,  mu in Pa s (the part of T in Roelands' equation)
 
-Kinematic viscosities at 40 degrees C are the middles of ISO 3448's grades; those at 100 degrees C belong to a viscosity index
-of 100, by the equations of ASTM D2270, which begin at 2 mm2/s: for grades 2, 3 and 5 they say nothing. Density and specific
-heat of a mineral oil are typical values, not the grade's.
+Kinematic viscosities at 40 degrees C are the middles of ISO 3448's grades (6.8 mm2/s of grade 7); those at 100 belong to a
+viscosity index of 100, by the equations of ASTM D2270, which begin at 2 mm2/s there, 6.394 at 40: for grades 2, 3 and 5 (2.2,
+3.2 and 4.6) they say nothing, and one viscosity alone is no law. Density and specific heat of a mineral oil are typical values,
+not the grade's.
 """
 
 from collections.abc import Sequence
@@ -26,7 +27,7 @@ ROELANDS_T, ROELANDS_MU, ROELANDS_P = 138.0, 9.67, 1.96e8  # K, of log(mu/(Pa s)
 DENSITY, SPECIFIC_HEAT = 870.0, 2000.0  # kg/m3, J/(kg K): typical of mineral oils
 # Grade: mm2/s at 40 and at 100 degrees C.
 GRADES = {
-    7: (7.0, 2.121),
+    7: (6.8, 2.081),
     10: (10.0, 2.659),
     15: (15.0, 3.410),
     22: (22.0, 4.294),
@@ -170,7 +171,8 @@ def named(name: str, rho: float = DENSITY) -> Walther:
     if grade not in GRADES:
         if grade in THIN:
             raise InputError(
-                f"{name}: a viscosity index begins at 2 mm2/s at 100 degrees C, which it has not; give law, T and mu"
+                f"{name}: a viscosity index begins at 2 mm2/s at 100 degrees C, which it has not; give law, T and mu, "
+                f"or one of {', '.join(NAMES)}"
             )
         close = min(GRADES, key=lambda one: abs(log(one / grade))) if grade > 0 else None
         near = f" (did you mean ISO VG {close}?)" if close else nearest(name, NAMES)
