@@ -105,8 +105,8 @@ class FirstOrder:
     def second(self, name: str) -> float:
         """dQ/Q by an effect that was not solved for, to second order; NaN where there is none. Collective.
 
-        L has no slope by the fields, so that L at z + z', J z' = -dG, with all of the effect has the second order too. What is
-        found for the scene is held, but for its first order.
+        L has no slope by the fields: at z + z', J z' = -dG, with what the effect makes of these, it has the second order too.
+        What is found for the scene is held, but for its first order.
         """
         eq, (d, _) = self.equations, self._change(name)
         with np.errstate(all="ignore"):
@@ -115,7 +115,12 @@ class FirstOrder:
             self._film(self._moved(d, STEP), STEP)
             (dz,) = self.linear.solve([(before - self._balance(self.p, self.r)) / STEP])
             p = np.where(self.cavity, self.p, self.p + dz * eq.constant.p_unit)
-            moved = self._lagrangians(self._moved(d, 1.0), 1.0, p, np.where(self.cavity, self.r - dz, self.r)) - self.start
+            r = np.where(self.cavity, self.r - dz, self.r)
+            cells = self._moved(d, 1.0)
+            self._film(cells, 1.0)
+            after = self._makes([*self.kept, name], Answer(eq.constant, p, r, cells, self.law, self.base))
+            d = {key: self._over(key, after[key], self.cells[key]) for key in after}
+            moved = self._lagrangians(self._moved(d, 1.0), 1.0, p, r) - self.start
             return self.found.total(self.quantity, name, dict(zip(self.lambdas, moved, strict=True))) / (self.value or np.nan)
 
     def _change(self, name: str) -> tuple[Cells, float]:
@@ -139,16 +144,19 @@ class FirstOrder:
 
     def _made(self, names: Sequence[str]) -> Cells:
         key = tuple(sorted(names))
-        if key in self._fields:
-            return self._fields[key]
+        if key not in self._fields:
+            self._fields[key] = self._makes(names, self.at)
+        return self._fields[key]
+
+    def _makes(self, names: Sequence[str], at: Answer) -> Cells:
+        """What these effects make of an answer."""
         out = neutral(self._physics(named(self.scene))[1], self.h.size)
         if "barus" in named(self.scene):
             out.setdefault("viscosity", np.ones(self.h.size))
         for effect in self._physics(names)[1]:
-            effect.apply(self.at, out)
+            effect.apply(at, out)
         if (barus := self._physics(names)[0]).barus and not self.law.barus:
-            out["viscosity"] = out["viscosity"] * barus.viscosity(self.p)
-        self._fields[key] = out
+            out["viscosity"] = out["viscosity"] * barus.viscosity(at.p)
         return out
 
     def _over(self, key: str, after: Array, before: Array) -> Array:
