@@ -80,12 +80,12 @@ class Run:
         if chosen.method == "active-set":  # the steps before have the front to within a cell or two: see `_sweeps`
             self.may_sweep = "sweeps" not in ask.options
             ask = replace(ask, options={"sweeps": 0, **ask.options})
-        coupled = bool(first.effects) or first.dense
-        self.march.curved = coupled
-        last_digit = self.rotor is not None or any(effect.carried for effect in first.effects)
-        if chosen.method == "fas" and not last_digit and ask.options.get("rest", REST):
-            ask = replace(ask, options={"rest": REST, **ask.options}, stopping=ask.stopping or {"eps1": EPS1})
-        self.ask = replace(ask, method=chosen.method, implied=not named)
+        self.march.curved = coupled = bool(first.effects) or first.dense
+        self.ask, last_digit = replace(ask, method=chosen.method, implied=not named), any(one.carried for one in first.effects)
+        if chosen.method == "fas" and self.rotor is None and not last_digit and ask.options.get("rest", REST):
+            stopping = ask.stopping or {"eps1": EPS1}
+            self.ask = replace(self.ask, options={"rest": REST, **ask.options}, stopping=stopping)
+            ask = ask if coupled else replace(ask, stopping=stopping)
         self.steps, self.certificates = list[Step](), list[Certificate]()
         self.times_s, self.history = dict[str, float](), list[dict[str, Any]]()
         self.lengths = [np.inf, 0.0]

@@ -150,3 +150,13 @@ def test_steps_of_any_length_settle(method, dt, monkeypatch):
             loads.append([row["load"] for row in solution.history])
         assert films[0] <= 3 * 8 + 8  # the steady film's with them
     assert loads[0] == pytest.approx(loads[-1], rel=1e-6)
+
+
+def test_large_symmetric_films_begin_by_the_method_that_half_of_them_takes():
+    """The steps' own options are multigrid's, of the whole film; the steady film at t = 0 is solved on half of its points."""
+    data: dict[str, Any] = {"family": "bearing", "dimension": 2, "L": 0.06, "width": 0.04, "U": 5.0, "nx": 128, "ny": 96}
+    data |= {"film": {"shape": "formula", "h": "3e-5*(1+0.5*cos(209*x))*(1+0.1*sin(314*t))"}}
+    for fluid in ({}, {"density": "dowson-higginson"}):
+        motion = {"t_end": 2e-4, "steps": 2}
+        with solve(data | {"fluid": {"mu": 0.03, "p_supply": 1e5, **fluid}, "motion": motion}) as solution:
+            assert solution.converged and solution.method == "fas" and solution.mass_defect_run < 1e-10, solution.message
