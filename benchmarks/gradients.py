@@ -65,7 +65,7 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=5)
     args = parser.parse_args()
     for case in args.cases:
-        name, points, key, *_ = *case.split(":"), "", ""
+        name, points, key = (*str(case).split(":"), "", "")[:3]
         scene = load_scene(name)
         if points:
             n, (nx, ny) = int(points), scene.shape
