@@ -35,7 +35,7 @@ class Trace:
     """Keeps the fields of all steps; heard as `Ask.watch`."""
 
     def __init__(self) -> None:
-        self.begun: Kept | None = None  # the steady film at t = 0; None where the march began with a full one
+        self.begun: Kept | None = None  # what the march began with; None: a full film
         self.steps: list[Kept] = []
 
     def __call__(self, moment: Moment) -> None:
@@ -70,7 +70,6 @@ def check_march(scene: Scene) -> None:
         (model.U < 0, "a wall that moves to smaller x (give the mirror image, with -U)"),
         (hasattr(scene, "observer"), "events"),
         (getattr(scene, "pads_follow", False), "pads that follow"),
-        ((getattr(scene, "motion", None) and scene.motion.fill) not in (None, 1.0), "a film that begins partly filled"),  # type: ignore[attr-defined]
     ):
         if found:
             raise InputError(f"scene {scene.name}: [motion]: no derivatives in time through {what}")
@@ -101,7 +100,13 @@ class Course:
         self.known: dict[int, Array] = {}
 
     def kept(self, n: int) -> Kept | None:
-        return self.trace.steps[n - 1] if n else self.trace.begun
+        """What step n left; None where no equation gave the film at t = 0."""
+        return self.trace.steps[n - 1] if n else self.trace.begun if self.table.fill is None else None
+
+    @property
+    def fill(self) -> float:
+        """The part of a film that no equation gave that is oil at t = 0."""
+        return self.table.fill or 1.0
 
     def place(self, n: int, shift: Any = 0.0) -> Any:
         t = self.trace.steps[n - 1].t if n else 0.0
@@ -125,7 +130,7 @@ class Course:
             kept = self.kept(n)
             self.known = {k: a for k, a in self.known.items() if abs(k - n) <= 2}
             film = contents(self.grid, self.film(n), None if kept is None else {"r": kept.r})
-            self.known[n] = film * self.density(n)
+            self.known[n] = film * self.density(n) * (1.0 if n else self.fill)
         return self.known[n]
 
     def density(self, n: int) -> Any:

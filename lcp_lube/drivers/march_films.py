@@ -45,7 +45,7 @@ def films_of(course: Course) -> Films:
         film = Around(model.gap, grid)
         cut = jumps_of(film, "x")
         if not n:
-            kept.append(mean_film(grid, model.film)[0])
+            kept.append(course.fill * mean_film(grid, model.film)[0])
             continue
         h: Array = np.broadcast_to(film(places, none[:, None]), places.shape)[0].astype(float)
         H, before, stored = np.split(h, [faces.size, 2 * faces.size])
@@ -78,7 +78,8 @@ class MarchFilms:
             r[:, 0] = enters
         self.wall, self.void = (_left(self.w, a) for a in (np.ones_like(r[:, :-1]), -r[:, :-1]))
         left = self.w * (1.0 - r[:, 1:-1])  # of what each step comes to store, by the film
-        begun = np.ones_like(left[0, :1]) if course.trace.begun is None else 1.0 - course.trace.begun.r[None, :]
+        start = course.kept(0)
+        begun = np.ones_like(left[0, :1]) if start is None else 1.0 - start.r[None, :]
         full = np.concatenate([begun, 1.0 - r[:, 1:-1]])
         formulas = [course.formula(n) for n in range(1, len(steps) + 1)]
         self.stored = np.array([one.weight for one in formulas])[:, None] * left

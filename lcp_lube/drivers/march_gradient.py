@@ -71,7 +71,7 @@ class MarchGradient:
         self.ties: dict[str, int] = {}
         self.switching = 0
         self.course = Course(scene, trace, comm)
-        for n in range(len(trace.steps), 0 if trace.begun is None else -1, -1):
+        for n in range(len(trace.steps), 0 if self.course.kept(0) is None else -1, -1):
             self._back(n)
 
     def _asked(self, n: int) -> dict[str, tuple[str, float]]:
@@ -203,7 +203,7 @@ class MarchGradient:
         total = dict.fromkeys(self.names, 0.0)
         start, free = course.begun[1], course.forces  # of what is free, which is held later
         quick = None if self._films is None else self._films.sums(course)
-        for n in range(0 if self.trace.begun is not None else 1, len(self.trace.steps) + 1):
+        for n in range(1 if self.course.kept(0) is None else 0, len(self.trace.steps) + 1):
             asked = self._asked(n)
             if quick is not None and n and not asked:
                 continue

@@ -67,6 +67,7 @@ CASES = {
         {"nx": 16, "ny": 4, "motion": {**FREE, "start": "full", "position": [0.5, 0.5]}, **DENSE},
         ["motion.mass", "film.journal.c"],
     ),
+    "partly filled": ("moving_texture", {"n": 30, "motion": {**TEXTURE, "steps": 4, "fill": 0.8}}, ["motion.fill"]),
     "free, steady start": ("dynamic_journal", {"nx": 16, "ny": 4, "motion": FREE}, ["film.journal.eccentricity"]),
 }
 
