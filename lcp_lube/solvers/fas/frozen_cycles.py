@@ -8,7 +8,6 @@ from ...base.parallel import Array
 from ...problems.film.lubrication import LubricationProblem
 from . import finest, frozen_kernels, frozen_transfer, held, levels, transfer
 
-SWEEPS = 1  # before and after the coarse grid
 COARSEST = 3  # sweeps of the coarsest grid, in numbers of its points a side, where it has more than FEW points
 FEW = 64
 
@@ -101,17 +100,12 @@ class Cycles:
         return inverse if np.isfinite(inverse).all() else None
 
     def mult(self, mat: PETSc.Mat | None, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """J x or J' x."""
-        self._rest(x.array_r, self.free[0], y.array)
-        np.negative(y.array, out=y.array)
-
-    def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """What one cycle makes of a right-hand side x."""
-        self._put(self.c[0], x.array_r)
-        self.z[0][:] = 0.0
+        """What a cycle takes away of an error x, or adds to -x: M J x or M J' x where `c` is zero, less M c where it is not."""
+        self._put(self.z[0], x.array_r)
         self._run(0, "F")
         self.work += self.several
         self._own(self.z[0], y.array)
+        np.subtract(x.array_r, y.array, out=y.array)
 
     def _put(self, into: Array, values: Array) -> None:
         for one, part in zip(into, values.reshape(self.several, -1), strict=True):
@@ -149,16 +143,14 @@ class Cycles:
             for s in range(COARSEST * max(level.nx, level.ny)):
                 self._sweep(k, s % 2 == 1)
             return
-        for _ in range(SWEEPS):
-            self._sweep(k, False)
+        self._sweep(k, False)
         self._descend(k)
         self.z[k + 1][:] = 0.0
         self._run(k + 1, kind)
         if kind == "F" and k + 2 < len(self.levels):
             self._run(k + 1, "V")
         self._ascend(k)
-        for _ in range(SWEEPS):
-            self._sweep(k, True)
+        self._sweep(k, True)
 
     def _descend(self, k: int) -> None:
         """What level k leaves is the coarser one's right-hand side."""
@@ -209,7 +201,7 @@ class Cycles:
         level, z = self.levels[k], self.z[k]
         data = z, self.full[k], self.free[k], level.kx, level.ky, self.c[k], down, self.passed[k][0]
         if self.transposed:
-            frozen_kernels.transposed_sweep(*data)
+            frozen_kernels.transposed_sweep(*data, level.periodic[0])
         else:
             frozen_kernels.sweep(*data, self.passed[k][1])
         for one in z:

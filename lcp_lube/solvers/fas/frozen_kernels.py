@@ -89,32 +89,51 @@ def residual(
 
 @kernel
 def transposed_sweep(
-    l: Array, full: Mask, free: Mask | None, kx: Array, ky: Array, c: Array, down: bool, carry: Array | None
-) -> None:
-    """One Gauss-Seidel sweep of J' l = c in place, each x line against the flow, lines upwards or down."""
+    l: Array, full: Mask, free: Mask | None, kx: Array, ky: Array, c: Array, down: bool,
+    carry: Array | None, ring: bool,
+) -> None:  # fmt: skip
+    """Two Gauss-Seidel sweeps of J' l = c in place, each x line against the flow, lines upwards or down.
+
+    The second one follows two lines behind the first (`kernels.sweep`): their chains overlap. Columns are unsigned for vector
+    instructions. ring: the ends of a line are neighbours.
+    """
     several, ny, nx = l.shape[0], l.shape[1] - 2, l.shape[2] - 2
-    given, east = np.empty((2, nx + 2)), np.empty(nx + 2)
-    for s in range(ny):
-        m = ny - s if down else 1 + s
-        for n in range(several):
-            for i in range(1, nx + 1):
-                k_W, k_E, k_S, k_N = kx[m, i], kx[m, i + 1], ky[m, i], ky[m + 1, i]
-                over = 1.0 / ((k_W + k_E) + (k_S + k_N))
-                t = over * (c[n, m, i] + k_W * l[n, m, i - 1] + k_S * l[n, m - 1, i] + k_N * l[n, m + 1, i])
-                t, along = (t, over * k_E) if full[m, i] else (c[n, m, i], 1.0 if carry is None else carry[m, i])
+    step, first = (-1, ny) if down else (1, 1)
+    over, east, t = np.zeros((3, nx + 2)), np.zeros((3, nx + 2)), np.zeros((4, nx + 2))
+    for s in range(ny + 2):
+        m, slot, behind = first + step * s, s % 3, (s - 2) % 3
+        if s < ny:
+            for i in range(np.uint32(1), np.uint32(nx + 1)):
+                part = 1.0 / ((kx[m, i] + kx[m, i + 1]) + (ky[m, i] + ky[m + 1, i])) if full[m, i] else 1.0
                 if free is not None:
-                    t, along = (t, along) if free[m, i] else (0.0, 0.0)
-                given[n, i], east[i] = t, along
-        if several == 1:
-            a = l[0, m, nx + 1]
-            for i in range(nx, 0, -1):
-                a = given[0, i] + east[i] * a
-                l[0, m, i] = a
-        else:
-            a, b = l[0, m, nx + 1], l[1, m, nx + 1]
-            for i in range(nx, 0, -1):
-                a, b = given[0, i] + east[i] * a, given[1, i] + east[i] * b
-                l[0, m, i], l[1, m, i] = a, b
+                    part = part if free[m, i] else 0.0
+                over[slot, i] = part
+            for i in range(np.uint32(1), np.uint32(nx + 1)):
+                east[slot, i] = over[slot, i] * (kx[m, i + 1] if full[m, i] else 1.0 if carry is None else carry[m, i])
+        for k in range(2):
+            if 0 <= s - 2 * k < ny:
+                j, q = m - 2 * k * step, behind if k else slot
+                for n in range(several):
+                    w = k * several + n
+                    for i in range(np.uint32(1), np.uint32(nx + 1)):
+                        others = kx[j, i] * l[n, j, i - 1] + (ky[j, i] * l[n, j - 1, i] + ky[j + 1, i] * l[n, j + 1, i])
+                        t[w, i] = over[q, i] * (c[n, j, i] + (others if full[j, i] else 0.0))
+                    t[w, nx] += east[q, nx] * l[n, j, nx + 1]
+        for k in range(several):  # two chains at once
+            one, two = 2 * k, 2 * k + 1
+            by_one, by_two = (slot, behind) if several == 1 else (behind, behind) if k else (slot, slot)
+            a, b = t[one, nx], t[two, nx]
+            for i in range(nx - 1, 0, -1):
+                a, b = t[one, i] + east[by_one, i] * a, t[two, i] + east[by_two, i] * b
+                t[one, i], t[two, i] = a, b
+        for k in range(2):
+            if 0 <= s - 2 * k < ny:
+                j = m - 2 * k * step
+                for n in range(several):
+                    for i in range(np.uint32(1), np.uint32(nx + 1)):
+                        l[n, j, i] = t[k * several + n, i]
+                    if ring:
+                        l[n, j, 0], l[n, j, nx + 1] = l[n, j, nx], l[n, j, 1]
 
 
 @kernel
