@@ -1,6 +1,12 @@
-"""The attitude at which a journal's film holds up a load of given direction: a secant iteration on the force's angle."""
+"""The attitude at which a journal's film holds up a load of given direction: a secant iteration on the force's angle.
+
+Oil under pressure in grooves may turn the force back where the attitude goes on: then secants of the slope that journals have
+lead nowhere, and the attitude is sought between two, all round, from one to the other of which the angle changes its sign.
+"""
 
 import math
+from collections.abc import Callable
+from itertools import pairwise
 
 from ..problems.solution import Outcome, Solution
 from ..scenes.grooved import GroovedJournalScene
@@ -10,7 +16,8 @@ from .ask import Ask
 from .chain import Chain
 from .compose import Inner
 
-MOST_SOLVES = 20
+MOST_SOLVES, MOST_BETWEEN = 12, 20
+AROUND = 12  # attitudes, all round
 TOLERANCE, PART = 1e-9, 0.1  # rad: the force across the load is then 1e-9 of it; of an eps1 that was given
 STEEPEST, FLATTEST = 2.0, 0.3  # slope of the force's angle over the attitude; without grooves it is 1
 
@@ -32,20 +39,25 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     known = ask.start.settings.get("attitude_deg") if ask.start is not None else None
     attitude = math.radians(known) if known is not None else half_film_attitude(scene.eccentricity)
     chain = Chain(ask, inner)
-    before: tuple[float, float] | None = None
     slope, tol = 1.0, max(TOLERANCE, PART * ask.stopping_for((0.0, 0.0)).eps1)
-    for _ in range(MOST_SOLVES):
+
+    def off_at(attitude: float) -> tuple[Solution, float]:
+        """The solution, and how far the force is from the load's line, rad; NaN without a film."""
         solution = chain.solve(scene.model_copy(update={"attitude_deg": math.degrees(attitude)}))
-        if not solution.converged:
-            break
         fx, fy = solution.problem.quantities(solution.fields)["force"]
-        off = math.atan2(-fy, -fx)
+        return solution, math.atan2(-fy, -fx) if solution.converged else math.nan
+
+    before: tuple[float, float] | None = None
+    for _ in range(MOST_SOLVES):
+        solution, off = off_at(attitude)
         if before is not None and attitude != before[0]:
             slope = min(max((off - before[1]) / (attitude - before[0]), FLATTEST), STEEPEST)
-        if abs(off) <= tol:
+        if not abs(off) > tol:
             break
         before = (attitude, off)
         attitude -= off / slope
+    if abs(off) > tol:
+        solution, attitude, off = _around(off_at, attitude, tol)
     if solution.converged and abs(off) > tol:
         solution.outcome = Outcome.LOAD_NOT_CARRIED
         solution.message = (
@@ -55,3 +67,27 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     solution.settings |= {"attitude_deg": math.degrees(attitude)}
     solution.because(f"attitude {math.degrees(attitude):.6g} degrees, at which the film's force is opposite to the load")
     return solution
+
+
+def _around(off_at: Callable[[float], tuple[Solution, float]], attitude: float, tol: float) -> tuple[Solution, float, float]:
+    """The attitude between two of which the angle changes its sign (regula falsi), best where it rises. Collective."""
+    attitude = math.remainder(attitude, 2.0 * math.pi)
+    places = [attitude + 2.0 * math.pi * k / AROUND for k in range(AROUND + 1)]
+    found = [(place, off_at(place)[1]) for place in places[:-1]]
+    found.append((places[-1], found[0][1]))
+    pairs = [(a, b) for a, b in pairwise(found) if a[1] * b[1] <= 0.0 and abs(a[1] - b[1]) < math.pi]
+    if not pairs:
+        solution, off = off_at(attitude)
+        return solution, attitude, off
+    (a, at_a), (b, at_b) = max(pairs, key=lambda pair: pair[1][1] - pair[0][1])
+    for _ in range(MOST_BETWEEN):
+        attitude = (a * at_b - b * at_a) / (at_b - at_a)
+        solution, off = off_at(attitude)
+        if not abs(off) > tol:
+            break
+        if off * at_b < 0.0:
+            a, at_a = b, at_b
+        else:
+            at_a *= 0.5
+        b, at_b = attitude, off
+    return solution, attitude, off

@@ -71,3 +71,11 @@ def test_with_effects_from_far_away():
     ):
         assert hot.converged and found.converged, found.message
         assert found.load == pytest.approx(112814.907, rel=1e-3)
+
+
+def test_attitudes_are_found_where_the_grooves_turn_the_force_back():
+    """Oil under pressure beside a slow journal: the force's angle jumps and falls as the attitude goes on."""
+    values = {"D": 0.07, "L_over_D": 0.45, "clearance": 6e-5, "speed_rpm": 80.0, "mu": 0.0165, "nx": 36, "ny": 5}
+    with solve(load_scene("two_groove_journal", **values, eccentricity=0.5, p_groove=6e5)) as solution:
+        fx, fy = solution.problem.quantities(solution.fields)["force"]
+        assert solution.converged and fx < 0.0 and abs(fy) < 1e-8 * abs(fx)
