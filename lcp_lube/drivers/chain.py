@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
-from ..problems.solution import Solution, Step
+from ..problems.solution import Fields, Solution, Step
 from ..scenes.scene import Solvable
-from .ask import Ask
+from .ask import Ask, Start
 from .compose import Inner
 
 
@@ -28,8 +28,11 @@ class Chain:
         self.steps: list[Step] = []
         self._times: dict[str, float] = {}
 
-    def solve(self, scene: Solvable) -> Solution:
-        new = self._inner(scene, replace(self._ask, start=self._last or self._ask.start))
+    def solve(self, scene: Solvable, near: Fields | None = None) -> Solution:
+        """near : fields nearer than the last one's."""
+        last = self._last
+        start = last if last is None or near is None else Start(last.problem, near, last.settings)
+        new = self._inner(scene, replace(self._ask, start=start or self._ask.start))
         if self._last is not None:
             self._last.destroy()
         self._last, self.steps = new, [*self.steps, *new.steps]

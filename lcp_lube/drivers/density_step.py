@@ -19,12 +19,12 @@ from ..base.parallel import Array
 from ..problems.film.effects import Answer, FaceFactors, answer, factors
 from ..problems.film.fluid import Law
 from ..problems.film.model import Model
-from ..problems.film.tangent import tangent
+from ..problems.film.tangent import Tangent, tangent
 from ..problems.solution import Fields, Outcome, Solution, Step
 from ..scenes.scene import Solvable
 from ..solvers.relaxation import relaxation
 from .ask import Ask
-from .linearised import Entries, Linear
+from .linearised import Linear
 from .loop import Frozen, settled
 
 WHY = "density: Newton's method on each step as a whole, the law linearised exactly"
@@ -125,7 +125,7 @@ class _Film:
     def step(self, at: _At) -> Array:
         """J^-1 G."""
         film = at.answer.problem
-        linear = Linear(film, (at.z < 0.0) & self._free, self.entries(at))
+        linear = Linear(film, (at.z < 0.0) & self._free, self.tangent(at).entries(film.scheme))
         (d,) = linear.solve([at.G])
         linear.destroy()
         film.free_matrices()
@@ -137,10 +137,9 @@ class _Film:
         by = replace(at.by, values={**at.by.values, "stored": stored})
         found = answer(self.base, self.law, at.answer.cells, by, at.answer.p, at.answer.r, self.p_sides)
         problem = found.problem
-        problem.cells, problem.entries = {**at.answer.cells, "stored": found.stored}, self.entries(at)
+        problem.cells, problem.tangent = {**at.answer.cells, "stored": found.stored}, self.tangent(at)
         return problem
 
-    def entries(self, at: _At) -> Entries:
-        """Of dG/dp."""
-        film, fields = at.answer.problem, at.fields
-        return tangent(film, self.law, self.base, fields["p"], fields["r"]).entries(film.scheme)
+    def tangent(self, at: _At) -> Tangent:
+        """dG/dp."""
+        return tangent(at.answer.problem, self.law, self.base, at.fields["p"], at.fields["r"])

@@ -42,7 +42,8 @@ class Linear:
         """entries : of dG/dp, where that is not A (of a fluid with a law). given : points in a groove, whose rows are those of
         the identity. M : the diagonal of what void is stored (`at`). factored : it is solved with so often that factors pay.
         least : points from which multigrid does; default SMALL."""
-        entries = entries or problem.entries
+        if entries is None and problem.tangent is not None:
+            entries = problem.tangent.entries(problem.scheme)
         self.problem, self.cavity, self.entries, self.given, self.M = problem, cavity, entries, given, M
         grid, self.frozen = problem.grid, None
         apart = entries is None and not factored and (given is None or problem.held is None)
@@ -148,7 +149,8 @@ class Feed:
         held, whole = problem.held, problem.scheme.changed(held=None)
         assert held is not None  # for the type checker: it has supplies
         self.problem, self.cavity, self.held, self.free = problem, cavity, held, np.flatnonzero(free)
-        self._A, self._B = assemble(problem.grid, whole.pressure_entries()), assemble(problem.grid, whole.void_entries())
+        by_p = whole.pressure_entries() if problem.tangent is None else problem.tangent.entries(whole)
+        self._A, self._B = assemble(problem.grid, by_p), assemble(problem.grid, whole.void_entries())
         self._unit = volume_unit(problem)
 
     def pushed(self, t: int) -> Array:

@@ -23,7 +23,7 @@ from ..problems.film.cavity import cavity_sign
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.supplies import Supply, supply_defects, supply_flows
-from ..problems.solution import Enclosure, Outcome, Solution
+from ..problems.solution import Enclosure, Fields, Outcome, Solution
 from ..scenes.scene import Derived, Scene, Solvable
 from .ask import Ask
 from .chain import Chain
@@ -84,18 +84,19 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     free = np.array([one.open for one in supplies])
     P, film = _coarse(scene, ask, inner, free)
     if known is not None and len(known) == len(supplies):
-        P = np.array(known)
+        P = np.array(known) if model.stored is None else _foreseen(ask.start, np.array(known), free)
     elif P is None:
         P = np.array(_first(model))
     known_before = shut and len(supplies) == 1  # nothing flows, through its restrictor neither, whatever rounding says
     P = np.array([supplies[0].p_s]) if known_before else P
     other = np.full(2, np.nan)  # of one supply: the last pressure that was too low, and too high
     last: tuple[Array, Array] | None = None  # pressures and flows
+    near: Fields | None = None  # in a time step, of the film with the next pressures
     chain = Chain(replace(ask, certify=False, reduction=ask.reduction and not ask.certify), inner)  # one band, at the end
     resting, least, enough = 0, np.inf, ENOUGH if known_before else TOLERANCE
     for count in range(1, MOST_SOLVES + 1):
         held = tuple(Supply(one.region, float(p)) for one, p in zip(supplies, P, strict=True))
-        solution = chain.solve(Fed(scene, held))
+        solution = chain.solve(Fed(scene, held), near)
         problem: Any = solution.problem
         if not solution.converged:
             break
@@ -108,7 +109,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         if np.max(off) <= TOLERANCE or starved.any() or count == MOST_SOLVES or known_before:
             break
         if film is None:
-            slopes = _slopes(problem, solution.fields, free)
+            slopes, answers = _slopes(problem, solution.fields, free)
         else:
             if last is not None and (moved := P[free] - last[0]).any():
                 film += np.outer(flows[free] - last[1] - film @ moved, moved) / (moved @ moved)
@@ -127,6 +128,9 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         if resting >= GIVE_UP or (resting >= PATIENCE and np.max(off) <= ENOUGH):
             enough = ENOUGH
             break
+        if film is None and model.stored is not None:
+            z = solution.fields["p"] - solution.fields["r"] + (new_P - P[free]) @ np.array(answers)
+            near = {"p": np.maximum(z, 0.0), "r": np.maximum(-z, 0.0)}
         P = P.copy()
         P[free] = new_P
     if solution.converged and np.max(off) > enough:
@@ -165,7 +169,7 @@ def _coarse(scene: Solvable, ask: Ask, inner: Inner, free: Array) -> tuple[Array
         if not solution.converged:
             return None, None
         problem: Any = solution.problem
-        return np.array(solution.settings["supply_pressures"]), _slopes(problem, solution.fields, free)
+        return np.array(solution.settings["supply_pressures"]), _slopes(problem, solution.fields, free)[0]
     finally:
         solution.destroy()
 
@@ -193,14 +197,23 @@ def check_backflow(solution: Solution) -> None:
             )
 
 
-def _slopes(problem: LubricationProblem, fields: Any, free: Any) -> Array:
-    """dQ_s/dP_t of the film at its signs for the supplies that are free, m3/s/Pa. Collective."""
+def _foreseen(start: Any, known: Array, free: Array) -> Array:
+    """Pressures that the fields foreseen for a time step have at the supplies whose pressures are free. Collective."""
+    problem, P = start.problem, known.copy()
+    for s in np.flatnonzero(free):
+        P[s] = problem.reduce.max(np.where(problem.held.owner.ravel() == s, start.fields["p"], 0.0)) * problem.p_unit
+    return P
+
+
+def _slopes(problem: LubricationProblem, fields: Any, free: Any) -> tuple[Array, list[Array]]:
+    """dQ_s/dP_t of the film at its signs for the supplies that are free, m3/s/Pa, and what it answers to each. Collective."""
     held = problem.held
     assert held is not None  # as `applies` found
     cavity = (cavity_sign(problem.reduce, fields["p"], fields["r"]) < 0) & ~held.mask.ravel()
     linear, feed = Linear(problem, cavity), Feed(problem, cavity, free)
     try:
-        return feed.slopes(linear.solve([feed.pushed(t) for t in feed.free]))
+        answers = linear.solve([feed.pushed(t) for t in feed.free])
+        return feed.slopes(answers), answers
     finally:
         linear.destroy()
         feed.destroy()

@@ -160,3 +160,14 @@ def test_large_symmetric_films_begin_by_the_method_that_half_of_them_takes():
         motion = {"t_end": 2e-4, "steps": 2}
         with solve(data | {"fluid": {"mu": 0.03, "p_supply": 1e5, **fluid}, "motion": motion}) as solution:
             assert solution.converged and solution.method == "fas" and solution.mass_defect_run < 1e-10, solution.message
+
+
+@pytest.mark.parametrize("source", [{"restrictor": "orifice", "K": 2e-7, "p_s": 3e6}, {"flow": 1e-4}])
+def test_pressures_of_supplies_follow_with_density(source):
+    """Foreseen, and by Newton's method with the density's own derivative: three films a step, of one iteration each."""
+    capillary = {"x_mm": [12, 18], "restrictor": "capillary", "K": 2e-10, "p_s": 3e6}
+    data = {"family": "bearing", "L": 0.05, "U": 2.0, "n": 63, "supply": [capillary, {"x_mm": [30, 36], **source}]}
+    data |= {"film": {"shape": "formula", "h": "4e-5*(1+8*x)*(1+0.3*sin(314*t))"}, "motion": {"t_end": 0.004, "steps": 20}}
+    with solve(data | {"fluid": {"mu": 0.03, "p_supply": 1e5, "density": "dowson-higginson"}}) as solution:
+        assert solution.converged and solution.mass_defect < 1e-10 and solution.mass_defect_run < 1e-10
+        assert np.mean([row["iterations"] for row in solution.history]) < 4.0

@@ -51,7 +51,7 @@ class LubricationProblem:
     edged = True  # whether the coefficients know edges inside cells; not where mean_cubes
     tops = False  # whether the largest pressure is looked for between the points (`peak`)
     factors: Any = None  # of its faces, that follow from `cells`
-    entries: Any = None  # of dG/dp, where that is not A
+    tangent: Any = None  # dG/dp, where that is not A
     thick: Any = None  # mu and the law of Barus' fluid, where nothing else acts
     contact: Any = None  # of asperities
     levers: Any = ()  # `Model.levers`
@@ -271,7 +271,7 @@ class LubricationProblem:
         other.scheme, other.mu, other.exact = scheme, mu, None  # type: ignore[assignment]
         other.p_sides, other.held = p_sides or self.p_sides, held or self.held
         new: dict[str, Any] = {name: {} for name in ("more", "more_fields", "more_measures", "cells")}
-        other.__dict__ |= {"plain": False, "coefficients_for": None, "factors": None, "contact": None, "entries": None, **new}
+        other.__dict__ |= {"plain": False, "coefficients_for": None, "factors": None, "contact": None, "tangent": None, **new}
         return other
 
     def with_lift(self, lift: Array) -> Self:
