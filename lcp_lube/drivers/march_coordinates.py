@@ -66,7 +66,7 @@ class Coordinates:
             out[: given.size] = given if self.journal else -given
         return out
 
-    def begin(self, course: Course | None, ask: Ask, inner: Inner | None) -> tuple[Array, Array]:
+    def begin(self, course: Course | None, ask: Ask | None, inner: Inner | None) -> tuple[Array, Array]:
         """Places and speeds at t = 0: pads where the steady film has them; without `inner`, as a search for that begins.
 
         Raises
@@ -82,7 +82,7 @@ class Coordinates:
         still: Any = as_scene(self.scene, changes) if changes else self.scene
         still = still.moved(place).model_copy(update={"motion": None})
         q = np.concatenate([place, type(self.pads)(still).start()[place.size :]])
-        if inner is not None:
+        if ask is not None and inner is not None:
             solution = pads.solve(still, ask, inner)
             if not solution.converged:
                 why = f"no steady film at t = 0: {solution.message}; motion.start = full needs none"

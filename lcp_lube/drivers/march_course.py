@@ -8,6 +8,7 @@ import numpy as np
 
 from ..base.parallel import Array
 from ..errors import InputError
+from ..problems.film.forces import PIVOT
 from ..problems.film.stored import Stored
 from ..problems.grid import Grid
 from ..scenes.scene import Scene
@@ -17,10 +18,12 @@ from .march_coordinates import Coordinates
 from .marching import Moment, first_film
 from .step import TimeStep, contents
 
+PLACES = ("journal_x", "journal_y", "h_offset", "pitch", "roll")
+
 
 @dataclass(frozen=True)
 class Kept:
-    """A step's end; p in Pa above p_c. dry : as the film's own. place : of the journal. pressures : of the supplies."""
+    """A step's end; p in Pa above p_c. dry : as the film's own. place : of all coordinates. pressures : of the supplies."""
 
     t: float
     dt: float
@@ -42,8 +45,8 @@ class Trace:
         problem, row = moment.problem, moment.row
         if not self.steps and moment.before is not None:
             p = moment.before["p"] * problem.p_unit
-            self.begun = Kept(0.0, 0.0, p, moment.before["r"].copy(), None, None, _pressures(problem, p))
-        place = np.array([row[name] for name in ("journal_x", "journal_y", "h_offset") if name in row])
+            self.begun = Kept(0.0, 0.0, p, moment.before["r"].copy(), None, moment.place, _pressures(problem, p))
+        place = np.array([row[name] for name in PLACES if name in row])
         p, r = moment.fields["p"] * problem.p_unit, moment.fields["r"].copy()
         self.steps.append(Kept(moment.t, row["dt"], p, r, problem.dry, place, _pressures(problem, p)))
 
@@ -60,16 +63,17 @@ def _pressures(problem: Any, p: Array) -> tuple[float, ...]:
 def check_march(scene: Scene) -> None:
     """Raise InputError for a march whose derivatives are not known, with the reason."""
     model: Any = scene.models()(0.0, None)  # type: ignore[attr-defined]
+    follow = getattr(scene, "pads_follow", False)
     for found, what in (
         (bool(model.effects), "effects"),
         (
             model.dense and bool(model.supplies or getattr(scene, "grooves_deg", ())),
             "what supplies a fluid whose density changes",
         ),
-        (any(one.open for one in model.supplies) and scene.motion.free, "supplies that follow beside what is free"),  # type: ignore[attr-defined]
+        (any(one.open for one in model.supplies) and (follow or scene.motion.free), "supplies that follow beside what is free"),  # type: ignore[attr-defined]
         (model.U < 0, "a wall that moves to smaller x (give the mirror image, with -U)"),
         (hasattr(scene, "observer"), "events"),
-        (getattr(scene, "pads_follow", False), "pads that follow"),
+        (follow and model.polar is None, "pads that follow a journal"),
     ):
         if found:
             raise InputError(f"scene {scene.name}: [motion]: no derivatives in time through {what}")
@@ -81,12 +85,14 @@ class Course:
     def __init__(self, scene: Any, trace: Trace, comm: Any, near: "Course | None" = None):
         self.scene, self.trace, self.comm, self.table = scene, trace, comm, scene.motion
         self.models, self._given = scene.models(), scene.motion.course(scene._folder, len(scene.place))
-        coordinates = Coordinates(scene, self.table)
-        journal, free = coordinates.journal, slice(len(scene.place))
-        self.forces = ("force_x", "force_y") if journal else ("load",)
-        self.unit, self.inertia = float(coordinates.unit[0]), float(coordinates.unit[0] * coordinates.mass[0])
-        self.load: Callable[[float], Array] = lambda t: coordinates.loads(t)[free]
-        self.begun = self.table.start_of(scene.place)  # place and speed of what is free
+        of = Coordinates(scene, self.table)
+        self.free = free = np.flatnonzero(of.free)
+        names = [*(("force_x", "force_y") if of.journal else ("load",)), f"{PIVOT}1", f"{PIVOT}2"]
+        self.forces = [names[k] for k in free]  # on what is free
+        self.reach, self.inertia = of.reach[free], (of.unit * of.mass)[free]
+        self.tilts = free >= len(scene.place)
+        self.load: Callable[[float], Array] = lambda t: of.loads(t)[free]
+        self.begun = of.begin(self._given, None, None)  # places and speeds, of pads where a search for them begins
         self.first = first_film(scene, self.models, self.place(0))
         if near is not None and not near.grid.even:
             places = followed(near.grid, near.first, self.first)
@@ -109,11 +115,26 @@ class Course:
         return self.table.fill or 1.0
 
     def place(self, n: int, shift: Any = 0.0) -> Any:
-        t = self.trace.steps[n - 1].t if n else 0.0
-        if not self.table.free:
-            return None if self._given is None else self._given(t)
-        e = self.trace.steps[n - 1].place if n else self.begun[0]
-        return tuple(map(float, e + shift))
+        kept, given = self.kept(n), None if self._given is None else self._given(self.trace.steps[n - 1].t if n else 0.0)
+        if not self.free.size:
+            return given
+        q = self.begun[0].copy()
+        if given is not None:
+            q[: len(given)] = given
+        if kept is not None:
+            found = self.free[self.sought(n)]
+            q[found] = kept.place[found]
+        q[self.free] += shift
+        return tuple(map(float, q))
+
+    def sought(self, n: int) -> Any:
+        """Which of what is free step n's equations give; those of the steady film at t = 0 its pads' tilts. bool of each."""
+        return self.tilts | (n > 0)
+
+    def speed(self, n: int) -> Array:
+        """Of what is free, by the formula of step n."""
+        formula, places = self.formula(n), [np.array(self.place(k))[self.free] for k in range(n, max(n - 2, 0) - 1, -1)]
+        return np.asarray(formula.weight * places[0] - formula.old(places[1:]))
 
     def film(self, n: int, shift: Any = 0.0) -> Any:
         t = self.trace.steps[n - 1].t if n else 0.0

@@ -8,7 +8,7 @@ earlier fields are the contents u = h (1 - r) of cells of size s, d/dt u ~ w_n u
 
 one transposed solve a step and quantity, whatever the number of parameters. A journal that is free adds its place e_n and speed
 v_n, with V_n = v_n - d/dt e and E_n = m c d/dt v - F(z_n) - W: G_n(e_n) makes their adjoints four numbers a step; a film whose
-level is free adds two. A supply
+level is free adds two, and so does each tilt of pads that follow, of which the steady film at t = 0 leaves no moment. A supply
 whose pressure P_n follows adds what its source and the film disagree by, M_n(z_n, P_n) = 0, and one number a step.
 """
 
@@ -62,7 +62,9 @@ class MarchGradient:
             solve(scene, Ask(method=solution.settings.get("method", "auto"), implied=True, comm=comm, watch=trace)).destroy()
         self.scene, self.trace, self.comm, self.names = scene, trace, comm, list(dict.fromkeys(quantities))
         self.lambdas: dict[str, list[Any]] = {name: [None] * (len(trace.steps) + 1) for name in self.names}
-        self.journal: dict[str, Array] = {name: np.zeros((len(trace.steps) + 1, 2 * len(scene.place))) for name in self.names}  # type: ignore[attr-defined]  # of E and V
+        self.course = Course(scene, trace, comm)
+        shape = (len(trace.steps) + 1, 2 * self.course.free.size)
+        self.journal: dict[str, Array] = {name: np.zeros(shape) for name in self.names}  # of E and V
         self.fed: dict[str, list[Any]] = {name: [np.zeros(0)] * (len(trace.steps) + 1) for name in self.names}  # of supplies
         self.units: dict[int, float] = {}  # of flow, of each step
         self.sizes = dict.fromkeys(self.names, 0.0)
@@ -70,7 +72,6 @@ class MarchGradient:
         self.conditions: dict[str, float] = {}
         self.ties: dict[str, int] = {}
         self.switching = 0
-        self.course = Course(scene, trace, comm)
         for n in range(len(trace.steps), 0 if self.course.kept(0) is None else -1, -1):
             self._back(n)
 
@@ -106,7 +107,7 @@ class MarchGradient:
         parts = {
             name: {part: share * w for part, w in eq.partials(numbers, base).items()} for name, (base, share) in asked.items()
         }
-        forces = self.course.forces if self.course.table.free and n else ()
+        forces = [name for name, found in zip(self.course.forces, self.course.sought(n), strict=True) if found]
         slopes = {part: eq.slope(p, r, part) for part in dict.fromkeys([*(q for one in parts.values() for q in one), *forces])}
         later = self._later(n)
         of_full = 0.0 if eq.law is None else (1.0 - r) * eq.law.density_slope(p) * eq.constant.p_unit
@@ -140,15 +141,18 @@ class MarchGradient:
         eq.destroy()
 
     def _place(self, n: int, found: dict[str, Array], pushed: list[Array], later: list[tuple[int, float]]) -> None:
-        """Adjoints of a free journal's E_n and V_n; those of the film with them. pushed : J'^-1 of both forces."""
-        course, kept, dot = self.course, self.trace.steps[n - 1], self.course.grid.reduce.dot
-        weight, inertia, free = course.formula(n).weight, course.inertia, len(pushed)
+        """Adjoints of E_n and V_n of what is found; those of the film with them. pushed : J'^-1 of the forces on it."""
+        course, kept, dot = self.course, self.course.kept(n), self.course.grid.reduce.dot
+        assert kept is not None  # as `_back` asks
+        weight, at, count = course.formula(n).weight if n else 0.0, np.flatnonzero(course.sought(n)), course.free.size
+        inertia = course.inertia[at]
         h = mean_film(course.grid, course.film(n).film)
-        d = NUDGE * course.grid.reduce.min(h) / course.unit
+        step = NUDGE * course.grid.reduce.min(h) / course.reach
         size = 2.0 * course.grid.spacing[0] * point_weights(course.grid) * (1.0 - kept.r) * course.density(n)
-        by_place = []  # of G, h and the numbers told, by X and Y, or by the level
-        for shift in np.eye(free) * d:
-            ends = []
+        by_place = []  # of G, h and the numbers told, by each
+        for k in at:
+            ends, d = [], step[k]
+            shift = np.eye(count)[k] * d
             for eq in (course.at(n, shift), course.at(n, -shift)):
                 G = self._scaled(n, eq)
                 h = mean_film(course.grid, eq.constant.film).ravel()
@@ -157,14 +161,15 @@ class MarchGradient:
             (G, h, above), (G_below, h_below, below) = ends
             told = {name: (above[name] - below[name]) / (2.0 * d) for name in above}
             by_place.append(((G - G_below) / (2.0 * d), (h - h_below) / (2.0 * d), told))
-        C = np.array([[dot(one, G) for one in pushed] for G, _, _ in by_place]) + inertia * weight**2 * np.eye(free)
+        C = np.array([[dot(one, G) for one in pushed] for G, _, _ in by_place]) + np.diag(inertia * weight**2)
         for name in self.names:
-            mu, nu = (sum((part * self.journal[name][m, k : k + free] for m, part in later), np.zeros(free)) for k in (0, free))
+            mu, nu = (sum((part * self.journal[name][m, k + at] for m, part in later), np.zeros(at.size)) for k in (0, count))
             kept_on = sum((part * self.lambdas[name][m] / self.units[m] for m, part in later), np.zeros(size.size))
             base, share = self._asked(n).get(name, ("", 0.0))
             own = [share * told.get(base, 0.0) - dot(found[name], G) + dot(kept_on, size * h) for G, h, told in by_place]
             one = np.linalg.solve(C, np.array(own) + weight * inertia * mu - nu)
-            self.journal[name][n] = *one, *(inertia * (mu - weight * one))
+            self.journal[name][n, at] = one
+            self.journal[name][n, count + at] = inertia * (mu - weight * one) * (n > 0)  # speeds at t = 0 are given
             found[name] = found[name] + sum(part * answer for part, answer in zip(one, pushed, strict=True))
 
     def _feed(self, n: int, found: dict[str, Array], answers: list[Array]) -> None:
@@ -201,7 +206,7 @@ class MarchGradient:
     def lagrangians(self, course: Course) -> Array:
         """Q minus what the adjoints make of all equations, of a scene near by, what was solved for held. Collective."""
         total = dict.fromkeys(self.names, 0.0)
-        start, free = course.begun[1], course.forces  # of what is free, which is held later
+        start, free = course.begun[1][course.free], course.forces  # of what is free, which is held later
         quick = None if self._films is None else self._films.sums(course)
         for n in range(1 if self.course.kept(0) is None else 0, len(self.trace.steps) + 1):
             asked = self._asked(n)
@@ -209,7 +214,7 @@ class MarchGradient:
                 continue
             eq, kept, dot = course.at(n), course.kept(n), course.grid.reduce.dot
             assert kept is not None
-            numbers = eq.numbers(kept.p, kept.r, None if asked else free if course.table.free else ())
+            numbers = eq.numbers(kept.p, kept.r, None if asked else free)
             told = eq.report(numbers)
             for name, (base, share) in asked.items():
                 total[name] += share * told[base]
@@ -218,12 +223,13 @@ class MarchGradient:
                 continue
             G = self._scaled(n, eq)
             rest = np.zeros(2 * len(free))
-            if course.table.free and n:
-                formula, places = course.formula(n), [np.array(course.place(k)) for k in range(max(n - 2, 0), n + 1)][::-1]
+            if free:
+                rest[: len(free)] = [-numbers[name] for name in free]
+            if free and n:
                 own, at = self.speeds[n], [*self.speeds[1:n][::-1], start]
-                rest[: len(free)] = course.inertia * (formula.weight * own - formula.old(at)) - course.load(kept.t)
-                rest[: len(free)] -= [numbers[name] for name in free]
-                rest[len(free) :] = own - (formula.weight * places[0] - formula.old(places[1:]))
+                formula = course.formula(n)
+                rest[: len(free)] += course.inertia * (formula.weight * own - formula.old(at)) - course.load(kept.t)
+                rest[len(free) :] = own - course.speed(n)
             off = np.array([value for name, value in told.items() if name.startswith(MISFIT)])
             for name in self.names:
                 total[name] -= dot(self.lambdas[name][n], G) + float(self.journal[name][n] @ rest)
@@ -238,12 +244,8 @@ class MarchGradient:
     @cached_property
     def speeds(self) -> list[Array]:
         """Of what is free at the end of each step, the first at t = 0, clearances per second; of a level m/s."""
-        course, found = self.course, [self.course.begun[1]]
-        for n in range(1, len(self.trace.steps) + 1):
-            places = [np.array(course.place(k)) for k in range(max(n - 2, 0), n + 1)][::-1]
-            formula = course.formula(n)
-            found.append(formula.weight * places[0] - formula.old(places[1:]))
-        return found
+        course = self.course
+        return [course.begun[1][course.free], *(course.speed(n) for n in range(1, len(self.trace.steps) + 1))]
 
     @cached_property
     def _here(self) -> Array:

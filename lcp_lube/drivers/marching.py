@@ -41,7 +41,7 @@ TOLD = ("load", "force", "moment", "p_max", "min_h", "cavitated_fraction", "fric
 
 @dataclass(frozen=True)
 class Moment:
-    """A step that was taken: what those hear who watch a march. row : its line of the history; before : the fields before."""
+    """A step that was taken: what those hear who watch a march. before, place : fields and places before it."""
 
     t: float
     t_end: float
@@ -50,6 +50,7 @@ class Moment:
     row: dict[str, Any]
     count: int
     before: dict[str, Any] | None
+    place: Any = None
 
 
 class Run:
@@ -165,9 +166,8 @@ class Run:
                 self.message = f"time step {len(self.history) + 1}, t = {t:.6g}: {why or solution.message}"
                 self._keep(solution, solves)
                 return
-            model = self.model
-            new = contents(march.grid, model, solution.fields, problem)
-            heat, error = carried(model, new, problem), None
+            new = contents(march.grid, self.model, solution.fields, problem)
+            heat, error = carried(self.model, new, problem), None
             if self.table.step is None:
                 error = march.error(dt, problem, new, heat)
                 if error is not None:  # where a cavity closes rates jump, whatever the step: a short step's error soon passes
@@ -198,8 +198,8 @@ class Run:
         self._sweeps(self.history)
         self.lengths = [min(self.lengths[0], dt), max(self.lengths[1], dt)]
         if self.watch is not None:
-            before = march.fields[1] if len(march.fields) > 1 else None
-            self.watch(Moment(march.t, self.table.t_end, problem, solution.fields, row, len(self.history), before))
+            was = march.fields[1] if len(march.fields) > 1 else None, self.rotor and self.rotor.places[1]
+            self.watch(Moment(march.t, self.table.t_end, problem, solution.fields, row, len(self.history), *was))
         self.file.after(self)
 
     def _step(self, t: float, dt: float) -> tuple[Solution, Any, str, list[list[Step]]]:

@@ -16,6 +16,8 @@ PUSH = ["2000*exp(-400*(mod(50*t,1)-0.1)^2)", "900.0"]
 TEXTURE = {"t_end": 0.01, "steps": 7}
 FREE = {"t_end": 0.002, "steps": 4, "free": True, "mass": 15.0, "load": PUSH}
 AT = {"position": 2e-7, "velocity": 1e-5}
+PADS = {"balance": None, "nx": 8, "ny": 4}
+ROCKED = {"set": {"h_offset": "2e-6*sin(800*t)"}, "pad_inertia": 1e-4}
 ON_A_COURSE = {"t_end": 0.002, "steps": 5, "journal": ["0.5 + 0.2*cos(400*t)", "0.2*sin(400*t)"]}
 SUPPLIES = [
     {"x_mm": [12.3, 14.1], "restrictor": "capillary", "K": 1e-11, "p_s": 8e6, "backflow": True},
@@ -68,6 +70,7 @@ CASES = {
         ["motion.mass", "film.journal.c"],
     ),
     "partly filled": ("moving_texture", {"n": 30, "motion": {**TEXTURE, "steps": 4, "fill": 0.8}}, ["motion.fill"]),
+    "pads that follow": ("tilting_pad_thrust", {**PADS, "motion": {"t_end": 0.002, "steps": 2, **ROCKED}}, ["mu"]),
     "free, steady start": ("dynamic_journal", {"nx": 16, "ny": 4, "motion": FREE}, ["film.journal.eccentricity"]),
 }
 
