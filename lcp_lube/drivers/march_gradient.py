@@ -162,6 +162,8 @@ class MarchGradient:
             told = {name: (above[name] - below[name]) / (2.0 * d) for name in above}
             by_place.append(((G - G_below) / (2.0 * d), (h - h_below) / (2.0 * d), told))
         C = np.array([[dot(one, G) for one in pushed] for G, _, _ in by_place]) + np.diag(inertia * weight**2)
+        if not np.linalg.det(C):
+            raise InputError(f"{self.scene.name}: t = {kept.t:.6g} s: the film bears nothing: no derivatives of what it bears")
         for name in self.names:
             mu, nu = (sum((part * self.journal[name][m, k + at] for m, part in later), np.zeros(at.size)) for k in (0, count))
             kept_on = sum((part * self.lambdas[name][m] / self.units[m] for m, part in later), np.zeros(size.size))
