@@ -4,7 +4,8 @@ film's exact stiffness.
 Unknowns are t = log(s/(1 - s)) of s = e/e_touch, the eccentricity in parts of that at which the journal touches its bore, in
 which the logarithm of the load is nearly linear, and the attitude; the equations are log(W/load) = 0 and that the force lies
 in the load's line. The stiffness matrix of the film (`coefficients`) gives their derivatives, so a handful of solves do, each
-started from the last; coarse grids come first, where they cost next to nothing.
+started from the last; coarse grids come first, where they cost next to nothing. Where none is found on one of them with the
+attitude open, as with a groove near the load, places all round are tried there, those of the likeliest forces first.
 """
 
 import math
@@ -38,6 +39,8 @@ FAR = 0.1  # a step along secants, which are too long to be trusted if it makes 
 WIDEST = 14.0  # of t: s from 1e-6 to 1 - 1e-6
 AWRY = 0.7  # rad from the load's line: then the force goes on in a line, not its logarithm
 ACROSS = 0.4  # of such a step, clearances
+ABOUT, AROUND, BEST = (-2.0, -1.0, 0.0, 1.0, 2.0), np.linspace(-math.pi, math.pi, 16, endpoint=False), 6  # of a scan
+HELD = 0.5  # part of a force that is there without eccentricity, from which on it goes on in a line
 DIRECTIONS = np.linspace(-0.5, 0.5, 2881)[1:-1] * math.pi  # from the attitude, in which the bore may be touched
 
 
@@ -70,9 +73,18 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     for shape in shapes:
         tol = table.tol if shape == shapes[-1] else max(table.tol, COARSE_TOL)
         most = MOST_SOLVES if shape == shapes[-1] else MOST_COARSE
-        solution, (t, phi), count, found = _on_grid(
-            free.with_shape(shape), replace(ask, start=near), inner, t, phi, table.load, tol, most
-        )
+        at = free.with_shape(shape)
+        solution, (t, phi), count, found = _on_grid(at, replace(ask, start=near), inner, t, phi, table.load, tol, most)
+        if not found and scene.attitude_deg is None and shape != shapes[-1]:
+            count += len(ABOUT) * len(AROUND)
+            for place in _scanned(at, ask, inner, guess, table.load):
+                other, q, more, found = _on_grid(at, ask, inner, *place, table.load, tol, most)
+                count += more
+                if found:
+                    solution.destroy()
+                    solution, (t, phi) = other, q
+                    break
+                other.destroy()
         if near is not None and near is not ask.start:
             near.destroy()  # type: ignore[union-attr]
         near, counts = solution, [*counts, count]
@@ -97,6 +109,23 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         "why": [*solution.settings["why"], f"balance: {answer}, found in {count} solves on this grid, {solves} in all"],
     }
     return solution
+
+
+def _scanned(scene: Any, ask: Ask, inner: Inner, s: float, load: float) -> list[tuple[float, float]]:
+    """Places (t, attitude) about s and all round at which the film's force is nearest to the one sought, from the nearest on.
+
+    For a groove near the load, of which closed forms know nothing: places behind it, and nearer to the bore. Collective.
+    """
+    chain, tried = Chain(replace(ask, start=None), inner), list[tuple[float, float, float]]()
+    for t in math.log(s / (1.0 - s)) + np.array(ABOUT):
+        for phi in AROUND:
+            here = {"eccentricity": eccentricity(scene, t, phi), "attitude_deg": math.degrees(phi)}
+            solution = chain.solve(scene.model_copy(update=here))
+            force = solution.problem.quantities(solution.fields)["force"]
+            if solution.converged and (W := math.hypot(*force)) > 0:
+                tried.append((abs(math.log(W / load)) + abs(math.atan2(-force[1], -force[0])), float(t), float(phi)))
+    solution.destroy()
+    return [place for _, *place in sorted(tried)[:BEST]]  # type: ignore[misc]
 
 
 def _coarse(scene: GroovedJournalScene, s: float) -> list[tuple[int, ...]]:
@@ -165,7 +194,7 @@ def _on_grid(
             return solution, q, count, True
         if count == most or (abs(t) >= WIDEST and left[0] * t < 0):
             return solution, q, count, False
-        if not W > 0:
+        if not W > 0 and (before is None or before[1][0] == -math.inf):
             step = np.array([LONGEST[0], 0.0])
         elif before is not None and not at.model.effects and np.abs(left).sum() > np.abs(before[1]).sum():
             q, left, step = before[0], before[1], 0.5 * before[2]
@@ -175,7 +204,9 @@ def _on_grid(
             astray = before is not None and np.abs(before[2]).max() > FAR and np.abs(left).sum() > np.abs(before[1]).sum()
             if inverse is None or not at.model.effects or astray:
                 K = _stiffness(at, solution, off)
-                if abs(left[1]) > AWRY:
+                still = force + K @ _place(scene, t, phi)  # that of the supplies alone
+                supplied = not given and not at.model.effects and t < 0 and np.hypot(*still) > HELD * W
+                if abs(left[1]) > AWRY or supplied:
                     q, before = _across(scene, t, phi, K, np.array([force[0] + load, force[1]])), None
                     continue
                 change = -K @ _moves(scene, t, phi)
@@ -204,18 +235,23 @@ def _across(scene: Any, t: float, phi: float, K: Array, left: Array) -> Array:
     at = eccentricity(scene, t, phi) * np.array([math.cos(phi), math.sin(phi)])
     at += step * min(1.0, ACROSS / float(np.hypot(*step)))
     phi, s = math.atan2(at[1], at[0]), 1.0 / (1.0 + math.exp(-t))
-    s = min(max(float(np.hypot(*at)) / touching(scene, phi), 1e-3), 0.5 * (s + 1.0))  # at most half the way to the bore
+    s = min(max(float(np.hypot(*at)) / touching(scene, phi), 1e-6), 0.5 * (s + 1.0))  # at most half the way to the bore
     return np.array([math.log(s / (1.0 - s)), phi])
+
+
+def _place(scene: Any, t: float, phi: float) -> Array:
+    """The journal's, m."""
+    return scene.clearance * eccentricity(scene, t, phi) * np.array([math.cos(phi), math.sin(phi)])
 
 
 def _moves(scene: Any, t: float, phi: float) -> Array:
     """How the journal moves (m) with t and with the attitude: columns."""
 
-    def place(t: float, phi: float) -> Array:
-        return scene.clearance * eccentricity(scene, t, phi) * np.array([math.cos(phi), math.sin(phi)])
-
     d = 1e-5
-    ends = (place(t + d, phi) - place(t - d, phi), place(t, phi + d) - place(t, phi - d))
+    ends = (
+        _place(scene, t + d, phi) - _place(scene, t - d, phi),
+        _place(scene, t, phi + d) - _place(scene, t, phi - d),
+    )
     return np.stack(ends, axis=1) / (2.0 * d)
 
 

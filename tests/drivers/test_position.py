@@ -56,6 +56,25 @@ def test_four_solves_find_a_place_with_the_attitude_given_or_open(name, changes)
     assert found["iterations"] <= 4 and found["work"] <= 6
 
 
+@pytest.mark.parametrize(
+    ("place", "changes"),
+    [
+        ((0.4122, 11.8), {"grooves_deg": [333.0], "groove_deg": 14.0}),  # its edge where the film is thin
+        ((0.0005, 60.0), {"grooves_deg": [0.0], "p_groove": 1e5}),  # the groove alone carries it
+    ],
+)
+def test_a_groove_near_the_load_of_which_closed_forms_know_nothing(place, changes):
+    """The film at a place gives the load; turned so that it is vertical, it is carried with the attitude open."""
+    changes = {"nx": 144, "ny": 7, **changes}
+    with solve(load_scene("two_groove_journal", changes, eccentricity=place[0], attitude_deg=place[1])) as there:
+        force = there.problem.quantities(there.fields)["force"]
+    off = math.degrees(math.atan2(-force[1], -force[0]))
+    changes["grooves_deg"] = [changes["grooves_deg"][0] - off]
+    with solve(load_scene("two_groove_journal", changes, balance={"load": math.hypot(*force)})) as solution:
+        assert solution.converged, solution.message
+        assert solution.settings["balance"]["carried"] == pytest.approx(math.hypot(*force), rel=2e-6)
+
+
 def test_a_load_beyond_what_a_tilted_journal_carries_until_it_touches():
     solution = solve(load_scene("misaligned_journal", {"nx": 108, "ny": 7, "L_over_D": 1.0, "balance.load": 1e7}))
     assert solution.outcome is Outcome.LOAD_NOT_CARRIED and solution.settings["balance"]["solves"] < 40
