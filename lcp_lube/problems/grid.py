@@ -204,10 +204,11 @@ class Grid:
     def widths(self, side: int, everywhere: bool = False) -> Array:
         """Widths of the owned columns (side 0) or lines (1) of cells, or of all, in spacings: 1, and 1/2 on a mirror."""
         start, end = (0, self.shape[side]) if everywhere else self._owned[side]
-        around, number, (first, last) = self._around[side], np.arange(start, end), self.ends[side]
-        halved = (number == 0) & (first == "mirror") | (number == self.shape[side] - 1) & (last == "mirror")
-        whole = 1.0 if around is None else (0.5 * (around[2:] - around[:-2]) / self.spacing[side])[start:end]
-        return np.where(halved, 0.5, 1.0) * whole
+        around, n = self._around[side], self.shape[side]
+        out = np.ones(end - start) if around is None else (0.5 * (around[2:] - around[:-2]) / self.spacing[side])[start:end]
+        for number in {k for k, kind in zip((0, n - 1), self.ends[side], strict=True) if kind == "mirror" and start <= k < end}:
+            out[number - start] *= 0.5
+        return out
 
     def rims(self, side: int) -> tuple[float, float]:
         """Distances from the outermost lines of points to the two sides, in spacings."""

@@ -11,6 +11,7 @@ an edge inside a cell, only the part before it resists, which the coefficients c
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -63,7 +64,12 @@ class Around:
     grid: Grid
 
     def __call__(self, x: Array, y: Array) -> Array:
-        return self.film(*self._inside(x, y))
+        """The film at x and y, which broadcast; of a film that is the same along y the one line there is."""
+        return self.film(*self._inside(x, y[:1] if self._one_line and x.shape[:-1] == (1,) else y))
+
+    @cached_property
+    def _one_line(self) -> bool:
+        return level(self.film) and not jumps_of(self.film, "y")
 
     def _inside(self, *at: Array) -> list[Array]:
         out = list(at)

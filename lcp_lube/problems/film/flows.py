@@ -87,25 +87,32 @@ def friction(problem: LubricationProblem, p_pa: Array, r: Array, lever: Array | 
         if alone:
             part.grid, part.scheme = places_of(grid, rows), s.rows(rows)
         along = lever[rows] if isinstance(lever, np.ndarray) else lever
-        if alone and grid.size >= MANY and has_numba():
-            return _drag_sum(part, p_pa[rows], r[rows], along)
         return float(np.sum(sum(drag(part, part.scheme, p_pa[rows].ravel(), r[rows].ravel())) * along))  # type: ignore[arg-type]
 
-    of_film = sum(each_strip(grid, add_up)) if alone else add_up(slice(0, grid.box[0]))
+    if alone and grid.size >= MANY and has_numba():
+        of_film = _drag_sum(problem, p_pa, r, lever)
+    else:
+        of_film = sum(each_strip(grid, add_up)) if alone else add_up(slice(0, grid.box[0]))
     of_film = problem.reduce.sum(np.array([of_film]))
     return of_film if problem.contact is None else of_film + problem.contact.drag(problem, lever)
 
 
 def _drag_sum(problem: LubricationProblem, p: Array, r: Array, lever: Array | float) -> float:
-    """The sum of `drag` times the lever, over lines of a large film without walls before or behind it."""
+    """The sum of `drag` times the lever, of a large film of one rank without walls before or behind it."""
     from .cell_loops import loop_drag
 
-    grid, s = problem.grid, problem.scheme
-    columns, lines, scale = _shares(problem)
-    faces = sheared_faces(problem, grid.x + grid.steps(0)[1:] / 2)
+    grid, (columns, lines, scale) = problem.grid, _shares(problem)
     first, last = sides(grid)[:2]
     beyond = np.full(p.shape[0], problem.p_sides[1]) if last.any() else p[:, 0].copy()
-    total = loop_drag(*faces, s.couette_E, s.b_E, r, p, beyond, columns, (lines * lever).ravel(), (scale * lever).ravel())
+    shears, pulls = (lines * lever).ravel(), (scale * lever).ravel()
+
+    def add_up(rows: slice) -> float:
+        part, s = copy(problem), problem.scheme.rows(rows)
+        part.grid = places_of(grid, rows)
+        faces = sheared_faces(part, grid.x + grid.steps(0)[1:] / 2)
+        return loop_drag(*faces, s.couette_E, s.b_E, r[rows], p[rows], beyond[rows], columns, shears[rows], pulls[rows])
+
+    total = sum(each_strip(grid, add_up))
     if first.any():
         before, push = _before_first(problem, p, 0.0)
         total += float(np.sum(lever * (columns[0] * lines * before + scale * push)))
@@ -191,10 +198,9 @@ def sheared_faces(problem: LubricationProblem, x: Array, lifted: complex = 0.0) 
     t/h^2, and 1/h. That is linear in what flows between a film that is full in the thinnest strip alone and one that is full.
     """
     grid, film = problem.grid, Around(problem.film, problem.grid)
-    h = np.broadcast_to(film(x, grid.y) + lifted, (grid.box[0], x.shape[1]))
-    if not problem.edged:  # an edge may lie on the face
-        d = 1e-6 * grid.spacing[0]
-        h = 2.0 / (1.0 / (film(x - d, grid.y) + lifted) + 1.0 / (film(x + d, grid.y) + lifted))
+    at, d = (lambda x: film(x, grid.y) + lifted), 1e-6 * grid.spacing[0]
+    h: Any = at(x) if problem.edged else 2.0 / (1.0 / at(x - d) + 1.0 / at(x + d))  # an edge may lie on the face
+    h = np.broadcast_to(h, (grid.box[0], x.shape[1]))
     resting, moving = np.broadcast_to(h.dtype.type(0.0), h.shape), h
     jumps = film.jumps("y") if grid.dim == 2 and problem.edged else ()
     if jumps:

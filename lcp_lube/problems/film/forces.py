@@ -154,13 +154,19 @@ def integrals(problem: LubricationProblem, p_pa: Array, asked: Sequence[tuple[fl
     def add_up(rows: slice) -> Array:
         part, inside = places_of(grid, rows), np.zeros(len(asked))
         x, y, along, lines = part.x, part.y, part.widths(0), stream_weights(part)[:, 0]
+        columns: dict[float, Array] = {}  # sums of each one
         for k, (above, weight) in enumerate(asked):
-            w, own = np.atleast_2d(weight(x, y)), p[rows] - above if above else p[rows]
+            w = np.atleast_2d(weight(x, y))
+            if w.shape[0] == 1 and above in columns:
+                inside[k] += columns[above] @ (w[0] * along)
+                continue
+            own = p[rows] - above if above else p[rows]
             # Columns first, and no BLAS: row by row it takes ten times as long, and it may have threads of its own.
-            if w.shape[1] == 1:  # of y alone
+            if w.shape[0] == 1:
+                columns[above] = np.einsum("i,ij->j", lines, own)
+                inside[k] += columns[above] @ (w[0] * along)
+            elif w.shape[1] == 1:  # of y alone
                 inside[k] += np.einsum("i,ij->j", lines * w[:, 0], own) @ along
-            elif w.shape[0] == 1:
-                inside[k] += np.einsum("i,ij->j", lines, own) @ (w[0] * along)
             else:
                 inside[k] += np.einsum("i,ij->j", lines, own * w) @ along
         return inside

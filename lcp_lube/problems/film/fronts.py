@@ -48,13 +48,14 @@ def line_fronts(problem: LubricationProblem, p: Array, r: Array, dry: NDArray[np
     grid, film, s = problem.grid, problem.film, problem.scheme
     start, steps = grid.origin[0], grid.steps(0)
     behind, ahead = steps[:-1], steps[1:]
-    cavity = grid.ghosted(dry, outside=0.0)[1:-1] > 0
+    cavity = ghosted(grid, dry, 0.0)(slice(0, grid.box[0]))[1:-1] > 0
     opens = [kind == "open" for kind in grid.ends[0]]
     if grid.x_start == 0 and opens[0]:
         cavity[:, 0] = problem.r_in > 0
     if grid.dim == 1 and opens[0]:
         Q = problem.boundary_flows(p, r)[0]
-    row, i = places_in(cavity[:, 1:-1] & ~cavity[:, :-2])
+    begins, ceases = _turns(cavity[:, :-2], cavity[:, 1:-1])
+    row, i = begins
     if not (grid.dim == 1 and opens[0]):
         Q = s.flow_unit * (s.couette_E[row, i] + s.b_E_at(row, i) * r.reshape(grid.box)[row, i]) / stream_weights(grid)[row, 0]
     x, y = grid.x[0], grid.y[:, 0]
@@ -64,7 +65,7 @@ def line_fronts(problem: LubricationProblem, p: Array, r: Array, dry: NDArray[np
     shift = np.zeros(grid.box[0])
     np.add.at(shift, row, (x - 0.5 * behind)[i] - ruptures)
     starts = row, i, ruptures
-    row, i = places_in(~cavity[:, 1:-1] & cavity[:, :-2])
+    row, i = ceases
     pressed = s.k_W[row, i] * p.reshape(grid.box)[row, i]
     whole = grid.box[1] == grid.shape[0]  # nothing enters the first point of a whole line that is open
     lacking = s.b_W_at(row, i) * (r.reshape(grid.box)[row, i - 1] if whole else grid.ghosted(r, outside=0.0)[row + 1, i])
@@ -82,10 +83,14 @@ def line_fronts(problem: LubricationProblem, p: Array, r: Array, dry: NDArray[np
     return Fronts(starts, (closes, ends, places), shift)
 
 
-def places_in(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """`numpy.nonzero` of a matrix, several times as fast where little of it is true."""
-    row, i = np.divmod(np.flatnonzero(mask), mask.shape[1])
-    return row, i
+Places = tuple[NDArray[np.int64], NDArray[np.int64]]
+
+
+def _turns(before: NDArray[np.bool_], here: NDArray[np.bool_]) -> tuple[Places, Places]:
+    """Rows and columns where a matrix is true and the one before it is not, and where it is the other way round."""
+    row, i = np.divmod(np.flatnonzero(before != here), here.shape[1])  # several times as fast as `numpy.nonzero`
+    on = here[row, i]
+    return (row[on], i[on]), (row[~on], i[~on])
 
 
 def fronts(problem: LubricationProblem, found: Fronts | None) -> tuple[list[float], list[float]]:
@@ -125,13 +130,13 @@ def cavitated_area(problem: LubricationProblem, found: Fronts | None, p: Array, 
         stretch, dy = part.stretch(part.y), grid.spacing[1] if grid.dim == 2 else 1.0
         more += float(np.sum(found.shift[rows, None] * line_weights(part) * stretch)) * dy
         if grid.dim == 2:
-            width, steps = part.widths(0) * grid.spacing[0] * stretch, part.steps(1)[:, None]
+            width, steps = part.widths(0) * grid.spacing[0], part.steps(1)[:, None]
             fronts_across = _across(frames[0](rows), frames[1](rows), steps)
             for (j, i, back), step in zip(fronts_across, (steps[:-1, 0], steps[1:, 0]), strict=True):
-                more += float(np.sum((0.5 * step[j] - back) * np.broadcast_to(width, part.box)[j, i]))
+                more += float(np.sum((0.5 * step[j] - back) * width[i] * stretch[j, 0]))
             for end, rim, p_side in zip(sides(part)[2:], grid.rims(1), problem.p_sides[2:], strict=True):
                 if p_side == 0.0 and end.any():  # the cavity reaches up to it
-                    more += float(np.sum(np.where(end, 0.5 * rim * dy * width, 0.0) * cavity[rows]))
+                    more += float(np.sum(0.5 * rim * dy * width * stretch * (end & cavity[rows])))
         return area, more
 
     area, more = (sum(parts) for parts in zip(*each_strip(grid, add_up), strict=True))
@@ -151,9 +156,10 @@ def across(grid: Grid, p: Array, cavity: NDArray[np.bool_]) -> Across:
 def _across(cavity: Array, frame: Array, steps: Array) -> Across:
     """The same of framed lines."""
     dry, out = cavity > 0.0, []
-    full = ~dry[1:-1, 1:-1]
-    for beside, beyond in ((0, 2), (2, 0)):  # rows of the frame, counted from a point's southern neighbour
-        j, i = places_in(dry[beside : beside + full.shape[0], 1:-1] & full)
+    to_north, to_south = _turns(dry[:-1, 1:-1], dry[1:, 1:-1])  # rows of the frame, counted from a point's southern neighbour
+    for (row, at), beside, beyond in ((to_south, 0, 2), (to_north, 2, 0)):
+        own = (row >= beside // 2) & (row < len(dry) - 2 + beside // 2)
+        j, i = row[own] - beside // 2, at[own]
         step, far = steps[j + beside // 2, 0], steps[j + beyond // 2, 0]
         here = frame[j + 1, i + 1]
         rise = (frame[j + beyond, i + 1] - here) / far * step

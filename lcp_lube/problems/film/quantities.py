@@ -89,7 +89,7 @@ def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any
         "p_ambient": (ambient(problem) if known is None else known.ambient(problem)) + problem.p_c,
         "friction": read.friction,
         "p_unit": problem.p_unit,
-        "cavitated_fraction": reduce.sum(cavity) / grid.size,
+        "cavitated_fraction": reduce.sum(np.array([np.count_nonzero(cavity)])) / grid.size,
         "cavitated_area": read.cavitated_area,
         "rupture": rupture,
         "reformation": reformation,
@@ -188,12 +188,14 @@ def largest_of(
 
     Of equals, to within the tolerance of a solve, the first in x and then y, whatever the ranks.
     """
-    largest = -problem.reduce.min(values) if opposite else problem.reduce.max(values)
+    columns = -values.min(axis=0) if opposite else values.max(axis=0)
+    largest = problem.reduce.max(columns)
     if not np.isfinite(largest):
         return largest, None
     least = largest - 1e-9 * abs(largest)
-    near = values <= -least if opposite else values >= least
-    column = int(np.argmax(near.any(axis=0)))
-    row = int(np.argmax(near[:, column]))
-    own = (float(x[column]), float(y[row])) if near.any() else (np.inf, np.inf)
+    own = (np.inf, np.inf)
+    if (near := columns >= least).any():
+        column = int(np.argmax(near))
+        line = values[:, column]
+        own = float(x[column]), float(y[np.argmax(line <= -least if opposite else line >= least)])
     return largest, [*problem.grid.comm.allreduce(own, MPI.MIN)][: problem.grid.dim]

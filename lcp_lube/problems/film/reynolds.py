@@ -159,12 +159,10 @@ def box_scheme(grid: Grid, film: Film, **data: Any) -> BoxScheme:
     reduce = grid.reduce
     # Every face once: k_E and k_N are k_W and k_S but for the last ones.
     faces = [box.k_W, box.k_E[:, -1:]] + ([box.k_S, box.k_N[-1:]] if grid.dim == 2 else [])
-    west, east, south, north = sides(grid, ("closed", "mirror"))
-    conducting = [
-        np.min(k, where=~wall, initial=np.inf) for k, wall in zip(faces, (west, east[:, -1:], south, north[-1:]), strict=False)
-    ]
+    west, east, south, north = (int(mask.any()) for mask in sides(grid, ("closed", "mirror")))  # which conduct nothing
+    conducting = [faces[0][:, west:], faces[1][:, east:]] + ([faces[2][south:], faces[3][north:]] if grid.dim == 2 else [])
     stores = [] if box.storage is None else [box.storage]
-    smallest = float(np.min([reduce.min(a) for a in (box.h, *ends, np.array(conducting), *stores)]))  # NaN stays NaN
+    smallest = float(np.min([reduce.min(a) for a in (box.h, *ends, *conducting, *stores)]))  # NaN stays NaN
     voids = np.array([np.max(np.abs(part.b_C)) for _, part in box.in_strips(grid)])
     largest = max(*map(reduce.max, faces), reduce.max(voids), reduce.largest(box.c))
     if not (smallest > 1 / LARGE and largest < LARGE):

@@ -30,8 +30,7 @@ def coefficients_of(
     x_nodes, x_faces = grid.nodes_and_faces(0)
     x, y = x_nodes[None, 1:-1], grid.y
     period = [length if around else 0.0 for length, around in zip(grid.lengths, grid.periodic, strict=True)]
-    h_x = np.broadcast_to(film(x_nodes[None, :], y), (ny, nx + 2))
-    h_face = np.broadcast_to(film(x_faces[None, :], y), (ny, nx + 1))
+    h_x, h_face = (film(at[None, :], y) for at in (x_nodes, x_faces))  # one line, where all are the same
 
     def cubes(at_faces: Array, at_nodes: Array) -> Array:
         """h^3 at the faces, which come first to last along axis 0."""
@@ -61,11 +60,11 @@ def coefficients_of(
             cubes_y = turned[0].T
         else:
             h_y = np.broadcast_to(film(x, y_nodes[:, None]), (ny + 2, nx)) if mean_cubes else h_x
-            cubes_y = cubes(np.broadcast_to(film(x, y_faces[:, None]), (ny + 1, nx)), h_y)
+            cubes_y = cubes(film(x, y_faces[:, None]), h_y)
         if rims:
             cubes_y = rims_across_y(grid, film, rims, cavity, cubes_y, period[1])
-        arcs = grid.spacing[0] * x_share * grid.stretch(y_faces)[:, None]
-        k_y = k * cubes_y * arcs / (grid.steps(1) * grid.spacing[1])[:, None]
+        arcs = k * cubes_y * (grid.spacing[0] * x_share)
+        k_y = arcs * (grid.stretch(y_faces) / (grid.steps(1) * grid.spacing[1]))[:, None]
     weight = y_share * m
     void = dragged(h_face if scheme == "face" else h_x[:, :-1], weight, U)
     wall = void if scheme != "nodal" else dragged(h_face, weight, U)
