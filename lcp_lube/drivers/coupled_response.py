@@ -20,7 +20,7 @@ from petsc4py import PETSc
 
 from ..base.parallel import Array
 from ..errors import NotFound
-from ..problems.film.cavity import VOID, cavity_sign
+from ..problems.film.cavity import about_to_change, cavity_sign
 from ..problems.film.contact import areas
 from ..problems.film.effects import Answer, answer, factors
 from ..problems.film.flows import point_weights
@@ -62,7 +62,7 @@ class CoupledResponse:
         self.cavity = (cavity_sign(problem.reduce, self.p, self.r) < 0) & ~self.given
         self.x = loop.vector(problem.cells) if loop.names else np.zeros(0)
         self.p_max = base.reduce.max(np.abs(self.p)) or 1.0
-        self.changing = (np.abs(self.p) <= VOID * self.p_max) & (np.abs(self.r) <= VOID) & ~self.given
+        self.changing = about_to_change(base.reduce, self.p, self.r) & ~self.given
         self.cavity ^= self.changing & flip
         at = self._answer(np.zeros(self.n), self.x, base)
         self._size = 2.0 * grid.spacing[0] / self.unit * point_weights(grid)

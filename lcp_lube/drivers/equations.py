@@ -16,7 +16,7 @@ from petsc4py import PETSc
 from ..base.parallel import Array
 from ..errors import InputError, nearest
 from ..problems.film import slopes
-from ..problems.film.cavity import VOID, cavitated
+from ..problems.film.cavity import about_to_change, cavitated
 from ..problems.film.forces import attitude, weights
 from ..problems.film.grooves import GroovedProblem
 from ..problems.film.known import known_fields
@@ -270,9 +270,7 @@ def fields_of(solution: Solution) -> tuple[Array, Array]:
 def cavity_of(equations: Equations, p: Array, r: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Whether a point is cavitated, and whether it is about to change: p and r both vanish there. Collective."""
     reduce = equations.grid.reduce
-    cavity = cavitated(reduce, p, r)
-    small = VOID * reduce.largest(p)
-    switching = (p <= small) & (p >= -small) & (r <= VOID) & (r >= -VOID)
+    cavity, switching = cavitated(reduce, p, r), about_to_change(reduce, p, r)
     if equations.given is not None:
         switching &= ~equations.given
         cavity &= ~equations.given

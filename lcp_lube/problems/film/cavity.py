@@ -33,3 +33,9 @@ def cavitated(reduce: Reduce, p: Array, r: Array) -> NDArray[np.bool_]:
         own = p[k : k + BLOCK]
         out[k : k + BLOCK] &= (own / p_max if p_max > 0 else own) < r[k : k + BLOCK]
     return out
+
+
+def about_to_change(reduce: Reduce, p: Array, r: Array) -> NDArray[np.bool_]:
+    """Where p and r both vanish: full or cavitated, as one likes. Collective."""
+    small = VOID * reduce.largest(p)
+    return (p <= small) & (p >= -small) & (r <= VOID) & (r >= -VOID)
