@@ -149,7 +149,7 @@ def _told(ask: Ask, loop: Loop) -> Solution:
     outcome, message, reduce = solution.outcome, solution.message, loop.base.reduce
     failure = ""
     if loop.answer is None:  # the first film had no answer
-        loop.base.destroy()
+        solution.problem.shares_grid = loop.base.shares_grid  # type: ignore[attr-defined]
         return solution
     at = loop.answer
     problem = at.problem
@@ -174,6 +174,7 @@ def _told(ask: Ask, loop: Loop) -> Solution:
             message = f"film {loop.solves} of the coupling: {message}"
     fields = {"p": at.p / problem.p_unit, "r": at.r}
     problem.cells = at.cells | {"stored": at.stored}
+    problem.rigid = None if loop.effects or problem.size > NESTED_ABOVE else loop.base
     certificate = problem.certify(fields, eps1)
     enclosure = _band(loop, solution.enclosure, fields) if ask.certify else None
     solution.destroy()

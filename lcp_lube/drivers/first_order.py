@@ -17,6 +17,7 @@ from ..base.parallel import Array
 from ..errors import InputError
 from ..problems.film.effects import Answer, Cells, Compressible, Effect, answer, factors, neutral
 from ..problems.film.fluid import Law
+from ..problems.film.forces import weights
 from ..problems.solution import Solution
 from ..scenes.effects.named import FLUID, named, without
 from ..scenes.values import values_of
@@ -60,7 +61,7 @@ class FirstOrder:
         pressures = [float(P) for P in solution.settings.get("supply_pressures", ())]
         self.scene = placed(self.scene, solution)
         bare = without(self.scene, named(scene))
-        own = None if self.kept else solution.problem  # solved without effects, as it is here
+        own = getattr(solution.problem, "rigid", None) or (None if self.kept else solution.problem)  # solved without effects
         self.equations = eq = Equations(bare, grid.petsc_comm, pressures, solved=own)
         self.base, (self.p, self.r) = eq.constant, fields_of(solution)
         self.h = self.base.scheme.h.ravel()
@@ -191,9 +192,9 @@ class FirstOrder:
     def _adjoints(self) -> dict[str, Array]:
         eq, p, r = self.equations, self.p, self.r
         rows = []
-        for weights in self.parts.values():
-            slopes = {part: eq.slope(p, r, part) for part in weights}
-            rows.append(right_side(slopes, weights, self.cavity))
+        for parts in self.parts.values():
+            slopes = {part: eq.slope(p, r, part) for part in parts}
+            rows.append(right_side(slopes, parts, self.cavity))
         z = unknowns(self.cavity, p, r, eq.constant.p_unit)
         return dict(zip(self.parts, self.linear.solve_transposed(rows, z), strict=True))
 
@@ -206,7 +207,9 @@ class FirstOrder:
         """L of all numbers with these coefficients, at the answer's fields or others."""
         eq, p, r = self.equations, self.p if p is None else p, self.r if r is None else r
         self._film(cells, t)
-        report = eq.report(eq.numbers(p, r, {part for weights in self.parts.values() for part in weights}, self.numbers))
+        wanted = {part for one in self.parts.values() for part in one}
+        same = p is self.p and "contact" not in cells and wanted <= set(weights(self.base))  # integrals of the pressure
+        report = eq.report(self.numbers if same else eq.numbers(p, r, wanted, self.numbers))
         G = self._balance(p, r)
         return np.array([report[name] - eq.grid.reduce.dot(one, G) for name, one in self.lambdas.items()])
 

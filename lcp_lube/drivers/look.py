@@ -216,6 +216,8 @@ def _by_solving(
     motion = motion_of(scene)
     shape = coarse_shape(scene.shape, len(names) + 1) if motion is None else first_shape(scene.shape)
     assert shape is not None  # for the type checker: `decide` has looked
+    if "area" in (ask.quantity or "") and PART * tol * prod(shape) < 1.0:  # it goes in parts of a cell
+        return names, {}, {"reason": f"on the coarse grid {shape} {ask.quantity} does not tell so small a change"}, 0.0
     coarse, in_time = scene.with_shape(shape), ""
     if motion is not None:
         steps = few_steps(motion, len(looked(names)) + 2)

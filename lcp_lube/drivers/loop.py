@@ -1,7 +1,9 @@
 """The loop of `coupling`: a film with its coefficients held, and Anderson's method for the fields that these come from."""
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -37,13 +39,15 @@ STEEPEST = 0.9  # of q, over 1/b, where the pressure is without bound: of an ite
 
 @dataclass(frozen=True)
 class Frozen(Derived):
-    """A scene with its coefficients held, in q where Barus' law holds. by : factors of its own grid; None: no effects."""
+    """A scene with its coefficients held, in q where Barus' law holds. by : factors of its own grid; None: no effects.
+    base : its rigid film on this grid, if somebody has that, whose grid films share."""
 
     law: Law
     by: FaceFactors | None = None
     even: bool = True
+    base: LubricationProblem | None = None
 
-    @property
+    @cached_property
     def constant(self) -> Model:
         """The rigid film of the constant fluid, in q."""
         model: Model = self.whole.model
@@ -66,7 +70,8 @@ class Frozen(Derived):
         return self.constant.facts(self.shape, comm)
 
     def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
-        problem = self.constant.build(self.shape, comm)
+        problem = self.constant.build(self.shape, comm) if self.base is None else copy(self.base)
+        problem.shares_grid = problem.shares_grid or self.base is not None
         problem.coefficients_for = None  # what is certified is another problem, made from this one
         return problem if self.by is None else self.by.film(problem)
 
@@ -86,6 +91,7 @@ class Loop:
             raise InputError(f"{scene.name}: scheme = {self.model.scheme}: {what} needs scheme = face")
         self.frozen = Frozen(scene, self.law, None, all(effect.even for effect in self.effects))
         self.base = self.frozen.build(ask.comm)
+        self.frozen = replace(self.frozen, base=self.base)
         self.p_sides = self.model.p_sides
         self.h = self.base.scheme.h.ravel()
         self.giving = Giving.of(self.law, self.model.effects, self.base)

@@ -104,6 +104,13 @@ def test_effects_that_cancel():
         assert told == pytest.approx(s.load / least.load - 1.0, rel=0.05) and abs(told) > PART * 0.01
 
 
+def test_an_area_on_a_coarse_grid():
+    """It goes in parts of a cell there: a tenth of 1e-4 of it does not show, and nothing is left out for that."""
+    scene = {**WIDE, "film": CAVITY, "viscosity": {"factor": "1 + 0.001*sin(60*x)"}}
+    with solve(scene, quantity="cavitated_area", accuracy=0.02, finest=(79, 39)) as s:
+        assert s.settings["model"]["kept"] == {"viscosity": None} and "cavitated_area" in s.settings["model"]["reason"]
+
+
 def test_the_film_that_was_looked_at_is_the_first_of_the_loop():
     """It takes as many films, that one among them, as a loop that is told which effects count, and fewer of its own."""
     with solve(SCENES["all laws"]) as s, solve(SCENES["all laws"], model=",".join(s.settings["model"]["kept"])) as named:

@@ -53,6 +53,7 @@ class LubricationProblem:
     factors: Any = None  # of its faces, that follow from `cells`
     tangent: Any = None  # dG/dp, where that is not A
     thick: Any = None  # mu and the law of Barus' fluid, where nothing else acts
+    rigid: Any = None  # the film in q that it was solved with, of a small one
     contact: Any = None  # of asperities
     levers: Any = ()  # `Model.levers`
     stored: Any = None  # by its cells, in a time step (`stored.Stored`)
@@ -271,7 +272,8 @@ class LubricationProblem:
         other.scheme, other.mu, other.exact = scheme, mu, None  # type: ignore[assignment]
         other.p_sides, other.held = p_sides or self.p_sides, held or self.held
         new: dict[str, Any] = {name: {} for name in ("more", "more_fields", "more_measures", "cells")}
-        other.__dict__ |= {"plain": False, "coefficients_for": None, "factors": None, "contact": None, "tangent": None, **new}
+        none = dict.fromkeys(("coefficients_for", "factors", "contact", "tangent", "rigid"))
+        other.__dict__ |= {"plain": False, **none, **new}
         return other
 
     def with_lift(self, lift: Array) -> Self:
