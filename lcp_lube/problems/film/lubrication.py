@@ -52,8 +52,8 @@ class LubricationProblem:
     tops = False  # whether the largest pressure is looked for between the points (`peak`)
     factors: Any = None  # of its faces, that follow from `cells`
     tangent: Any = None  # dG/dp, where that is not A
-    thick: Any = None  # mu and the law of Barus' fluid, where nothing else acts
-    rigid: Any = None  # the film in q that it was solved with, of a small one
+    thick: Any = None  # mu and the law of Barus' fluid, where nothing else acts; rigid: its film in q, of a small one
+    rigid: Any = None
     contact: Any = None  # of asperities
     levers: Any = ()  # `Model.levers`
     stored: Any = None  # by its cells, in a time step (`stored.Stored`)
@@ -271,9 +271,8 @@ class LubricationProblem:
         other = copy(self)
         other.scheme, other.mu, other.exact = scheme, mu, None  # type: ignore[assignment]
         other.p_sides, other.held = p_sides or self.p_sides, held or self.held
-        new: dict[str, Any] = {name: {} for name in ("more", "more_fields", "more_measures", "cells")}
-        none = dict.fromkeys(("coefficients_for", "factors", "contact", "tangent", "rigid"))
-        other.__dict__ |= {"plain": False, **none, **new}
+        other.__dict__ |= dict.fromkeys(("coefficients_for", "factors", "contact", "tangent", "rigid"), None)
+        other.__dict__ |= {name: {} for name in ("more", "more_fields", "more_measures", "cells")} | {"plain": False}
         return other
 
     def with_lift(self, lift: Array) -> Self:
