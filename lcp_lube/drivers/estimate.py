@@ -34,6 +34,7 @@ from typing import Any
 
 import numpy as np
 
+from ..problems.film.edges import jumps_of, level
 from ..problems.film.integrals import line_integrals
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
@@ -221,10 +222,9 @@ def misplaced_film(problem: Problem) -> float:
         fine = (around[:-1] + _LOOKS[:, None] * meshes).ravel()
         face = around[:-1] + 0.5 * meshes
         across = 1 - side
-        if grid.dim == 1:
-            lines = np.zeros(1)
-        else:
-            lines = grid.origin[across] + (np.arange(LINES) + 0.5) * (grid.lengths[across] / LINES)
+        alike = side == 0 and level(problem.film) and not jumps_of(problem.film, "y")  # one line is as good as all
+        count = 1 if grid.dim == 1 or alike else LINES
+        lines = np.zeros(1) if grid.dim == 1 else grid.origin[across] + (np.arange(count) + 0.5) * (grid.lengths[across] / count)
         film = [
             np.broadcast_to(problem.film(*((at[None, :], lines[:, None])[:: 1 - 2 * side])), (lines.size, at.size))
             for at in (fine, face)
