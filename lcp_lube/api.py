@@ -11,6 +11,7 @@ from .drivers import compose
 from .drivers.ask import Ask
 from .drivers.memory import peak
 from .drivers.supplies import check_backflow
+from .errors import InputError
 from .problems.solution import Solution
 from .scenes.doubts import doubts
 from .scenes.scene import Scene, as_scene
@@ -39,6 +40,8 @@ def solve(scene: str | Path | dict[str, Any] | Scene, ask: Ask | None = None, **
     InputError : an unknown name, a value out of range, an option that does not fit, things that do not compose.
     """
     begin = perf_counter()
+    if not isinstance(ask, Ask | None):
+        raise InputError(f"ask = {ask!r}: an Ask is allowed; a scene's keys are given by name, as in solve(scene, n=200)")
     ask = replace(ask or Ask(), **{name: value for name, value in given.items() if name in ASKED})
     scene = as_scene(scene, {name: value for name, value in given.items() if name not in ASKED}, ASKED)
     if scene.family != "user":  # whose data are each rank's own

@@ -37,6 +37,8 @@ def test_a_scene_is_named_in_any_way_and_changed_by_keywords(source: Any) -> Non
 
 
 def test_a_misspelt_argument_is_said_to_be_one() -> None:
+    with pytest.raises(InputError, match="an Ask is allowed; a scene's keys are given by name"):
+        solve("problem1", {"n": 200})  # type: ignore[arg-type]
     with pytest.raises(InputError, match="metod is neither a key of the scene nor an argument; nearest is method"):
         solve("problem1", metod="din")
 

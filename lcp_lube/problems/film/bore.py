@@ -91,7 +91,7 @@ class PadBore:
         h = c_p - (c_p - c) cos(theta - q_k) - c e cos(theta - attitude) - tilt_k R sin(theta - q_k) :
 
     a positive tilt (rad) opens the edge at which the journal enters. eccentricity e is relative to c, half: of a pad's extent,
-    rad. Between pads the film is that of the nearer edge, where it stands for nothing.
+    rad. Between pads, where a pressure is held and only the drag counts it, the film is straight from edge to edge.
     """
 
     turning: Turning
@@ -105,17 +105,25 @@ class PadBore:
 
     def __call__(self, x: Array, y: Array | None = None, /) -> Array:
         """The film at x and y (m), with the broadcast shape of both."""
-        turning, x = self.turning, np.asarray(x, dtype=float)
-        middles = np.array(self.middles)
-        off = np.remainder(turning.theta(x)[..., None] - middles + math.pi, 2.0 * math.pi) - math.pi
-        pad = np.abs(off).argmin(axis=-1)
-        nearest = np.take_along_axis(off, pad[..., None], axis=-1)[..., 0]
-        theta = middles[pad] + np.clip(nearest, -self.half, self.half)
-        from_pivot = theta - np.array(self.pivots)[pad]
-        h = turning.c * (1.0 - self.eccentricity * np.cos(theta - self.attitude))
-        h = h + 2.0 * (self.c_pad - turning.c) * np.sin(0.5 * from_pivot) ** 2
-        h = h - np.array(self.tilts)[pad] * turning.R * np.sin(from_pivot)
+        x = np.asarray(x, dtype=float)
+        inlets = np.array(self.middles) - self.half
+        passed = np.remainder(self.turning.theta(x)[..., None] - inlets, 2.0 * math.pi)
+        pad = passed.argmin(axis=-1)  # whose inlet lies behind
+        on = passed.min(axis=-1)
+        turn = np.remainder(np.diff(inlets, append=inlets[:1]), 2.0 * math.pi)
+        gaps = np.where(turn == 0.0, 2.0 * math.pi, turn) - 2.0 * self.half  # of one pad the way to itself is a turn
+        beyond = np.maximum(on - 2.0 * self.half, 0.0) / gaps[pad]
+        h = self._on(pad, np.minimum(on, 2.0 * self.half))
+        h = h + beyond * (self._on((pad + 1) % inlets.size, 0.0) - h)
         return np.array(np.broadcast_to(h, np.broadcast_shapes(x.shape, np.shape(0.0 if y is None else y))))
+
+    def _on(self, pad: NDArray[np.intp], on: Array | float) -> Array:
+        """The film of pads at this angle behind their inlets, m."""
+        from_pivot = (np.array(self.middles) - np.array(self.pivots))[pad] - self.half + on
+        theta = np.array(self.pivots)[pad] + from_pivot
+        h = self.turning.c * (1.0 - self.eccentricity * np.cos(theta - self.attitude))
+        h = h + 2.0 * (self.c_pad - self.turning.c) * np.sin(0.5 * from_pivot) ** 2
+        return np.asarray(h - np.array(self.tilts)[pad] * self.turning.R * np.sin(from_pivot))
 
 
 @dataclass(frozen=True)
