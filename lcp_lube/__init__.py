@@ -10,6 +10,7 @@ from typing import Any
 __version__ = "0.1.0"
 
 _PUBLIC = {
+    "Ask": "lcp_lube.drivers.ask",
     "Complementarity": "lcp_lube.scenes.user",
     "InputError": "lcp_lube.errors",
     "Scene": "lcp_lube.scenes.scene",

@@ -271,6 +271,7 @@ OUTPUT: dict[str, Entry] = {
     "summary": Entry("lcp_lube.output.results:summary", "a few lines for people"),
     "plot": Entry("lcp_lube.output.plot:plot", "pictures"),
     "save": Entry("lcp_lube.output.files:save", "fields in files"),
+    "coefficients": Entry("lcp_lube.drivers.coefficients:coefficients_of", "stiffness and damping"),
     "gradient": Entry("lcp_lube.drivers.gradient:gradient_of", "derivatives of a number by those of the scene"),
     "xarray": Entry("lcp_lube.output.dataset:to_xarray", "fields as an xarray.Dataset"),
 }

@@ -1,7 +1,8 @@
 """What the caller of `solve` wants, beyond the scene: one value that every driver reads and hands down."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ from petsc4py import PETSc
 
 from ..base.options import wants_ksp
 from ..base.progress import Progress
-from ..errors import InputError
+from ..errors import InputError, nearest
 from ..problems.solution import Fields, Problem, Solution
 from ..solvers.newton import Monitor, Stopping
 
@@ -27,6 +28,21 @@ class Start:
     fields: Fields
     settings: Mapping[str, Any] = field(default_factory=dict)
     made: Mapping[str, Any] | None = None
+
+
+# What attributes may be, and in words: for those who call from Python.
+KINDS: dict[str, tuple[Any, str]] = {
+    **dict.fromkeys(("method", "system", "model"), (str, "a text")),
+    **dict.fromkeys(("recipe", "quantity"), (str | None, "a text")),
+    **dict.fromkeys(("checkpoint", "resume"), (str | Path | None, "a path")),
+    **dict.fromkeys(("options", "stopping"), (Mapping | Stopping | None, "a dictionary")),
+    **dict.fromkeys(("monitor", "progress", "watch"), (Callable | None, "a function")),
+    "accuracy": (Real | None, "a number"),
+    "finest": (tuple | None, "a tuple"),
+    "every": (Integral, "an integer"),
+    "direct_below": (Integral | None, "an integer"),
+    "start": (Solution | Start | None, "a Solution"),
+}
 
 
 @dataclass(frozen=True)
@@ -89,6 +105,13 @@ class Ask:
     comm: PETSc.Comm | None = None
 
     def __post_init__(self) -> None:
+        for name, (kind, words) in KINDS.items():
+            if not isinstance(value := getattr(self, name), kind):
+                raise InputError(f"{name} = {value!r}: {words} is needed")
+        known = [one.name for one in fields(Stopping)]
+        for name in self.stopping if isinstance(self.stopping, Mapping) else ():
+            if name not in known:
+                raise InputError(f"stopping.{name}: unknown{nearest(str(name), known)}; there are {', '.join(known)}")
         if self.every < 1:
             raise InputError(f"--every {self.every}: at least 1 is needed")
         if self.options is None:

@@ -122,6 +122,25 @@ def coefficients(
     ]
 
 
+def coefficients_of(solution: Solution, frequency: float | Sequence[float], tilt: bool) -> Coefficients | list[Coefficients]:
+    """`Solution.coefficients`: at one frequency, or a list for several."""
+    if not solution.converged:
+        raise InputError(f"coefficients are of solutions that converged: {solution.message}")
+    try:
+        frequencies = [float(nu) for nu in np.atleast_1d(frequency)]  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        raise InputError(f"frequency = {frequency!r}: numbers in rad/s are needed") from None
+    found = coefficients(scene_of(solution), solution, frequencies, tilt)
+    return found if np.ndim(frequency) else found[0]
+
+
+def scene_of(solution: Solution) -> Scene:
+    """What was solved; InputError for a problem that no scene describes."""
+    if not isinstance(solution.solved_scene, Scene):
+        raise InputError("derivatives and coefficients are of solutions that solve() has made of a scene")
+    return solution.solved_scene
+
+
 def _of_pads(
     scene: Any, solution: Solution, frequencies: Sequence[float], free: Any, with_effects: bool, stored: bool
 ) -> Array:

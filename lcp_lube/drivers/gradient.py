@@ -22,7 +22,7 @@ from ..scenes.scene import Scene
 from ..scenes.tilting import TiltingPadScene
 from ..scenes.values import key_of, values_of
 from .adjoint import Adjoint, Implicit
-from .coefficients import placed
+from .coefficients import placed, scene_of
 from .coupled_gradient import CoupledGradient
 from .equations import check_film
 from .march_course import Trace, check_march
@@ -69,10 +69,14 @@ class Gradient:
         return sorted(self.gradient, key=place)
 
 
-def gradient_of(solution: Solution, quantity: str, keys: Sequence[str]) -> dict[str, float]:
-    """`Solution.gradient`: dQ/da by the keys as they were given."""
-    found = gradients(_scene(solution), solution, [quantity], keys)[0]
-    scene = placed(_scene(solution), solution)
+def gradient_of(solution: Solution, quantity: str, keys: str | Sequence[str] | None) -> dict[str, float]:
+    """`Solution.gradient`: dQ/da by the keys as they were given, or by all that have a derivative."""
+    of = scene_of(solution)
+    keys = [keys] if isinstance(keys, str) else keys
+    found = gradients(of, solution, [quantity], keys)[0]
+    if keys is None:
+        return found.gradient
+    scene = placed(of, solution)
     out = {}
     for text in keys:
         key = text if text in found.gradient else key_of(scene, text)  # placed, it has no balance.load
@@ -80,12 +84,6 @@ def gradient_of(solution: Solution, quantity: str, keys: Sequence[str]) -> dict[
             raise InputError(f"{text}: no derivative: {found.held[key]}")
         out[text] = found.gradient[key]
     return out
-
-
-def _scene(solution: Solution) -> Scene:
-    if not isinstance(solution.solved_scene, Scene):
-        raise InputError("gradients are of solutions that solve() has made of a scene")
-    return solution.solved_scene
 
 
 def gradients(

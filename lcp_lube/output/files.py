@@ -28,7 +28,7 @@ MOST_TEXT = 60_000  # of an attribute: HDF5 takes 64 KB
 PICTURES = (".png", ".pdf", ".svg")
 
 
-def check_target(path: str | Path, plot: bool = False) -> None:
+def check_target(path: str | Path, plot: bool = False, comm: MPI.Comm = MPI.COMM_WORLD) -> None:
     """Refuse, before a long run, a file that could not be written after it. Collective.
 
     Parameters
@@ -41,7 +41,6 @@ def check_target(path: str | Path, plot: bool = False) -> None:
     InputError : an extension off the list, a folder that is missing or cannot be written to, a format whose library is
         missing. Rank 0 looks, all ranks raise.
     """
-    comm = MPI.COMM_WORLD
     if fault := comm.bcast(_fault(Path(path), plot) if comm.rank == 0 else None):
         raise InputError(f"{'--plot' if plot else '--output'} {path}: {fault}")
 

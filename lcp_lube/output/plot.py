@@ -1,13 +1,12 @@
 """Pictures of a Solution: lines in 1D, maps and a section in 2D, a journal in its bush."""
 
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
 from ..problems.solution import Solution
+from .files import check_target
 from .journal import journal
 from .maps import FLAT, height, outline, panels, shape
 from .panels import section
@@ -26,10 +25,9 @@ def plot(solution: Solution, path: str | Path) -> None:
 
     Raises
     ------
-    InputError : matplotlib is missing, or the file cannot be written; then nothing is left behind.
+    InputError : another extension, matplotlib is missing, or the file cannot be written; then nothing is left behind.
     """
-    if find_spec("matplotlib") is None:
-        raise InputError(f"--plot {path}: pictures need matplotlib: pip install lcp-lube[plot]")
+    check_target(path, plot=True, comm=solution.problem.grid.comm)
     picture = collect(solution)
     save_figure(lambda: draw(picture), path, solution.problem.grid.comm, few_colours=True)  # type: ignore[arg-type]
 

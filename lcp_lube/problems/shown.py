@@ -106,7 +106,7 @@ class Shown:
 
         Raises
         ------
-        InputError : matplotlib is missing, or the file cannot be written.
+        InputError : another extension, matplotlib is missing, or the file cannot be written.
         """
         OUTPUT["plot"].load()(self, path)
 
@@ -130,16 +130,34 @@ class Shown:
 
         return front_curves(self.problem, self.fields["p"], self.fields["r"])  # type: ignore[arg-type]
 
-    def gradient(self, quantity: str, keys: Sequence[str]) -> dict[str, float]:
+    def gradient(self, quantity: str = "load", keys: str | Sequence[str] | None = None) -> dict[str, float]:
         """Derivatives of one of the numbers by numbers of the scene, SI: dQ/da by key, as --set takes them. Collective.
 
         One transposed solve for the quantity, whatever the number of keys (docs/gradients.md).
+
+        Parameters
+        ----------
+        keys : one key, or several; default all that have a derivative.
 
         Raises
         ------
         InputError : a quantity or a key without a derivative, a solution that did not converge.
         """
         return OUTPUT["gradient"].load()(self, quantity, keys)
+
+    def coefficients(self, frequency: float | Sequence[float] = 0.0, tilt: bool = False) -> Any:
+        """Stiffness and damping: `K`, `C` and their `motions`, SI (`drivers.coefficients`). Collective.
+
+        Parameters
+        ----------
+        frequency : of the motion, rad/s; of several there is a list. tilt : with the slopes of a journal's axis, 4 x 4.
+
+        Raises
+        ------
+        InputError : no film, or one in time, a frequency below zero, a solution that did not converge.
+        NotFound : effects whose linearised equations GMRES does not solve.
+        """
+        return OUTPUT["coefficients"].load()(self, frequency, tilt)
 
     def to_xarray(self, boundary: bool = False) -> Any:
         """The fields as an xarray.Dataset with their units, over x and y. On several ranks: the rank's own part.

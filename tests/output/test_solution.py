@@ -68,6 +68,34 @@ def test_a_solution_in_one_line_and_by_names(film: Solution) -> None:
         film.lood  # noqa: B018
     with pytest.raises(InputError, match="no field q; there are p, r, h, x, y"):
         film.field("q")
+    with pytest.raises(InputError, match=r"a\.xyz: extension"):
+        film.plot("a.xyz")
+
+
+def test_derivatives_of_a_solution(film: Solution) -> None:
+    every = film.gradient()
+    assert {"U", "mu", "h_offset"} <= set(every)
+    assert film.gradient("load", "mu") == film.gradient(keys=["mu"]) == {"mu": every["mu"]}
+    assert film.coefficients().K.shape == (1, 1)
+    slow, fast = film.coefficients(frequency=[0.0, 1e4])
+    assert slow.K[0, 0] == film.coefficients(0.0).K[0, 0] != fast.K[0, 0]
+    with pytest.raises(InputError, match="numbers in rad/s are needed"):
+        film.coefficients(frequency="fast")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    "given, message",
+    [
+        ({"accuracy": "a"}, "accuracy = 'a': a number is needed"),
+        ({"method": 3}, "method = 3: a text is needed"),
+        ({"stopping": {"eps": 1.0}}, "stopping.eps: unknown; nearest is eps2; there are eps1, eps2, max_it"),
+        ({"start": 3}, "start = 3: a Solution is needed"),
+        ({"finest": -3}, "finest = -3: a tuple is needed"),
+    ],
+)
+def test_what_ask_may_be(given: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        solve("problem1", **given)
 
 
 def test_fields_are_arrays_in_si(film: Solution) -> None:
