@@ -4,22 +4,23 @@ The cycle is that of the film itself with its signs held, for J' transposed: the
 coarse points for the coarse grids' signs. Full points alone are corrected, as void follows from the sweeps, which go along the
 flow. Of J' a full point's residual goes where its pressure is interpolated from, nothing of a cavitated one's, and corrections
 are interpolated as the film's residuals are restricted. GMRES removes what the fronts leave, preconditioned from the left, so
-that the norm that it ends by is near the answer's error. How near is seen for J' by what l is for: l' (J z) = b' z of the
-solution z, and it is improved until that holds. Of the void that cells store a motion exp(i nu t) makes a part leave them, with
-another phase: a complex number.
+that the residual's norm is near the answer's error. That residual is what one more cycle would change: it is added at the end,
+and what it leaves told from what cycles have made of the basis. How near the answer is is seen for J' by what l is for:
+l' (J z) = b' z of the solution z, and it is improved until that holds. Of the void that cells store a motion exp(i nu t) makes
+a part leave them, with another phase: a complex number.
 """
 
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from petsc4py import PETSc
 
 from ...base.parallel import Array
 from .frozen_cycles import Cycles
 
-# Of J' less is asked: a derivative has about the relative error of lambda, 1e-7 beside the 1e-6 that is promised of it.
-RTOL, TRANSPOSED, MOST = 1e-9, 3e-8, 60
+# Of J' less is asked: a derivative's error is at most about lambda's relative one, and 1e-6 is promised of it.
+RTOL, TRANSPOSED, MOST = 1e-9, 2e-7, 60
+MANY = 10  # vectors that the basis has room for at first
 AGREES, LEAST = 1e-7, 1e-13  # l' (J z) and b' z, relative: cycles go on until they do, down to the least residual
 
 
@@ -62,51 +63,47 @@ class Frozen(Cycles):
         return (x[0] + 1j * x[1]) / scale if nu else x / scale
 
     def _gmres(self, b: Array, z: Array | None = None) -> Array | None:
-        """Of the free points, which z is zero beside; of J' until x' (J z) = b' z."""
-        sizes: Any = np.array([self.grid.reduce.norm(one) for one in b])
-        sizes = np.where(sizes > 0.0, sizes, 1.0) if self.passed[0][1] is None else np.hypot(*sizes) or 1.0
-        b = b / sizes.reshape(-1, 1)
-        sizes_of = (b.size, b.shape[0] * self.grid.size)
-        mat = PETSc.Mat().createPython((sizes_of, sizes_of), self, comm=self.grid.petsc_comm)
-        mat.setUp()
-        ksp = PETSc.KSP().create(self.grid.petsc_comm)
-        (x, rhs), (start, seen) = mat.createVecs(), mat.createVecs()
-        rtol, size = TRANSPOSED if self.transposed else RTOL, [0.0]
-
-        def ended(ksp: PETSc.KSP, its: int, norm: float) -> int:
-            size[0] = size[0] or norm
-            reason = PETSc.KSP.ConvergedReason
-            if not np.isfinite(norm) or its > MOST:
-                return int(reason.DIVERGED_MAX_IT)
-            if norm > rtol * size[0]:
-                return int(reason.ITERATING)
-            if z is None:
-                return int(reason.CONVERGED_RTOL)
-            answer = ksp.buildSolution(seen)
-            answer.axpy(1.0, start)
-            size[0] = min(size[0], answer.norm()) if its else size[0]
-            if norm <= rtol * size[0] and self._agree(answer.array_r.reshape(b.shape), b, z):
-                return int(reason.CONVERGED_RTOL)
-            return int(reason.ITERATING if norm > LEAST * size[0] else reason.DIVERGED_BREAKDOWN)
-
-        try:
-            ksp.setOperators(mat)
-            ksp.setType(PETSc.KSP.Type.GMRES)
-            ksp.getPC().setType(PETSc.PC.Type.NONE)
-            ksp.setConvergenceTest(ended)
-            if self.transposed and np.isfinite(first := self.nested(b)).all():
-                start.setArray(first)
-                size[0] = start.norm()  # nearly that of M b
-            self._put(self.c[0], b)
-            self.mult(mat, start, rhs)
-            rhs.scale(-1.0)  # M b - M J x of the start
-            self.c[0][:] = 0.0
-            ksp.solve(rhs, x)
-            x.axpy(1.0, start)
-            return x.array_r.reshape(b.shape) * sizes.reshape(-1, 1) if ksp.getConvergedReason() > 0 else None
-        finally:
-            for one in (ksp, mat, x, start, seen, rhs):
-                one.destroy()
+        """Of the free points, which z is zero beside; of J' until x' (J z) = b' z. None where cycles stall."""
+        norm, total, start = self.grid.reduce.norm, self.grid.comm.allreduce, np.zeros_like(b)
+        if self.transposed and np.isfinite(total(float(np.sum(nested := self.nested(b))))):
+            start = nested.reshape(b.shape)
+        sizes: Any = np.array([norm(one) or norm(asked) or 1.0 for one, asked in zip(start, b, strict=True)])
+        sizes = sizes.reshape(-1, 1) if self.passed[0][1] is None else np.hypot(*sizes)
+        b, start = b / sizes, (start / sizes).ravel()  # answers of one size, that both be as good
+        self._put(self.c[0], b)
+        V, H = np.empty((MANY, b.size)), np.zeros((MOST + 2, MOST + 1))
+        V[0] = self.change(start)
+        self.c[0][:] = 0.0
+        first, y, rtol = norm(V[0]), np.zeros(0), TRANSPOSED if self.transposed else RTOL
+        size, rest = norm(start) or first, np.array([first])  # of the answer; the residual in the basis V
+        if not np.isfinite(first):
+            return None
+        V[0] /= first or 1.0
+        for k in range(MOST + 1):
+            # One more cycle takes x to x + rest; what it leaves of `rest` is taken to be what it leaves of the basis at most.
+            left = np.linalg.norm(rest) * min(1.0, np.linalg.norm(np.eye(k + 1, k) - H[: k + 1, :k], 2) if k else 1.0)
+            if left <= rtol * size:
+                x = start + np.append(y, 0.0) @ V[: k + 1] + rest @ V[: k + 1]
+                size = min(size, norm(x))
+                if left <= rtol * size and (z is None or self._agree(x.reshape(b.shape), b, z)):
+                    return x.reshape(b.shape) * sizes
+                if left <= LEAST * size:
+                    return None
+            V = V if k + 1 < len(V) else np.concatenate([V, np.empty_like(V)])
+            w = V[k + 1]
+            np.negative(self.change(V[k]), out=w)
+            for _ in range(2 if k > 8 else 1):  # rounding has left long bases less orthogonal
+                part = total(V[: k + 1] @ w)
+                w -= part @ V[: k + 1]
+                H[: k + 1, k] += part
+            H[k + 1, k] = norm(w)
+            if not np.isfinite(H[k + 1, k]):
+                return None
+            w /= H[k + 1, k] or 1.0
+            target = np.append(first, np.zeros(k + 1))
+            y = np.linalg.lstsq(H[: k + 2, : k + 1], target, rcond=None)[0]
+            rest = target - H[: k + 2, : k + 1] @ y
+        return None
 
     def _agree(self, found: Array, b: Array, z: Array) -> bool:
         """Whether x' (J z) = b' z, each."""

@@ -2,7 +2,6 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from petsc4py import PETSc
 
 from ...base.parallel import Array
 from ...problems.film.lubrication import LubricationProblem
@@ -99,13 +98,14 @@ class Cycles:
                 return None
         return inverse if np.isfinite(inverse).all() else None
 
-    def mult(self, mat: PETSc.Mat | None, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """What a cycle takes away of an error x, or adds to -x: M J x or M J' x where `c` is zero, less M c where it is not."""
-        self._put(self.z[0], x.array_r)
+    def change(self, x: Array) -> Array:
+        """What a cycle adds to x: M (c - J x), or M (c - J' x)."""
+        self._put(self.z[0], x)
         self._run(0, "F")
         self.work += self.several
-        self._own(self.z[0], y.array)
-        np.subtract(x.array_r, y.array, out=y.array)
+        out = self._own(self.z[0])
+        out -= x
+        return out
 
     def _put(self, into: Array, values: Array) -> None:
         for one, part in zip(into, values.reshape(self.several, -1), strict=True):
