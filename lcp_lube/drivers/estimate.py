@@ -223,8 +223,8 @@ def misplaced_film(problem: Problem) -> float:
         face = around[:-1] + 0.5 * meshes
         across = 1 - side
         alike = side == 0 and level(problem.film) and not jumps_of(problem.film, "y")  # one line is as good as all
-        count = 1 if grid.dim == 1 or alike else LINES
-        lines = np.zeros(1) if grid.dim == 1 else grid.origin[across] + (np.arange(count) + 0.5) * (grid.lengths[across] / count)
+        places = (np.arange(count := 1 if alike else LINES) + 0.5) / count
+        lines = np.zeros(1) if grid.dim == 1 else grid.origin[across] + places * grid.lengths[across]
         film = [
             np.broadcast_to(problem.film(*((at[None, :], lines[:, None])[:: 1 - 2 * side])), (lines.size, at.size))
             for at in (fine, face)

@@ -51,13 +51,13 @@ def rungs_up(estimates: Sequence[float], tol: float, known: bool, dim: int, pair
     (of three grids, or of one whose error is known) falls by second order; of several at most JUMP doublings of the points a
     side.
 
-    pairs : two grids give an estimate, best with half the spacing on the second.
+    pairs : two grids give an estimate, best with half the spacing on the second; a rung short is a grid more.
     """
     if pairs and not (len(estimates) >= 2 and estimates[-1] < ASYMPTOTIC):
         return dim
     if not (known or pairs or len(estimates) >= 3) or not estimates[-1] < ASYMPTOTIC:
         return 1
-    up = max(1, ceil(0.5 * dim * log2(estimates[-1] / tol) - NEARLY))
+    up = max(1, ceil(0.5 * dim * log2(estimates[-1] / tol) - NEARLY * (not pairs)))
     return up if known else min(up, dim * JUMP)
 
 

@@ -10,7 +10,7 @@ from lcp_lube.base.quantity import quantity
 from lcp_lube.scenes.scene import load_scene
 from lcp_lube.scenes.values import unit_of, values_of, with_values
 
-# Those without logarithms or formulas in metres, and without named oils.
+# Those without formulas in metres, and without named oils.
 SCENES = {
     "problem1": {"n": 40},
     "pocketed_pad": {"n": 37},
@@ -23,6 +23,7 @@ SCENES = {
     "herringbone_journal": {"nx": 120, "ny": 19},
     "tapered_land": {"nx": 17, "ny": 11},
     "step_thrust": {"nx": 17, "ny": 11},
+    "spiral_groove": {"nx": 20, "ny": 24},
     "tilting_pad_journal": {"nx": 72, "ny": 5, "eccentricity": 0.3, "balance": None},
 }
 UNITLESS = {"speed_rpm": (0, 0, -1)}  # by names that tell their unit

@@ -179,7 +179,8 @@ class Herringbone:
 class SpiralGrooves:
     """`count` logarithmic spirals on a full turn, of a depth, between two radii; inclined by `angle` (rad) against the motion.
 
-    They pump inwards, and outwards where the angle is negative. polar : radius at y = 0, and that on which x is measured, m.
+    They pump inwards, and outwards where the angle is negative. polar : radius at y = 0 (there a groove begins at x = 0), and
+    that on which x is measured, m.
     """
 
     depth: float
@@ -193,7 +194,8 @@ class SpiralGrooves:
 
     def __call__(self, x: Array, y: Array) -> Array:
         theta, r = x / self.polar[1], self.polar[0] + y
-        phase = np.remainder(((theta + np.log(r) / np.tan(self.angle)) / (2.0 * np.pi) + EDGE) * self.count, 1.0)
+        turns = (theta + np.log(r / self.polar[0]) / np.tan(self.angle)) / (2.0 * np.pi)
+        phase = np.remainder((turns + EDGE) * self.count, 1.0)
         return np.where((phase < self.ratio) & _within(r, *self.between), self.depth, 0.0)
 
     def jumps(self, axis: str) -> tuple[float, ...]:
