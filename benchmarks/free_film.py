@@ -89,7 +89,7 @@ def evaluated(rho: Any, weights: Any) -> tuple[float, Any]:
     if not solution.converged:
         raise SystemExit(f"free film: {solution.message}")
     adjoint = Adjoint(scene, solution, ["load"])
-    slope = FilmGradient(adjoint, None).field("load") * areas(solution.problem.grid)
+    slope = FilmGradient(adjoint).field("load") * areas(solution.problem.grid)
     load = solution.load
     adjoint.destroy()
     solution.destroy()

@@ -36,7 +36,7 @@ def timed(task: Callable[[], Any]) -> tuple[float, Any]:
 def steady(scene: Any, key: str) -> list[float]:
     def all_films(solution: Any) -> None:
         adjoint = Adjoint(scene, solution, ["load"])
-        FilmGradient(adjoint, None).field("load")
+        FilmGradient(adjoint).field("load")
         adjoint.destroy()
 
     seconds, solution = timed(lambda: solve(scene))

@@ -47,6 +47,14 @@ class Reduce:
     def sum(self, a: NDArray) -> float:
         return self.comm.allreduce(float(np.sum(a)))
 
+    def summed(self, own: float, terms: Callable[[], Array]) -> float:
+        """The sum of what is this rank's; terms : the part of each of its points, for those who ask (`drivers.tape`)."""
+        return self.comm.allreduce(own)
+
+    def through(self, field: Any) -> Any:
+        """What makes a field of a field, every point's of those of all: a symmetric map, or a solver with its `mat`."""
+        return field
+
     def dot(self, a: Array, b: Array) -> float:
         return self.comm.allreduce(float(np.dot(a, b)))
 

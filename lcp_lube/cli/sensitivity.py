@@ -9,11 +9,9 @@ from typing import Any
 from ..api import solve
 from ..base.options import check_unread
 from ..base.progress import Line
-from ..drivers.adjoint import Adjoint
 from ..drivers.ask import Ask
-from ..drivers.film_gradient import FilmGradient
 from ..drivers.goal_error import finer_shape, goal_error
-from ..drivers.gradient import Gradient, check, gradients
+from ..drivers.gradient import Gradient, check, film_fields, gradients
 from ..drivers.march_course import Trace
 from ..errors import InputError
 from ..output import files, sensitivity
@@ -126,12 +124,7 @@ def pictures(args: argparse.Namespace, scene: Scene, solution: Solution, found: 
     if not (args.plot or args.output):
         return
     names = [one.quantity for one in found]
-    adjoint = Adjoint(scene, solution, names)
-    try:
-        film = FilmGradient(adjoint, solution.settings.get("balance"))
-        fields = {name: film.field(name) for name in (names if args.output else names[:1])}
-    finally:
-        adjoint.destroy()
+    fields = film_fields(scene, solution, names if args.output else names[:1])
     if args.plot:
         sensitivity.plot(found[0], solution, fields[names[0]], args.plot)
     if args.output:

@@ -261,6 +261,19 @@ class Implicit:
         by_found = {name: np.array([one[name] for one in slopes]) for name in adjoint.lambdas}
         return cls(adjoint.found, conditions, inverse, by_found)
 
+    def weights(self, quantity: str) -> dict[str, float]:
+        """Of the derivatives of each L by something, in what the quantity changes by where v follows."""
+        out = {} if quantity in self.found else {quantity: 1.0}
+        if self.found:
+            change = (
+                -self.inverse[self.found.index(quantity)]
+                if quantity in self.found
+                else -self.by_found[quantity] @ self.inverse
+            )
+            for name, part in zip(self.conditions, change, strict=True):
+                out[name] = out.get(name, 0.0) + float(part)
+        return out
+
     def total(self, quantity: str, key: str, slope: dict[str, float]) -> float:
         """dQ/da from the derivatives of every L by a."""
         if not self.found:

@@ -23,6 +23,7 @@ from ..problems.film.edges import oblique
 from ..problems.film.forces import PIVOT, totals
 from ..problems.film.grooves import GroovedProblem
 from ..problems.film.supplies import Supply, supply_flows
+from ..problems.film.turned import TurnedProblem
 from ..problems.solution import Solution
 from ..scenes.scene import Scene
 from ..scenes.values import values_of, with_values
@@ -58,6 +59,8 @@ class CoupledGradient(CoupledResponse):
     def __init__(self, scene: Scene, solution: Solution, quantities: Sequence[str], flip: bool = False):
         if not solution.converged:
             raise InputError(f"{scene.name}: {solution.outcome.sentence}: no solution, no derivatives")
+        if isinstance(solution.problem, TurnedProblem):
+            raise InputError(f"{scene.name}: its wall moves to smaller x: derivatives through effects are of the mirror image, with -U")
         self.scene: Any = placed(scene, solution)
         super().__init__(self.scene, solution, [], flip)
         self.found, self.conditions = conditions_of(scene, solution)
@@ -78,11 +81,11 @@ class CoupledGradient(CoupledResponse):
     def value(self, key: str) -> float:
         return values_of(self.scene)[key]
 
-    def _numbers(self, loop: Loop, z: Array, x: Array) -> dict[str, float]:
-        """What is told of a state, vectors by their parts."""
-        at = self._answer(z, x, loop.base, loop)
+    def _numbers(self, loop: Loop, z: Array, x: Array, base: Any = None) -> dict[str, float]:
+        """What is told of a state, vectors by their parts; base : a film near the loop's own."""
+        at = self._answer(z, x, base or loop.base, loop)
         if self.free:
-            held, highest = at.problem.held, loop.base.reduce.max
+            held, highest = at.problem.held, at.problem.reduce.max
             P = [highest(np.where(self._owner == k, at.p, -np.inf)) for k in range(len(self.supplies))]
             supplies = tuple(replace(one, p=p) for one, p in zip(held.supplies, P, strict=True))  # type: ignore[union-attr]
             at.problem.held = replace(held, supplies=supplies)  # type: ignore[type-var]

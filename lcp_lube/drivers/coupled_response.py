@@ -172,28 +172,10 @@ class CoupledResponse:
                     y[n:] -= self._along(np.concatenate([z, 0.0 * y[n:]]))[0][n:]  # what the effects make of the film's answer
                 out.setArray(done.ravel())
 
-        sizes = (len(parts) * size, None)
-        mat = PETSc.Mat().createPython((sizes, sizes), Whole(), comm=comm)
-        mat.setUp()
-        ksp = PETSc.KSP().create(comm)
-        ksp.setOptionsPrefix("coupled_response_")
-        ksp.setOperators(mat)
-        ksp.setType("gmres")
-        ksp.setGMRESRestart(RESTART)
-        ksp.setTolerances(rtol=RTOL, atol=0.0, max_it=MOST)
-        pc = ksp.getPC()
-        pc.setType("python")
-        pc.setPythonContext(Film())
-        ksp.setFromOptions()
-        v, rhs = mat.createVecs()
-        rhs.setArray(np.concatenate(parts))
-        ksp.solve(rhs, v)
-        found, reason = v.array_r.reshape(len(parts), size).copy(), ksp.getConvergedReason()
-        for obj in (v, rhs, ksp, mat):
-            obj.destroy()
+        found, reason = krylov(comm, np.concatenate(parts), Whole(), Film(), RTOL)
         if reason < 0:
             raise NotFound(f"coefficients: the linearised effects were not solved (GMRES ended with {reason})")
-        return found[0] if nu == 0.0 else found[0] + 1j * found[1]
+        return found if nu == 0.0 else found[:size] + 1j * found[size:]
 
     @cached_property
     def _slow(self) -> list[Array]:
@@ -240,6 +222,29 @@ class CoupledResponse:
         """Free the PETSc objects. Collective."""
         self._linear.destroy()
         self.loop.base.destroy()
+
+
+def krylov(comm: PETSc.Comm, b: Array, whole: Any, nearly: Any, rtol: float) -> tuple[Array, int]:
+    """GMRES with a linear map and one that nearly inverts it (`mult`, `apply`): what it finds, and how it ends. Collective."""
+    mat = PETSc.Mat().createPython(((b.size, None), (b.size, None)), whole, comm=comm)
+    mat.setUp()
+    ksp = PETSc.KSP().create(comm)
+    ksp.setOptionsPrefix("coupled_response_")
+    ksp.setOperators(mat)
+    ksp.setType("gmres")
+    ksp.setGMRESRestart(RESTART)
+    ksp.setTolerances(rtol=rtol, atol=0.0, max_it=MOST)
+    pc = ksp.getPC()
+    pc.setType("python")
+    pc.setPythonContext(nearly)
+    ksp.setFromOptions()
+    v, rhs = mat.createVecs()
+    rhs.setArray(b)
+    ksp.solve(rhs, v)
+    found, reason = v.array_r.copy(), ksp.getConvergedReason()
+    for obj in (v, rhs, ksp, mat):
+        obj.destroy()
+    return found, reason
 
 
 def _slopes(ends: Sequence[Changes], width: float) -> Changes:

@@ -44,7 +44,7 @@ def areas(grid: Grid) -> Array:
 class FilmGradient:
     """dQ/dh of an adjoint's quantities. Collective, as its method."""
 
-    def __init__(self, adjoint: Adjoint, balance: dict[str, Any] | None):
+    def __init__(self, adjoint: Adjoint):
         self.adjoint, eq = adjoint, adjoint.equations
         film: Any = Mirrored(adjoint.scene) if eq.turned else adjoint.scene
         model = Frozen(film, eq.law).constant if eq.law else film.model
@@ -70,21 +70,16 @@ class FilmGradient:
 
         A change of the film by dh(x, y) changes Q by the sum over the points of dQ/dh dh times their `areas`.
         """
-        adjoint, eq, implicit = self.adjoint, self.adjoint.equations, self.implicit
-        weights = {quantity: 1.0} if quantity not in adjoint.found else {}
-        if implicit.found:
-            if quantity in adjoint.found:
-                row = -implicit.inverse[implicit.found.index(quantity)]
-            else:
-                row = -implicit.by_found[quantity] @ implicit.inverse
-            for name, factor in zip(implicit.conditions, row, strict=True):
-                weights[name] = weights.get(name, 0.0) + float(factor)
+        adjoint, eq = self.adjoint, self.adjoint.equations
         total = np.zeros(eq.grid.box)
-        for name, factor in weights.items():
+        for name, factor in self.implicit.weights(quantity).items():
             total = total + factor * self._lagrangian(name)
         out = total.ravel() / areas(eq.grid)
         reported = adjoint.reported
         return reported.here({"h": out})["h"] if isinstance(reported, TurnedProblem) else out
+
+    def destroy(self) -> None:
+        """Nothing of its own."""
 
     def _lagrangian(self, name: str) -> Array:
         """Of one L by the film at each point: by what the balance has, and by what the number itself has."""

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from ..base.parallel import Array
 from ..errors import InputError
 from ..problems.solution import Solution
 from ..scenes.grooved import GroovedJournalScene
@@ -25,8 +26,10 @@ from .adjoint import Adjoint, Implicit
 from .coefficients import placed, scene_of
 from .coupled_gradient import CoupledGradient
 from .equations import check_film
+from .film_gradient import FilmGradient
 from .march_course import Trace, check_march
 from .march_gradient import MarchGradient
+from .transposed import CoupledFilm
 
 BY_STEPS = "no derivative on this grid: it changes by steps, whose mean slope is another over other widths"
 STEPWISE = "the lines of points go with the edges of grooves, and their number between two by steps"
@@ -120,9 +123,21 @@ def check(scene: Scene, film: bool = False) -> None:
         check_march(scene)
     else:
         check_film(scene)
-    if film and (motion_of(scene) is not None or _coupled(scene)):
-        what = "of films with effects" if motion_of(scene) is None else "in time"
-        raise InputError(f"scene {scene.name}: dQ/dh at every point is not known {what}: leave --plot and --output out")
+    if film and motion_of(scene) is not None:
+        raise InputError(f"scene {scene.name}: dQ/dh at every point is not known in time: leave --plot and --output out")
+
+
+def film_fields(scene: Scene, solution: Solution, quantities: Sequence[str]) -> dict[str, Array]:
+    """dQ/dh by quantity at the owned points of the solution's grid, per area. Collective."""
+    adjoint: Any = (CoupledGradient if _coupled(scene) else Adjoint)(scene, solution, quantities)
+    film: Any = None
+    try:
+        film = CoupledFilm(adjoint) if _coupled(scene) else FilmGradient(adjoint)
+        return {name: film.field(name) for name in quantities}
+    finally:
+        if film is not None:
+            film.destroy()
+        adjoint.destroy()
 
 
 def _stepwise(scene: Any) -> tuple[str, ...]:

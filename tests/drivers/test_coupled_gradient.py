@@ -1,10 +1,16 @@
 """Derivatives of films with effects by the implicit function: differences of solves, Taylor's test, bad input."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from lcp_lube import load_scene, solve
-from lcp_lube.drivers.gradient import gradients
+from lcp_lube.drivers.coupled_gradient import CoupledGradient
+from lcp_lube.drivers.film_gradient import areas
+from lcp_lube.drivers.gradient import film_fields, gradients
+from lcp_lube.drivers.transposed import CoupledFilm
+from lcp_lube.problems.film.views import LiftedFilm
 from lcp_lube.scenes.values import values_of, with_values
 
 TIGHT = {"eps1": 1e-11, "max_it": 200}
@@ -80,7 +86,52 @@ def test_taylor():
     assert np.log2(np.array(left[:-1]) / left[1:]) == pytest.approx(2.0, abs=0.1)
 
 
-def test_the_command_on_ranks_and_bad_input(cli):
+PAD = {"nx": 13, "ny": 11, "fluid.barus": 0.0}
+HEAT = {"temperature": {"beta": 0.02, "T_in": 320.0, "model": "effective"}, "roelands": {"z": 0.6}}
+SOFT = {"half_space": {"E_reduced": 2e10}, "asperity": {"sigma": 5e-6, "E_reduced": 1e11}}
+FED = {**RECESSES, "nx": 25, "ny": 5, "attitude_deg": 20.0, "temperature": {"oil": "ISO VG 32", "T_in": 313.0}}
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "key", "quantities"),
+    [
+        ("lined_pad", {"n": 24}, "h_offset", ["load", "p_max", "friction", "temperature_max"]),
+        ("pocketed_pad_2d", {**PAD, **HEAT}, "h_offset", ["friction", "flow_east", "temperature_out"]),
+        ("pocketed_pad_2d", {**PAD, **SOFT}, "h_offset", ["load", "asperity_load"]),
+        ("hybrid_journal", FED, "clearance", ["load", "supply_flow_2"]),
+    ],
+)
+def test_the_films_own_derivative(name, changes, key, quantities):
+    """Of a film that is thicker everywhere, or in proportion; pressures of supplies follow."""
+    scene = load_scene(name, changes)
+    with answer(scene) as solution:
+        fields, problem = film_fields(scene, solution, quantities), solution.problem
+        dh = 1.0 if key == "h_offset" else problem.scheme.h.ravel() / scene.clearance
+        for one in gradients(scene, solution, quantities, [key]):
+            changed = float(np.sum(fields[one.quantity] * dh * areas(problem.grid)))
+            assert changed == pytest.approx(one.gradient[key], rel=1e-6), one.quantity
+
+
+def test_of_a_film_with_effects_that_is_changed_here_and_there():
+    """By what equations and numbers change by along a film's change that is another at each point, and one solve with it."""
+    scene, names = load_scene("lined_pad", n=24), ["load", "friction", "temperature_max"]
+    with answer(scene) as solution:
+        gradient = CoupledGradient(scene, solution, names)
+        base, model = gradient.loop.base, gradient.loop.frozen.constant
+        grid, here = base.grid, (np.zeros(gradient.n), gradient.x)
+        dh, R, told = np.cos(np.arange(24.0)) * 1e-5 * base.scheme.h.min(), [], []
+        for d in (dh, -dh):
+            film = replace(model, gap=LiftedFilm.of(model.gap, grid, d)).build(grid.shape, grid.petsc_comm, grid)
+            R.append(gradient._system(*here, film)[0])
+            told.append(gradient._numbers(gradient.loop, *here, film))
+        along = gradient._numbers_along(gradient._settled(0.5 * (R[1] - R[0]), 0.0, 0.0))[0]
+        film = CoupledFilm(gradient)
+        for name in names:
+            expected = along[name] + 0.5 * (told[0][name] - told[1][name])
+            assert np.dot(film.field(name) * areas(grid), dh) == pytest.approx(expected, rel=1e-6)
+
+
+def test_the_command_on_ranks_and_bad_input(cli, tmp_path):
     words = (
         "sensitivity",
         "lined_pad",
@@ -90,6 +141,8 @@ def test_the_command_on_ranks_and_bad_input(cli):
         "load,temperature_max",
         "--by",
         "U,temperature.T_in",
+        "--output",
+        tmp_path / "film.npz",
         "--json",
     )
     found = cli(*words, ranks=2).json
@@ -97,6 +150,8 @@ def test_the_command_on_ranks_and_bad_input(cli):
     scene = load_scene("lined_pad", n=40)
     with solve(scene) as solution:
         both = gradients(scene, solution, ["load", "temperature_max"], ["U", "temperature.T_in"])
+        field = film_fields(scene, solution, ["load"])["load"]
+    assert np.load(tmp_path / "film.npz")["dload_dh"] == pytest.approx(field, rel=1e-6, abs=1e-8 * np.abs(field).max())
     for one, told in zip(both, (found, *found["others"]), strict=True):
         assert told["gradient"] == pytest.approx(one.gradient, rel=1e-6)
     refused = cli("sensitivity", "lined_pad", "--n", "40", "--quantity", "temperature_least")

@@ -196,7 +196,7 @@ def test_the_films_own_derivative(name):
     scene, solution = solved(name)
     report = ["load", "friction", "p_max", "flow_west"]
     adjoint = Adjoint(scene, solution, report)
-    film = FilmGradient(adjoint, None)
+    film = FilmGradient(adjoint)
     grid = adjoint.equations.grid
     for name, one in zip(report, gradients(scene, solution, report, ["h_offset"]), strict=True):
         lifted = grid.reduce.dot(film.field(name), areas(grid))
@@ -223,7 +223,7 @@ def test_the_scaling_law(name):
     """Without pressures at the sides p goes with mu U L/h^2: the sum of h dQ/dh is -2 loads, by keys and in the field."""
     scene, solution = solved(name, **({"p_side": 0.0, "n": 60} if name == "problem4" else {}))
     adjoint = Adjoint(scene, solution, ["load"])
-    field, grid = FilmGradient(adjoint, None).field("load"), adjoint.equations.grid
+    field, grid = FilmGradient(adjoint).field("load"), adjoint.equations.grid
     total = grid.reduce.sum(field * areas(grid) * solution.problem.scheme.h.ravel())
     assert total == pytest.approx(-2.0 * solution.load, rel=1e-2)
     (one,) = gradients(scene, solution, ["load"])

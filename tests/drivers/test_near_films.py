@@ -66,6 +66,6 @@ def test_the_film_s_own_derivative_is_that_of_its_arrays(monkeypatch, name):
         for least in (1, 10**9):
             monkeypatch.setattr(film_gradient, "SMALL", least)
             adjoint = Adjoint(scene, solution, ["load"])
-            fields.append(FilmGradient(adjoint, None).field("load"))
+            fields.append(FilmGradient(adjoint).field("load"))
             adjoint.destroy()
     assert fields[0] == pytest.approx(fields[1], abs=1e-12 * np.abs(fields[1]).max())

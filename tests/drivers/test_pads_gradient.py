@@ -94,7 +94,7 @@ def test_the_films_own_derivative():
     scene = load_scene("tilting_pad_thrust", THRUST)
     with answer(scene) as solution:
         adjoint = Adjoint(scene, solution, ["p_max", "h_min"])
-        film = FilmGradient(adjoint, None)
+        film = FilmGradient(adjoint)
         grid = adjoint.equations.grid
         lifted = {name: grid.reduce.dot(film.field(name), areas(grid)) for name in ("p_max", "h_min")}
         adjoint.destroy()

@@ -187,7 +187,8 @@ def heated(
     entries = [(0, 0, diagonal)]
     for (dj, di), a, near in list(zip(offsets, enters, inside, strict=True))[: 2 * grid.dim]:
         entries.append((dj, di, np.where(still, 0.0, -rho_c * a * near)))
-    solver = _Transport(assemble(grid, entries))
+    transport = _Transport(assemble(grid, entries))
+    solver = reduce.through(transport)
     heat = np.where(still, 0.0, flow.dissipation + np.where(free, more, 0.0) + H * wall + rho_c * flow.kept).ravel()
     left = reduce.sum(np.where(free & still, np.maximum(flow.dissipation, 0.0), 0.0))
     nowhere = left > STILL * reduce.sum(np.abs(flow.dissipation))  # heat that no liquid carries away
@@ -210,7 +211,7 @@ def heated(
         else:
             mixed = np.zeros(0)
     finally:
-        solver.destroy()
+        transport.destroy()
     T = theta.reshape(grid.box)
     edge = _over_edge(flow, inside)
     on = [float(back) * reduce.sum(into) for (_, into, _), back in zip(mixers, mixed, strict=True)]  # goes on with the oil
@@ -291,6 +292,16 @@ class _Transport:
         for obj in (x, b):
             obj.destroy()
         return values, float(residual)
+
+    def transposed(self, b: Array) -> Array:
+        """The solution with the transpose, where the flow is followed back. Collective."""
+        x, rhs = self.mat.createVecs()
+        rhs.setArray(b)
+        self.ksp.solveTranspose(rhs, x)
+        values = x.array_r.copy()
+        for obj in (x, rhs):
+            obj.destroy()
+        return values
 
     def destroy(self) -> None:
         self.ksp.destroy()

@@ -13,7 +13,7 @@ from ..grid import Grid
 from ..strips import MANY, each_strip, places_of
 from .cavity import cavitated
 from .edges import Around, strips
-from .reynolds import BoxScheme, sides
+from .reynolds import BoxScheme, placed, sides
 from .strip import line_weights, stream_weights
 
 if TYPE_CHECKING:
@@ -49,11 +49,15 @@ def side_flows(problem: LubricationProblem, p: Array, r: Array) -> dict[str, flo
         return {"west": -0.5 * west, "east": 0.5 * east}
     at_west, at_east, *at_ends = sides(grid)
     leaving = problem.leaving(r)
-    total = lambda flows: s.flow_unit * problem.reduce.sum(flows)  # noqa: E731
+    first, last = (slice(None), slice(0, 1)), (slice(None), slice(-1, None))
+
+    def total(at: Any, flows: Array) -> float:
+        return s.flow_unit * problem.reduce.summed(float(np.sum(flows)), lambda: placed(flows, at, grid.box))
+
     strips = [  # enters at the west, leaves at the east
         (
-            0.5 * rim * total(np.where(at_west[:, :1] & end, s.couette_W[:, :1] / lines, 0.0)),
-            0.5 * rim * total(np.where(at_east[:, -1:] & end, leaving / lines, 0.0)),
+            0.5 * rim * total(first, np.where(at_west[:, :1] & end, s.couette_W[:, :1] / lines, 0.0)),
+            0.5 * rim * total(last, np.where(at_east[:, -1:] & end, leaving / lines, 0.0)),
         )
         for end, rim in zip(at_ends, grid.rims(1), strict=True)
     ]
@@ -93,7 +97,7 @@ def friction(problem: LubricationProblem, p_pa: Array, r: Array, lever: Array | 
         of_film = _drag_sum(problem, p_pa, r, lever)
     else:
         of_film = sum(each_strip(grid, add_up)) if alone else add_up(slice(0, grid.box[0]))
-    of_film = problem.reduce.sum(np.array([of_film]))
+    of_film = problem.reduce.summed(float(of_film), lambda: sum(drag(problem, s, p_pa.ravel(), r.ravel())) * lever)
     return of_film if problem.contact is None else of_film + problem.contact.drag(problem, lever)
 
 

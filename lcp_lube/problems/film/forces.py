@@ -171,10 +171,17 @@ def integrals(problem: LubricationProblem, p_pa: Array, asked: Sequence[tuple[fl
                 inside[k] += np.einsum("i,ij->j", lines, own * w) @ along
         return inside
 
+    cells = lambda: stream_weights(grid) * grid.widths(0)  # noqa: E731
     inside: Array = sum(each_strip(grid, add_up))
     return [
-        float(grid.cell * (problem.reduce.sum(np.array([part])) + _in_rims(problem, above, weight)))
-        for part, (above, weight) in zip(inside, asked, strict=True)
+        float(
+            grid.cell
+            * (
+                problem.reduce.summed(float(part), lambda one=one: (p - one[0]) * one[1](grid.x, grid.y) * cells())
+                + _in_rims(problem, *one)
+            )
+        )
+        for part, one in zip(inside, asked, strict=True)
     ]
 
 

@@ -21,7 +21,7 @@ from .certify import certify
 from .exact import ExactSolution
 from .integrals import LineIntegrals
 from .quantities import open_pressures, quantities, units
-from .reynolds import BoxScheme, side_points, sides
+from .reynolds import BoxScheme, placed, side_points, sides
 from .supplies import Held, Supply, pressed
 from .turning import Shaft
 from .views import LiftedFilm
@@ -192,12 +192,14 @@ class LubricationProblem:
         p, r = p.reshape(box), r.reshape(box)
         p_W, p_E, p_S, p_N = (side / self.p_unit for side in self.p_sides)
         west, east, south, north = side_points(self.grid)
-        total = lambda flows: s.flow_unit * self.reduce.sum(flows)  # noqa: E731
+        total = lambda at, flows: s.flow_unit * self.reduce.summed(  # noqa: E731
+            float(np.sum(flows)), lambda: placed(flows, at, box)
+        )
         return (
-            total(s.couette_W[west] + s.k_W[west] * (p_W - p[west])),
-            total(self.leaving(r)[:, : r[east].shape[1]] + s.k_E[east] * (p[east] - p_E)),
-            total(s.k_S[south] * (p_S - p[south])),
-            total(s.k_N[north] * (p[north] - p_N)),
+            total(west, s.couette_W[west] + s.k_W[west] * (p_W - p[west])),
+            total(east, self.leaving(r)[:, : r[east].shape[1]] + s.k_E[east] * (p[east] - p_E)),
+            total(south, s.k_S[south] * (p_S - p[south])),
+            total(north, s.k_N[north] * (p[north] - p_N)),
         )
 
     def leaving(self, r: Array) -> Array:
