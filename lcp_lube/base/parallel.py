@@ -51,6 +51,10 @@ class Reduce:
         """The sum of what is this rank's; terms : the part of each of its points, for those who ask (`drivers.tape`)."""
         return self.comm.allreduce(own)
 
+    def of_some(self, values: NDArray, at: Any, box: tuple[int, int]) -> float:
+        """The sum over some points: at, in an array of shape box of all."""
+        return self.sum(values)
+
     def through(self, field: Any) -> Any:
         """What makes a field of a field, every point's of those of all: a symmetric map, or a solver with its `mat`."""
         return field

@@ -266,9 +266,7 @@ class Implicit:
         out = {} if quantity in self.found else {quantity: 1.0}
         if self.found:
             change = (
-                -self.inverse[self.found.index(quantity)]
-                if quantity in self.found
-                else -self.by_found[quantity] @ self.inverse
+                -self.inverse[self.found.index(quantity)] if quantity in self.found else -self.by_found[quantity] @ self.inverse
             )
             for name, part in zip(self.conditions, change, strict=True):
                 out[name] = out.get(name, 0.0) + float(part)

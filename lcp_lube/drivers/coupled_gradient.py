@@ -60,7 +60,9 @@ class CoupledGradient(CoupledResponse):
         if not solution.converged:
             raise InputError(f"{scene.name}: {solution.outcome.sentence}: no solution, no derivatives")
         if isinstance(solution.problem, TurnedProblem):
-            raise InputError(f"{scene.name}: its wall moves to smaller x: derivatives through effects are of the mirror image, with -U")
+            raise InputError(
+                f"{scene.name}: its wall moves to smaller x: derivatives through effects are of the mirror image, with -U"
+            )
         self.scene: Any = placed(scene, solution)
         super().__init__(self.scene, solution, [], flip)
         self.found, self.conditions = conditions_of(scene, solution)

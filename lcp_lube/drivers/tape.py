@@ -57,6 +57,11 @@ class Tape(Reduce):
     def summed(self, own: float, terms: Callable[[], Array]) -> float:
         return float(self._next(lambda: super(Tape, self).summed(own, terms), self._points(terms())))
 
+    def of_some(self, values: NDArray, at: Any, box: tuple[int, int]) -> float:
+        whole = np.zeros(box)
+        whole[at] = values
+        return self.sum(whole)
+
     def norm(self, *arrays: Array) -> float:
         return float(self._next(lambda: super(Tape, self).norm(*arrays), None))
 
@@ -85,7 +90,7 @@ class Tape(Reduce):
         def solved(heat: Array) -> tuple[Array, float]:
             """By the equations mat T = heat: how far they are from holding, T held."""
             x, b = field.mat.createVecs()
-            T = self._next(lambda: field(heat)[0], None, lambda w: -kept.transposed(w))
+            T = self._next(lambda: field(heat)[0], None, lambda w: -kept(w, transposed=True)[0])
             x.setArray(T)
             field.mat.mult(x, b)
             self.made[-1] = b.array_r - heat

@@ -5,8 +5,8 @@ With R(y; h) = 0 all equations (`coupled_gradient`), one transposed solve a quan
     R_y' lambda = Q_y,      dQ/dh = Q_h - R_h' lambda.
 
 What is not local in them stands on a `tape`, as inputs g and what these are made of. All else is of a point and its neighbours
-around it, so that points of one colour, no two of which have a neighbour in common, are changed together: central differences,
-as many as there are colours and fields. The film's change is bilinear between points, their mean at faces as in `film_gradient`.
+around it: points of one colour, no two of which have a neighbour in common, are changed together, for central differences. The
+film's change is bilinear between points, their mean at faces as in `film_gradient`.
 """
 
 from collections.abc import Callable, Iterator
@@ -58,8 +58,8 @@ class Local:
     def transposed(self, w: Any) -> Array:
         """The product of the transpose with a field. Collective."""
         out = np.zeros(self.grid.box)
-        for mask, slope in self.by:
-            a = (slope * w).reshape(self.grid.box)
+        for mask, change in self.by:
+            a = (change * w).reshape(self.grid.box)
             for axis in range(self.grid.dim):
                 framed = self.grid.ghosted(a.ravel(), outside=0.0)
                 a = a + (framed[1:-1, :-2] + framed[1:-1, 2:] if axis == 0 else framed[:-2, 1:-1] + framed[2:, 1:-1])
@@ -78,6 +78,7 @@ class CoupledFilm:
         self.film = self._taped(loop.base)
         self.implicit = Implicit.of(gradient)
         self.names = gradient.names
+        self.first = 0  # of the tape, what numbers ask for
         self.begun = self._evaluated()
         self.blocks: dict[Place, dict[Place, Any]] = {}  # of each output by the inputs
         self.numbers: dict[str, Weights] = {name: {} for name in [*self.names, *self._taken]}
@@ -219,7 +220,7 @@ class CoupledFilm:
                 if isinstance(block, Local):
                     part: Any = block.transposed(w)
                 else:
-                    part = self.reduce.dot(w, block) if np.ndim(w) and place[0] == "tape" else w * block
+                    part = self.reduce.dot(w, block) if np.ndim(w) else w * block
                 total[place] = total.get(place, 0.0) + part
 
         for k, row in enumerate(() if rows is None else np.split(rows, self.count)):

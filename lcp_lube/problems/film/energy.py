@@ -187,8 +187,7 @@ def heated(
     entries = [(0, 0, diagonal)]
     for (dj, di), a, near in list(zip(offsets, enters, inside, strict=True))[: 2 * grid.dim]:
         entries.append((dj, di, np.where(still, 0.0, -rho_c * a * near)))
-    transport = _Transport(assemble(grid, entries))
-    solver = reduce.through(transport)
+    solver = reduce.through(transport := _Transport(assemble(grid, entries)))
     heat = np.where(still, 0.0, flow.dissipation + np.where(free, more, 0.0) + H * wall + rho_c * flow.kept).ravel()
     left = reduce.sum(np.where(free & still, np.maximum(flow.dissipation, 0.0), 0.0))
     nowhere = left > STILL * reduce.sum(np.abs(flow.dissipation))  # heat that no liquid carries away
@@ -280,28 +279,18 @@ class _Transport:
         pc.setType("ilu" if mat.comm.getSize() == 1 else "bjacobi")
         self.ksp.setFromOptions()
 
-    def __call__(self, heat: Array) -> tuple[Array, float]:
-        """The solution, and its residual in parts of the right-hand side. Collective."""
+    def __call__(self, heat: Array, transposed: bool = False) -> tuple[Array, float]:
+        """The solution, and its residual in parts of the right-hand side; transposed : that up the flow. Collective."""
         x, b = self.mat.createVecs()
         b.setArray(heat)
         size = b.norm()
-        self.ksp.solve(b, x)
+        (self.ksp.solveTranspose if transposed else self.ksp.solve)(b, x)
         values = x.array_r.copy()
         b.aypx(-1.0, self.mat * x)
         residual = b.norm() / size if size > 0 else 0.0
         for obj in (x, b):
             obj.destroy()
         return values, float(residual)
-
-    def transposed(self, b: Array) -> Array:
-        """The solution with the transpose, where the flow is followed back. Collective."""
-        x, rhs = self.mat.createVecs()
-        rhs.setArray(b)
-        self.ksp.solveTranspose(rhs, x)
-        values = x.array_r.copy()
-        for obj in (x, rhs):
-            obj.destroy()
-        return values
 
     def destroy(self) -> None:
         self.ksp.destroy()

@@ -13,7 +13,7 @@ from ..grid import Grid
 from ..strips import MANY, each_strip, places_of
 from .cavity import cavitated
 from .edges import Around, strips
-from .reynolds import BoxScheme, placed, sides
+from .reynolds import BoxScheme, sides
 from .strip import line_weights, stream_weights
 
 if TYPE_CHECKING:
@@ -50,10 +50,7 @@ def side_flows(problem: LubricationProblem, p: Array, r: Array) -> dict[str, flo
     at_west, at_east, *at_ends = sides(grid)
     leaving = problem.leaving(r)
     first, last = (slice(None), slice(0, 1)), (slice(None), slice(-1, None))
-
-    def total(at: Any, flows: Array) -> float:
-        return s.flow_unit * problem.reduce.summed(float(np.sum(flows)), lambda: placed(flows, at, grid.box))
-
+    total = lambda at, flows: s.flow_unit * problem.reduce.of_some(flows, at, grid.box)  # noqa: E731
     strips = [  # enters at the west, leaves at the east
         (
             0.5 * rim * total(first, np.where(at_west[:, :1] & end, s.couette_W[:, :1] / lines, 0.0)),
@@ -97,7 +94,7 @@ def friction(problem: LubricationProblem, p_pa: Array, r: Array, lever: Array | 
         of_film = _drag_sum(problem, p_pa, r, lever)
     else:
         of_film = sum(each_strip(grid, add_up)) if alone else add_up(slice(0, grid.box[0]))
-    of_film = problem.reduce.summed(float(of_film), lambda: sum(drag(problem, s, p_pa.ravel(), r.ravel())) * lever)
+    of_film = problem.reduce.summed(float(of_film), lambda: np.add(*drag(problem, s, p_pa.ravel(), r.ravel())) * lever)
     return of_film if problem.contact is None else of_film + problem.contact.drag(problem, lever)
 
 

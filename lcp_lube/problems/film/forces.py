@@ -173,16 +173,10 @@ def integrals(problem: LubricationProblem, p_pa: Array, asked: Sequence[tuple[fl
 
     cells = lambda: stream_weights(grid) * grid.widths(0)  # noqa: E731
     inside: Array = sum(each_strip(grid, add_up))
-    return [
-        float(
-            grid.cell
-            * (
-                problem.reduce.summed(float(part), lambda one=one: (p - one[0]) * one[1](grid.x, grid.y) * cells())
-                + _in_rims(problem, *one)
-            )
-        )
-        for part, one in zip(inside, asked, strict=True)
-    ]
+    total = lambda part, above, weight: problem.reduce.summed(  # noqa: E731
+        float(part), lambda: (p - above) * weight(grid.x, grid.y) * cells()
+    )
+    return [float(grid.cell * (total(part, *one) + _in_rims(problem, *one))) for part, one in zip(inside, asked, strict=True)]
 
 
 def _in_rims(problem: LubricationProblem, above: float, weight: Weight) -> float:

@@ -21,7 +21,7 @@ from .certify import certify
 from .exact import ExactSolution
 from .integrals import LineIntegrals
 from .quantities import open_pressures, quantities, units
-from .reynolds import BoxScheme, placed, side_points, sides
+from .reynolds import BoxScheme, side_points, sides
 from .supplies import Held, Supply, pressed
 from .turning import Shaft
 from .views import LiftedFilm
@@ -192,9 +192,7 @@ class LubricationProblem:
         p, r = p.reshape(box), r.reshape(box)
         p_W, p_E, p_S, p_N = (side / self.p_unit for side in self.p_sides)
         west, east, south, north = side_points(self.grid)
-        total = lambda at, flows: s.flow_unit * self.reduce.summed(  # noqa: E731
-            float(np.sum(flows)), lambda: placed(flows, at, box)
-        )
+        total = lambda at, flows: s.flow_unit * self.reduce.of_some(flows, at, box)  # noqa: E731
         return (
             total(west, s.couette_W[west] + s.k_W[west] * (p_W - p[west])),
             total(east, self.leaving(r)[:, : r[east].shape[1]] + s.k_E[east] * (p[east] - p_E)),

@@ -287,13 +287,6 @@ def sides(grid: Grid, kinds: Sequence[str] = ("open",)) -> tuple[NDArray[np.bool
     return tuple(mask & is_found for mask, is_found in zip(masks, found, strict=False))
 
 
-def placed(values: Array, at: Any, box: tuple[int, int]) -> Array:
-    """Values of some points of an array that is 0 elsewhere."""
-    out = np.zeros(box)
-    out[at] = values
-    return out
-
-
 def side_points(grid: Grid) -> tuple[tuple[slice | NDArray, slice | NDArray], ...]:
     """The owned points at the open ends of `sides` as indices into arrays of `grid.box`."""
     west, east, south, north = (np.flatnonzero(mask) for mask in sides(grid))
