@@ -2,12 +2,17 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from ..problems.film.effects import factors
+from ..problems.film.fluid import Law
 from ..problems.film.turning import Turning
+from ..problems.solution import Solution
 from .coupled_response import CoupledResponse
+from .loop import Frozen
 from .response import Change, Response
 
 Mode = Change  # dh of a rigid motion of a wall, by its coordinate, of x and y (m)
@@ -40,3 +45,12 @@ def stiffness(response: Response) -> Any:
         return response.stiffness()
     finally:
         response.destroy()
+
+
+def held(scene: Any, solution: Solution) -> Any:
+    """The scene of a solution, its coefficients held where effects act: its stiffness is near enough for Newton's method."""
+    if not scene.model.effects:
+        return scene
+    problem: Any = solution.problem
+    frozen = Frozen(scene.with_shape(problem.grid.shape), Law())
+    return replace(frozen, by=factors(frozen.build(problem.grid.petsc_comm), problem.cells))

@@ -32,6 +32,7 @@ IN_TIME = (1e-2, 5e-5)  # the same in a time step: of what it changes, and at mo
 MEMORY = 30  # answers that Anderson's method combines; -coupling_snes_anderson_m changes it
 CYCLE = 25  # steps after which it begins anew: its least squares see no changes 1e-8 of the largest that they remember
 FEW, NEAR, AWAY = 1, 0.3, 30.0  # answers combined while a coefficient changes by more than NEAR; AWAY: times the least change
+WARMER = 1.0  # of log(viscosity): where a second start is
 LONGEST = 1.0  # relative change of a coefficient in one step, before answers are combined
 LEAST_LIFT = -0.9  # of the rigid film, of an iterate
 STEEPEST = 0.9  # of q, over 1/b, where the pressure is without bound: of an iterate, whose viscosity is then 10 times mu
@@ -201,15 +202,16 @@ class Loop:
         """Anderson's method from these fields on, until they change by no more than `tol` or no film can be solved.
 
         Far from the answer old steps mislead: there it combines two answers alone, and many once coefficients change by less
-        than `NEAR`. Where steps lead away from the best fields so far, or a cycle ends, it begins anew from these.
+        than `NEAR`. Where steps lead away from the best fields so far, or a cycle ends, it begins anew from these; where that
+        leads no further, once from thinner oil: what hardly moves against a supply gets hot, and then flows back from it.
         watch : called after every film.
         """
-        comm = self.base.grid.petsc_comm
-        x = PETSc.Vec().createMPI((len(self.names) * self.h.size, None), comm=comm)
+        x = PETSc.Vec().createMPI((len(self.names) * self.h.size, None), comm=self.base.grid.petsc_comm)
         x.setArray(begin)
         self.begun = begin
-        best, last, near = (np.inf, begin), (begin + 1.0, begin), False
+        best, last, near, idle = (np.inf, begin), (begin + 1.0, begin), False, 0  # idle: cycles without better fields
         mark = (np.inf, 0)  # a least change, and the films after which it was found
+        warm = None if "warmth" not in self.names or self.model.stored is not None else self._warmer(begin)
 
         def ends() -> bool:
             return self.solves >= (LONG if self.solves - mark[1] < PATIENCE else MOST_SOLVES)
@@ -234,14 +236,26 @@ class Loop:
                 return int(PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN)
             if self.change > AWAY * best[0] or ends():
                 return int(PETSc.SNES.ConvergedReason.DIVERGED_DTOL)
-            return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS) if self.change <= (tol if near else NEAR) else 0
+            done = self.change <= (tol if near or idle else NEAR)
+            return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS) if done else 0
 
         while not ends() and self.change > tol:  # NaN: no film
-            self._cycle(comm, x, residual, ended, MEMORY if near else FEW)
-            near = not near
+            before = best[0]
+            self._cycle(x, residual, ended, MEMORY if near else FEW)
+            near, idle = not near, idle + 1 if best[0] >= before else 0
             if best[0] < self.change < np.inf:
                 x.setArray(best[1])
+            if idle == 2:  # both kinds of cycle would take the same steps again
+                if warm is None:
+                    break
+                x.setArray(warm)
+                best, warm, near, idle, mark = (np.inf, warm), None, False, 0, (np.inf, self.solves)
         x.destroy()
+
+    def _warmer(self, x: Array) -> Array:
+        """These fields, with warmer oil."""
+        parts = zip(self.names, self.split(x), strict=True)
+        return np.concatenate([part - WARMER * (name in ("viscosity", "warmth")) for name, part in parts])
 
     def _found(self, x: Array, watch: Callable[[], None]) -> Array:
         """The vector of what the effects make of the film with these fields; NaN, which ends the loop, if it has no answer."""
@@ -254,9 +268,9 @@ class Loop:
         watch()
         return self.log[-1]
 
-    def _cycle(self, comm: PETSc.Comm, x: PETSc.Vec, residual: Any, ended: Any, memory: int) -> None:
+    def _cycle(self, x: PETSc.Vec, residual: Any, ended: Any, memory: int) -> None:
         """Some steps of Anderson's method. Collective."""
-        snes, f = PETSc.SNES().create(comm), x.duplicate()
+        snes, f = PETSc.SNES().create(x.comm), x.duplicate()
         snes.setOptionsPrefix("coupling_")
         snes.setType("anderson")
         snes.setTolerances(max_it=CYCLE)
@@ -284,12 +298,3 @@ def settled(ask: Ask, stored: Stored | None, moved: float) -> float:
     given = ask.stopping is not None and not ask.options.get("rest")
     in_time = stored is not None and not stored.exact and not given
     return max(found, min(IN_TIME[0] * moved, IN_TIME[1])) if in_time else found
-
-
-def held(scene: Any, solution: Solution) -> Any:
-    """The scene of a solution, its coefficients held where effects act: its stiffness is near enough for Newton's method."""
-    if not scene.model.effects:
-        return scene
-    problem: Any = solution.problem
-    frozen = Frozen(scene.with_shape(problem.grid.shape), Law())
-    return replace(frozen, by=factors(frozen.build(problem.grid.petsc_comm), problem.cells))

@@ -18,8 +18,7 @@ from ..scenes.scene import Scene, Solvable
 from ..scenes.thrust import ThrustScene
 from ..scenes.tilting import TiltingPadScene
 from .grooves import SideBySide, SolvedFilm, films_of
-from .impedance import Mode, displacements
-from .loop import held
+from .impedance import Mode, displacements, held
 from .response import Response
 
 MOMENTS = 1e-8  # of the load times the lever, about a pivot

@@ -25,8 +25,7 @@ from .attitude import half_film_attitude
 from .chain import Chain
 from .coefficients import coefficients, motions_of, summed
 from .compose import Inner
-from .impedance import stiffness
-from .loop import held
+from .impedance import held, stiffness
 
 MOST_SOLVES = 25  # on a grid
 COARSEST, COARSE_TOL = (36, 7), 1e-2  # fewest points around and across, and how well a coarse grid's place is worth knowing
