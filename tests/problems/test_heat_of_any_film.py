@@ -56,8 +56,8 @@ def test_oil_that_flows_back_from_a_supply():
     L, W = 0.1167, 0.092
     pad = {"family": "bearing", "dimension": 2, "L": L, "width": W, "U": 10.7, "nx": 17, "ny": 9}
     pad |= {"film": [{"shape": "linear", "h_start": 8.2465e-5, "h_end": 3.7484e-5}], "fluid": {"p_supply": 1.45e6}}
-    pad |= {"supply": [{"x": [0.1 * L, 0.25 * L], "y": [0.3 * W, 0.7 * W], "p": 4.36e6}], "shear": {"law": "eyring", "tau_0": 5448}}
+    pad |= {"supply": [{"x": [0.1 * L, 0.25 * L], "y": [0.3 * W, 0.7 * W], "p": 4.36e6}]}
     heat = {"T_in": 317.3, "law": "exponential", "T": [313.15, 353.15], "mu": [0.05334, 0.01362]}
-    with solve({**pad, "temperature": heat}, model="full") as s:
+    with solve({**pad, "temperature": heat, "shear": {"law": "eyring", "tau_0": 5448}}, model="full") as s:
         assert s.converged, s.message
         assert s.certificate.measures["coupling"] <= 1e-9 and s.certificate.measures["energy_residual"] <= 1e-9
