@@ -148,6 +148,39 @@ def test_area_and_fronts_of_the_cavity():
     assert areas[0] == pytest.approx(areas[2], rel=5e-3) and areas[1] == pytest.approx(areas[2], rel=5e-4)
 
 
+def beside_sides(n, ends, U=1.0, film=(2.0, 6.0)):
+    """A wedge whose cavity comes near its sides: pressures west, east, south, north (None: closed)."""
+    sides = {name: "closed" if p is None else p for name, p in zip(("west", "east", "south", "north"), ends, strict=True)}
+    shape = {"shape": "linear", "h_start_um": film[0], "h_end_um": film[1]}
+    data = {"family": "bearing", "dimension": 2, "L_mm": 10, "width_mm": 8, "U": U, "n": n, "fluid": {"mu": 0.02}}
+    return solve(load_scene({**data, "film": [shape], "sides": sides}), method="active-set", reduction=False)
+
+
+@pytest.mark.parametrize("p_east", [1e4, 3e4, 1e5])
+def test_fronts_before_a_full_side_lie_inside_the_last_cell(p_east):
+    """Between closed sides: on any grid at the same place, and the cavity is shorter by what lies behind it."""
+    places = []
+    for n in (9, 39):
+        with beside_sides(n, (1e5, p_east, None, None)) as found, beside_sides(n, (1e5, 0.0, None, None)) as empty:
+            places += found.numbers["reformations"]
+            shorter = empty.numbers["cavitated_area"] - found.numbers["cavitated_area"]
+            assert shorter == pytest.approx((0.01 - places[-1]) * 0.008, rel=1e-6)
+    assert 0.01 - places[0] == pytest.approx(0.01 - places[1], rel=5e-3) and places[1] < 0.01
+
+
+def test_mirrored_films_have_the_same_area():
+    areas = []
+    for ends, more in (
+        ((2e5, 1e5, 1e4, 1e3), {}),
+        ((2e5, 1e5, 1e3, 1e4), {}),
+        ((1e5, 2e5, 1e4, 1e3), {"U": -1.0, "film": (6.0, 2.0)}),
+    ):
+        with beside_sides(27, ends, **more) as solution:
+            areas.append(solution.numbers["cavitated_area"])
+            assert len(solution.front_curves()) > 0
+    np.testing.assert_allclose(areas, areas[0], rtol=1e-9)
+
+
 def test_order_over_places_of_an_edge():
     """Load, friction and area of a pocket anywhere: no place is bad, and the mean falls by 2^1.8 a grid and more."""
     rng = np.random.default_rng(2)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ...base.parallel import Array
 from ...errors import InputError
 from .cavity import cavitated
-from .fronts import across, line_fronts
+from .fronts import across, before_side, line_fronts
 
 if TYPE_CHECKING:
     from .lubrication import LubricationProblem
@@ -57,13 +57,13 @@ def _crossings(problem: LubricationProblem, p: Array, r: Array) -> Array:
         at = y[j] + (1 - 2 * lower) * back
         rows.append(np.stack([j + grid.y_start - lower, i + grid.x_start, np.ones(j.size), x[i], at], axis=1))
     steps = grid.steps(1)
-    for k, (own, step, p_side) in enumerate(((0, steps[0], problem.p_sides[2]), (-1, steps[-1], problem.p_sides[3]))):
+    for k, (own, step, p_side) in enumerate(((0, steps[0], problem.p_sides[2]), (-1, -steps[-1], problem.p_sides[3]))):
         at_side = (grid.y_start, grid.y_end)[k] == (0, grid.shape[1])[k] and grid.ends[1][k] == "open"
         if at_side and p_side > 0.0:  # the film is full there
             i = np.flatnonzero(cavity.reshape(grid.box)[own])
             edge = np.full(i.size, -1 if k == 0 else grid.shape[1] - 1)
-            half = np.full(i.size, y[own] + (k - 0.5) * step)
-            rows.append(np.stack([edge, i + grid.x_start, np.ones(i.size), x[i], half], axis=1))
+            at = y[own] - step + before_side(problem, k)[i] * step
+            rows.append(np.stack([edge, i + grid.x_start, np.ones(i.size), x[i], at], axis=1))
     return np.concatenate(rows)
 
 

@@ -75,9 +75,13 @@ def line_fronts(problem: LubricationProblem, p: Array, r: Array, dry: NDArray[np
     closes, ends, places = row, i, (x[i] - back * behind[i])
     if grid.x_end == grid.shape[0] and opens[1]:
         row = np.flatnonzero(cavity[:, -2])
-        if problem.p_sides[1] > 0:  # before a side above the cavitation pressure
+        if problem.p_sides[1] > 0:  # before a side above the cavitation pressure: it is the full point
+            pressed = s.k_E[row, -1] * (problem.p_sides[1] / problem.p_unit)
+            lacking = -s.b_E_at(row, grid.box[1] - 1) * r.reshape(grid.box)[row, -1]
+            back = np.where(lacking > 0.0, pressed / (pressed + lacking), 0.5)
             closes, ends = np.append(closes, row), np.append(ends, np.full(row.size, x.size))
-            places = np.append(places, np.full(row.size, start + grid.lengths[0] - 0.5 * steps[-1]))
+            places = np.append(places, start + grid.lengths[0] - back * steps[-1])
+            shift[row] += (0.5 - back) * steps[-1]
         else:
             shift[row] += 0.5 * steps[-1]
     return Fronts(starts, (closes, ends, places), shift)
@@ -116,7 +120,8 @@ def fronts(problem: LubricationProblem, found: Fronts | None) -> tuple[list[floa
 def cavitated_area(problem: LubricationProblem, found: Fronts | None, p: Array, dry: NDArray[np.bool_]) -> float:
     """Area of the cavities, m2 (1D: length, m): cells of their points, and what lies between these and the fronts. Collective.
 
-    Across the flow a front lies where the pressure beside it, followed by its slope, is zero. dry : as in `line_fronts`.
+    Across the flow a front lies where the pressure beside it, followed by its slope, is zero; beside a side as `before_side`
+    says. dry : as in `line_fronts`.
     """
     grid = problem.grid
     cavity = dry.reshape(grid.box)
@@ -134,14 +139,28 @@ def cavitated_area(problem: LubricationProblem, found: Fronts | None, p: Array, 
             fronts_across = _across(frames[0](rows), frames[1](rows), steps)
             for (j, i, back), step in zip(fronts_across, (steps[:-1, 0], steps[1:, 0]), strict=True):
                 more += float(np.sum((0.5 * step[j] - back) * width[i] * stretch[j, 0]))
-            for end, rim, p_side in zip(sides(part)[2:], grid.rims(1), problem.p_sides[2:], strict=True):
-                if p_side == 0.0 and end.any():  # the cavity reaches up to it
-                    more += float(np.sum(0.5 * rim * dy * width * stretch * (end & cavity[rows])))
+            for side, (end, rim) in enumerate(zip(sides(part)[2:], grid.rims(1), strict=True)):
+                if end.any():
+                    up_to = 0.5 - before_side(problem, side)
+                    more += float(np.sum(up_to * rim * dy * width * stretch * (end & cavity[rows])))
         return area, more
 
     area, more = (sum(parts) for parts in zip(*each_strip(grid, add_up), strict=True))
     area, more = (problem.reduce.sum(np.array([part])) for part in (area * grid.cell, more))
     return area if found is None else max(area + more, 0.0)  # of a cavity of one point the two fronts may cross
+
+
+def before_side(problem: LubricationProblem, side: int) -> Array:
+    """How far the front before an open side across the flow (0 south, 1 north) lies from it where the line of points beside it
+    is cavitated, in parts of their distance.
+
+    From the side on p falls to p = p' = 0 with p'' = 6 mu U h_x/h^3, in a length s, s^2 = 2 p_side/p''.
+    """
+    s, row = problem.scheme, -side
+    pressed = (s.k_S, s.k_N)[side][row] * (problem.p_sides[2 + side] / problem.p_unit)
+    spread = s.couette_E[row] - s.couette_W[row]  # what the wall takes away from a full cell
+    part = np.divide(2.0 * pressed, spread, out=np.full_like(spread, 0.25), where=spread > 0.0)
+    return np.sqrt(np.minimum(part, 1.0)) if problem.p_sides[2 + side] > 0.0 else np.zeros_like(part)
 
 
 Across = list[tuple[NDArray[np.int64], NDArray[np.int64], Array]]
