@@ -104,9 +104,10 @@ class Adjoint:
     def _here(self) -> Array:
         return self.lagrangians(self.scene)
 
-    def _at(self, quick: bool) -> Array:
-        """L as `near` has it, or as it is: one differs from the other by rounding, which differences would see."""
-        found = self.near.lagrangians(self.scene) if quick else None
+    @cached_property
+    def _near_here(self) -> Array:
+        """As `near` has it: it differs from the other by rounding, which differences would see."""
+        found = self.near.lagrangians(self.scene)
         return self._here if found is None else found
 
     def _solve(self, rows: list[Array]) -> list[Array]:
@@ -175,7 +176,7 @@ class Adjoint:
 
             def near(a: float) -> Array:
                 if a == value:
-                    return self._at(quick[0])
+                    return self._near_here if quick[0] else self._here
                 scene = with_values(self.scene, {key: a})
                 found = self.near.lagrangians(scene)
                 quick[0] = found is not None

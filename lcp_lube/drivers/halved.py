@@ -29,7 +29,9 @@ class Halved:
         grid, part = problem.grid, Part(film, "mirror")
         self.problem, self.cavity, self.M, self.least = problem, cavity, M, least
         half = self._cut(part) or part.build(grid.petsc_comm)
-        self._take, self._spread = Pick(grid, half.grid, *numbers(half.grid)), Pick(half.grid, grid, *part.places(grid))
+        j, i = numbers(half.grid)
+        self._take, self._spread = Pick(grid, half.grid, j, i), Pick(half.grid, grid, *part.places(grid))
+        self._beyond = Pick(grid, half.grid, grid.shape[1] - 1 - j, i)
         self.half = half if problem.dry is None or half.coefficients_for is None else half.revised(self._take(problem.dry))
         self._share = np.broadcast_to(np.where(sides(half.grid, ("mirror",))[3], 0.5, 1.0), half.grid.box).ravel()
         of_half = None if M is None else self._share * self._take(M)
@@ -43,14 +45,18 @@ class Halved:
         half = copy(whole)
         half.grid = part.grid(whole.grid.petsc_comm)
         half.__dict__.pop("_at_sides", None)  # the whole's
-        n = half.grid.box[0]
-        names = ("k_W", "k_E", "k_S", "k_N", "couette_W", "couette_E", "b_C", "b_W")
-        some = {name: np.array(getattr(s.rows(slice(0, n)), name)) for name in names}
-        some["k_N"][-1] = 0.0
-        if whole.grid.shape[1] % 2:  # the line on the mirror
-            for name in set(names) - {"k_S", "k_N"}:
-                some[name][-1] *= 0.5
-        half.scheme, half.held, half.shares_grid = s.changed(**some, c=s.c[:n], h=s.h[:n]), None, False
+        n, nx = half.grid.box
+        s = s.rows(slice(0, n))
+        kx, ky = np.zeros((n + 2, nx + 3)), np.zeros((n + 3, nx + 2))  # as `reynolds` makes them, which are not copied again
+        k_S, k_N = ky[1 : n + 1, 1:-1], ky[2 : n + 2, 1:-1]
+        k_W, k_E = kx[1:-1, 1:-2], kx[1:-1, 2:-1]
+        k_S[:], k_N[-1] = s.k_S, 0.0
+        k_W[:], k_E[:, -1] = s.k_W, s.k_E[:, -1]
+        b_C, b_W = np.array(s.b_C), np.array(s.b_W)
+        for one in (kx[:-1], b_C, b_W) if whole.grid.shape[1] % 2 else ():  # the line on the mirror
+            one[-1] *= 0.5
+        some = {"k_W": k_W, "k_E": k_E, "k_S": k_S, "k_N": k_N, "b_C": b_C, "b_W": b_W}
+        half.scheme, half.held, half.shares_grid = s.changed(**some), None, False
         return half
 
     @cached_property
@@ -62,8 +68,8 @@ class Halved:
 
     def _solved(self, ask: Callable[[Linear, list[Any], Callable[[Any], Any]], list[Any]], rows: Sequence[Any]) -> list[Any]:
         reduce, halves = self.problem.reduce, [self._of(self._take, b) for b in rows]
-        odd = [np.abs(b - self._of(self._spread, half)) for b, half in zip(rows, halves, strict=True)]
-        even = all(reduce.max(part) <= EVEN * reduce.max(np.abs(b)) for part, b in zip(odd, rows, strict=True))
+        odd = [np.abs(half - self._of(self._beyond, b)) for b, half in zip(rows, halves, strict=True)]
+        even = all(reduce.max(part) <= EVEN * reduce.max(np.abs(half)) for part, half in zip(odd, halves, strict=True))
         if not even or self.half.scheme.flow_unit != self.problem.scheme.flow_unit:
             return ask(self._whole, list(rows), lambda a: a)
         found = ask(self._small, [self._share * half for half in halves], self._take)
@@ -81,5 +87,5 @@ class Halved:
     def destroy(self) -> None:
         if "_whole" in self.__dict__:
             self._whole.destroy()
-        for one in (self._small, self._take, self._spread, self.half):
+        for one in (self._small, self._take, self._beyond, self._spread, self.half):
             one.destroy()

@@ -156,7 +156,8 @@ class Pick:
 
     def __call__(self, field: Array) -> Array:
         if self.target.comm.size == 1:
-            return np.broadcast_to(field.reshape(self.source.box)[self._at], self.target.box).flatten()
+            values = field.reshape(self.source.box)[self._at]
+            return values.ravel() if values.shape == self.target.box else np.broadcast_to(values, self.target.box).flatten()
         source, target = self.source.dm.createGlobalVec(), self.target.dm.createGlobalVec()
         source.setArray(field)
         scatter = PETSc.Scatter().create(source, self._from, target, self._to)
