@@ -17,6 +17,7 @@ from ..base.parallel import Array
 from ..problems.film import forces
 from ..problems.film.by_faces import ByFaces
 from ..problems.film.fluid import Law
+from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.weighed import can
 from ..problems.grid import Grid
@@ -49,6 +50,7 @@ class NearFilms:
     ):
         self.equations, self.model, self.p, self.r = equations, equations.model, p, r
         self.lambdas, self.numbers = lambdas, numbers
+        self._columns: dict[bytes, Array] = {}
         self.wanted = {part for one in parts.values() for part in one}
         constant = not (equations.law and equations.law.dowson_higginson)
         alone = constant and can(equations.constant, self.model, SMALL)
@@ -65,6 +67,15 @@ class NearFilms:
     @cached_property
     def _here(self) -> Array | None:
         return self._own.sums(self.model.gap, self.equations.grid)
+
+    @cached_property
+    def _told(self) -> dict[str, float]:
+        return self._totals(self.equations.constant)
+
+    def _totals(self, problem: LubricationProblem) -> dict[str, float]:
+        """The numbers, with the integrals of a film's pressure, which is held."""
+        found = forces.totals(problem, self.p, wanted=self.wanted, columns=self._columns)
+        return self.numbers | {name: found[name] for name in self.wanted}
 
     def lagrangians(self, scene: Scene) -> Array | None:
         """L of every quantity; None where it is not that of another film at these points."""
@@ -88,9 +99,7 @@ class NearFilms:
         near.levers, own = model.levers, self.model
         same = (eq._p_sides, eq.constant.p_c) == (p_sides, near.p_c) and grid is eq.grid
         same = same and _same((own.shaft, own.levers), (near.shaft, near.levers))
-        told = {} if same else forces.totals(near, self.p, wanted=self.wanted)
-        told = {name: told.get(name, value) if name in self.wanted else value for name, value in self.numbers.items()}
-        report = lean.report(told)
+        report = lean.report(self._told if same else self._totals(near))
         return np.array([report[name] for name in self.lambdas]) - G / eq.constant.scheme.flow_unit
 
     def _sums(self, gap: Any, law: Law, grid: Grid) -> Array | None:

@@ -68,16 +68,20 @@ def forces(problem: LubricationProblem, p_pa: Array, known: Known | None = None)
 
 
 def totals(
-    problem: LubricationProblem, p_pa: Array, known: Known | None = None, wanted: Collection[str] | None = None
+    problem: LubricationProblem,
+    p_pa: Array,
+    known: Known | None = None,
+    wanted: Collection[str] | None = None,
+    columns: dict[bytes, Array] | None = None,
 ) -> dict[str, float]:
     """Integrals of the pressure by its `weights`, but for `pressure_integral` above ambient and with contact. Collective.
 
-    wanted : those alone, the others are NaN; None: all.
+    wanted : those alone, the others are NaN; None: all. columns : as `integrals` takes them.
     """
     every, contact = weights(problem), problem.contact
     by = {name: weight for name, weight in every.items() if wanted is None or name in wanted}
     asked = [(_above(problem, name, weight), weight) for name, weight in by.items()]
-    out = dict.fromkeys(every, np.nan) | dict(zip(by, integrals(problem, p_pa, asked), strict=True))
+    out = dict.fromkeys(every, np.nan) | dict(zip(by, integrals(problem, p_pa, asked, columns), strict=True))
     for name, weight in by.items() if contact is not None else ():
         if name != "pressure_integral":
             out[name] += contact.total(problem, weight)
@@ -145,11 +149,26 @@ def integral(problem: LubricationProblem, p_pa: Array, above: float, weight: Wei
     return integrals(problem, p_pa, [(above, weight)])[0]
 
 
-def integrals(problem: LubricationProblem, p_pa: Array, asked: Sequence[tuple[float, Weight]]) -> list[float]:
+def integrals(
+    problem: LubricationProblem,
+    p_pa: Array,
+    asked: Sequence[tuple[float, Weight]],
+    known: dict[bytes, Array] | None = None,
+) -> list[float]:
     """Integrals of (p - above) weight(x, y), in one pass: trapezoidal to the open sides, a corner having the mean of its two;
-    cells end at the others. Collective."""
+    cells end at the others. Collective.
+
+    known : keeps the sums of p's columns by the weights of their lines, for integrals of the same p on other grids.
+    """
     grid = problem.grid
     p = p_pa.reshape(grid.box)
+    if known is not None and all(np.atleast_2d(weight(grid.x, grid.y[[0, -1]])).shape[0] == 1 for _, weight in asked):
+        of_lines, along = stream_weights(grid)[:, 0], grid.widths(0)
+        if (key := of_lines.tobytes()) not in known:
+            known[key] = np.einsum("i,ij->j", of_lines, p)
+        sums = [(known[key] - above * of_lines.sum()) @ (np.atleast_2d(w(grid.x, grid.y))[0] * along) for above, w in asked]
+        parts = zip(sums, asked, strict=True)
+        return [float(grid.cell * (problem.reduce.sum(np.array([a])) + _in_rims(problem, *one))) for a, one in parts]
 
     def add_up(rows: slice) -> Array:
         part, inside = places_of(grid, rows), np.zeros(len(asked))
