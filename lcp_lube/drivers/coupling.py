@@ -22,12 +22,11 @@ from ..problems.solution import Enclosure, Fields, Outcome, Solution
 from ..problems.transfer import Transfer
 from ..scenes.scene import Solvable
 from ..solvers.enclosure import bounds_of
-from . import density_step
 from .ask import Ask, Start
 from .compose import Inner
 from .coupling_file import CouplingFile
 from .levels import level_shapes
-from .loop import Loop, settled
+from .loop import Loop
 
 ROUNDED = 2.0**-50  # relative error of p made of q, at most
 NESTED_ABOVE = 2_000  # points from which the fields are first found on coarser grids
@@ -57,8 +56,11 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         loop.film({})
         loop.change = 0.0
         return _told(ask, loop)
-    if density_step.applies(scene, ask) and (found := density_step.solve(scene, ask)) is not None:
-        return found
+    if model.stored is not None:
+        from . import density_step  # here: of marches alone
+
+        if density_step.applies(scene, ask) and (found := density_step.solve(scene, ask)) is not None:
+            return found
     file = CouplingFile(scene, ask)
     with file.keeper.listening():
         return _settled_on(scene, file.ask, inner, file)
@@ -78,7 +80,7 @@ def _settled_on(scene: Solvable, ask: Ask, inner: Inner, file: CouplingFile) -> 
             coarse = _coarser(scene, inside, inner, loop, file)
             known = _taken(loop, coarse.problem) if coarse is not None else None
         begin = loop.vector(known or neutral(loop.effects, loop.h.size))
-    loop.settle(begin, settled(ask, loop.model.stored, loop.moved), lambda: file.save(loop))
+    loop.settle(begin, lambda: file.save(loop))
     if loop.solution is None or (ask.certify and loop.answer is not None):  # all of its films were taken from the file
         loop.again(ask.certify)
     if coarse is not None:
@@ -165,9 +167,9 @@ def _told(ask: Ask, loop: Loop) -> Solution:
                 problem.more_measures |= told.measures
                 failure = failure or told.failure
         problem.more_measures["coupling"] = loop.change
-        if failure and loop.change <= settled(ask, loop.model.stored, loop.moved):
+        if failure and loop.found:
             outcome, message = Outcome.NO_SOLUTION, failure
-        elif solution.converged and not loop.change <= settled(ask, loop.model.stored, loop.moved):
+        elif solution.converged and not loop.found:
             outcome = Outcome.MAX_ITERATIONS
             message = f"the coefficients still change by {loop.change:.1e} after {loop.solves} films ({', '.join(loop.names)})"
         elif not solution.converged:

@@ -6,7 +6,8 @@ compression than flows through it. Here the law and what cells store by it are l
     J = dG/dp where the film is full, -B where it is not,       z -> z - J^-1 G(z),    p = max(z, 0), r = max(-z, 0)
 
 What the last step leaves of G goes into the densities that are stored, so that mass is conserved to rounding. They are then off
-the law by `coupling`: a small part of what those foreseen were off by.
+the law by `coupling`: a small part of what those foreseen were off by. Pressures of supplies that follow are found beside z
+(`sources.Sources`); what their cells store takes what is left of their balances likewise.
 """
 
 from dataclasses import dataclass, replace
@@ -25,7 +26,9 @@ from ..scenes.scene import Solvable
 from ..solvers.relaxation import relaxation
 from .ask import Ask
 from .linearised import Linear
-from .loop import Frozen, settled
+from .loop import Frozen
+from .settled import settled
+from .sources import Sources
 
 WHY = "density: Newton's method on each step as a whole, the law linearised exactly"
 SWEEPS = 16  # once two steps have not halved what is left
@@ -45,9 +48,7 @@ def solve(scene: Any, ask: Ask) -> Solution | None:
     begun, near = perf_counter(), ask.start
     film = _Film(scene, ask)
     assert near is not None  # as `applies` found
-    reduce, unit = film.base.reduce, film.base.p_unit
-    u = near.problem.p_unit / unit  # type: ignore[attr-defined]
-    at = film.at(np.where((near.fields["r"] > 0) & ~(near.fields["p"] > 0), -near.fields["r"], near.fields["p"] * u))
+    reduce, at = film.base.reduce, film.begin(near)
     sweeps = ask.options.get("sweeps", 0)
     steps: list[Step] = []
     allowed = settled(ask, scene.model.stored, at.size)  # the first densities are those foreseen
@@ -59,26 +60,30 @@ def solve(scene: Any, ask: Ask) -> Solution | None:
             film.base.destroy()
             return None
         at = film.swept(at, sweeps or SWEEPS * (vain > 1))
-        d = film.step(at)
-        at = film.at(at.z - d)
-        steps.append(Step(at.size, reduce.max(np.abs(d)), 1.0, 1))
-    fields, found = at.fields, film.closed(at)
-    found.more_measures["coupling"] = at.size
-    certificate = found.certify(fields, near.settings["eps1"])
+        found = film.step(at)
+        if found is None:
+            film.base.destroy()
+            return None
+        at = film.at(at.z + found[0], at.P + found[1])
+        steps.append(Step(at.size, reduce.max(np.abs(found[0])), 1.0, 1))
+    fields, problem = at.fields, film.closed(at)
+    problem.more_measures["coupling"] = at.size
+    certificate = problem.certify(fields, near.settings["eps1"])
     times = {"setup": 0.0, "assembly": 0.0, "linear": 0.0, "total": perf_counter() - begun}
     why = [WHY, *(one for one in near.settings["why"] if not one.startswith(("coupling", WHY)))]
     details = {key: value for key, value in near.settings["details"].items() if key not in ("fluid_solves", "coupling_work")}
     settings = {**near.settings, "why": why, "details": details}
     message = f"densities off by {at.size:.1e} after {len(steps)} steps"
-    return Solution(found, fields, Outcome.CONVERGED, message, certificate, steps, settings, times).judged()
+    return Solution(problem, fields, Outcome.CONVERGED, message, certificate, steps, settings, times).judged()
 
 
 @dataclass(frozen=True)
 class _At:
-    """z; the film with the densities at z, and their factors; what is left of its balances, and which density that is, at most
-    `size`."""
+    """z, and the supplies' pressures, Pa; the film with the densities at z, and their factors; what is left of its balances,
+    and which density that is, at most `size`."""
 
     z: Array
+    P: Array
     answer: Answer
     by: FaceFactors
     G: Array
@@ -101,8 +106,18 @@ class _Film:
         self._densities = [float(self.law.density(np.array(p))) for p in self.p_sides]
         held = self.base.held
         self._free = True if held is None else ~held.mask.ravel()
+        self._sources = Sources(model.supplies)
 
-    def at(self, z: Array) -> _At:
+    def begin(self, near: Any) -> _At:
+        """At the fields of a start."""
+        u = near.problem.p_unit / self.base.p_unit
+        z = np.where((near.fields["r"] > 0) & ~(near.fields["p"] > 0), -near.fields["r"], near.fields["p"] * u)
+        return self.at(z, self._sources.foreseen(self.base, z) if self._sources.any else np.zeros(0))
+
+    def at(self, z: Array, P: Array) -> _At:
+        if self._sources.any:
+            self.base.hold_at(self._sources.held(self.law.reduced(P)))
+            z = self._sources.put(self.base, z, P)
         p, r = np.maximum(z, 0.0), np.maximum(-z, 0.0)
         pressure = p * self.base.p_unit
         cells = {"density": self.law.density(pressure)}
@@ -110,8 +125,11 @@ class _Film:
             by = factors(self.base, cells, self._densities)
             found = answer(self.base, self.law, cells, by, pressure, r, self.p_sides)
             G = found.problem.balance(p, r)
-            off = np.where(self._free, G / (self.base.scheme.storage.ravel() * (1.0 - r)), 0.0)
-        return _At(z, found, by, G, off, self.base.reduce.max(np.abs(off)))
+            storage = self.base.scheme.storage.ravel()
+            off = np.where(self._free, G / (storage * (1.0 - r)), 0.0)
+            if self._sources.any:
+                off += self._sources.off(found.problem, p, r, P, storage)
+        return _At(z, P, found, by, G, off, self.base.reduce.max(np.abs(off)))
 
     def swept(self, at: _At, sweeps: int) -> _At:
         """With fronts put right by sweeps, if that brings anything: where they run by several cells a step."""
@@ -119,17 +137,21 @@ class _Film:
         if sweep is None:
             return at
         new = sweep(at.fields, sweeps)
-        other = self.at(new["p"] - new["r"])
+        other = self.at(new["p"] - new["r"], at.P)
         return other if other.size < at.size else at
 
-    def step(self, at: _At) -> Array:
-        """J^-1 G."""
-        film = at.answer.problem
-        linear = Linear(film, (at.z < 0.0) & self._free, self.tangent(at).entries(film.scheme))
-        (d,) = linear.solve([at.G])
-        linear.destroy()
+    def step(self, at: _At) -> tuple[Array, Any] | None:
+        """Changes of z and of the supplies' pressures; None where no pressures are found."""
+        film, cavity = at.answer.problem, (at.z < 0.0) & self._free
+        film.tangent = self.tangent(at)
+        if self._sources.any:
+            found = self._sources.step(film, cavity, at.z, at.G, at.P)
+        else:
+            linear = Linear(film, cavity)
+            found = -linear.solve([at.G])[0], np.zeros(0)
+            linear.destroy()
         film.free_matrices()
-        return d
+        return found
 
     def closed(self, at: _At) -> Any:
         """The film with densities stored that leave nothing of G."""

@@ -16,19 +16,17 @@ from ..problems.film.effects import Answer, Cells, Compressible, Effect, FaceFac
 from ..problems.film.fluid import Law
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
-from ..problems.film.stored import Stored
-from ..problems.film.tangent import WIDEST, Giving, filled, lift_of, logarithm
+from ..problems.film.tangent import WIDEST, Giving, closed, filled, lift_of, logarithm
 from ..problems.grid import EVEN
 from ..problems.solution import Solution
 from ..scenes.scene import Derived, Solvable
 from .ask import Ask, Start
 from .chain import added
 from .compose import Inner
+from .settled import settled
 
 MOST_SOLVES, LONG = 100, 300  # films; and while the least change has fallen to a tenth within as many as
 PATIENCE = 50
-SETTLED = 0.1  # of eps1: relative change of the coefficients at which they count as found
-IN_TIME = (1e-2, 5e-5)  # the same in a time step: of what it changes, and at most
 MEMORY = 30  # answers that Anderson's method combines; -coupling_snes_anderson_m changes it
 CYCLE = 25  # steps after which it begins anew: its least squares see no changes 1e-8 of the largest that they remember
 FEW, NEAR, AWAY = 1, 0.3, 30.0  # answers combined while a coefficient changes by more than NEAR; AWAY: times the least change
@@ -105,7 +103,8 @@ class Loop:
         self.times: dict[str, float] = {}
         self.rescued: Solution | None = None
         self.solves, self.work, self.change = 0, 0, np.inf
-        self.moved = 0.0  # how far a time step is expected to change the fields, as a vector
+        # How far a time step is expected to change the fields, as a vector; and how far they are then from having no effect.
+        self.moved, self.reach = 0.0, np.inf
         self.answer: Answer | None = None
         self.beyond = False  # whether no pressure carries the last film's flow
         self.start: Solution | Start | None = ask.start
@@ -168,6 +167,8 @@ class Loop:
         self.work += new.problem.unknowns
         if not new.converged:
             return False
+        if any(one.open for one in self.model.supplies):
+            self.base.hold_at(new.problem.held.supplies)  # type: ignore[attr-defined]
         unit = new.problem.p_unit  # type: ignore[attr-defined]
         q, b = new.fields["p"] * unit, self.law.barus
         self.beyond = bool(b) and not self.base.reduce.max(b * q) < 1.0
@@ -175,6 +176,8 @@ class Loop:
             q = np.minimum(q, STEEPEST / b)
         p = self.law.pressure(q)
         by = filled(plain, by, q)
+        if self.model.stored is not None and self.ask.options.get("rest"):
+            by = closed(by, new.problem, new.fields, self.base)
         with np.errstate(all="ignore"):
             self.answer = answer(self.base, self.law, cells, by, p, new.fields["r"], self.p_sides)
         return bool(np.isfinite(self.base.reduce.max(p)))
@@ -187,8 +190,15 @@ class Loop:
             self.answer = answer(self.base, self.law, cells, self.by(cells), p, near.fields["r"], self.p_sides)
             found, self.answer = self.made(), None
         if known is not None:
-            self.moved = self.base.reduce.max(np.abs(self.vector(found) - self.vector(cells)))
+            new = self.vector(found)
+            self.moved = self.base.reduce.max(np.abs(new - self.vector(cells)))
+            self.reach = self.base.reduce.max(np.abs(new - self.vector(neutral(self.effects, self.h.size))))
         return found
+
+    @property
+    def found(self) -> bool:
+        """Whether the coefficients count as found."""
+        return self.change <= settled(self.ask, self.model.stored, self.moved, self.reach)
 
     def made(self) -> Cells:
         """The fields that the effects make of the last answer."""
@@ -198,8 +208,8 @@ class Loop:
             effect.apply(self.answer, out)
         return out
 
-    def settle(self, begin: Array, tol: float, watch: Callable[[], None]) -> None:
-        """Anderson's method from these fields on, until they change by no more than `tol` or no film can be solved.
+    def settle(self, begin: Array, watch: Callable[[], None]) -> None:
+        """Anderson's method from these fields on, until they are `found` or no film can be solved.
 
         Far from the answer old steps mislead: there it combines two answers alone, and many once coefficients change by less
         than `NEAR`. Where steps lead away from the best fields so far, or a cycle ends, it begins anew from these; where that
@@ -236,10 +246,10 @@ class Loop:
                 return int(PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN)
             if self.change > AWAY * best[0] or ends():
                 return int(PETSc.SNES.ConvergedReason.DIVERGED_DTOL)
-            done = self.change <= (tol if near or idle else NEAR)
+            done = self.found if near or idle else self.change <= NEAR
             return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS) if done else 0
 
-        while not ends() and self.change > tol:  # NaN: no film
+        while not (ends() or self.found or np.isnan(self.change)):  # NaN: no film
             before = best[0]
             self._cycle(x, residual, ended, MEMORY if near else FEW)
             near, idle = not near, idle + 1 if best[0] >= before else 0
@@ -286,15 +296,3 @@ class Loop:
         snes.solve(None, x)
         for obj in (snes, f):
             obj.destroy()
-
-
-def settled(ask: Ask, stored: Stored | None, moved: float) -> float:
-    """Relative change of the coefficients at which they count as found: by the eps1 asked for, not by a method's own.
-
-    In a time step, which is expected to change them by `moved`, as far as its formula's error makes sense of it, a part of
-    that: nothing is lost by it, as what cells store has the very density that flows.
-    """
-    found = SETTLED * ask.stopping_for((1e-8, 1e-8)).eps1
-    given = ask.stopping is not None and not ask.options.get("rest")
-    in_time = stored is not None and not stored.exact and not given
-    return max(found, min(IN_TIME[0] * moved, IN_TIME[1])) if in_time else found

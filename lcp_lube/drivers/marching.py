@@ -82,8 +82,8 @@ class Run:
             self.may_sweep = "sweeps" not in ask.options
             ask = replace(ask, options={"sweeps": 0, **ask.options})
         self.march.curved = coupled = bool(first.effects) or first.dense
-        self.ask, last_digit = replace(ask, method=chosen.method, implied=not named), any(one.carried for one in first.effects)
-        if chosen.method == "fas" and self.rotor is None and not last_digit and ask.options.get("rest", REST):
+        self.ask = replace(ask, method=chosen.method, implied=not named)
+        if chosen.method == "fas" and self.rotor is None and ask.options.get("rest", REST):
             stopping = ask.stopping or {"eps1": EPS1}
             self.ask = replace(self.ask, options={"rest": REST, **ask.options}, stopping=stopping)
             ask = ask if coupled else replace(ask, stopping=stopping)

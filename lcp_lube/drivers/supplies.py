@@ -77,6 +77,11 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     """
     model: Model = scene.model  # type: ignore[attr-defined]
     supplies = model.supplies
+    if model.stored is not None:
+        from . import supply_step  # here: of marches alone
+
+        if (by_steps := supply_step.solve(scene, ask)) is not None:
+            return by_steps
     shut = not model.grooves and not any(side.kind == "open" for side in model.sides[: 2 * len(scene.shape)])
     if shut and all(one.flow is not None for one in supplies):
         raise InputError(f"{scene.name}: supply.1.flow: no side has a pressure, and no supply one or a restrictor: no way out")
@@ -84,19 +89,22 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     free = np.array([one.open for one in supplies])
     P, film = _coarse(scene, ask, inner, free)
     if known is not None and len(known) == len(supplies):
-        P = np.array(known) if model.stored is None else _foreseen(ask.start, np.array(known), free)
+        near: Any = ask.start
+        P = np.array(known)
+        if model.stored is not None:
+            P = supply_step.Sources(supplies).foreseen(near.problem, near.fields["p"])
     elif P is None:
         P = np.array(_first(model))
     known_before = shut and len(supplies) == 1  # nothing flows, through its restrictor neither, whatever rounding says
     P = np.array([supplies[0].p_s]) if known_before else P
     other = np.full(2, np.nan)  # of one supply: the last pressure that was too low, and too high
     last: tuple[Array, Array] | None = None  # pressures and flows
-    near: Fields | None = None  # in a time step, of the film with the next pressures
+    ahead: Fields | None = None  # in a time step, of the film with the next pressures
     chain = Chain(replace(ask, certify=False, reduction=ask.reduction and not ask.certify), inner)  # one band, at the end
     resting, least, enough = 0, np.inf, ENOUGH if known_before else TOLERANCE
     for count in range(1, MOST_SOLVES + 1):
         held = tuple(Supply(one.region, float(p)) for one, p in zip(supplies, P, strict=True))
-        solution = chain.solve(Fed(scene, held), near)
+        solution = chain.solve(Fed(scene, held), ahead)
         problem: Any = solution.problem
         if not solution.converged:
             break
@@ -130,7 +138,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
             break
         if film is None and model.stored is not None:
             z = solution.fields["p"] - solution.fields["r"] + (new_P - P[free]) @ np.array(answers)
-            near = {"p": np.maximum(z, 0.0), "r": np.maximum(-z, 0.0)}
+            ahead = {"p": np.maximum(z, 0.0), "r": np.maximum(-z, 0.0)}
         P = P.copy()
         P[free] = new_P
     if solution.converged and np.max(off) > enough:
@@ -195,14 +203,6 @@ def check_backflow(solution: Solution) -> None:
                 f"{solution.settings['scene']}: supply.{number}.p_s = {p_s:g}: less than the film's pressure there, {p:g} Pa: "
                 f"oil would flow back through the restrictor; a larger p_s is needed, or supply.{number}.backflow = true"
             )
-
-
-def _foreseen(start: Any, known: Array, free: Array) -> Array:
-    """Pressures that the fields foreseen for a time step have at the supplies whose pressures are free. Collective."""
-    problem, P = start.problem, known.copy()
-    for s in np.flatnonzero(free):
-        P[s] = problem.reduce.max(np.where(problem.held.owner.ravel() == s, start.fields["p"], 0.0)) * problem.p_unit
-    return P
 
 
 def _slopes(problem: LubricationProblem, fields: Any, free: Any) -> tuple[Array, list[Array]]:

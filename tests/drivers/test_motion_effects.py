@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from lcp_lube import load_scene, solve
+from lcp_lube.drivers import supply_step
 from lcp_lube.drivers.loop import Loop
 from lcp_lube.problems.film.fluid import Law
 
@@ -162,12 +163,26 @@ def test_large_symmetric_films_begin_by_the_method_that_half_of_them_takes():
             assert solution.converged and solution.method == "fas" and solution.mass_defect_run < 1e-10, solution.message
 
 
-@pytest.mark.parametrize("source", [{"restrictor": "orifice", "K": 2e-7, "p_s": 3e6}, {"flow": 1e-4}])
-def test_pressures_of_supplies_follow_with_density(source):
-    """Foreseen, and by Newton's method with the density's own derivative: three films a step, of one iteration each."""
-    capillary = {"x_mm": [12, 18], "restrictor": "capillary", "K": 2e-10, "p_s": 3e6}
-    data = {"family": "bearing", "L": 0.05, "U": 2.0, "n": 63, "supply": [capillary, {"x_mm": [30, 36], **source}]}
-    data |= {"film": {"shape": "formula", "h": "4e-5*(1+8*x)*(1+0.3*sin(314*t))"}, "motion": {"t_end": 0.004, "steps": 20}}
-    with solve(data | {"fluid": {"mu": 0.03, "p_supply": 1e5, "density": "dowson-higginson"}}) as solution:
-        assert solution.converged and solution.mass_defect < 1e-10 and solution.mass_defect_run < 1e-10
-        assert np.mean([row["iterations"] for row in solution.history]) < 4.0
+@pytest.mark.parametrize("effect", ["none", "density", "walls"])
+def test_pressures_of_supplies_follow(effect, monkeypatch):
+    """Unknowns of each step beside the film's: one or two steps of Newton's method, two or three films between soft walls."""
+    sources = [
+        {"restrictor": "capillary", "K": 2e-10, "p_s": 3e6},
+        {"restrictor": "orifice", "K": 2e-7, "p_s": 3e6},
+        {"flow": 1e-4},
+    ]
+    supply = [{"x_mm": [9 + 12 * k, 13 + 12 * k], **source} for k, source in enumerate(sources)]
+    film = {"shape": "formula", "h": "4e-5*(1+8*x)*(1+0.3*sin(314*t))"}
+    data: dict[str, Any] = {"family": "bearing", "L": 0.05, "U": 2.0, "n": 45, "supply": supply, "film": film}
+    fluid = {"density": {"density": "dowson-higginson"}, "walls": {"barus": 2e-8}}.get(effect, {})
+    data |= {"fluid": {"mu": 0.03, "p_supply": 1e5, **fluid}, "motion": {"t_end": 0.003, "steps": 9}}
+    data |= {"elastic": {"compliance": 1e-13}} if effect == "walls" else {}
+    loads, counts = [], []
+    for way in (supply_step.solve, lambda scene, ask: None):  # and around films with given pressures
+        monkeypatch.setattr(supply_step, "solve", way)
+        with solve(data, model="full") as solution:
+            assert solution.converged and solution.mass_defect < 1e-10 and solution.mass_defect_run < 1e-10
+            loads.append([row["load"] for row in solution.history])
+            counts.append(np.mean([row["iterations"] for row in solution.history[3:]]))
+    assert loads[0] == pytest.approx(loads[1], rel=1e-3 if effect == "density" else 1e-5)  # the formula's error is 1e-2
+    assert counts[0] <= (3.0 if effect == "walls" else 1.5)

@@ -12,11 +12,12 @@ a term >= 0 on A's diagonal, which leaves a step in the M-matrix family and sett
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from ...base.parallel import Array
+from ..solution import Fields
 from .effects import Answer, Cells, Effect, FaceFactors, answer, around, face_means, factors, framed_by
 from .fluid import Law
 from .lubrication import LubricationProblem
@@ -24,6 +25,7 @@ from .reynolds import BoxScheme, sides
 
 LEAST_KEPT = 0.5  # of what a cell stores at p_k, at most of the rigid film: by the line through that it does so at p = 0
 LEAST = 1e-30  # 1/Pa
+EMPTY = 1e-6  # of a cell's room: less liquid takes up nothing that others have left
 WIDEST = 40.0  # of the logarithm of a factor, of an iterate
 
 
@@ -137,6 +139,14 @@ def filled(plain: FaceFactors, by: FaceFactors, q: Array) -> FaceFactors:
         return plain
     stored = by.values["stored"] + by.values["gives"] * q.reshape(by.grid.box)
     return replace(plain, values=plain.values | {"stored": stored})
+
+
+def closed(by: FaceFactors, problem: Any, fields: Fields, rigid: LubricationProblem) -> FaceFactors:
+    """The factors with what is left of a problem's balances in what its cells store, so that no cell loses any. Collective."""
+    p, r, storage = fields["p"], fields["r"], np.asarray(rigid.scheme.storage)
+    room, left = storage * (1.0 - r.reshape(storage.shape)), problem.balance(p, r).reshape(storage.shape)
+    off = np.divide(left, room, out=np.zeros(storage.shape), where=room > EMPTY * storage)
+    return replace(by, values=by.values | {"stored": by.values["stored"] - off})
 
 
 def logarithm(lift: Array) -> Array:

@@ -1,0 +1,90 @@
+"""A time step's film and the pressures of its supplies that follow from flows, by one Newton's method for both.
+
+`supplies` finds the pressures around solves of the film, each of which has them given. From the step before, both are near:
+here both are unknowns of each step (`sources`). A film of constant density is linear at its signs, and exact once these stay;
+of one whose density follows the pressure `density_step` takes the steps. Inside of the loop of `coupling` it is such a film
+that is solved, so that pressures and effects are found by one loop.
+"""
+
+from dataclasses import replace
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from ..problems.film.model import Model
+from ..problems.solution import Outcome, Solution, Step
+from ..scenes.scene import Solvable
+from ..solvers.relaxation import relaxation
+from . import coupling
+from .ask import Ask
+from .loop import Frozen
+from .sources import CONSTANT, Sources
+
+WHY = "supplies: their pressures are unknowns of each step beside the film's"
+MOST = 12  # steps, after which `supplies` takes over
+SWEEPS = 16  # once three steps have not put the signs right
+
+
+def solve(scene: Solvable, ask: Ask) -> Solution | None:
+    """The film at the step's end with the pressures of its supplies; None where it is not found so. Collective."""
+    model: Model = scene.model  # type: ignore[attr-defined]
+    plain = ask.method == "active-set" and not ask.certify and not model.grooves
+    if not plain or model.stored is None or ask.start is None or "supply_pressures" not in ask.start.settings:
+        return None
+    try:
+        solution = coupling.solve(scene, ask, _film) if coupling.applies(scene, ask) else _film(scene, ask)
+    except _NotFound:
+        return None
+    problem: Any = solution.problem
+    P = [one.p for one in problem.held.supplies]
+    if not solution.converged:
+        solution.destroy()
+        return None
+    problem.hold_at([replace(one, p=p) for one, p in zip(model.supplies, P, strict=True)])
+    solution.certificate = problem.certify(solution.fields, solution.settings["eps1"])
+    why = [WHY, *(one for one in solution.settings["why"] if not one.startswith("supplies"))]
+    solution.settings |= {"supply_pressures": P, "why": why}
+    return solution.judged()
+
+
+class _NotFound(Exception):
+    """The film's steps do not end."""
+
+
+def _film(scene: Solvable, ask: Ask) -> Solution:
+    """A film of constant density and viscosity, its supplies held at the pressures found. Collective."""
+    begun, near = perf_counter(), ask.start
+    assert near is not None  # as `solve` found
+    film: Any = scene.build(ask.comm)
+    model, law = (scene.constant, scene.law) if isinstance(scene, Frozen) else (scene.model, CONSTANT)  # type: ignore[attr-defined]
+    sources = Sources(model.supplies, law)
+    u = near.problem.p_unit / film.p_unit  # type: ignore[attr-defined]
+    z = np.where((near.fields["r"] > 0) & ~(near.fields["p"] > 0), -near.fields["r"], near.fields["p"] * u)
+    P, inside, steps = sources.foreseen(film, z), film.held.mask.ravel(), list[Step]()
+    sweeps = ask.options.get("sweeps", 0)
+    while True:
+        film.hold_at(sources.held(P))
+        z = sources.put(film, z, P)
+        sweep = relaxation(film) if sweeps or len(steps) > 2 else None
+        if sweep is not None:
+            fields = sweep({"p": np.maximum(z, 0.0), "r": np.maximum(-z, 0.0)}, sweeps or SWEEPS)
+            z = fields["p"] - fields["r"]
+        cavity = (z < 0.0) & ~inside
+        found = sources.step(film, cavity, z, film.balance(np.maximum(z, 0.0), np.maximum(-z, 0.0)), P)
+        if found is None or len(steps) == MOST:
+            film.destroy()
+            raise _NotFound
+        z, P = z + found[0], P + found[1]
+        changed = film.reduce.sum((cavity != ((z < 0.0) & ~inside)).astype(float))
+        steps.append(Step(changed, film.reduce.max(np.abs(found[0])), 1.0, 1))
+        if not changed:
+            break
+    film.hold_at(sources.held(P))
+    film.free_matrices()
+    fields = {"p": np.maximum(z, 0.0), "r": np.maximum(-z, 0.0)}
+    certificate = film.certify(fields, near.settings["eps1"])
+    why = [one for one in near.settings["why"] if not one.startswith("coupling")]
+    times = {"setup": 0.0, "assembly": 0.0, "linear": 0.0, "total": perf_counter() - begun}
+    message = f"no sign changes any more after {len(steps)} steps"
+    return Solution(film, fields, Outcome.CONVERGED, message, certificate, steps, {**near.settings, "why": why}, times).judged()
