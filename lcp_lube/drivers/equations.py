@@ -17,9 +17,9 @@ from ..base.parallel import Array
 from ..errors import InputError, nearest
 from ..problems.film import slopes
 from ..problems.film.cavity import about_to_change, cavitated
-from ..problems.film.forces import attitude, weights
+from ..problems.film.forces import attitude, totals, weights
 from ..problems.film.grooves import GroovedProblem
-from ..problems.film.known import known_fields
+from ..problems.film.known import known_fields, known_of
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.tangent import Tangent, effective, tangent
@@ -139,7 +139,11 @@ class Equations:
         problem = self.problem(p)
         found = slopes.numbers(problem, p / problem.p_unit, r, wanted)
         if (fields := known_fields(problem)) is not None:  # a line's numbers are free of the grid's error (`film.known`)
-            told, discrete = _flat(problem.quantities(fields)), slopes.numbers(problem, fields["p"], fields["r"])
+            if wanted is not None and set(wanted) <= set(weights(problem)):  # integrals of the pressure: no flows, no fronts
+                told = totals(problem, fields["p"] * problem.p_unit, known_of(problem), wanted)
+            else:
+                told = _flat(problem.quantities(fields))
+            discrete = slopes.numbers(problem, fields["p"], fields["r"], wanted)
             found = {name: value + (told.get(name, discrete[name]) - discrete[name]) for name, value in found.items()}
         if self.turned:
             found = {FLIPPED.get(name, name): -value if name in DRAGS else value for name, value in found.items()}

@@ -29,6 +29,7 @@ SHARE_TIME = 0.13  # the same of a march in time, by its steps
 LEAST = {1: 15, 2: 6}  # points a side of a coarse grid, at least
 FREE = {"barus"}  # a change of the unknown: it costs nothing, and is always kept
 COARSE_EPS1 = 1e-7
+PLACE = 1e-2  # by which the load of a film that is looked at may be off
 FEWEST = 5  # steps of a march that is looked at, at least
 
 
@@ -106,7 +107,10 @@ class Look:
         own = shape == self.scene.shape and self.ask.accuracy is None and not filed
         try:
             rigid = without(self.scene.with_shape(shape), [name for name in self.names if name not in FREE])
-            first = self.inner(rigid, self.ask if own else quick(self.ask))
+            table = getattr(rigid, "balance", None)
+            if table is not None:  # the place need not be exact: what is kept moves it
+                rigid = rigid.model_copy(update={"balance": table.model_copy(update={"tol": max(table.tol, PLACE)})})
+            first = self.inner(rigid, self.ask if own and table is None else quick(self.ask))
         except InputError:
             self.record = {"reason": f"no film without effects on {shape} points"}
             return
@@ -131,7 +135,7 @@ class Look:
         self.doubtful = [name for name in self.names if name not in self.kept and not self._sure(name, acting)]
         self.work = first.problem.unknowns + (0 if own else total_work(first))
         self.record = {"quantity": quantity, "tolerance": self.ask.accuracy or TOLERANCE, "grid": list(shape)}
-        if own and self.kept == self._free:
+        if own and table is None and self.kept == self._free:
             self.solution, self.first = first, None
         elif own and self.ask.start is None:
             solved: Any = getattr(first.problem, "moving", first.problem)
