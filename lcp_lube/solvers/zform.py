@@ -6,6 +6,7 @@ With this s both kinds of columns of G's Jacobian have A's diagonal: a step in z
 """
 
 from collections.abc import Callable
+from copy import copy
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +25,10 @@ class ZForm:
     """z of fields, fields of z, G and its norm, for one problem."""
 
     def __init__(self, problem: LubricationProblem):
-        self.problem, scheme = problem, problem.scheme
-        self.diagonal = scheme.diagonal.ravel()
-        b_C = scheme.b_C.ravel()
+        scheme = problem.scheme.changed(b_C=problem.scheme.b_C, b_W=problem.scheme.b_W)  # made once, not for each residual
+        self.problem = copy(problem)
+        self.problem.scheme = scheme
+        self.diagonal, b_C = scheme.diagonal.ravel(), scheme.b_C.ravel()
         self.s = self.diagonal / -b_C
         self._dragged, self._driven = (problem.reduce.norm(a) for a in (b_C, problem.c))
 

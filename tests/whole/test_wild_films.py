@@ -30,6 +30,7 @@ CERTIFIED_WRONG_ONCE = [
     (902845, "a pocket behind a film of 1e-15 of its conductance"),
     (5017662, "half way up a steep wall between two pressures"),
     (5018091, "a dimple of 1e16 times its surroundings' conductance"),
+    (771555, "pressures that drive 1e-9 of what the wall does"),
 ]
 
 

@@ -185,11 +185,11 @@ class Fas(Cycles):
         self._first = self.norm if self._taken == 1 else self._first
         step = self.problem.reduce.comm.allreduce(self._correction) if self._levels[0].comm is not None else self._correction
         size = float(np.sqrt(step))
-        if self._extreme and not anew and self.norm <= self.eps1:
-            p_max = self.problem.reduce.max(self.z)
-            self.norm = (
-                max(self.norm, self.eps1 * size / (SETTLED * p_max * np.sqrt(self.problem.size))) if p_max > 0 else self.norm
-            )
+        if self.norm <= self.eps1:
+            whole = self.problem.reduce.max(self.fields["p"]) * np.sqrt(self.problem.size)
+            # Where pressures drive less through a cell than the wall does, ||c|| is no scale for them.
+            if whole > 0.0 and ((self._extreme and not anew) or whole < self._unit * self._c_norm):
+                self.norm = max(self.norm, self.eps1 * size / (SETTLED * whole))
         return Step(self.norm, size, 1.0, enough=self._rest > self.eps1 and self.norm <= self._rest)
 
     def _kind(self) -> str:
