@@ -45,7 +45,7 @@ class Reduce:
         return _over, (self.comm.size == 1,)
 
     def sum(self, a: NDArray) -> float:
-        return self.comm.allreduce(float(np.sum(a)))
+        return self._total(float(np.sum(a)))
 
     def summed(self, own: float, terms: Callable[[], Array]) -> float:
         """The sum of what is this rank's; terms : the part of each of its points, for those who ask (`drivers.tape`)."""
@@ -60,12 +60,15 @@ class Reduce:
         return field
 
     def dot(self, a: Array, b: Array) -> float:
-        return self.comm.allreduce(float(np.dot(a, b)))
+        return self._total(float(np.dot(a, b)))
 
     def norm(self, *arrays: Array) -> float:
         """Euclidean norm of the arrays laid end to end."""
         squares = (float(np.dot(a, a) if a.ndim == 1 else np.einsum("ij,ij->", a, a)) for a in arrays)
-        return float(np.sqrt(self.comm.allreduce(sum(squares))))
+        return float(np.sqrt(self._total(sum(squares))))
+
+    def _total(self, own: float) -> float:
+        return own if self.comm.size == 1 else self.comm.allreduce(own)
 
     def min(self, a: Array) -> float:
         """Smallest entry, inf where there is none; NaN if any entry is NaN (MPI.MIN alone may drop it)."""

@@ -87,7 +87,7 @@ class Grid:
         self._own, self.petsc_comm = Owned(self, comm), comm
         self.comm = comm.tompi4py()  # not the DM's own: that ends with it, and a solution is asked for more when it is freed
         self.reduce = Reduce(self.comm)
-        # One rank has them all: its DMDA, some 30 bytes a point, waits for a matrix that asks for it.
+        # One rank has them all: its DMDA, some 30 bytes a point, waits for what asks for it (files, frames).
         ranges = self.dm.getRanges() if comm.size > 1 else [(0, n) for n in self.shape]
         self._owned = [(int(start), int(end)) for start, end in (*ranges, (0, 1))][:2]
         (self.x_start, self.x_end), (self.y_start, self.y_end) = self._owned
@@ -264,6 +264,8 @@ class Grid:
 
         Shape (ny_local + 2, nx_local + 2); its corners are not to be used.
         """
+        if self.comm.size == 1:
+            return self.ghosted(np.arange(self.size), -1).astype(np.int64)
         return self._frame(self.dm.getLGMap().indices, -1)
 
     def _frame(self, values: NDArray, outside: float) -> NDArray:
