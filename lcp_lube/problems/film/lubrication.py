@@ -168,8 +168,7 @@ class LubricationProblem:
         """What c has beyond the flows of the wall and the sides' pressures on some lines: nothing in a steady film."""
         c = s.couette_W - s.couette_E
         for k, at_side, p_side in zip((s.k_W, s.k_E, s.k_S, s.k_N), self._at_sides, self.p_sides, strict=True):
-            if p_side:
-                c += np.where(at_side if len(at_side) == 1 else at_side[rows], k * (p_side / self.p_unit), 0.0)
+            c += np.where(at_side if len(at_side) == 1 else at_side[rows], k * (p_side / self.p_unit), 0.0) if p_side else 0.0
         return s.c - c if s.held is None else np.where(s.held, 0.0, s.c - c)
 
     def hold_at(self, supplies: Sequence[Supply]) -> None:
