@@ -90,6 +90,10 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     rung = next(k for k in count() if ranks == 1 or finer(first, meshes, k, unit)[-1] >= 2 * ranks)
     if line and first[0] < FEW_KNOWN and (finest is None or finer(first, meshes, rung + 1, unit)[0] <= finest[0]):
         rung += 1
+    # Where a stretch between two edges may be one cell wide a grid tells little of the next one.
+    narrow = pairs and any(n + 1 < 2 * least for n, least in zip(first, fewest, strict=False))
+    if narrow and all(n <= most for n, most in zip(finer(first, meshes, rung + 4, unit), finest or (inf, inf), strict=True)):
+        rung += 2
     shape = finer(first, meshes, rung, unit)
     solution: Solution | None = None
     before: Solution | None = None
