@@ -1,6 +1,6 @@
 """A march in time as scenes near by have it: the equations of its steps at the fields that were found."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -9,7 +9,7 @@ import numpy as np
 from ..base.parallel import Array
 from ..errors import InputError
 from ..problems.film.forces import PIVOT
-from ..problems.film.stored import Stored
+from ..problems.film.stored import Stored, mean_film
 from ..problems.grid import Grid
 from ..scenes.scene import Scene
 from .equations import Equations, followed
@@ -18,6 +18,8 @@ from .march_coordinates import Coordinates
 from .marching import Moment, first_film
 from .step import TimeStep, contents
 
+STEP = 1e-3  # of a supply's pressure, in which G and what it is told by are linear
+NUDGE = 1e-5  # of the thinnest film: of the journal's place, for differences
 PLACES = ("journal_x", "journal_y", "h_offset", "pitch", "roll")
 
 
@@ -66,11 +68,6 @@ def check_march(scene: Scene) -> None:
     follow = getattr(scene, "pads_follow", False)
     for found, what in (
         (bool(model.effects), "effects"),
-        (
-            model.dense and bool(model.supplies or getattr(scene, "grooves_deg", ())),
-            "what supplies a fluid whose density changes",
-        ),
-        (any(one.open for one in model.supplies) and (follow or scene.motion.free), "supplies that follow beside what is free"),  # type: ignore[attr-defined]
         (model.U < 0, "a wall that moves to smaller x (give the mirror image, with -U)"),
         (hasattr(scene, "observer"), "events"),
         (follow and model.polar is None, "pads that follow a journal"),
@@ -159,7 +156,7 @@ class Course:
         kept, law = self.kept(n), self.first.law
         return 1.0 if kept is None or law is None else law.density(kept.p)
 
-    def at(self, n: int, shift: Any = 0.0, pressures: Sequence[float] = ()) -> Equations:
+    def at(self, n: int, shift: Any = 0.0, pressures: Any = None) -> Equations:
         """G and Q of step n; n = 0: of the steady film that it begins with. pressures : of the supplies, other than its own."""
         model, kept = self.film(n, shift), self.kept(n)
         assert kept is not None  # as its caller asks for no others
@@ -167,7 +164,31 @@ class Course:
             formula = self.formula(n)
             old = formula.old([self.content(n - 1), self.content(n - 2) if formula.before else None])
             model = replace(model, stored=Stored(formula.weight, old, self.grid))
-        return Equations(TimeStep(self.scene, model, self.grid), self.comm, pressures or kept.pressures, dry=kept.dry)  # type: ignore[arg-type]
+        pressures = kept.pressures if pressures is None else pressures
+        return Equations(TimeStep(self.scene, model, self.grid), self.comm, pressures, dry=kept.dry)  # type: ignore[arg-type]
+
+    def by_followed(self, n: int, at: Any, unit: float) -> list[tuple[Array, Array, dict[str, float]]]:
+        """Derivatives of G in a unit of flow, the film and the numbers told, by each place that is free and pressure that follows."""
+        kept = self.kept(n)
+        assert kept is not None  # as its caller asks for no others
+        step = NUDGE * self.grid.reduce.min(mean_film(self.grid, self.film(n).film)) / self.reach
+        P, changes = np.array(kept.pressures), [(step[k], {"shift": np.eye(self.free.size)[k]}) for k in at]
+        for k, one in enumerate(self.film(n).supplies):
+            if one.open:
+                changes.append((STEP * (abs(P[k]) or P.max() or 1.0), {"pressures": np.eye(P.size)[k]}))
+        found = []
+        for d, change in changes:
+            ends = []
+            for way in (d, -d):
+                moved = {name: (way * one + (P if name == "pressures" else 0.0)).tolist() for name, one in change.items()}
+                eq = self.at(n, **moved)
+                h = mean_film(self.grid, eq.constant.film).ravel()
+                ends.append((eq.scaled(kept.p, kept.r, unit), h, eq.report(eq.numbers(kept.p, kept.r))))
+                eq.destroy()
+            (G, h, above), (G_below, h_below, below) = ends
+            told = {name: (above[name] - below[name]) / (2.0 * d) for name in above}
+            found.append(((G - G_below) / (2.0 * d), (h - h_below) / (2.0 * d), told))
+        return found
 
     def destroy(self) -> None:
         self.grid.destroy()

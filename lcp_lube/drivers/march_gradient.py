@@ -22,7 +22,8 @@ from ..base.differences import differences
 from ..base.parallel import Array
 from ..errors import InputError
 from ..problems.film.edges import oblique
-from ..problems.film.flows import point_weights
+from ..problems.film.flows import point_weights, volume_unit
+from ..problems.film.slopes import giving
 from ..problems.film.stored import mean_film
 from ..problems.solution import Solution
 from ..scenes.scene import Scene
@@ -36,8 +37,7 @@ from .march_course import Course, Trace, check_march
 from .march_films import MarchFilms
 
 MEAN = "mean_"  # of a quantity: its mean over the march, of the steps' ends
-STEP = 1e-3  # of a supply's pressure, in which G and what it is told by are linear
-NUDGE = 1e-5  # of the thinnest film: of the journal's place, for differences
+GIVEN = ("supply_flow_", "groove_flow_")
 HELD = ("t_end", "dt", "tol")
 STEPS = "the steps in time are held"
 
@@ -62,6 +62,7 @@ class MarchGradient:
             solve(scene, Ask(method=solution.settings.get("method", "auto"), implied=True, comm=comm, watch=trace)).destroy()
         self.scene, self.trace, self.comm, self.names = scene, trace, comm, list(dict.fromkeys(quantities))
         self.lambdas: dict[str, list[Any]] = {name: [None] * (len(trace.steps) + 1) for name in self.names}
+        self.left: dict[str, list[Any]] = {name: [None] * (len(trace.steps) + 1) for name in self.names}  # lambda, of contents
         self.course = Course(scene, trace, comm)
         shape = (len(trace.steps) + 1, 2 * self.course.free.size)
         self.journal: dict[str, Array] = {name: np.zeros(shape) for name in self.names}  # of E and V
@@ -115,7 +116,7 @@ class MarchGradient:
         left *= np.where(cavity, 1.0, of_full)  # of the content, by z
         rows = {
             name: right_side(slopes, parts.get(name, {}), cavity)
-            + left * sum(part * self.lambdas[name][m] / self.units[m] for m, part in later)
+            + left * sum(part * self.left[name][m] / self.units[m] for m, part in later)
             for name in self.names
         }
         problem = eq.problem(p)
@@ -130,74 +131,54 @@ class MarchGradient:
         linear.destroy()
         self.units[n], terms = problem.scheme.flow_unit, eq.terms(p, r) / problem.scheme.flow_unit
         found = dict(zip(rows, solved, strict=False))
-        if forces:
-            self._place(n, found, solved[len(rows) : len(rows) + len(forces)], later)
-        if off:
-            self._feed(n, found, solved[-len(off) :])
+        pushed, off_by = solved[len(rows) : len(rows) + len(forces)], solved[len(rows) + len(forces) :]
+        if forces or off:
+            self._follow(n, found, pushed, off_by, later)
         for name, one in found.items():
-            self.lambdas[name][n] = one
-            own = sum(abs(w * numbers[part]) for part, w in parts.get(name, {}).items())
-            self.sizes[name] += own + grid.reduce.dot(np.abs(one), terms)
+            self.lambdas[name][n] = self.left[name][n] = one
+            if eq.given is not None:  # what was left in a supply is missing in what it gives
+                gives = {part: -w for part, w in parts.get(name, {}).items() if part.startswith(GIVEN)}
+                for fed, by in zip(self.fed[name][n], off, strict=True):
+                    gives |= {part: gives.get(part, 0.0) + fed * w for part, w in by.items()}
+                own = sum((w * giving(problem, part) for part, w in gives.items()), np.zeros(one.size))
+                self.left[name][n] = np.where(eq.given, volume_unit(problem) * own, one)
+            size = sum(abs(w * numbers[part]) for part, w in parts.get(name, {}).items())
+            self.sizes[name] += size + grid.reduce.dot(np.abs(one), terms)
         eq.destroy()
 
-    def _place(self, n: int, found: dict[str, Array], pushed: list[Array], later: list[tuple[int, float]]) -> None:
-        """Adjoints of E_n and V_n of what is found; those of the film with them. pushed : J'^-1 of the forces on it."""
+    def _follow(
+        self, n: int, found: dict[str, Array], pushed: list[Array], off_by: list[Array], later: list[tuple[int, float]]
+    ) -> None:
+        """Adjoints of E_n and V_n of what is free, and of M_n; those of the film with them.
+
+        pushed, off_by : J'^-1 of the forces on what is free, and of what supplies and film disagree by.
+        """
         course, kept, dot = self.course, self.course.kept(n), self.course.grid.reduce.dot
         assert kept is not None  # as `_back` asks
         weight, at, count = course.formula(n).weight if n else 0.0, np.flatnonzero(course.sought(n)), course.free.size
         inertia = course.inertia[at]
-        h = mean_film(course.grid, course.film(n).film)
-        step = NUDGE * course.grid.reduce.min(h) / course.reach
         size = 2.0 * course.grid.spacing[0] * point_weights(course.grid) * (1.0 - kept.r) * course.density(n)
-        by_place = []  # of G, h and the numbers told, by each
-        for k in at:
-            ends, d = [], step[k]
-            shift = np.eye(count)[k] * d
-            for eq in (course.at(n, shift), course.at(n, -shift)):
-                G = self._scaled(n, eq)
-                h = mean_film(course.grid, eq.constant.film).ravel()
-                ends.append((G, h, eq.report(eq.numbers(kept.p, kept.r))))
-                eq.destroy()
-            (G, h, above), (G_below, h_below, below) = ends
-            told = {name: (above[name] - below[name]) / (2.0 * d) for name in above}
-            by_place.append(((G - G_below) / (2.0 * d), (h - h_below) / (2.0 * d), told))
-        C = np.array([[dot(one, G) for one in pushed] for G, _, _ in by_place]) + np.diag(inertia * weight**2)
+        by = course.by_followed(n, at, self.units[n])
+        C = np.zeros((len(by), len(by)))  # of what follows, by the conditions
+        for row, (G, _, told) in zip(C, by, strict=True):
+            misfits = [value for name, value in told.items() if name.startswith(MISFIT)]
+            row[: at.size] = [dot(one, G) for one in pushed]
+            row[at.size :] = [value - dot(one, G) for value, one in zip(misfits, off_by, strict=True)]
+        C[: at.size, : at.size] += np.diag(inertia * weight**2)
         if not np.linalg.det(C):
             raise InputError(f"{self.scene.name}: t = {kept.t:.6g} s: the film bears nothing: no derivatives of what it bears")
         for name in self.names:
             mu, nu = (sum((part * self.journal[name][m, k + at] for m, part in later), np.zeros(at.size)) for k in (0, count))
-            kept_on = sum((part * self.lambdas[name][m] / self.units[m] for m, part in later), np.zeros(size.size))
+            kept_on = sum((part * self.left[name][m] / self.units[m] for m, part in later), np.zeros(size.size))
             base, share = self._asked(n).get(name, ("", 0.0))
-            own = [share * told.get(base, 0.0) - dot(found[name], G) + dot(kept_on, size * h) for G, h, told in by_place]
-            one = np.linalg.solve(C, np.array(own) + weight * inertia * mu - nu)
+            own = [share * told.get(base, 0.0) - dot(found[name], G) + dot(kept_on, size * h) for G, h, told in by]
+            own[: at.size] += weight * inertia * mu - nu
+            one, fed = np.split(np.linalg.solve(C, own), [at.size])
             self.journal[name][n, at] = one
             self.journal[name][n, count + at] = inertia * (mu - weight * one) * (n > 0)  # speeds at t = 0 are given
+            self.fed[name][n] = fed
             found[name] = found[name] + sum(part * answer for part, answer in zip(one, pushed, strict=True))
-
-    def _feed(self, n: int, found: dict[str, Array], answers: list[Array]) -> None:
-        """Adjoints of step n's supplies; those of the film with them. answers : J'^-1 of what they disagree by."""
-        kept, dot = self.course.kept(n), self.course.grid.reduce.dot
-        assert kept is not None  # as `_back` asks
-        by_p = []  # of G and the numbers told, by the pressure of each
-        for k, one in enumerate(self.course.film(n).supplies):
-            if not one.open:
-                continue
-            P = np.array(kept.pressures)
-            d = STEP * (abs(P[k]) or P.max() or 1.0)
-            ends = []
-            for change in (d, -d):
-                eq = self.course.at(n, pressures=[*P[:k], P[k] + change, *P[k + 1 :]])
-                ends.append((self._scaled(n, eq), eq.report(eq.numbers(kept.p, kept.r))))
-                eq.destroy()
-            (G, above), (G_below, below) = ends
-            by_p.append(((G - G_below) / (2.0 * d), {name: (above[name] - below[name]) / (2.0 * d) for name in above}))
-        misfits = [name for name in by_p[0][1] if name.startswith(MISFIT)]
-        C = np.array([[told[name] - dot(one, G) for name, one in zip(misfits, answers, strict=True)] for G, told in by_p])
-        for name in self.names:
-            base, share = self._asked(n).get(name, ("", 0.0))
-            own = [share * told.get(base, 0.0) - dot(found[name], G) for G, told in by_p]
-            self.fed[name][n] = one = np.linalg.solve(C, own)
-            found[name] = found[name] - sum(part * answer for part, answer in zip(one, answers, strict=True))
+            found[name] = found[name] - sum(part * answer for part, answer in zip(fed, off_by, strict=True))
 
     def _scaled(self, n: int, eq: Equations) -> Array:
         """G of step n in the units of its adjoints."""
