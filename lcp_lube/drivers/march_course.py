@@ -168,7 +168,7 @@ class Course:
         return Equations(TimeStep(self.scene, model, self.grid), self.comm, pressures, dry=kept.dry)  # type: ignore[arg-type]
 
     def by_followed(self, n: int, at: Any, unit: float) -> list[tuple[Array, Array, dict[str, float]]]:
-        """Derivatives of G in a unit of flow, the film and the numbers told, by each place that is free and pressure that follows."""
+        """Derivatives of G in a unit of flow, the film and the numbers told, by each place and pressure that follows."""
         kept = self.kept(n)
         assert kept is not None  # as its caller asks for no others
         step = NUDGE * self.grid.reduce.min(mean_film(self.grid, self.film(n).film)) / self.reach
