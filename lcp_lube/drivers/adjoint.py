@@ -6,6 +6,7 @@ solution. Where v was found such that C = 0 holds (an attitude, the eccentricity
     dQ/da = L_a - L_v (C_v)^-1 C_a.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -34,7 +35,7 @@ from .pad_coordinates import bearing_of
 CANCELLED = 1e-10
 ROUNDED = 1e-8  # of what is small of what was found: a 0 that rounding has moved, the attitude of pads about the load
 FEWER = 2_000  # points from which multigrid solves for an answer that multigrid gave: its loops are loaded
-DIRECT = {"load", "friction", "p_max"}  # numbers that are made of no others in a film without a shaft
+DIRECT = {"load", "friction", "p_max", "force_x", "force_y"}  # numbers that are mostly made of no others but these
 SUPPLY = "supply.{}.p"  # the key of a supply's pressure, Pa above p_c
 
 
@@ -73,8 +74,10 @@ class Adjoint:
         self.asked = list(quantities)
         names = [name for name in [*quantities, *self.conditions] if name not in self.found]
         eq, p, r = self.equations, self.p, self.r
-        itself = quantities and eq.constant.extras is None and DIRECT.issuperset(names)
-        self.numbers = eq.numbers(p, r, names if itself and eq.constant.shaft is None else None)
+        lean = {*names, "force_x", "force_y"} if quantities and DIRECT.issuperset(names) else None
+        self.numbers = eq.numbers(p, r, lean)
+        if lean and any(math.isnan(eq.report(self.numbers)[name]) for name in names):  # made of others too
+            self.numbers = eq.numbers(p, r)
         parts = {name: eq.partials(self.numbers, name) for name in names}
         self.cavity, switching = cavity_of(eq, p, r)
         if flip:

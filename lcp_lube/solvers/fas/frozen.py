@@ -83,7 +83,7 @@ class Frozen(Cycles):
             # One more cycle takes x to x + rest; what it leaves of `rest` is taken to be what it leaves of the basis at most.
             left = np.linalg.norm(rest) * min(1.0, np.linalg.norm(np.eye(k + 1, k) - H[: k + 1, :k], 2) if k else 1.0)
             if left <= rtol * size:
-                x = start + np.append(y, 0.0) @ V[: k + 1] + rest @ V[: k + 1]
+                x = start + (np.append(y, 0.0) + rest) @ V[: k + 1]
                 size = min(size, norm(x))
                 if left <= rtol * size and (z is None or self._agree(x.reshape(b.shape), b, z)):
                     return x.reshape(b.shape) * sizes
