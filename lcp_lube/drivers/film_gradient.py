@@ -33,12 +33,13 @@ STEP = 1e-30  # relative: complex steps have no differences whose digits could c
 
 def areas(grid: Grid) -> Array:
     """What of the film stands for a point: its cell, at an open side with the half cell up to the side, m2 (1D: m)."""
-    masks, size = sides(grid), grid.widths(0)[None, :] * grid.widths(1)[:, None] if grid.dim == 2 else grid.widths(0)[None, :]
-    for side in range(grid.dim):
-        width = grid.widths(side)[None, :] if side == 0 else grid.widths(side)[:, None]
+    masks, sizes = sides(grid), [grid.widths(side) for side in range(grid.dim)]
+    for side, size in enumerate(sizes):
         for mask, rim in zip(masks[2 * side : 2 * side + 2], grid.rims(side), strict=True):
-            size = size * (1.0 + np.where(mask, 0.5 * rim / width, 0.0))
-    return np.broadcast_to(size * grid.stretch(grid.y), grid.box).ravel() * grid.cell
+            size = size + 0.5 * rim * mask.ravel()
+        sizes[side] = size
+    of_lines = grid.cell * grid.stretch(grid.y) * (sizes[1][:, None] if grid.dim == 2 else 1.0)
+    return np.asarray(sizes[0][None, :] * of_lines).ravel()
 
 
 class FilmGradient:
@@ -71,7 +72,7 @@ class FilmGradient:
         A change of the film by dh(x, y) changes Q by the sum over the points of dQ/dh dh times their `areas`.
         """
         adjoint, eq = self.adjoint, self.adjoint.equations
-        total = np.zeros(eq.grid.box)
+        total: Any = 0.0
         for name, factor in self.implicit.weights(quantity).items():
             total = total + factor * self._lagrangian(name)
         out = total.ravel() / areas(eq.grid)
@@ -86,7 +87,7 @@ class FilmGradient:
         adjoint = self.adjoint
         held = adjoint.equations.given
         rows = -adjoint.lambdas[name] if held is None else np.where(held, 0.0, -adjoint.lambdas[name])
-        total = np.zeros(adjoint.equations.grid.box)
+        total: Any = 0.0
         unit = volume_unit(self.problem)
         for part, weight in adjoint.parts[name].items():
             part = FLIPPED.get(part, part) if adjoint.equations.turned else part
