@@ -42,7 +42,7 @@ LEAST = 1e-15  # p_unit: a largest pressure below this is rounding
 @dataclass(frozen=True)
 class ActiveSetOptions(MethodOptions):
     """patience: steps without a fall of ||G|| by 10 % before sweeps take over; give_up: steps after which it is taken to
-    cycle; p0: p (p_unit) where the film is full at the start; rtol: smallest relative tolerance of iterative inner solves; sweeps:
+    cycle; p0: p (p_unit) where the film is full at the start; rtol: smallest relative tolerance of iterative solves; sweeps:
     of relaxation before the first step from a given start, and after each step; 0: none at all, also when stalled."""
 
     method = "active-set"
