@@ -29,8 +29,8 @@ def answer(scene, near=None):
     return solution
 
 
-def off(scene, solution, quantities, keys=None, step=1e-3):
-    """Those derivatives that differ from differences of solves, of fourth order."""
+def off(scene, solution, quantities, keys=None, step=2e-4):
+    """Those derivatives that differ from differences of solves."""
     worst = {}
     for one in (found := gradients(scene, solution, quantities, keys)):
         assert one.value == pytest.approx(solution.numbers[one.quantity], rel=1e-6)
@@ -38,13 +38,12 @@ def off(scene, solution, quantities, keys=None, step=1e-3):
         a = values_of(scene)[key]
         d = step * (abs(a) or {"h_offset": 2e-5}.get(key, 1e5))
         told = {}
-        for k in (-2, -1, 1, 2):
+        for k in (-1, 1):
             with answer(with_values(scene, {key: a + k * d}), solution) as other:
                 told[k] = other.numbers
         for one in found:
-            f = {k: numbers[one.quantity] for k, numbers in told.items()}
-            slope = (8.0 * (f[1] - f[-1]) - (f[2] - f[-2])) / (12.0 * d)
-            error = abs(one.gradient[key] - slope) - 1e-10 * abs(one.value) / d
+            slope = (told[1][one.quantity] - told[-1][one.quantity]) / (2.0 * d)
+            error = abs(one.gradient[key] - slope) - 2e-11 * abs(one.value) / d
             if error > 1e-6 * abs(slope):
                 worst[key, one.quantity] = error / abs(slope)
     return worst
@@ -56,7 +55,7 @@ def test_every_number_of_a_pad():
     with answer(scene) as solution:
         keys = [key for key in values_of(scene) if not key.startswith("sides") and key not in ("fluid.p_c", "shear.tau_0")]
         keys = [key for key in keys if key not in ("temperature.exchange", "shear.least")]  # least values, from above alone
-        assert not off(scene, solution, ["load", "p_max", "friction", "temperature_max"], keys, step=1e-4)
+        assert not off(scene, solution, ["load", "p_max", "friction", "temperature_max"], keys)
 
 
 def test_through_a_journals_place():
@@ -134,28 +133,28 @@ def test_of_a_film_with_effects_that_is_changed_here_and_there():
 
 
 def test_the_command_on_ranks_and_bad_input(cli, tmp_path):
-    words = (
-        "sensitivity",
-        "lined_pad",
-        "--n",
-        "40",
-        "--quantity",
-        "load,temperature_max",
-        "--by",
-        "U,temperature.T_in",
-        "--output",
-        tmp_path / "film.npz",
-        "--json",
-    )
-    found = cli(*words, ranks=2).json
+    """A number that is zero has a step that is seen: 1 K more by exchange is 1e-12 of the load, and its derivative is not that
+    of rounding; what has no effect has none."""
+    keys, quantities = ["U", "temperature.T_in", "temperature.exchange", "shear.least"], ["load", "temperature_max"]
+    words = ("sensitivity", "lined_pad", "--n", "40", "--quantity", ",".join(quantities), "--by", ",".join(keys), "--json")
+    found = cli(*words, "--output", tmp_path / "film.npz", ranks=3, timeout=300).json
     assert found["elasticity"]["temperature.T_in"] < -5
     scene = load_scene("lined_pad", n=40)
     with solve(scene) as solution:
-        both = gradients(scene, solution, ["load", "temperature_max"], ["U", "temperature.T_in"])
+        both = gradients(scene, solution, quantities, keys)
         field = film_fields(scene, solution, ["load"])["load"]
     assert np.load(tmp_path / "film.npz")["dload_dh"] == pytest.approx(field, rel=1e-6, abs=1e-8 * np.abs(field).max())
     for one, told in zip(both, (found, *found["others"]), strict=True):
         assert told["gradient"] == pytest.approx(one.gradient, rel=1e-6)
+    one, three = both[0].gradient, found["gradient"]
+    assert three["temperature.exchange"] == pytest.approx(one["temperature.exchange"], rel=1e-8)
+    assert one["shear.least"] == three["shear.least"] == 0.0
+    loads = {}
+    for exchange in (0.0, 50.0, 100.0):
+        with answer(load_scene("lined_pad", {"n": 40, "temperature.exchange": exchange})) as solution:
+            loads[exchange] = solution.load
+    slope = (4.0 * loads[50.0] - loads[100.0] - 3.0 * loads[0.0]) / 100.0
+    assert one["temperature.exchange"] == pytest.approx(slope, rel=1e-4)
     refused = cli("sensitivity", "lined_pad", "--n", "40", "--quantity", "temperature_least")
     assert refused.status == 2 and len(refused.lines) == 1 and "no derivative" in refused.lines[0]
 
@@ -177,20 +176,6 @@ def test_supplies_whose_pressures_follow():
             least = 2e-6 * np.abs(told[0] / a)  # sources and film agree to 1e-10 of a flow
             for one, slope, small in zip(found, slopes, least, strict=True):
                 assert one.gradient[key] == pytest.approx(slope, rel=1e-6, abs=small), (one.quantity, key)
-
-
-def test_a_number_that_is_zero_has_a_step_that_is_seen(cli):
-    """1 K more by exchange is 1e-12 of the load: its derivative is not that of rounding; what has no effect has none."""
-    words = ("sensitivity", "lined_pad", "--n", "40", "--by", "temperature.exchange,shear.least", "--json")
-    one, three = (cli(*words, ranks=ranks).json["gradient"] for ranks in (1, 3))
-    assert three["temperature.exchange"] == pytest.approx(one["temperature.exchange"], rel=1e-8)
-    assert one["shear.least"] == three["shear.least"] == 0.0
-    loads = {}
-    for exchange in (0.0, 50.0, 100.0):
-        with answer(load_scene("lined_pad", {"n": 40, "temperature.exchange": exchange})) as solution:
-            loads[exchange] = solution.load
-    slope = (4.0 * loads[50.0] - loads[100.0] - 3.0 * loads[0.0]) / 100.0
-    assert one["temperature.exchange"] == pytest.approx(slope, rel=1e-4)
 
 
 def test_of_a_very_soft_wall():

@@ -1,6 +1,5 @@
 """Estimates of memory: near the peak, refused when there is too little, and nothing that grows."""
 
-import gc
 from types import SimpleNamespace
 
 import pytest
@@ -121,21 +120,3 @@ def test_limits_of_control_groups(tmp_path):
     assert memory._groups(own, tmp_path / "sys") == [8 * GB]
     assert memory._groups(tmp_path / "nothing", tmp_path) == []
     assert 0 < memory.available() < 2**50 and memory.resident() > 10**6
-
-
-def test_200_solves_do_not_grow():
-    """Films by four methods, in 1D and 2D, one after the other in one process."""
-    runs = [("problem1", {"n": 200}, "active-set"), ("problem4", {"n": 12}, "din"), ("problem4", {"n": 12}, "fas")]
-    runs += [("problem1", {"n": 60}, "monotone"), ("obstacle_bratu", {"n": 12}, "auto")]
-
-    def round_of_runs():
-        for name, changes, method in runs:
-            solve(load_scene(name, changes), method=method).destroy()
-        gc.collect()
-
-    for _ in range(5):  # libraries are loaded, pools filled
-        round_of_runs()
-    before = memory.resident()
-    for _ in range(200 // len(runs)):
-        round_of_runs()
-    assert memory.resident() - before < 3 * 2**20

@@ -169,7 +169,7 @@ def test_rates_that_jump_do_not_stop_the_march():
     scene = {"family": "bearing", "L": 0.02, "U": 3.0, "n": 15, "fluid": {"mu": 0.03, "p_supply": 1e5}, "film": film}
     s = march(scene | {"motion": {"t_end": 0.003, "tol": 1e-3}})
     assert s.step_min > 1e-6 * 0.003 and len(s.history) < 500 and "of the oil lost" in s.message
-    assert s.load == pytest.approx(march(scene | {"motion": {"t_end": 0.003, "steps": 600}}).load, rel=2e-3)
+    assert s.load == pytest.approx(march(scene | {"motion": {"t_end": 0.003, "steps": 300}}).load, rel=2e-3)
 
 
 def test_smooth_motion_takes_two_iterations_a_step_at_most():
@@ -208,7 +208,7 @@ def test_the_family_journal_moves(round_):
 
 def test_a_journal_moves_in_pads_that_are_held():
     """A journal at rest has the steady film; a free one comes to where the pads, held, carry it."""
-    held = {"nx": 90, "ny": 5, "tilts": [1e-4] * 5, "balance": None}
+    held = {"nx": 60, "ny": 5, "pivots_deg": [60.0, 180.0, 300.0], "tilts": [1e-4] * 3, "balance": None}
     steady = march("tilting_pad_journal", **held, eccentricity=0.3)
     still = march("tilting_pad_journal", **held, motion={"t_end": 0.01, "steps": 4, "journal": [0.3, 0.0]})
     assert still.load == pytest.approx(steady.load, rel=1e-9)

@@ -68,7 +68,7 @@ def test_second_order_in_time(model):
     film = {"shape": "formula", "h": "7.5e-5*(1+3*x)*(1+0.2*sin(600*t)**2)"}
     data = STILL | OIL | {"U": 2.0, "n": 16, "film": film, "temperature": OIL["temperature"] | {"model": model}}
     found = []
-    for steps in (20, 40, 120):
+    for steps in (10, 20, 60):
         motion = {"t_end": 0.01, "steps": steps}
         with solve(load_scene(data | {"motion": motion}), model="full", stopping={"eps1": 1e-10}) as s:
             balanced(s)
@@ -84,7 +84,7 @@ def test_second_order_in_time(model):
 def test_with_a_cavity_and_walls_moving_either_way(changes):
     """Waves and cavities that travel; steps by their error's estimate."""
     with solve(
-        load_scene(marches.WEDGE | {"n": 24} | OIL | {"motion": {"t_end": 0.02, "tol": 3e-3}}, changes), model="full"
+        load_scene(marches.WEDGE | {"n": 24} | OIL | {"motion": {"t_end": 0.02, "tol": 1e-2}}, changes), model="full"
     ) as s:
         balanced(s)
         assert max(row["cavitated_fraction"] for row in s.history) > 0.05
