@@ -17,13 +17,12 @@ from ..problems.film.model import Model
 from ..problems.grid import OFFSET
 from ..problems.solution import Outcome, Solution
 from ..registry import METHODS
-from ..scenes.moving import motion_of
 from ..scenes.scene import Solvable
 from ..solvers.newton import Stopping
 from .ask import Ask
 from .chain import added
 from .compose import Inner
-from .estimate import INTEGRALS, is_known, scalars
+from .estimate import INTEGRALS, given_film, is_known, scalars
 from .memory import DENSE, available
 from .plan import SMALL
 from .rungs import ASYMPTOTIC, finer, first_shape, round_ring, rungs_up
@@ -79,7 +78,8 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     assert tol is not None
     begin = perf_counter()
     fewest = model.fewest_meshes() if isinstance(model := getattr(scene, "model", None), Model) else ()
-    line, pairs = is_known(scene), _by_pairs(scene, quantity)
+    line = is_known(scene)  # of the load in the plane each two grids give an estimate (`estimate.of_pair`):
+    pairs = quantity in (None, *INTEGRALS) and len(scene.shape) == 2 and given_film(scene) is not None
     few = FEW_KNOWN if line else FEW_PAIRS if pairs else None
     first = first_shape(scene.shape, fewest, finest, few)
     pairs = pairs and first == first_shape(scene.shape, (), finest, few)  # else its cells are as wide as what they show
@@ -160,13 +160,6 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     solution.levels = levels
     solution.times = {**times, "total": perf_counter() - begin}
     return solution
-
-
-def _by_pairs(scene: Solvable, quantity: str | None) -> bool:
-    """Whether each two grids give an estimate (`estimate.of_pair`): of the load of a steady film in the plane."""
-    given = getattr(scene, "balance", None) is None and motion_of(scene) is None
-    film = isinstance(getattr(scene, "model", None), Model) and len(scene.shape) == 2
-    return film and given and quantity in (None, *INTEGRALS)
 
 
 def ladder(levels: list[dict[str, Any]], quantity: str, tol: float) -> list[str]:

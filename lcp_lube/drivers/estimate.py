@@ -176,13 +176,17 @@ def scalars(found: Mapping[str, Any]) -> dict[str, float]:
     }
 
 
+def given_film(scene: Solvable) -> Model | None:
+    """A film whose heights and past are known before it is solved: steady, and in no balance; None of other scenes."""
+    model, found = getattr(scene, "model", None), getattr(scene, "balance", None) is not None or motion_of(scene) is not None
+    return model if isinstance(model, Model) and not found else None
+
+
 def is_known(scene: Solvable) -> bool:
     """Whether a film in 1D can be solved by quadrature: its ends open or closed, no supplies, not in time, no effects."""
-    model = getattr(scene, "model", None)
-    if not isinstance(model, Model) or len(scene.shape) != 1 or model.law or model.effects or model.supplies or model.grooves:
+    model = given_film(scene)
+    if model is None or len(scene.shape) != 1 or model.law or model.effects or model.supplies or model.grooves:
         return False
-    if getattr(scene, "balance", None) is not None or motion_of(scene) is not None:
-        return False  # its film, or what it has come from, is not known yet
     from ..problems.film.known import KINDS  # here: of lines alone
 
     return {side.kind for side in model.sides[:2]} <= KINDS

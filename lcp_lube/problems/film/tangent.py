@@ -12,6 +12,7 @@ a term >= 0 on A's diagonal, which leaves a step in the M-matrix family and sett
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -115,7 +116,7 @@ class Giving(Effect):
         found = cls(law, sum((effect.yields(film.grid) for effect in effects), np.zeros(h.size)) / h)
         return found if film.scheme.storage is not None and film.reduce.max(found.slopes) > LEAST else None
 
-    @property
+    @cached_property
     def slopes(self) -> Array:
         return np.maximum(self.walls + self.law.density_slope(np.zeros(self.walls.size)), LEAST)
 
