@@ -144,13 +144,11 @@ def test_pads_are_taken_up_and_march_on_ranks(cli, tmp_path):
     whole = march(scene)
     with taken_up(scene, tmp_path / "c", 3) as s:
         assert len(s.history) == 4 and s.pad_tilts == pytest.approx(whole.pad_tilts, rel=1e-7)
-    (tmp_path / "pads.toml").write_text(
-        'family = "tilting_pad"\nnx = 60\nny = 5\npivots_deg = [60.0, 180.0, 300.0]\n'
-        "[motion]\nt_end = 0.001\nsteps = 2\n"
-        'journal = ["0.3+0.1*sin(300*t)", "0.1*cos(300*t)-0.1"]\n'
-    )
-    alone = [whole.history[2][f"tilt_{pad}"] for pad in (1, 2, 3)]
-    run = cli("solve", "pads.toml", "--history", "h.csv", "--json", ranks=3, timeout=300)
+    alone = [whole.history[1][f"tilt_{pad}"] for pad in (1, 2, 3)]
+    words = ("nx=60", "ny=5", "pivots_deg=[60,180,300]", "balance=none", "motion.t_end=0.001", "motion.steps=2")
+    words += ('motion.journal=["0.3+0.1*sin(300*t)", "0.1*cos(300*t)-0.1"]',)
+    words = ("solve", "tilting_pad_journal", *(f"--set={word}" for word in words), "--history", "h.csv", "--json")
+    run = cli(*words, ranks=3, timeout=300)
     assert run.status == 0 and run.json["pad_tilts"] == pytest.approx(alone, rel=1e-7), run.err
     assert (tmp_path / "h.csv").read_text().startswith("t,dt,journal_x,journal_y,tilt_1,tilt_2,tilt_3,load")
 
