@@ -17,7 +17,7 @@ from ..output.console import coloured, say
 from ..output.results import as_dict, finite, summary
 from ..output.table import table as text_table
 from ..problems.solution import Step
-from ..registry import METHODS, RUNGS, SHAPES, STABILITY, SYSTEMS, recipe_line, recipe_names
+from ..registry import DRIVERS, FAMILIES, METHODS, RUNGS, SHAPES, STABILITY, SYSTEMS, recipe_line, recipe_names
 from ..scenes.scene import scene_line, scene_names
 from .asked import options_of, scene_of, solution_of, stopping_of
 
@@ -140,11 +140,13 @@ def run_new(args: argparse.Namespace) -> int:
 def run_list(args: argparse.Namespace) -> int:
     groups: dict[str, Any] = {
         "scenes": {name: scene_line(name) for name in scene_names()},
+        "families of scenes": FAMILIES,
         "methods": METHODS,
         "systems": SYSTEMS,
         "recipes": {name: recipe_line(name) for name in recipe_names()},
         "film shapes": SHAPES,
         "effects": RUNGS,
+        "drivers, outermost first": DRIVERS,
         "maps of chart stability": STABILITY,
     }
     for title, group in groups.items():
