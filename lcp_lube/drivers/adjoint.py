@@ -32,7 +32,7 @@ from .linearised import Linear
 from .near_films import NearFilms
 from .pad_coordinates import bearing_of
 
-CANCELLED = 1e-10
+CANCELLED = 1e-10  # of its parts: what lambda errs by may make so much of a sum that is none
 ROUNDED = 1e-8  # of what is small of what was found: a 0 that rounding has moved, the attitude of pads about the load
 FEWER = 2_000  # points from which multigrid solves for an answer that multigrid gave: its loops are loaded
 DIRECT = {"load", "friction", "p_max", "force_x", "force_y"}  # numbers that are mostly made of no others but these

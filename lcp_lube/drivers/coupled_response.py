@@ -33,7 +33,7 @@ from .loop import Loop
 from .supplies import Fed
 
 STEP = 1e-4  # of differences: their error is its square
-RTOL, RESTART, MOST = 1e-8, 150, 1500
+RTOL, RESTART, MOST = 1e-8, 150, 1500  # of GMRES; MOST: ten restarts
 Changes = tuple[Array, Array, Array]  # of a state's H and x - X, of Q, and of what supplies give and hold
 
 

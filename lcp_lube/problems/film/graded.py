@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 WORK = {True: 4e8, False: 2e5}  # multiplications of a factorisation, compiled or not: some 0.3 s
 UNIT = 2.0**-53
-REFINEMENTS = 10
+REFINEMENTS = 10  # at most: each gains several digits, or ends them
 HALVES = 200  # steps of half the wrong cells that may fail to make fewer of them
 PATIENCE = HALVES + 250  # and of all of them before: what is wrong on a ring may have to go round it many times
 

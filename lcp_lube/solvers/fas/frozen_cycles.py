@@ -8,7 +8,7 @@ from ...problems.film.lubrication import LubricationProblem
 from . import finest, frozen_kernels, frozen_transfer, held, levels, transfer
 
 COARSEST = 3  # sweeps of the coarsest grid, in numbers of its points a side, where it has more than FEW points
-FEW = 64
+FEW = 64  # up to which J's inverse is kept: 32 KB
 
 
 class Cycles:
