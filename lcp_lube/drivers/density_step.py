@@ -25,8 +25,8 @@ from ..problems.solution import Fields, Outcome, Solution, Step
 from ..scenes.scene import Solvable
 from ..solvers.relaxation import relaxation
 from .ask import Ask
+from .frozen import Frozen
 from .linearised import Linear
-from .loop import Frozen
 from .settled import settled
 from .sources import Sources
 

@@ -30,7 +30,7 @@ from ..registry import DRIVERS
 from ..scenes.moving import motion_of
 from ..scenes.scene import Scene
 from .ask import Ask
-from .loop import Frozen
+from .frozen import Frozen
 from .turned import Mirrored
 
 FLIPPED = {"flow_west": "flow_east", "flow_east": "flow_west"}

@@ -25,7 +25,7 @@ from ..problems.grid import Grid
 from ..registry import SMALL
 from .adjoint import Adjoint, Implicit
 from .equations import DRAGS, FLIPPED
-from .loop import Frozen
+from .frozen import Frozen
 from .turned import Mirrored
 
 STEP = 1e-30  # relative: complex steps have no differences whose digits could cancel

@@ -19,7 +19,6 @@ from petsc4py import PETSc
 from ..base.parallel import Array
 from ..problems.facts import Facts
 from ..problems.film.edges import jumps_of
-from ..problems.film.effects import FaceFactors
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model, Side
 from ..problems.grid import EVEN, Grid, some_places
@@ -98,10 +97,7 @@ class Part(Derived):
         """The discrete problem of the part. Collective."""
         model, shape = self._model()
         problem = model.build(shape, comm)
-        if hasattr(self.whole, "by"):  # of effects, which the faces at round edges are not made for
-            problem.coefficients_for = None
-        by: FaceFactors | None = getattr(self.whole, "by", None)
-        return problem if by is None else by.on(problem.grid, *numbers(problem.grid)).film(problem)
+        return self.factored(problem, *numbers(problem.grid))  # type: ignore[no-any-return]
 
     def answer(self, problem: Problem) -> Fields | None:
         """The whole problem's fields, where there is nothing to solve."""
@@ -215,6 +211,12 @@ def _is_symmetric(problem: LubricationProblem, faces: bool) -> bool:
         pairs = [(s.k_S, s.k_N), *((a, a) for a in (s.k_W, s.k_E, s.couette_W, s.couette_E, s.h))]
         return _all_close(problem, [(a[:half], b[::-1][:half]) for a, b in pairs], CUBED * SAME)
     pairs = list(zip(_films(problem), _films(problem, mirror), strict=True))
+    if (by := problem.factors) is not None:  # of effects
+        j, i = numbers(grid)
+        other = by.on(grid, grid.shape[1] - 1 - j, i).values
+        other = other | {"k_S": other["k_N"], "k_N": other["k_S"]}
+        if not _all_close(problem, [(values, other[name]) for name, values in by.values.items()], CUBED * SAME):
+            return False
     return _all_close(problem, pairs if faces else pairs[:1])
 
 

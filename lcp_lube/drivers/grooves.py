@@ -7,12 +7,12 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ..base.parallel import Array
 from ..base.together import EXPECTED, on_all_ranks
 from ..linear.krylov import LinearSolverError
-from ..problems.film.effects import FaceFactors
 from ..problems.film.grooves import GroovedProblem, Pad
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
@@ -39,17 +39,16 @@ class PadFilm(Derived):
         return self.points
 
     def with_shape(self, shape: tuple[int, ...]) -> "PadFilm":
-        return replace(self, points=shape)
+        # On a coarse grid, for a start, nothing is known of effects.
+        whole = self.whole if shape == self.points else self.whole.with_shape(self.whole.shape)
+        return replace(self, whole=whole, points=shape)
 
     def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
         problem = self.model.build(self.shape, comm)
-        if hasattr(self.whole, "by"):  # of effects, which the faces at round edges are not made for
-            problem.coefficients_for = None
-        by: FaceFactors | None = getattr(self.whole, "by", None)
-        if by is None or self.shape[1:] != by.grid.shape[1:]:  # a coarse grid, for a start
-            return problem
-        j, i = numbers(problem.grid)
-        return by.on(problem.grid, j, (self.first + i) % by.grid.shape[0]).film(problem)
+        return self.factored(problem, *numbers(problem.grid))  # type: ignore[no-any-return]
+
+    def factored(self, problem: Any, j: NDArray[np.int64], i: NDArray[np.int64]) -> Any:
+        return super().factored(problem, j, (self.first + i) % self.whole.shape[0])
 
 
 Films = list[tuple[Pad, PadFilm]]

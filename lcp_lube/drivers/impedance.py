@@ -12,7 +12,7 @@ from ..problems.film.fluid import Law
 from ..problems.film.turning import Turning
 from ..problems.solution import Solution
 from .coupled_response import CoupledResponse
-from .loop import Frozen
+from .frozen import Frozen
 from .response import Change, Response
 
 Mode = Change  # dh of a rigid motion of a wall, by its coordinate, of x and y (m)

@@ -1,9 +1,7 @@
 """The loop of `coupling`: a film with its coefficients held, and Anderson's method for the fields that these come from."""
 
 from collections.abc import Callable
-from copy import copy
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,18 +9,16 @@ from petsc4py import PETSc
 
 from ..base.parallel import Array
 from ..errors import InputError
-from ..problems.facts import Facts
 from ..problems.film.effects import Answer, Cells, Compressible, Effect, FaceFactors, answer, factors, neutral
 from ..problems.film.fluid import Law
-from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.tangent import WIDEST, Giving, closed, filled, lift_of, logarithm
-from ..problems.grid import EVEN
 from ..problems.solution import Solution
-from ..scenes.scene import Derived, Solvable
+from ..scenes.scene import Solvable
 from .ask import Ask, Start
 from .chain import added
 from .compose import Inner
+from .frozen import Frozen
 from .settled import settled
 
 MOST_SOLVES, LONG = 100, 300  # films; and while the least change has fallen to a tenth within as many as
@@ -34,45 +30,6 @@ WARMER = 1.0  # of log(viscosity): where a second start is
 LONGEST = 1.0  # relative change of a coefficient in one step, before answers are combined
 LEAST_LIFT = -0.9  # of the rigid film, of an iterate
 STEEPEST = 0.9  # of q, over 1/b, where the pressure is without bound: of an iterate, whose viscosity is then 10 times mu
-
-
-@dataclass(frozen=True)
-class Frozen(Derived):
-    """A scene with its coefficients held, in q where Barus' law holds. by : factors of its own grid; None: no effects.
-    base : its rigid film on this grid, if somebody has that, whose grid films share."""
-
-    law: Law
-    by: FaceFactors | None = None
-    even: bool = True
-    base: LubricationProblem | None = None
-
-    @cached_property
-    def constant(self) -> Model:
-        """The rigid film of the constant fluid, in q."""
-        model: Model = self.whole.model
-        sides = (replace(side, p=float(self.law.reduced(np.array(side.p)))) for side in model.sides)
-        supplies = tuple(replace(one, p=float(self.law.reduced(np.array(one.p)))) for one in model.supplies)
-        changed: dict[str, Any] = {"sides": tuple(sides), "supplies": supplies, "law": None, "effects": (), "exact": None}
-        if any(getattr(effect, "even_lines", False) for effect in model.effects):
-            changed["places"] = EVEN
-        return replace(model, **changed)
-
-    @property
-    def model(self) -> Model | None:
-        """What `grooves` and `symmetry` look at; they take their parts' factors from `by`."""
-        return self.constant if self.even or self.constant.grooves else None
-
-    def with_shape(self, shape: tuple[int, ...]) -> "Frozen":
-        return Frozen(self.whole.with_shape(shape), self.law, None, self.even)
-
-    def facts(self, comm: PETSc.Comm | None = None) -> Facts:
-        return self.constant.facts(self.shape, comm)
-
-    def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
-        problem = self.constant.build(self.shape, comm) if self.base is None else copy(self.base)
-        problem.shares_grid = problem.shares_grid or self.base is not None
-        problem.coefficients_for = None  # what is certified is another problem, made from this one
-        return problem if self.by is None else self.by.film(problem)
 
 
 class Loop:

@@ -7,6 +7,8 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Protocol, Self
 
+import numpy as np
+from numpy.typing import NDArray
 from petsc4py import PETSc
 from pydantic import Field, PrivateAttr, ValidationError
 
@@ -67,6 +69,11 @@ class Derived:
 
     def facts(self, comm: PETSc.Comm | None = None) -> Facts:
         return self.model.facts(self.shape, comm)  # type: ignore[attr-defined]
+
+    def factored(self, problem: Any, j: NDArray[np.int64], i: NDArray[np.int64]) -> Any:
+        """A problem on these lines and columns, with what effects make of its coefficients. Collective."""
+        of_whole = getattr(self.whole, "factored", None)
+        return problem if of_whole is None else of_whole(problem, j, i)
 
 
 class Scene(Measured):

@@ -4,6 +4,8 @@ import pytest
 
 from lcp_lube import InputError, load_scene, solve
 
+EYRING = {"law": "eyring", "tau_0": 1e6}
+
 FLAT = {"family": "thrust", "profile": "flat", "pad_deg": 50.0}
 WARM = {"beta": 0.03, "T_in": 320.0}
 SMALL = {
@@ -78,3 +80,13 @@ def test_on_ranks(cli):
     assert alone.status == three.status == 0, three.err
     for key in ("load", "power_loss", "temperature_max", "heat_out"):
         assert three.json[key] == pytest.approx(alone.json[key], rel=1e-6)
+
+
+@pytest.mark.parametrize("ny", [8, 9])
+def test_half_of_a_film_between_grooves_has_its_effects(ny):
+    """A weak effect above all: half a film without it would pass as the whole's answer."""
+    scene = load_scene("two_groove_journal", {"nx": 45, "ny": ny, "attitude_deg": 40.0, "p_end": 1e5, "shear": EYRING})
+    half, whole = (solve(scene, model="full", reduction=reduction) for reduction in (True, False))
+    assert half.settings["details"]["reduction"] == "mirror" and "reduction" not in whole.settings["details"]
+    assert max(half.residual, half.mass_defect, whole.residual) < 1e-13
+    assert half.load == pytest.approx(whole.load, rel=1e-10)
