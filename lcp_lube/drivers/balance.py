@@ -177,21 +177,22 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
 
 
 def exact_slope(scene: Any, solution: Solution, unknown: Variable, t: float, W: float) -> float | None:
-    """d log W/dt by the stiffness of a film that carries W, if t displaces a wall and no effects but a fluid's law act; else
-    None. Collective."""
+    """d log W/dt by the stiffness of a film that carries W, if t displaces a journal, or a flat wall and no effects but a
+    fluid's law act; else None. Collective."""
     model, turning = getattr(scene, "model", None), getattr(scene, "turning", None)
-    if not isinstance(model, Model) or model.effects:
+    if not isinstance(model, Model) or (model.effects and turning is None):
         return None
     from ..scenes.thrust import ThrustScene  # here, as above
     from .coefficients import coefficients
 
     key = unknown.key.rpartition(".")[2]
-    if key == "eccentricity" and turning is not None and turning.widest is not None and model.law is None and model.U >= 0:
-        (one,) = coefficients(scene, solution)
-        fx, fy = turning.force(solution.problem, solution.fields["p"])
+    if key == "eccentricity" and turning is not None and turning.widest is not None and model.U >= 0:
+        fx, fy = solution.problem.quantities(solution.fields)["force"]
         e, along = unknown.to_value(t), atan2(-fy, -fx) - turning.widest
         move = turning.c * e * (1.0 - e) * np.array([-cos(along), sin(along)])  # away from the widest gap, in the load's axes
-        return float(one.K[0] @ move) / W
+        with suppress(NotFound):
+            (one,) = coefficients(scene, solution)
+            return float(one.K[0] @ move) / W
     if turning is None and (key == "h_offset" or (key == "h_min" and isinstance(scene, ThrustScene))):
         alike = 1
         if isinstance(turned := solution.problem, TurnedProblem):

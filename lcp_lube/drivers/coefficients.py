@@ -13,6 +13,7 @@ import numpy as np
 
 from ..base.parallel import Array
 from ..errors import InputError
+from ..problems.film.forces import totals
 from ..problems.film.grooves import GroovedProblem
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
@@ -85,7 +86,6 @@ def coefficients(
         raise InputError(f"scene {scene.name}: coefficients are of films; it has no part that could be displaced")
     if motion_of(scene) is not None:
         raise InputError(f"scene {scene.name}: coefficients are of films at rest in time; leave [motion] out")
-    model = supplied(model, solution)
     if isinstance(solution.problem, TurnedProblem):
         raise InputError(f"scene {scene.name}: its wall moves to smaller x; give its mirror image, with -U")
     turning: Turning | None = getattr(scene, "turning", None)
@@ -98,23 +98,17 @@ def coefficients(
     assert isinstance(ring, LubricationProblem)  # as a scene with a `model` has
     along = 0.0
     if turning is not None:
-        fx, fy = turning.force(ring, solution.fields["p"])
-        along = math.atan2(-fy, -fx)
+        force = totals(ring, solution.fields["p"] * ring.p_unit, wanted=("force_x", "force_y"))
+        along = math.atan2(-force["force_y"], -force["force_x"])
     motions = motions_of(turning, tilt, 0.5 * model.lengths[-1], along)
     names = FLAT if turning is None else TILTED if tilt else JOURNAL
-    symmetric = solution.settings.get("details", {}).get("reduction") == "mirror"
-    with_effects = model.law is not None or bool(model.effects)
     if isinstance(scene, TiltingPadScene) or pads is not None:
         turn = np.array([[math.cos(along), -math.sin(along)], [math.sin(along), math.cos(along)]])
         follow = np.zeros(0, dtype=bool) if pads is None else pads.free
-        own = _of_pads(scene, solution, frequencies, follow, with_effects, stored)
+        own = _of_pads(scene, solution, frequencies, follow, has_effects(model), stored)
         total = turn.T @ own @ turn if turning is not None else own
-    elif with_effects:  # as a whole: a ring's films share their oil
-        gaps = [lambda e, motion=motion: Moved(model.gap, motion, e, 0.0) for motion in motions]
-        total = impedance(CoupledResponse(scene, solution, gaps), frequencies, stored)
     else:
-        of = partial(impedance, frequencies=frequencies, stored=stored)
-        total = summed(of, scene, model, ring, solution.fields, motions, symmetric)
+        total = by_film(partial(impedance, frequencies=frequencies, stored=stored), scene, solution, motions)
     total = total * (scene.pads if isinstance(scene, ThrustScene) else 1)  # one of which was solved
     return [
         Coefficients(nu, one.real, one.imag / nu if nu > 0 else one.imag, names)
@@ -139,6 +133,21 @@ def scene_of(solution: Solution) -> Scene:
     if not isinstance(solution.solved_scene, Scene):
         raise InputError("derivatives and coefficients are of solutions that solve() has made of a scene")
     return solution.solved_scene
+
+
+def has_effects(model: Model) -> bool:
+    return model.law is not None or bool(model.effects)
+
+
+def by_film(of: Callable[[Any], Any], scene: Any, solution: Solution, motions: Sequence[Change]) -> Any:
+    """What `of` finds, and frees, of the response to these motions of what is no pad. Collective."""
+    model = supplied(scene.model, solution)
+    if has_effects(model):  # as a whole: a ring's films share their oil
+        gaps = [lambda e, motion=motion: Moved(model.gap, motion, e, 0.0) for motion in motions]
+        return of(CoupledResponse(scene, solution, gaps))
+    symmetric = solution.settings.get("details", {}).get("reduction") == "mirror"
+    ring: Any = solution.problem
+    return summed(of, scene, model, ring, solution.fields, motions, symmetric)
 
 
 def _of_pads(

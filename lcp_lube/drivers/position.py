@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..base.parallel import Array
+from ..errors import NotFound
 from ..problems.film.turning import Turning
 from ..problems.solution import Outcome, Solution
 from ..scenes.effects.named import named, without
@@ -23,18 +24,18 @@ from ..scenes.scene import Solvable
 from .ask import Ask
 from .attitude import half_film_attitude
 from .chain import Chain
-from .coefficients import coefficients, motions_of, summed
+from .coefficients import by_film, motions_of, placed
 from .compose import Inner
-from .impedance import held, stiffness
+from .impedance import stiffness
 
 MOST_SOLVES = 25  # on a grid
 COARSEST, COARSE_TOL = (36, 7), 1e-2  # fewest points around and across, and how well a coarse grid's place is worth knowing
+COARSER = 0.6  # points of a grid over those of the next finer one, at most
 SEEN = 0.5  # a mesh in parts of the stretch sqrt(2 (1 - s)) on which the film is thin, at most
 MOST_COARSE = 8  # solves on a grid that is not the last
 LONGEST = (2.0, 0.4)  # of a step in t and in the attitude (rad)
 MOST_FAILED = 4  # solves without an answer on a grid, from each of which half of the step is taken
 SHORTEST = 1e-4  # of a step that was halved
-FAR = 0.1  # a step along secants, which are too long to be trusted if it makes residuals larger
 WIDEST = 14.0  # of t: s from 1e-6 to 1 - 1e-6
 AWRY = 0.7  # rad from the load's line: then the force goes on in a line, not its logarithm
 ACROSS = 0.4  # of such a step, clearances
@@ -131,10 +132,12 @@ def _coarse(scene: GroovedJournalScene, s: float) -> list[tuple[int, ...]]:
     """Grids from coarse to fine, the coarsest with a few points on the stretch where the film is thin at s."""
     around = max(COARSEST[0], 12 * len(scene.grooves_deg), 2.0 * math.pi / (SEEN * math.sqrt(2.0 * (1.0 - s))))
     shapes = [scene.shape]
-    while shapes[0][0] >= 2 * around:
+    while True:
         nx, ny = shapes[0]
-        shapes.insert(0, (nx // 2, ny // 2 | 1 if ny >= 2 * COARSEST[1] else ny))
-    return shapes
+        coarser = max(nx // 2, math.ceil(around)), ny // 2 | 1 if ny >= 2 * COARSEST[1] else ny
+        if math.prod(coarser) > COARSER * nx * ny:
+            return shapes
+        shapes.insert(0, coarser)
 
 
 def touching(scene: GroovedJournalScene, phi: float) -> float:
@@ -168,11 +171,10 @@ def _on_grid(
 ) -> tuple[Solution, Array, int, bool]:
     """Newton's method on one grid: solution, t and attitude, number of solves, whether the place was found. Collective.
 
-    A step that makes residuals larger, or leads to where no film is found, is taken again, half as long. Where effects act,
-    whose part in the stiffness is unknown, Broyden's method goes on from there, and begins anew where such a step was long.
+    A step that makes residuals larger, or leads to where no film is found, is taken again, half as long.
     """
     chain, given = Chain(ask, inner), scene.attitude_deg is not None
-    q, inverse, before, failed = np.array([t, phi]), None, None, 0  # before : place, residual and step
+    q, before, failed = np.array([t, phi]), None, 0  # before : place, residual and step
     for count in range(1, most + 1):
         t, phi = map(float, q)
         at = scene.model_copy(update={"eccentricity": eccentricity(scene, t, phi), "attitude_deg": math.degrees(phi)})
@@ -195,28 +197,24 @@ def _on_grid(
             return solution, q, count, False
         if not W > 0 and (before is None or before[1][0] == -math.inf):
             step = np.array([LONGEST[0], 0.0])
-        elif before is not None and not at.model.effects and np.abs(left).sum() > np.abs(before[1]).sum():
+        elif before is not None and np.abs(left).sum() > np.abs(before[1]).sum():
             q, left, step = before[0], before[1], 0.5 * before[2]
             if np.abs(step).max() < SHORTEST:
                 return solution, q + 2.0 * step, count, False
         else:
-            astray = before is not None and np.abs(before[2]).max() > FAR and np.abs(left).sum() > np.abs(before[1]).sum()
-            if inverse is None or not at.model.effects or astray:
-                K = _stiffness(at, solution, off)
-                still = force + K @ _place(scene, t, phi)  # that of the supplies alone
-                supplied = not given and not at.model.effects and t < 0 and np.hypot(*still) > HELD * W
-                if abs(left[1]) > AWRY or supplied:
-                    q, before = _across(scene, t, phi, K, np.array([force[0] + load, force[1]])), None
-                    continue
-                change = -K @ _moves(scene, t, phi)
-                jacobian = np.stack([force @ change, force[0] * change[1] - force[1] * change[0]]) / W**2
-                if given:
-                    jacobian[:, 1], jacobian[1] = 0.0, [0.0, 1.0]
-                inverse = _inverse(jacobian)
-            elif before is not None:
-                inverse = _secant(inverse, before[2], left - before[1])
+            K = _stiffness(at, solution)
+            still = force + K @ _place(scene, t, phi)  # that of the supplies alone
+            supplied = not given and not at.model.effects and t < 0 and np.hypot(*still) > HELD * W
+            if abs(left[1]) > AWRY or supplied:
+                q, before = _across(scene, t, phi, K, np.array([force[0] + load, force[1]])), None
+                continue
+            change = -K @ _moves(scene, t, phi)
+            jacobian = np.stack([force @ change, force[0] * change[1] - force[1] * change[0]]) / W**2
+            if given:
+                jacobian[:, 1], jacobian[1] = 0.0, [0.0, 1.0]
+            inverse = _inverse(jacobian)
             step = -inverse @ left
-            if before is not None and not at.model.effects:  # what residuals bend by along the step before
+            if before is not None:  # what residuals bend by along the step before
                 size = float(before[2] @ before[2])
                 bend = (before[1] - left + jacobian @ before[2]) * (float(step @ before[2]) / size) ** 2
                 bent = inverse @ bend
@@ -254,27 +252,16 @@ def _moves(scene: Any, t: float, phi: float) -> Array:
     return np.stack(ends, axis=1) / (2.0 * d)
 
 
-def _stiffness(at: Any, solution: Solution, along: float) -> Array:
-    """K in the axes of the load, where effects act that of the film with its coefficients held. Collective."""
-    if at.model.effects and not solution.settings.get("supply_pressures"):
-        frozen: Any = held(at, solution)
-        problem: Any = frozen.build(solution.problem.grid.petsc_comm)
-        motions = motions_of(at.turning, False, 0.5 * at.model.lengths[-1])
-        K = summed(stiffness, frozen, frozen.constant, problem, solution.fields, motions)
-        problem.destroy()
-        return K  # type: ignore[no-any-return]
-    K = coefficients(without(at, named(at)) if at.model.effects else at, solution)[0].K
-    turn = np.array([[math.cos(along), -math.sin(along)], [math.sin(along), math.cos(along)]])
-    return turn @ K @ turn.T  # type: ignore[no-any-return]
+def _stiffness(at: Any, solution: Solution) -> Array:
+    """K in the axes of the load. Collective."""
+    at = placed(at, solution)
+    motions = motions_of(at.turning, False, 0.0)
+    try:
+        return by_film(stiffness, at, solution, motions)  # type: ignore[no-any-return]
+    except NotFound:  # with the effects' part; then without it
+        return by_film(stiffness, without(at, named(at)), solution, motions)  # type: ignore[no-any-return]
 
 
 def _inverse(jacobian: Array) -> Array:
     """Of the derivatives of log W and of the force's angle in t and in the attitude; where there is none, that of a line."""
     return np.linalg.inv(jacobian) if abs(np.linalg.det(jacobian)) > 1e-12 else np.diag([0.5, 1.0])
-
-
-def _secant(inverse: Array, step: Array, change: Array) -> Array:
-    """Broyden's update of the inverse derivative with what a step changed."""
-    moved = inverse @ change
-    along = step @ moved
-    return inverse if not abs(along) > 1e-30 else inverse + np.outer(step - moved, step @ inverse) / along

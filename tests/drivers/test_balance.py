@@ -36,10 +36,10 @@ def balance(name, changes, near=None):
 
 
 @settings(max_examples=15)
-@given(st.floats(0.02, 0.98))
-def test_journals_round_trip(eccentricity):
-    """The eccentricity of a direct solve is found from its load."""
-    data = {"nx": 31, "ny": 7}
+@given(st.floats(0.02, 0.98), st.sampled_from([0.0, 1e5]))
+def test_journals_round_trip(eccentricity, p_groove):
+    """The eccentricity of a direct solve is found from its load; pressure in the groove, on the sides, is a part of it."""
+    data = {"nx": 31, "ny": 7, "p_a": p_groove, "p_b": p_groove}
     load = direct("journal", {**data, "eccentricity": eccentricity})
     found, outcome, message, values = balance("journal", {**data, "balance": {"load": load}})
     assert outcome is Outcome.CONVERGED, message

@@ -64,7 +64,7 @@ def test_stiffness_is_what_solves_differ_by(changes):
     """Central differences of two solves, in both directions; the attitude is given, and the load not vertical."""
     scene = load_scene("two_groove_journal", **SMALL, **{"attitude_deg": 40.0, **changes})
     solution = solve(scene, method="active-set")
-    along = scene.turning.force(solution.problem, solution.fields["p"])
+    along = solution.problem.quantities(solution.fields)["force"]
     (found,) = coefficients(scene, solution)
     solution.destroy()
     beta = math.atan2(-along[1], -along[0])

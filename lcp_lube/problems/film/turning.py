@@ -1,23 +1,14 @@
-"""A journal that turns in its bush: where its film lies around it, and the force of the film on it.
+"""A journal that turns in its bush: where its film lies around it.
 
 Angles theta are counted from the line of the load, in the sense of rotation; axes are x along the load and y a quarter of a
 turn ahead. An eccentricity (ex, ey) makes the film h = c - ex cos(theta) - ey sin(theta).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import Any
 
 from ...base.parallel import Array
-from .contact import areas
-from .flows import point_weights
-
-if TYPE_CHECKING:
-    from .lubrication import LubricationProblem
 
 
 @dataclass(frozen=True)
@@ -48,14 +39,6 @@ class Turning(Shaft):
     def length(self) -> float:
         """Of the unwrapped film, m."""
         return 2.0 * math.pi * self.R
-
-    def force(self, problem: LubricationProblem, p: Array) -> tuple[float, float]:
-        """Force of the pressure p (owned points, p_unit above p_c) and of asperities on it, N (1D: N/m). Collective."""
-        theta = np.broadcast_to(self.theta(problem.grid.x), problem.grid.box).ravel()
-        size = -problem.grid.cell * problem.p_unit * point_weights(problem.grid) * p
-        if problem.contact is not None:
-            size = size - problem.contact.p_a * areas(problem).ravel()
-        return problem.reduce.sum(size * np.cos(theta)), problem.reduce.sum(size * np.sin(theta))
 
     def numbers(self, load: float, mu: float, eccentricity: float) -> dict[str, Any]:
         """What a bearing's sheet lists: Sommerfeld numbers. eccentricity : relative."""
