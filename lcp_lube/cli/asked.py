@@ -8,6 +8,7 @@ from ..api import solve
 from ..base.progress import Progress
 from ..base.quantity import in_si, quantity
 from ..drivers.ask import Ask
+from ..drivers.plan import FEW
 from ..errors import InputError
 from ..problems.solution import Solution
 from ..registry import METHODS
@@ -101,6 +102,7 @@ def solution_of(
         resume=args.resume,
         reduction=args.reduction,
         memory_check=not args.no_memory_check,
+        direct_below=FEW,  # as for any one solve; a run to an accuracy would load multigrid's loops for this command alone
         progress=progress,
         watch=watching,
         times=watching.args_times if watching is not None else (),

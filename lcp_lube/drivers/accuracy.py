@@ -24,7 +24,7 @@ from .chain import added
 from .compose import Inner
 from .estimate import INTEGRALS, given_film, is_known, scalars
 from .memory import DENSE, available
-from .plan import SMALL
+from .plan import FEW, SMALL
 from .rungs import ASYMPTOTIC, finer, first_shape, round_ring, rungs_up
 from .values import Values, carried, sought
 
@@ -32,6 +32,7 @@ FEW_KNOWN = 128  # points of the first grid of a line whose number is known: no 
 FEW_PAIRS = 200  # of a film whose load is estimated from each two grids: these are solved by elimination
 ALGEBRAIC = 1e-3  # ||F|| relative to the tolerance: with many small cavities it leaves up to 60 times itself in a load
 ALLOWED = (1e-10, 0.5)  # tolerances
+SOON = 3e-3  # a tolerance below which most films in 2D end on grids for multigrid
 WHOLE = {True: 100_000, False: 1500}  # points up to which looking for symmetries costs what it saves, by multigrid or directly
 HOPELESS = 1_000_000  # points on which an estimate that has not come down is taken to stay up
 PATIENCE = 6  # grids without a better estimate: rounding dominates
@@ -100,14 +101,16 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     told = Values(line, pairs)
     levels: list[dict[str, Any]] = []
     times: dict[str, float] = {}
-    end = ""
+    # A program that goes on loads multigrid's loops once; for one run they pay where its last grid will be one for multigrid
+    # (second order: points as 1/error), and serve those before it too.
+    end, loops = "", ask.direct_below is None or tol < SOON
     while not end:
         level_begin, before, earlier = perf_counter(), solution, before
         near = ask.start if before is None else _start(before, prod(shape)) if ask.nested is not False else None
         stopping = _stopping(ask.stopping, tol, before)
         halved = ask.reduction and (len(shape) == 1 or prod(shape) > WHOLE[before is None or before.asked == "fas"])
         this = replace(ask, accuracy=None, stopping=stopping, start=near, nested=False, reduction=halved)
-        solution = inner(scene.with_shape(shape), replace(this, direct_below=0))
+        solution = inner(scene.with_shape(shape), replace(this, direct_below=0) if loops else this)
         problem = solution.problem
         sure = quantity or (DEFAULT_QUANTITY[0] if pairs or line else "")
         value = carried(problem, solution.fields, sure)
@@ -120,6 +123,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         best = told.add(solution, before, earlier, prod(problem.grid.meshes) ** (1.0 / len(first)), quantity, value)
         if earlier is not None:
             earlier.destroy()
+        loops = loops or inf > best.relative > 3 * FEW / problem.grid.size * tol
         levels.append(
             {
                 **dict(zip(("nx", "ny"), problem.grid.shape, strict=False)),
