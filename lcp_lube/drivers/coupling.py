@@ -166,7 +166,7 @@ def _told(ask: Ask, loop: Loop) -> Solution:
                 problem.more_fields |= told.fields
                 problem.more_measures |= told.measures
                 failure = failure or told.failure
-        problem.more_measures["coupling"] = loop.change
+        problem.more_measures |= {"coupling": loop.change, **loop.left}
         if failure and loop.found:
             outcome, message = Outcome.NO_SOLUTION, failure
         elif solution.converged and not loop.found:

@@ -63,6 +63,7 @@ class Loop:
         # How far a time step is expected to change the fields, as a vector; and how far they are then from having no effect.
         self.moved, self.reach = 0.0, np.inf
         self.answer: Answer | None = None
+        self.left: dict[str, float] = {}  # of a film's balances, where that went into what its cells store
         self.beyond = False  # whether no pressure carries the last film's flow
         self.start: Solution | Start | None = ask.start
         self.begun = self.last = np.zeros(0)  # the vectors of fields that the loop began with, and of the last film's
@@ -135,6 +136,7 @@ class Loop:
         by = filled(plain, by, q)
         if self.model.stored is not None and self.ask.options.get("rest"):
             by = closed(by, new.problem, new.fields, self.base)
+            self.left = {"residual": new.certificate.measures["residual"]}
         with np.errstate(all="ignore"):
             self.answer = answer(self.base, self.law, cells, by, p, new.fields["r"], self.p_sides)
         return bool(np.isfinite(self.base.reduce.max(p)))
