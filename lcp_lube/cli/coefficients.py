@@ -12,7 +12,7 @@ from ..api import solve
 from ..base.files import write_text
 from ..base.options import check_unread
 from ..base.progress import Line
-from ..drivers.coefficients import Coefficients, coefficients, placed, stability
+from ..drivers.coefficients import Coefficients, check_frequencies, coefficients, placed, stability
 from ..errors import InputError, NotFound
 from ..output.console import say
 from ..output.files import check_target
@@ -38,6 +38,7 @@ def run(args: argparse.Namespace) -> int:
         frequencies = [float(word) for word in args.frequency.split(",")]
     except ValueError:
         raise InputError(f"--frequency {args.frequency}: numbers in rad/s are needed, with commas between them") from None
+    check_frequencies(frequencies)
     if args.speeds is not None:
         return table(args, scene, frequencies)
     for option, file in (("--output", args.output), ("--plot", args.plot)):

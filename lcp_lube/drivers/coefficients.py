@@ -91,9 +91,7 @@ def coefficients(
     turning: Turning | None = getattr(scene, "turning", None)
     if tilt and (turning is None or len(model.lengths) == 1 or isinstance(scene, TiltingPadScene)):
         raise InputError(f"scene {scene.name}: --tilt is of journals with a width")
-    for nu in frequencies:
-        if not 0 <= nu <= FASTEST:
-            raise InputError(f"--frequency {nu:g}: numbers from 0 to {FASTEST:g} rad/s are needed")
+    check_frequencies(frequencies)
     ring = solution.problem
     assert isinstance(ring, LubricationProblem)  # as a scene with a `model` has
     along = 0.0
@@ -148,6 +146,13 @@ def by_film(of: Callable[[Any], Any], scene: Any, solution: Solution, motions: S
     symmetric = solution.settings.get("details", {}).get("reduction") == "mirror"
     ring: Any = solution.problem
     return summed(of, scene, model, ring, solution.fields, motions, symmetric)
+
+
+def check_frequencies(frequencies: Sequence[float]) -> None:
+    """Raise InputError for one that no motion has."""
+    for nu in frequencies:
+        if not 0 <= nu <= FASTEST:
+            raise InputError(f"--frequency {nu:g}: numbers from 0 to {FASTEST:g} rad/s are needed")
 
 
 def _of_pads(
