@@ -273,6 +273,7 @@ OUTPUT: dict[str, Entry] = {
     "save": Entry("lcp_lube.output.files:save", "fields in files"),
     "coefficients": Entry("lcp_lube.drivers.coefficients:coefficients_of", "stiffness and damping"),
     "gradient": Entry("lcp_lube.drivers.gradient:gradient_of", "derivatives of a number by those of the scene"),
+    "film_gradient": Entry("lcp_lube.drivers.gradient:film_gradient_of", "derivative of a number by the film at every point"),
     "xarray": Entry("lcp_lube.output.dataset:to_xarray", "fields as an xarray.Dataset"),
 }
 

@@ -131,8 +131,7 @@ def pictures(args: argparse.Namespace, scene: Scene, solution: Solution, found: 
         dim = solution.problem.grid.dim
         # Of d(Q)/dh per area (1D: per length).
         units = {name: f"{sensitivity.unit_of(solution, name) or '1'}/m{dim + 1}" for name in names}
-        shape = solution.problem.grid.box if dim == 2 else (-1,)
-        more = {f"d{name}_dh": (fields[name].reshape(shape), units[name]) for name in names}
+        more = {f"d{name}_dh": (fields[name], units[name]) for name in names}
         files.save(solution, args.output, more=more)
 
 

@@ -89,6 +89,11 @@ def gradient_of(solution: Solution, quantity: str, keys: str | Sequence[str] | N
     return out
 
 
+def film_gradient_of(solution: Solution, quantity: str) -> Array:
+    """`Solution.film_gradient`."""
+    return film_fields(scene_of(solution), solution, [quantity])[quantity]
+
+
 def gradients(
     scene: Scene, solution: Solution, quantities: Sequence[str], keys: Sequence[str] | None = None, trace: Trace | None = None
 ) -> list[Gradient]:
@@ -124,16 +129,23 @@ def check(scene: Scene, film: bool = False) -> None:
     else:
         check_film(scene)
     if film and motion_of(scene) is not None:
-        raise InputError(f"scene {scene.name}: dQ/dh at every point is not known in time: leave --plot and --output out")
+        raise InputError(f"scene {scene.name}: dQ/dh at every point (--plot, --output) is not known in time")
 
 
 def film_fields(scene: Scene, solution: Solution, quantities: Sequence[str]) -> dict[str, Array]:
-    """dQ/dh by quantity at the owned points of the solution's grid, per area. Collective."""
+    """dQ/dh by quantity at the owned points of the solution's grid, per area, in the fields' shape. Collective.
+
+    Raises
+    ------
+    InputError : a quantity without a derivative, a scene without a film or in time, a solution that is none.
+    """
+    check(scene, film=True)
+    grid = solution.problem.grid
     adjoint: Any = (CoupledGradient if _coupled(scene) else Adjoint)(scene, solution, quantities)
     film: Any = None
     try:
         film = CoupledFilm(adjoint) if _coupled(scene) else FilmGradient(adjoint)
-        return {name: film.field(name) for name in quantities}
+        return {name: film.field(name).reshape(grid.box if grid.dim == 2 else -1) for name in quantities}
     finally:
         if film is not None:
             film.destroy()

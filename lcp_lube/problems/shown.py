@@ -145,6 +145,18 @@ class Shown:
         """
         return OUTPUT["gradient"].load()(self, quantity, keys)
 
+    def film_gradient(self, quantity: str = "load") -> Array:
+        """The derivative of one of the numbers by the film at every point, dQ/dh(x, y), through effects too. Collective.
+
+        An array as the fields are, in the number's unit per m and m2 (1D: per m and m): a film changed by dh(x, y) changes the
+        number by the integral of dQ/dh dh. Where it is negative, taking material away there lowers the number.
+
+        Raises
+        ------
+        InputError : a quantity without a derivative, no film, or one in time, a solution that did not converge.
+        """
+        return OUTPUT["film_gradient"].load()(self, quantity)
+
     def coefficients(self, frequency: float | Sequence[float] = 0.0, tilt: bool = False) -> Any:
         """Stiffness and damping: `K`, `C` and their `motions`, SI (`drivers.coefficients`). Collective.
 

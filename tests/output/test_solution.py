@@ -15,6 +15,7 @@ from petsc4py import PETSc
 
 import lcp_lube
 from lcp_lube import InputError, Solution, load_scene, solve
+from lcp_lube.drivers.film_gradient import areas
 from lcp_lube.output.results import as_dict, summary
 from lcp_lube.problems.film.lubrication import LubricationProblem
 from lcp_lube.registry import SCENE_DIR, scene_names
@@ -76,6 +77,12 @@ def test_derivatives_of_a_solution(film: Solution) -> None:
     every = film.gradient()
     assert {"U", "mu", "h_offset"} <= set(every)
     assert film.gradient("load", "mu") == film.gradient(keys=["mu"]) == {"mu": every["mu"]}
+    field = film.film_gradient("load")
+    assert field.shape == film.p.shape
+    assert field.ravel() @ areas(film.problem.grid) == pytest.approx(every["h_offset"], rel=1e-7)
+    assert not np.array_equal(film.film_gradient("friction"), field)
+    with pytest.raises(InputError, match="nearest is friction"):
+        film.film_gradient("fricton")
     assert film.coefficients().K.shape == (1, 1)
     slow, fast = film.coefficients(frequency=[0.0, 1e4])
     assert slow.K[0, 0] == film.coefficients(0.0).K[0, 0] != fast.K[0, 0]
