@@ -24,10 +24,11 @@ SMALL, SAME = 30, 1e-14  # steps of Newton's method for the pressures alone, and
 
 
 class Sources:
-    """P : pressures of all, in the film's unknown (q of `fluid`, or p), Pa. Collective, as its methods."""
+    """P : pressures of all, in the film's unknown (q of `fluid`, or p), Pa; like : 2 where half of what the sources feed
+    is solved. Collective, as its methods."""
 
-    def __init__(self, supplies: Sequence[Supply], law: Law = CONSTANT):
-        self.supplies, self.law = tuple(supplies), law
+    def __init__(self, supplies: Sequence[Supply], law: Law = CONSTANT, like: int = 1):
+        self.supplies, self.law, self.like = tuple(supplies), law, like
         self.free = np.array([one.open for one in supplies], dtype=bool)
         self.any = bool(self.free.any())
 
@@ -61,7 +62,7 @@ class Sources:
         try:
             d, *answers = linear.solve([G, *(feed.pushed(t) for t in feed.free)])
             flows = np.array(supply_flows(film, np.maximum(z, 0.0), np.maximum(-z, 0.0))) - feed.taken(d)
-            new = self._balanced(P[self.free], flows[self.free], feed.slopes(answers))
+            new = self._balanced(P[self.free], self.like * flows[self.free], self.like * feed.slopes(answers))
         finally:
             linear.destroy()
             feed.destroy()

@@ -3,7 +3,8 @@
 `supplies` finds the pressures around solves of the film, each of which has them given. From the step before, both are near:
 here both are unknowns of each step (`sources`). A film of constant density is linear at its signs, and exact once these stay;
 of one whose density follows the pressure `density_step` takes the steps. Inside of the loop of `coupling` it is such a film
-that is solved, so that pressures and effects are found by one loop.
+that is solved, so that pressures and effects are found by one loop. Where film and supplies are symmetric about the middle of
+the width half is solved of large films.
 """
 
 from dataclasses import replace
@@ -12,17 +13,21 @@ from typing import Any
 
 import numpy as np
 
+from ..base.parallel import Array
 from ..problems.film.model import Model
+from ..problems.grid import Grid
 from ..problems.solution import Outcome, Solution, Step
+from ..problems.transfer import Pick, numbers
 from ..scenes.scene import Solvable
 from ..solvers.relaxation import relaxation
-from . import coupling
+from . import coupling, film_part, symmetry
 from .ask import Ask
 from .loop import Frozen
 from .sources import CONSTANT, Sources
 
 WHY = "supplies: their pressures are unknowns of each step beside the film's"
 MOST = 12  # steps, after which `supplies` takes over
+HALVED = 3000  # points of symmetric films from which two builds and half the factors cost less than one of each
 SWEEPS = 16  # once three steps have not put the signs right
 
 
@@ -56,11 +61,15 @@ def _film(scene: Solvable, ask: Ask) -> Solution:
     """A film of constant density and viscosity, its supplies held at the pressures found. Collective."""
     begun, near = perf_counter(), ask.start
     assert near is not None  # as `solve` found
-    film: Any = scene.build(ask.comm)
+    whole: Any = scene.build(ask.comm)
+    large = whole.grid.size > HALVED and film_part.applies(scene) and not symmetry.why_not(ask)
+    part = film_part.part_of(scene, whole) if large and film_part.promising(scene) else None
+    film: Any = part.build(whole.grid.petsc_comm) if part is not None else whole
     model, law = (scene.constant, scene.law) if isinstance(scene, Frozen) else (scene.model, CONSTANT)  # type: ignore[attr-defined]
-    sources = Sources(model.supplies, law)
+    sources = Sources(model.supplies, law, like=1 if part is None else 2)
     u = near.problem.p_unit / film.p_unit  # type: ignore[attr-defined]
     z = np.where((near.fields["r"] > 0) & ~(near.fields["p"] > 0), -near.fields["r"], near.fields["p"] * u)
+    z = z if part is None else _taken(whole.grid, film.grid, numbers(film.grid), z)
     P, inside, steps = sources.foreseen(film, z), film.held.mask.ravel(), list[Step]()
     sweeps = ask.options.get("sweeps", 0)
     while True:
@@ -73,13 +82,18 @@ def _film(scene: Solvable, ask: Ask) -> Solution:
         cavity = (z < 0.0) & ~inside
         found = sources.step(film, cavity, z, film.balance(np.maximum(z, 0.0), np.maximum(-z, 0.0)), P)
         if found is None or len(steps) == MOST:
-            film.destroy()
+            for one in {film, whole}:
+                one.destroy()
             raise _NotFound
         z, P = z + found[0], P + found[1]
         changed = film.reduce.sum((cavity != ((z < 0.0) & ~inside)).astype(float))
         steps.append(Step(changed, film.reduce.max(np.abs(found[0])), 1.0, 1))
         if not changed:
             break
+    if part is not None:
+        z = _taken(film.grid, whole.grid, part.places(whole.grid), z)
+        film.destroy()
+    film = whole
     film.hold_at(sources.held(P))
     film.free_matrices()
     fields = {"p": np.maximum(z, 0.0), "r": np.maximum(-z, 0.0)}
@@ -88,3 +102,11 @@ def _film(scene: Solvable, ask: Ask) -> Solution:
     times = {"setup": 0.0, "assembly": 0.0, "linear": 0.0, "total": perf_counter() - begun}
     message = f"no sign changes any more after {len(steps)} steps"
     return Solution(film, fields, Outcome.CONVERGED, message, certificate, steps, {**near.settings, "why": why}, times).judged()
+
+
+def _taken(source: Grid, target: Grid, places: Any, z: Array) -> Array:
+    """z at these lines and columns of a grid. Collective."""
+    take = Pick(source, target, *places)
+    found = take(z)
+    take.destroy()
+    return found

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lcp_lube import load_scene, solve
-from lcp_lube.drivers import supply_step
+from lcp_lube.drivers import film_part, supply_step
 from lcp_lube.drivers.loop import Loop
 from lcp_lube.problems.film.fluid import Law
 
@@ -186,3 +186,27 @@ def test_pressures_of_supplies_follow(effect, monkeypatch):
             counts.append(np.mean([row["iterations"] for row in solution.history[3:]]))
     assert loads[0] == pytest.approx(loads[1], rel=1e-3 if effect == "density" else 1e-5)  # the formula's error is 1e-2
     assert counts[0] <= (3.0 if effect == "walls" else 1.5)
+
+
+@pytest.mark.parametrize("ny", [10, 11])
+def test_half_of_a_symmetric_film_and_its_supplies_is_solved(ny, monkeypatch):
+    """Also with lines of points in its middle, which half of it has half of; each source feeds both halves."""
+    sources: list[dict[str, Any]] = [{"restrictor": "capillary", "K": 4e-12, "p_s": 3e6}, {"flow": 2e-6}]
+    supply = [{"x_mm": [9 + 12 * k, 15 + 12 * k], "y_mm": [6, 14], **one} for k, one in enumerate(sources)]
+    film = {"shape": "formula", "h": "4e-5*(1+8*x)*(1+0.3*sin(314*t))"}
+    data = {"family": "bearing", "dimension": 2, "L": 0.05, "width": 0.02, "U": 2.0, "nx": 24, "ny": ny, "film": film}
+    data |= {"fluid": {"mu": 0.03, "p_supply": 1e5, "barus": 2e-8}, "elastic": {"compliance": 1e-13}, "supply": supply}
+    found, looks, part_of = [], list[int](), film_part.part_of
+
+    def counted(*given):
+        looks[-1] += 1
+        return part_of(*given)
+
+    monkeypatch.setattr(film_part, "part_of", counted)
+    for least in (0, 10**9):
+        looks.append(0)
+        monkeypatch.setattr(supply_step, "HALVED", least)
+        with solve(data | {"motion": {"t_end": 0.002, "steps": 4}}, model="full") as solution:
+            assert solution.converged and solution.mass_defect_run < 1e-10
+            found.append([row["load"] for row in solution.history])
+    assert looks[0] >= looks[1] + 4 and found[0] == pytest.approx(found[1], rel=1e-10)
