@@ -30,6 +30,7 @@ from .pad_coordinates import Bearing, Films, PadFilm, bearing_of
 MOST_SOLVES = 80
 THINNER, THICKER = 0.7, 3.0  # parts of a film anywhere by which a step may change it
 THINNEST = 1e-5  # film over the clearance, below which no load is looked for: a difference quotient's step is a tenth of it
+ROUNDING = 1e-15  # a step in parts of the coordinates' sizes, of which a film knows nothing
 NEAR = 0.05  # a step in parts of the coordinates' sizes
 NUDGES, NUDGE = 12, 0.5  # of a pad without stiffness: how often its inlet is opened, and by how much of its size of tilt
 SHRINK = 0.5  # of a nudge beside the one before: in a lightly loaded bearing a wide one upsets the other pads
@@ -60,41 +61,59 @@ def _from(bearing: Bearing, q: Array, scene: Solvable, ask: Ask, inner: Inner) -
     """From one place. Collective."""
     chain = Chain(ask, inner)
     found, again, stiff = False, False, False
-    nudges, nudge = np.zeros(q.size, dtype=int), np.zeros(q.size)
+    nudges, nudge, off = np.zeros(q.size, dtype=int), np.zeros(q.size), np.zeros(q.size)
+    counts, idle = off, list[bool]()
     for count in range(1, MOST_SOLVES + 1):
         at = bearing.at(q)
         solution = chain.solve(at)
+        why = f"in {count} solves"
         if not solution.converged:
             break
         with bearing.films(at, solution) as films:
             off, counts = bearing.misfit(solution)
             if films.min(lambda one: float(np.min(one.problem.film(*_places(one))))) < THINNEST * bearing.sizes[0]:
+                why += ", the film all but gone"
                 break
             met = bool(np.all(np.abs(off[bearing.free]) <= counts[bearing.free]))
             if met and stiff and not nudges.any():
                 found = True
                 break
             K = films.sum(lambda one: one.spread(stiffness(one.response()), q.size))  # noqa: B023
+            # As wide as what else is displaced: under a light load, whose film is nearly even, more would push all away.
+            wide = NUDGE * bearing.sizes * min(1.0, max(float(np.max(np.abs(q / bearing.sizes))), THINNEST))
             for k in bearing.pitches:
                 opens = bearing.free[k] and not K[k, k] > 0 and nudges[k] < NUDGES
                 closes = bearing.free[k] and nudges[k] >= NUDGES and abs(off[k]) > counts[k]
-                nudge[k] = NUDGE * bearing.sizes[k] * (opens * SHRINK ** int(nudges[k]) - 1.0 * closes)
+                nudge[k] = wide[k] * (opens * SHRINK ** int(nudges[k]) - 1.0 * closes)
             nudges += nudge > 0
             found = met and not nudge.any()
             if found and not again and (nudges >= NUDGES).any():
                 # From the place that was found, a pad that idles may find its own.
-                nudge = np.where(nudges >= NUDGES, NUDGE * bearing.sizes, 0.0)
+                nudge = np.where(nudges >= NUDGES, wide, 0.0)
                 nudges, found, again = np.zeros_like(nudges), False, True
             step = _step(bearing, films, K, off, counts, nudge, bearing.free & (nudge == 0) & (nudges < NUDGES))
+            idle = [bearing.free[k] and (nudges[k] >= NUDGES or not K[k, k] > 0) for k in bearing.pitches]
         if found or count == MOST_SOLVES:
+            break
+        if float(np.max(np.abs(step / bearing.sizes))) < ROUNDING:
+            why += ", the last of them a step of rounding"
             break
         # A place so near has stiffness too: it need not be found once more to know that the pads are stable there.
         stiff = float(np.max(np.abs(step / bearing.sizes))) < NEAR and all(
             K[k, k] > 0 for k in bearing.pitches if bearing.free[k]
         )
         q = q + step
-    _tell(scene, bearing, solution, q, found, count)
+    _tell(scene, bearing, solution, q, found, count, why + _left(bearing, off, counts, idle))
     return solution
+
+
+def _left(bearing: Bearing, off: Array, counts: Array, idle: list[bool]) -> str:
+    """What is left of the equations that are not met (N, N m), and which pads bear nothing or tip over."""
+    kept = zip(bearing.conditions, off, bearing.free & (np.abs(off) > counts), strict=True)
+    rest = [f"{key} {abs(one):.3g}" for key, one, more in kept if more]
+    idles = [str(k) for k, one in enumerate(idle, start=1) if one]
+    told = {"left over: ": rest, "without stiffness: pad ": idles}
+    return "".join(f"; {what}{', '.join(which)}" for what, which in told.items() if which)
 
 
 def _places(film: PadFilm) -> tuple[Array, Array]:
@@ -119,14 +138,14 @@ def _step(bearing: Bearing, films: Films, K: Array, off: Array, counts: Array, n
     return films.min(share) * step
 
 
-def _tell(scene: Any, bearing: Bearing, solution: Solution, q: Array, found: bool, count: int) -> None:
-    """Outcome, record and the pads' numbers on the solution. Collective."""
+def _tell(scene: Any, bearing: Bearing, solution: Solution, q: Array, found: bool, count: int, why: str) -> None:
+    """Outcome, record and the pads' numbers on the solution. why : where none was found. Collective."""
     values, told = solution.problem.quantities(solution.fields), bearing.told(solution, q)
     place = f"{told['vary']} = {told['value']:.8g}, tilts {', '.join(f'{tilt:.4g}' for tilt in told['tilts'])} rad"
     if solution.converged and not found:
         wanted = "" if scene.balance is None else f"{scene.balance.load:g} asked for; "
         solution.outcome = Outcome.LOAD_NOT_CARRIED
-        solution.message = f"{wanted}no balance was found in {count} solves; the last: {place} carries {values['load']:.8g}"
+        solution.message = f"{wanted}no balance was found {why}; the last: {place} carries {values['load']:.8g}"
     tilts = [float(tilt) for tilt in told["tilts"]]
     solution.problem.more |= {"pad_tilts": tilts}  # type: ignore[attr-defined]
     solution.settings |= {"coordinates": [float(one) for one in q], "relative_coordinates": q / bearing.sizes}

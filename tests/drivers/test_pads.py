@@ -86,6 +86,7 @@ def test_a_pad_without_preload_idles():
 def test_a_load_that_no_place_carries(name, changes):
     with solve(load_scene(name, changes)) as solution:
         assert solution.outcome == "load_not_carried" and "no balance was found" in solution.message
+        assert "left over: load" in solution.message
 
 
 def test_thrust_pads():
@@ -151,13 +152,13 @@ def test_films_are_linearised_side_by_side(script):
 
 
 def test_pads_without_preload_under_a_light_load():
-    """Upper pads hardly bear: those that lose their pressure are opened by less each time, and find their place."""
+    """Upper pads hardly bear: those that lose their pressure are opened by no more than what else is displaced."""
     scene = load_scene("tilting_pad_journal", {"nx": 120, "ny": 5, "preload": 0.0, "balance.load": 500.0})
     with solve(scene) as solution:
         assert solution.converged, solution.message
         values = solution.problem.quantities(solution.fields)
         assert values["force"] == pytest.approx([-500.0, 0.0], abs=1e-2)
-        assert solution.settings["balance"]["solves"] < 75
+        assert solution.settings["balance"]["solves"] < 45
 
 
 @pytest.mark.parametrize("nx", [72, 77])
