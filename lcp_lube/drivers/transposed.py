@@ -184,13 +184,18 @@ class CoupledFilm:
         slopes: dict[int, list[tuple[Array, Array]]] = {}
         for mask in self._colours:
             fields, _ = self._pair(place, np.where(mask.ravel(), size, 0.0))
+            seen = self._seen(fields)
             for number, *_ in self._outputs():
-                if self.reduce.max(np.abs(fields[number])) > 0.0:
+                if seen[number]:
                     slopes.setdefault(number, []).append((mask, fields[number]))
         for number, out, is_field in self._outputs():
             if number in slopes:
                 local = Local(self.grid, size, slopes[number])
                 self.blocks.setdefault(out, {})[place] = local if is_field else local.transposed(1.0)
+
+    def _seen(self, fields: list[Any]) -> Array:
+        """How many ranks have more than zeros in each of these; one message for all."""
+        return np.asarray(self.reduce.comm.allreduce(np.array([0.0 if a is None else float(np.any(a)) for a in fields])))
 
     def _by_sum(self, place: Place) -> None:
         """The outputs' and numbers' derivatives by what is one number."""
@@ -198,8 +203,9 @@ class CoupledFilm:
         if not d > 0.0 or self._same(at(d), self.begun):
             return
         fields, numbers = self._pair(place, d)
+        seen = self._seen(fields)
         for number, out, is_field in self._outputs():
-            if self.reduce.max(np.abs(fields[number])) > 0.0:
+            if seen[number]:
                 self.blocks.setdefault(out, {})[place] = fields[number] / d if is_field else self.reduce.sum(fields[number]) / d
         for name, change in numbers.items():
             if change:
