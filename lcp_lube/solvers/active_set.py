@@ -42,7 +42,7 @@ LEAST = 1e-15  # p_unit: a largest pressure below this is rounding
 @dataclass(frozen=True)
 class ActiveSetOptions(MethodOptions):
     """patience: steps without a fall of ||G|| by 10 % before sweeps take over; give_up: steps after which it is taken to
-    cycle; p0: p (p_unit) where the film is full at the start; rtol: smallest relative tolerance of iterative solves; sweeps:
+    cycle; p0: full film at this p (p_unit) at the start; rtol: smallest relative tolerance of iterative inner solves; sweeps:
     of relaxation before the first step from a given start, and after each step; 0: none at all, also when stalled."""
 
     method = "active-set"
@@ -56,7 +56,7 @@ class ActiveSetOptions(MethodOptions):
 class ActiveSet(Method):
     """The iterates z; `newton.iterate` runs it. `norm` is ||G(z)|| / ||c||, see `zform.ZForm.norm`.
 
-    A start's cells count as cavitated where r > 0; without one see `_first_guess`.
+    A start's cells count as cavitated where r > 0; without one the film is full at options.p0.
     """
 
     Options = ActiveSetOptions
@@ -69,7 +69,7 @@ class ActiveSet(Method):
         problem, options, start = self.problem, self.options, job.start
         self.system = make_system(job.system, problem, self.stages)
         self.form = ZForm(problem)
-        self.z = self.form.z(start) if start else self._first_guess()
+        self.z = self.form.z(start) if start else np.full(problem.grid.local_size, options.p0)
         self._look()
         self._relaxation: Relaxation | None = relaxation(problem) if options.sweeps else None
         self._sweeps = options.sweeps if start else 0
@@ -79,17 +79,6 @@ class ActiveSet(Method):
     @property
     def fields(self) -> Fields:
         return self.form.fields(self.z)
-
-    def _first_guess(self) -> Array:
-        """z without a start: full at p0, but where the wall carries off more than it brings and nothing else feeds the film.
-
-        Such cells start cavitated. The front lies behind the first of them, and nearer to it than all of the width that has
-        negative pressures in a film taken to be full: one step of five less.
-        """
-        problem, full = self.problem, np.full(self.problem.grid.local_size, self.options.p0)
-        if problem.held is not None or any(problem.p_sides) or problem.scheme.storage is not None:
-            return full
-        return np.where(problem.c < 0.0, -LEAST, full)
 
     def _look(self) -> None:
         self.G = self.form.residual(self.z)
