@@ -49,7 +49,7 @@ class Reduce:
 
     def summed(self, own: float, terms: Callable[[], Array]) -> float:
         """The sum of what is this rank's; terms : the part of each of its points, for those who ask (`drivers.tape`)."""
-        return self.comm.allreduce(own)
+        return self._total(own)
 
     def of_some(self, values: NDArray, at: Any, box: tuple[int, int]) -> float:
         """The sum over some points: at, in an array of shape box of all."""

@@ -108,7 +108,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         level_begin, before, earlier = perf_counter(), solution, before
         near = ask.start if before is None else _start(before, prod(shape)) if ask.nested is not False else None
         stopping = _stopping(ask.stopping, tol, before)
-        halved = ask.reduction and (len(shape) == 1 or prod(shape) > WHOLE[before is None or before.asked == "fas"])
+        halved = ask.reduction and (len(shape) == 1 or prod(shape) > WHOLE[loops if before is None else before.asked == "fas"])
         this = replace(ask, accuracy=None, stopping=stopping, start=near, nested=False, reduction=halved)
         solution = inner(scene.with_shape(shape), replace(this, direct_below=0) if loops else this)
         problem = solution.problem

@@ -28,10 +28,9 @@ from .ask import Ask
 from .frozen import Frozen
 from .linearised import Linear
 from .settled import settled
-from .sources import Sources
+from .sources import SWEEPS, Sources, z_of
 
 WHY = "density: Newton's method on each step as a whole, the law linearised exactly"
-SWEEPS = 16  # once two steps have not halved what is left
 IN_VAIN = 8  # steps that do not halve what is left, after which `coupling` takes over
 
 
@@ -110,8 +109,7 @@ class _Film:
 
     def begin(self, near: Any) -> _At:
         """At the fields of a start."""
-        u = near.problem.p_unit / self.base.p_unit
-        z = np.where((near.fields["r"] > 0) & ~(near.fields["p"] > 0), -near.fields["r"], near.fields["p"] * u)
+        z = z_of(near, self.base.p_unit)
         return self.at(z, self._sources.foreseen(self.base, z) if self._sources.any else np.zeros(0))
 
     def at(self, z: Array, P: Array) -> _At:

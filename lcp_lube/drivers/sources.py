@@ -20,7 +20,14 @@ from ..problems.film.supplies import Supply, supply_flows
 from .linearised import Feed, Linear
 
 CONSTANT = Law()
+SWEEPS = 16  # of a step's film, once some steps have not put its signs right
 SMALL, SAME = 30, 1e-14  # steps of Newton's method for the pressures alone, and of these what rounding is
+
+
+def z_of(near: Any, p_unit: float) -> Array:
+    """z = p (p_unit), or -r where the film is not full, of a start."""
+    p, r = near.fields["p"], near.fields["r"]
+    return np.where((r > 0) & ~(p > 0), -r, p * (near.problem.p_unit / p_unit))
 
 
 class Sources:
@@ -51,9 +58,8 @@ class Sources:
         flows, out, owner = np.array(supply_flows(film, p, r)), np.zeros(p.size), film.held.owner.ravel()
         for k in np.flatnonzero(self.free):
             one, mine = self.supplies[k], owner == k
-            source = one.flow if one.flow is not None else one.given(P[k]) if one.law == "orifice" else one.K * (one.p_s - P[k])
             room = volume_unit(film) * film.reduce.sum(np.where(mine, storage, 0.0))
-            out[mine] = (flows[k] - source) / room
+            out[mine] = (flows[k] - one.given(P[k])) / room
         return out
 
     def step(self, film: Any, cavity: Any, z: Array, G: Array, P: Array) -> tuple[Array, Array] | None:

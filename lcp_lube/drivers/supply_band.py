@@ -132,5 +132,5 @@ def _source(one: Supply, p: float, sign: float) -> float:
     if one.flow is not None:
         return one.flow
     moved = replace(one, p_s=one.p_s + sign * 8 * UNIT * (abs(one.p_s) + abs(p)))
-    flow = moved.given(p) if one.law == "orifice" else one.K * (moved.p_s - p)
+    flow = moved.given(p)
     return flow + sign * 8 * UNIT * abs(flow)

@@ -22,13 +22,12 @@ from ..scenes.scene import Solvable
 from ..solvers.relaxation import relaxation
 from . import coupling, film_part, symmetry
 from .ask import Ask
-from .loop import Frozen
-from .sources import CONSTANT, Sources
+from .frozen import Frozen
+from .sources import CONSTANT, SWEEPS, Sources, z_of
 
 WHY = "supplies: their pressures are unknowns of each step beside the film's"
 MOST = 12  # steps, after which `supplies` takes over
 HALVED = 3000  # points of symmetric films from which two builds and half the factors cost less than one of each
-SWEEPS = 16  # once three steps have not put the signs right
 
 
 def solve(scene: Solvable, ask: Ask) -> Solution | None:
@@ -67,8 +66,7 @@ def _film(scene: Solvable, ask: Ask) -> Solution:
     film: Any = part.build(whole.grid.petsc_comm) if part is not None else whole
     model, law = (scene.constant, scene.law) if isinstance(scene, Frozen) else (scene.model, CONSTANT)  # type: ignore[attr-defined]
     sources = Sources(model.supplies, law, like=1 if part is None else 2)
-    u = near.problem.p_unit / film.p_unit  # type: ignore[attr-defined]
-    z = np.where((near.fields["r"] > 0) & ~(near.fields["p"] > 0), -near.fields["r"], near.fields["p"] * u)
+    z = z_of(near, film.p_unit)
     z = z if part is None else _taken(whole.grid, film.grid, numbers(film.grid), z)
     P, inside, steps = sources.foreseen(film, z), film.held.mask.ravel(), list[Step]()
     sweeps = ask.options.get("sweeps", 0)

@@ -138,14 +138,14 @@ class Supply:
         """
         if not self.open:
             return 0.0, 1.0, 0.0
-        if self.flow is not None:
-            return flow - self.flow, 0.0, 1.0
-        if self.law == "capillary":
-            return flow - self.K * (self.p_s - p), self.K, 1.0
+        if self.law != "orifice":
+            return flow - self.given(p), self.K, 1.0
         return p - self.p_s + flow * abs(flow) / self.K**2, 1.0, 2.0 * abs(flow) / self.K**2
 
     def given(self, p: float) -> float:
-        """What an orifice lets through at the pressure p, m3/s."""
+        """What its source lets through at the pressure p, m3/s."""
+        if self.law != "orifice":
+            return self.K * (self.p_s - p) if self.flow is None else self.flow
         return math.copysign(self.K * math.sqrt(abs(self.p_s - p)), self.p_s - p)
 
     def sought(self, p: float, flow: float) -> tuple[float, float, float]:
