@@ -29,6 +29,7 @@ from .rungs import ASYMPTOTIC, finer, first_shape, round_ring, rungs_up
 from .values import Values, carried, sought
 
 FEW_KNOWN = 128  # points of the first grid of a line whose number is known: no coarser grid is cheaper
+FEW_LINE = 230  # of a line that multigrid's loops solve by elimination alone (`fas.driver.DIRECT`)
 FEW_PAIRS = 200  # of a film whose load is estimated from each two grids: these are solved by elimination
 ALGEBRAIC = 1e-3  # ||F|| relative to the tolerance: with many small cavities it leaves up to 60 times itself in a load
 ALLOWED = (1e-10, 0.5)  # tolerances
@@ -103,14 +104,16 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     times: dict[str, float] = {}
     # A program that goes on loads multigrid's loops once; for one run they pay where its last grid will be one for multigrid
     # (second order: points as 1/error), and serve those before it too.
-    end, loops = "", ask.direct_below is None or tol < SOON
+    plane = len(first) == 2
+    end, loops = "", ask.direct_below is None or (plane and tol < SOON)
     while not end:
         level_begin, before, earlier = perf_counter(), solution, before
         near = ask.start if before is None else _start(before, prod(shape)) if ask.nested is not False else None
         stopping = _stopping(ask.stopping, tol, before)
         halved = ask.reduction and (len(shape) == 1 or prod(shape) > WHOLE[loops if before is None else before.asked == "fas"])
         this = replace(ask, accuracy=None, stopping=stopping, start=near, nested=False, reduction=halved)
-        solution = inner(scene.with_shape(shape), replace(this, direct_below=0) if loops else this)
+        by_loops = loops and (plane or (line and shape[0] <= FEW_LINE))
+        solution = inner(scene.with_shape(shape), replace(this, direct_below=0) if by_loops else this)
         problem = solution.problem
         sure = quantity or (DEFAULT_QUANTITY[0] if pairs or line else "")
         value = carried(problem, solution.fields, sure)
@@ -123,7 +126,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         best = told.add(solution, before, earlier, prod(problem.grid.meshes) ** (1.0 / len(first)), quantity, value)
         if earlier is not None:
             earlier.destroy()
-        loops = loops or inf > best.relative > 3 * FEW / problem.grid.size * tol
+        loops = loops or (plane and inf > best.relative > 3 * FEW / problem.grid.size * tol)
         levels.append(
             {
                 **dict(zip(("nx", "ny"), problem.grid.shape, strict=False)),

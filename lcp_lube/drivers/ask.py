@@ -71,7 +71,7 @@ class Ask:
     memory_check : refuse a run that needs more memory than there is, by an estimate (`memory`).
     implied : method and options are a driver's choice, and nobody has named them.
     direct_below : points up to which a film in 2D is solved directly, where multigrid would do; default `plan.FEW`,
-        of the grids of a run to an accuracy none.
+        of the grids of a run to an accuracy none; with 0 a film in 1D is solved by multigrid's loops too.
     monitor : called after every step with its number and record.
     progress : told by the loops over grids, levels and time steps how far they have come.
     watch : called after every time step of a march with its `time.Moment`; collective.

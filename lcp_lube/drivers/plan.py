@@ -44,7 +44,7 @@ def plan(facts: Facts, ask: Ask, scene: str) -> Plan:
         method = DEFAULT_METHOD[facts.kind]
         no_linear = system == "auto" and recipe is None and not nested and not options
         why_direct = ""
-        if method == "active-set" and no_linear and _suits_multigrid(facts):
+        if method == "active-set" and no_linear and _suits_multigrid(facts, lines=ask.direct_below == 0):
             few = FEW if ask.direct_below is None else ask.direct_below
             if facts.size > few:
                 method = "fas"
@@ -95,9 +95,10 @@ def plan(facts: Facts, ask: Ask, scene: str) -> Plan:
     return Plan(method, system, recipe, nested, why)
 
 
-def _suits_multigrid(facts: Facts) -> bool:
-    """Whether nonlinear multigrid is the fastest: in 2D, its loops compiled, nobody having asked for an inner solver."""
-    plane = facts.kind == "lubrication" and facts.dim == 2
+def _suits_multigrid(facts: Facts, lines: bool) -> bool:
+    """Whether nonlinear multigrid is the fastest: in 2D, or on lines where that is said, its loops compiled, nobody having
+    asked for an inner solver."""
+    plane = facts.kind == "lubrication" and (facts.dim == 2 or lines)
     # A ring's coarser grids need even numbers of points; one that is hardly fed stalls at once and is handed over.
     ring = facts.periodic == (True, False) and facts.shape[0] % 8 == 0
     suits = plane and (ring or not any(facts.periodic))

@@ -117,11 +117,15 @@ class Line:
 
 @dataclass(frozen=True)
 class Flow:
-    """Q of a line, m2/s, and its derivatives by the pressures (of Barus' fluid by q) at its ends, m2/s/Pa."""
+    """Q of a line, m2/s, and its derivatives by the pressures (of Barus' fluid by q) at its ends, m2/s/Pa.
+
+    crossings : where U h = Q, if that has been looked for.
+    """
 
     Q: float
     by_a: float = 0.0
     by_b: float = 0.0
+    crossings: Array | None = None
 
 
 def crossings(line: LineIntegrals, U: float, level: float) -> Array:
@@ -143,14 +147,16 @@ def line_flow(
     least, at = _least((p_a + F[1:]) / J[1:], J[1:])
     if p_a == 0.0 and (enters := U * float(line.looks[1][0, 0]) * (1.0 - r_in)) < least:
         least, at = enters, np.inf
+    x: Array | None = None
     for _ in range(MOST if U and least else 0):
-        J_x, F_x = _J_F(line, mu, U, crossings(line, U, least))
+        x = crossings(line, U, least)
+        J_x, F_x = _J_F(line, mu, U, x)
         Q, J_Q = _least((p_a + F_x) / J_x, J_x)
         if not least * (1.0 - SETTLED) > Q:
             break
-        least, at = Q, J_Q
+        least, at, x = Q, J_Q, None
     Q_full = float((p_a - p_b + F[-1]) / J[-1])
-    return Flow(Q_full, 1.0 / J[-1], -1.0 / J[-1]) if Q_full <= least * (1.0 + SETTLED) else Flow(least, 1.0 / at)
+    return Flow(Q_full, 1.0 / J[-1], -1.0 / J[-1]) if Q_full <= least * (1.0 + SETTLED) else Flow(least, 1.0 / at, 0.0, x)
 
 
 def _least(M: Array, J: Array) -> tuple[float, float]:
@@ -182,8 +188,10 @@ def solve_line(
     r_in : void fraction that enters at the first point; 0 unless p_a is. closed : nothing flows, as an end is; p_b is the
     pressure at the last point all the same. law : of Barus' fluid, whose p_a and p_b are q.
     """
-    Q = line_flow(line, mu, U, p_a, p_b, r_in, closed).Q
-    x = np.union1d(line.ends, crossings(line, U, Q)) if U else line.ends
+    flow = line_flow(line, mu, U, p_a, p_b, r_in, closed)
+    Q, x = flow.Q, line.ends
+    if U:
+        x = np.union1d(x, crossings(line, U, Q) if flow.crossings is None else flow.crossings)
     J, F = _J_F(line, mu, U, x)
     Z = F - Q * J
     p = _followed(Z, p_b)
