@@ -244,6 +244,9 @@ class Grid:
 
         Returns an array of shape (ny_local + 2, nx_local + 2); its corners are not to be used. Collective.
         """
+        if owned.dtype == np.longdouble:  # PETSc's vectors hold doubles
+            high = owned.astype(float)
+            return np.add(self.ghosted(high, outside), self.ghosted((owned - high).astype(float), 0.0), dtype=np.longdouble)
         if self.comm.size == 1:
             out = np.empty((self.box[0] + 2, self.box[1] + 2), dtype=bool if owned.dtype == bool and not outside else float)
             out[1:-1, 1:-1] = np.reshape(owned, self.box)

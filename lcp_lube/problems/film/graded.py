@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 WORK = {True: 4e8, False: 2e5}  # multiplications of a factorisation, compiled or not: some 0.3 s
 UNIT = 2.0**-53
+LONG = np.longdouble  # what is left of a balance is summed in it: pressures beside ones 1e9 times theirs have signs, too
 REFINEMENTS = 10  # at most: each gains several digits, or ends them
 HALVES = 200  # steps of half the wrong cells that may fail to make fewer of them
 PATIENCE = HALVES + 250  # and of all of them before: what is wrong on a ring may have to go round it many times
@@ -107,19 +108,23 @@ class Pivots:
         jacobian = GradedJacobian(self.problem, self.full)
         if jacobian.singular:
             raise ZeroDivisionError("a part of the film has no way out")
-        last = np.inf
+        last, unit = np.inf, float(np.finfo(LONG).eps) / 2
+        p, r = self.p.astype(LONG), self.r.astype(LONG)
         for _ in range(REFINEMENTS):
-            y = jacobian.solve(-self.problem.balance(self.p, self.r))
-            self.p, self.r = self.p + np.where(self.full, y, 0.0), self.r - np.where(self.full, 0.0, y)
-            pairs = ((np.where(self.full, y, 0.0), self.p), (np.where(self.full, 0.0, y), self.r))
+            y = jacobian.solve(-self.problem.balance(p, r).astype(float))
+            p, r = p + np.where(self.full, y, 0.0), r - np.where(self.full, 0.0, y)
+            pairs = ((np.where(self.full, y, 0.0), p.astype(float)), (np.where(self.full, 0.0, y), r.astype(float)))
             size = max(reduce.max(np.abs(moved)) / (reduce.max(np.abs(whole)) or 1.0) for moved, whole in pairs)
-            if size <= UNIT or not size < 0.5 * last:  # done, or rounding, or NaN
+            if size <= unit or not size < 0.5 * last:  # done, or rounding, or NaN
                 break
             last = size
-        p_max = reduce.max(np.abs(self.p))
-        bad = np.where(self.full, self.p < -8 * UNIT * p_max, self.r < -8 * UNIT)
-        self.wrong = int(reduce.sum(bad.astype(float))) if self._driven else 0
-        self.p, self.r = (np.maximum(a, 0.0) for a in (self.p, self.r))
+        p_max, self.wrong = reduce.max(np.abs(p.astype(float))), 0
+        for least in (UNIT, unit) if self._driven else ():  # what is surely wrong, and only then what may be
+            bad = np.where(self.full, p < -8 * least * p_max, r < -8 * least)
+            self.wrong = int(reduce.sum(bad.astype(float)))
+            if self.wrong:
+                break
+        self.p, self.r = (np.maximum(a, 0.0).astype(float) for a in (p, r))
         if self.wrong:
             if self.wrong < self._fewest:
                 self._fewest, self._patience = self.wrong, PATIENCE

@@ -21,6 +21,7 @@ from ..grid import Grid
 Flags = NDArray[np.bool_]
 Shape = Callable[[Array, Array], Array]
 SIDE_BY_SIDE, IN_SERIES = 16, 32  # looks across a face and between its two points
+TOGETHER = 200  # faces that are looked at together, in cache
 THIN = 1 / 3  # of the way from the thinnest to the thickest film of a face: what is below is the film outside a recess
 
 
@@ -53,44 +54,49 @@ def cut_faces(
         cut |= np.abs(rim(middle, across)) <= reach
     cut &= d[None, :] > 0.0
     j, i = np.nonzero(cut)
-    t = a[i, None] + d[i, None] * ((np.arange(IN_SERIES) + 0.5) / IN_SERIES)
-    looks = ((np.arange(SIDE_BY_SIDE) + 0.5) / SIDE_BY_SIDE)[:, None] * width[j] + low[j]
-    dry_first, dry_last = cavity[j, i], cavity[j, i + 1]
-    cubes, films = _in_series(film, t, looks)
-    some = np.flatnonzero(dry_first | dry_last)  # a full face resists all along: only beside a cavity a part may do it alone
-    if not some.size:
-        return cut, cubes, films
-    t, looks, j, i, dry_first, dry_last = t[some], looks[:, some], j[some], i[some], dry_first[some], dry_last[some]
-    thinnest, thickest = np.full(some.size, np.inf), np.zeros(some.size)
-    for s in looks:
-        h = np.real(film(t, s[:, None]))
-        thinnest, thickest = np.minimum(thinnest, h.min(axis=1)), np.maximum(thickest, h.max(axis=1))
-    between = thinnest + THIN * (thickest - thinnest)
-    first, last = (np.real(film(nodes[i + k], lines[j])) > between for k in (0, 1))  # whether the points lie in the recess
-    void = np.where(first == last, dry_first & dry_last, np.where(last, dry_last, dry_first & np.bool_(not along_flow)))
-
-    def resists(h: Array) -> Flags:
-        thin = np.real(h) <= between[void, None]
-        if along_flow:  # the film before the first place where it becomes thick
-            thin = np.logical_and.accumulate(thin, axis=1)
-            alone = thin[:, 0] & (np.real(h[:, -1]) > between[void])
-        else:
-            alone = thin.any(axis=1)
-        return thin | ~alone[:, None]
-
-    cubes[some[void]], films[some[void]] = _in_series(film, t[void], looks[:, void], resists)
+    cubes = np.zeros(j.size, dtype=np.asarray(film(nodes[:1], lines[:1])).dtype)  # complex, where a derivative is asked for
+    films = np.zeros_like(cubes)
+    for some in (slice(k, k + TOGETHER) for k in range(0, j.size, TOGETHER)):
+        at = j[some], i[some]
+        dry = cavity[at], cavity[at[0], at[1] + 1]
+        t = a[at[1], None] + d[at[1], None] * ((np.arange(IN_SERIES) + 0.5) / IN_SERIES)
+        looks = ((np.arange(SIDE_BY_SIDE) + 0.5) / SIDE_BY_SIDE)[:, None] * width[at[0]] + low[at[0]]
+        ends = [partial(film, nodes[at[1] + k], lines[at[0]]) for k in (0, 1)]
+        cubes[some], films[some] = _of_faces(film(t, looks[:, :, None]), ends, dry, along_flow)
     return cut, cubes, films
 
 
-def _in_series(film: Shape, t: Array, looks: Array, resists: Callable[[Array], Flags] | None = None) -> tuple[Array, Array]:
+def _of_faces(h: Array, ends: Sequence[Callable[[], Array]], dry: Sequence[Flags], along_flow: bool) -> tuple[Array, Array]:
+    """C and H of faces from the film at all looks, shape (side by side, faces, in series).
+
+    ends : the film at their first and last points. dry : whether these are cavitated.
+    """
+    cubes, films = _in_series(h)
+    some = np.flatnonzero(dry[0] | dry[1])  # a full face resists all along: only beside a cavity a part may do it alone
+    if not some.size:
+        return cubes, films
+    seen = np.real(h[:, some])
+    thinnest, thickest = seen.min(axis=(0, 2)), seen.max(axis=(0, 2))
+    between = thinnest + THIN * (thickest - thinnest)
+    first, last = (np.real(end()[some]) > between for end in ends)  # whether the points lie in the recess
+    dry_first, dry_last = (flags[some] for flags in dry)
+    void = np.where(first == last, dry_first & dry_last, np.where(last, dry_last, dry_first & np.bool_(not along_flow)))
+    seen = seen[:, void]
+    thin = seen <= between[void, None]
+    if along_flow:  # the film before the first place where it becomes thick
+        thin = np.logical_and.accumulate(thin, axis=2)
+        alone = thin[..., 0] & (seen[..., -1] > between[void])
+    else:
+        alone = thin.any(axis=2)
+    cubes[some[void]], films[some[void]] = _in_series(h[:, some[void]], thin | ~alone[..., None])
+    return cubes, films
+
+
+def _in_series(h: Array, resists: Flags | None = None) -> tuple[Array, Array]:
     """C and H of faces: means over lines of looks, on each of which what `resists` (None: all of it) does so in series."""
-    cubes, films = 0.0, 0.0
-    for s in looks:
-        h = film(t, s[:, None])  # complex, where its derivative is asked for
-        drag = 1.0 / h**2 if resists is None else np.where(resists(h), 1.0 / h**2, 0.0)
-        resistance = np.mean(drag / h, axis=1)
-        cubes, films = cubes + 1.0 / resistance / SIDE_BY_SIDE, films + np.mean(drag, axis=1) / resistance / SIDE_BY_SIDE
-    return np.asarray(cubes), np.asarray(films)
+    drag = 1.0 / h**2 if resists is None else np.where(resists, 1.0 / h**2, 0.0)
+    resistance = np.mean(drag / h, axis=2)
+    return np.mean(1.0 / resistance, axis=0), np.mean(np.mean(drag, axis=2) / resistance, axis=0)
 
 
 def rims_across_x(
