@@ -244,7 +244,7 @@ class Grid:
 
         Returns an array of shape (ny_local + 2, nx_local + 2); its corners are not to be used. Collective.
         """
-        if owned.dtype == np.longdouble:  # PETSc's vectors hold doubles
+        if owned.dtype.itemsize > 8:  # PETSc's vectors hold doubles
             high = owned.astype(float)
             return np.add(self.ghosted(high, outside), self.ghosted((owned - high).astype(float), 0.0), dtype=np.longdouble)
         if self.comm.size == 1:
@@ -253,8 +253,7 @@ class Grid:
             out[:, 0], out[:, -1] = (out[:, -2], out[:, 1]) if self.periodic[0] else (outside, outside)
             out[0], out[-1] = (out[-2], out[1]) if self.periodic[-1] and self.dim == 2 else (outside, outside)
             return out
-        source = self.dm.getGlobalVec()
-        target = self.dm.getLocalVec()
+        source, target = self.dm.getGlobalVec(), self.dm.getLocalVec()
         source.setArray(owned)
         self.dm.globalToLocal(source, target)
         out = self._frame(target.array_r, outside)
