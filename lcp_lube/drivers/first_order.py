@@ -8,6 +8,7 @@ is found for the scene, where a load is carried, follows by the conditions that 
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 from math import expm1
 from typing import Any
 
@@ -15,7 +16,18 @@ import numpy as np
 
 from ..base.parallel import Array
 from ..errors import InputError
-from ..problems.film.effects import Answer, Cells, Compressible, Effect, answer, factors, neutral
+from ..problems.film.effects import (
+    Answer,
+    Cells,
+    Compressible,
+    Effect,
+    FaceFactors,
+    answer,
+    around,
+    factors,
+    framed_by,
+    neutral,
+)
 from ..problems.film.fluid import Law
 from ..problems.film.forces import weights
 from ..problems.solution import Solution
@@ -87,14 +99,12 @@ class FirstOrder:
         self.cavity, _ = cavity_of(eq, self.p, self.r)
         self.linear = Linear(eq.constant, self.cavity, given=eq.held)
         self.lambdas = self._adjoints()
-        self.start = self._lagrangians(self.cells)
 
     def change(self, name: str) -> tuple[float | None, float]:
         """dQ/Q by an effect that was not solved for, or by Barus' law, and the largest change of a coefficient. Collective."""
         d, sign = self._change(name)
         with np.errstate(all="ignore"):
-            slopes = (self._lagrangians(self._moved(d, STEP), STEP) - self.start) / STEP
-            total = self.found.total(self.quantity, name, dict(zip(self.lambdas, slopes, strict=True)))
+            total = self.found.total(self.quantity, name, dict(zip(self.lambdas, self._slopes(d), strict=True)))
         largest = {key: self.base.reduce.max(np.abs(change)) for key, change in d.items()}
         if "contact" in largest:
             largest["contact"] /= max(self.base.reduce.max(self.p), SOME)
@@ -121,7 +131,7 @@ class FirstOrder:
             self._film(cells, 1.0)
             after = self._makes([*self.kept, name], Answer(eq.constant, p, r, cells, self.law, self.base))
             d = {key: self._over(key, after[key], self.cells[key]) for key in after}
-            moved = self._lagrangians(self._moved(d, 1.0), 1.0, p, r) - self.start
+            moved = self._lagrangians(self._moved(d, 1.0), 1.0, p, r) - self._start
             return self.found.total(self.quantity, name, dict(zip(self.lambdas, moved, strict=True))) / (self.value or np.nan)
 
     def _change(self, name: str) -> tuple[Cells, float]:
@@ -179,11 +189,48 @@ class FirstOrder:
                 out[key] = out[key] * np.exp(t * change)
         return out
 
+    def _slopes(self, d: Cells) -> Array:
+        """dL/dt of all numbers, where coefficients change by t d. Collective."""
+        cells = self._moved(d, STEP)
+        if not self._only_pressures(cells):
+            return (self._lagrangians(cells, STEP) - self._start) / STEP
+        by, dot = self._factors(cells, STEP).values, self.base.reduce.dot
+        G = sum(flow * ((by[name] - before) / before) for name, (flow, before) in self._flows.items()).ravel()  # type: ignore[union-attr]
+        return np.array([-dot(one, G) / STEP for one in self.lambdas.values()])
+
+    def _only_pressures(self, cells: Cells) -> bool:
+        """Whether all numbers are integrals of the pressure, so that coefficients change G alone."""
+        wanted = {part for one in self.parts.values() for part in one}
+        return "contact" not in cells and wanted <= set(weights(self.base))
+
+    @cached_property
+    def _start(self) -> Array:
+        return self._lagrangians(self.cells)
+
+    @cached_property
+    def _flows(self) -> dict[str, tuple[Array, Array]]:
+        """What leaves each cell at the answer by the factors of its faces, and these; nothing where the pressure is given."""
+        film, grid = self.at.problem, self.base.grid
+        s, p, r = film.scheme, self.p.reshape(grid.box) / film.p_unit, self.r.reshape(grid.box)
+        beside = around(framed_by(grid, self.p / film.p_unit, [side / film.p_unit for side in film.p_sides]))
+        names = ("k_W", "k_E", "k_S", "k_N")[: 2 * grid.dim]
+        flows = {name: getattr(s, name) * (p - near) for name, near in zip(names, beside, strict=False)}
+        flows["u_W"] = s.b_W * grid.ghosted(self.r, outside=0.0)[1:-1, :-2] - s.couette_W
+        flows["u_E"] = s.couette_E + s.b_E * r
+        given = self.equations.given
+        free = 1.0 if given is None else ~given.reshape(grid.box)
+        before = self._factors(self.cells, 0.0).values
+        return {name: (free * flow, before[name]) for name, flow in flows.items()}
+
+    def _factors(self, cells: Cells, t: float) -> FaceFactors:
+        dense, own = self._physics(named(self.scene))[0], self._physics(self.kept)[0]
+        power = 1.0 if own.dowson_higginson else t
+        return factors(self.base, cells, [float(dense.density(np.array(p))) ** power for p in self.equations._p_sides])
+
     def _film(self, cells: Cells, t: float = 0.0) -> None:
         """The equations are those of the film with these coefficients; t : the part of what was not solved for in them."""
         eq, law = self.equations, self._physics(self.kept)[0]
-        dense, power = self._physics(named(self.scene))[0], 1.0 if law.dowson_higginson else t
-        by = factors(self.base, cells, [float(dense.density(np.array(p))) ** power for p in eq._p_sides])
+        by = self._factors(cells, t)
         film = answer(self.base, law, cells, by, self.p, self.r, eq._p_sides).problem  # type: ignore[arg-type]
         if "contact" in cells and (contact := getattr(getattr(self, "at", None), "problem", film).contact) is not None:
             film.contact = replace(contact, p_a=cells["contact"])
@@ -208,7 +255,7 @@ class FirstOrder:
         eq, p, r = self.equations, self.p if p is None else p, self.r if r is None else r
         self._film(cells, t)
         wanted = {part for one in self.parts.values() for part in one}
-        same = p is self.p and "contact" not in cells and wanted <= set(weights(self.base))  # integrals of the pressure
+        same = p is self.p and self._only_pressures(cells)
         report = eq.report(self.numbers if same else eq.numbers(p, r, wanted, self.numbers))
         G = self._balance(p, r)
         return np.array([report[name] - eq.grid.reduce.dot(one, G) for name, one in self.lambdas.items()])

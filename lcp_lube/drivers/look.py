@@ -11,7 +11,7 @@ from ..problems.solution import Solution
 from ..registry import RUNGS, SMALL
 from ..scenes.effects.named import named, without
 from ..scenes.moving import motion_of
-from .accuracy import DEFAULT_QUANTITY, find_value
+from .accuracy import DEFAULT_QUANTITY, WHOLE, find_value
 from .ask import Ask, Start
 from .compose import Inner
 from .coupling import NESTED_ABOVE
@@ -110,7 +110,7 @@ class Look:
             table = getattr(rigid, "balance", None)
             if table is not None:  # the place need not be exact: what is kept moves it
                 rigid = rigid.model_copy(update={"balance": table.model_copy(update={"tol": max(table.tol, PLACE)})})
-            first = self.inner(rigid, self.ask if own and table is None else quick(self.ask))
+            first = self.inner(rigid, self.ask if own and table is None else quick(self.ask, shape))
         except InputError:
             self.record = {"reason": f"no film without effects on {shape} points"}
             return
@@ -200,10 +200,11 @@ class Look:
             self.first.destroy()
 
 
-def quick(ask: Ask) -> Ask:
-    """For a film that is looked at, and thrown away."""
+def quick(ask: Ask, shape: tuple[int, ...]) -> Ask:
+    """For a film that is looked at on so many points, and thrown away."""
     none = dict.fromkeys(("accuracy", "quantity", "finest", "start", "monitor", "checkpoint", "resume", "watch", "progress"))
-    return replace(ask, **none, times=(), certify=False, stopping={"eps1": COARSE_EPS1})  # type: ignore[arg-type]
+    halved = ask.reduction and prod(shape) > WHOLE[False]
+    return replace(ask, **none, times=(), certify=False, reduction=halved, stopping={"eps1": COARSE_EPS1})  # type: ignore[arg-type]
 
 
 def first_shape(shape: tuple[int, ...]) -> tuple[int, ...]:
@@ -228,7 +229,7 @@ def _by_solving(
         in_time = f" in {steps} steps"
         coarse = coarse.model_copy(update={"motion": motion.model_copy(update={"steps": steps, "dt": None, "tol": None})})
     try:
-        full = inner(coarse, quick(ask))
+        full = inner(coarse, quick(ask, shape))
     except InputError:
         return names, {}, {"reason": f"no film on the coarse grid {shape}{in_time}"}, 0.0
     work, effects = total_work(full), {}
@@ -244,7 +245,7 @@ def _by_solving(
             if not named(bare):  # a line's numbers are exact without effects, and the others have the grid's error
                 bare = bare.model_copy(update={"viscosity": RUNGS["viscosity"].load()(factor="1")})
             try:
-                other = inner(bare, replace(quick(ask), start=full))
+                other = inner(bare, replace(quick(ask, shape), start=full))
             except InputError:
                 return None
             work += total_work(other)

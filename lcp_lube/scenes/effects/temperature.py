@@ -130,6 +130,7 @@ class Heat(Effect):
             return np.full(at.p.size, T[0])
         with np.errstate(all="ignore"):
             T = np.clip(np.nan_to_num(law.T(old), nan=oils.HIGHEST), coldest, oils.HIGHEST)
+        before = FOUND
         for _ in range(NEWTON):
             ratio, slope = law(T) / old, (law(T + NEAR) - law(T - NEAR)) / (2.0 * NEAR * old)
             falls = np.maximum(-slope, 0.0) * flow.sheared.ravel()
@@ -138,8 +139,9 @@ class Heat(Effect):
             new = table.T_in + heated(at, flow, rho_c, table.exchange, self.wall, table.carry_over, *steps).theta
             new = np.clip(np.nan_to_num(new, nan=oils.HIGHEST), coldest, oils.HIGHEST)
             T, moved = new, reduce.max(np.abs(new - T))
-            if not moved > FOUND:
+            if not moved * (moved / before) ** 2 > FOUND:  # what the next step is expected to move
                 break
+            before = moved
         return T
 
     def _gain(self, rho_c: float, fresh: float, held: float) -> float:
