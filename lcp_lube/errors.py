@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-LONGEST = 700
+LONGEST = 700  # characters: some six lines of a terminal; of a longer message both ends are kept, where file and value stand
 
 
 class InputError(ValueError):

@@ -13,7 +13,7 @@ SMOOTH = 1e-5  # relative difference between differences of second and fourth or
 QUICK, BENT = 1e-5, 1e-4  # of a number, relative; least part of the slope that the second difference must have to be heeded
 KINK = 1e-2  # relative difference between both sides
 CHORD, SLIGHT = 1e-2, 1e-2  # relative: width and least slope of a function that changes by steps
-ROUNDING, TINY = 1e-15, 1e-300
+ROUNDING, TINY = 1e-15, 1e-300  # of a value, generously (2^-53 is 1.1e-16); what stands for 0 in a quotient
 WIDTHS, APART = (0.5, 1.0, 2.0), 0.2  # of chords, in CHORD; by what part they may differ where f changes by steps
 
 

@@ -16,6 +16,7 @@ ORDER = ("sweep", "accuracy", "time", "grids")  # from the outermost in: the fir
 
 PATIENCE = 2.0  # seconds before anything is shown
 PAUSE = 0.2  # and between two lines
+# Columns of a terminal that a line of progress takes at most: longer ones wrap, and \r no longer goes back to their start.
 WIDTH = 100
 
 

@@ -12,7 +12,7 @@ from mpi4py import MPI
 from ..errors import InputError
 
 PATIENCE = 5.0  # seconds that a rank which failed waits for the others, which may be a little behind
-FOREVER = 1e9
+FOREVER = 1e9  # seconds
 EXPECTED: tuple[type[Exception], ...] = (InputError, OSError)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from ..base.quantity import Quantity, in_own, quantity
 from ..errors import InputError
 
-MOST_POINTS = 100_000
+MOST_POINTS = 100_000  # a slip of the pen (1:2:1e9) is refused before a list of it is made
 
 
 @dataclass(frozen=True)

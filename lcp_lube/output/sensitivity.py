@@ -18,7 +18,7 @@ from .style import BLUE, RED, Axes, new_figure, save_figure
 from .table import table
 from .units import with_unit
 
-MOST_BARS = 20
+MOST_BARS = 20  # as many names as are read on one picture
 
 
 def unit_of(solution: Solution, name: str) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..base.parallel import Array, Reduce
 
-MAX_HALVINGS = 99
+MAX_HALVINGS = 99  # to 1.6e-30 of a step: beyond any rounding, so that it is the criterion that fails, not the count
 
 
 class StepLengthError(ArithmeticError):

@@ -25,7 +25,7 @@ from .map_picture import Axis, Panels, converged, groups, picture
 from .reference import WRONG, Reference, References
 
 COLUMNS = ("distance", "reference", "system", "cpu_s", "command")
-KRYLOV_MOST = 100_000
+KRYLOV_MOST = 100_000  # of a whole run; what takes more has a colour of its own
 
 WORDS = {
     "max_iterations": "at the iteration limit",

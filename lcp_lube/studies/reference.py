@@ -13,7 +13,7 @@ from ..scenes.scene import Scene
 from ..solvers.newton import Stopping
 
 WRONG = 1e-2  # distance from which a run that believes in its answer is wrong: a per cent of p_max, or of the film's content
-NEGLIGIBLE = 1e-6
+NEGLIGIBLE = 1e-6  # below it a film with no pressure at all is compared with what it could build up
 TIGHT = Stopping(1e-12, np.inf)
 
 

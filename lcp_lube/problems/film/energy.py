@@ -33,7 +33,7 @@ RTOL = 1e-13  # of the linear solves
 NOTHING = 1e-18  # of what pressures could turn into heat: the square of what a solve may leave of them
 LEVEL = 1e-15  # of the largest pressure: a drop by less is rounding where no wall moves
 STILL = 1e-11  # of the largest flow out of a cell: what is less is rounding
-SAME = 1e-300
+SAME = 1e-300  # what stands for 0 in a quotient
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...base.parallel import Array
 
-BULK, SLOPE = 2.22e9, 1.66
+BULK, SLOPE = 2.22e9, 1.66  # C in Pa and the factor of p above
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from ..scene import NotNegative, Positive
 from ..units import measured, metres
 from .table import EffectTable
 
-FIT, REACH, POWER = 4.4086e-5, 4.0, 6.804
+FIT, REACH, POWER = 4.4086e-5, 4.0, 6.804  # of F(H), as printed above
 
 
 class Asperity(EffectTable):

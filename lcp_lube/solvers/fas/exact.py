@@ -13,8 +13,8 @@ from .fronts import relax_pairs
 from .held import free_spans
 from .kernels import balance_row
 
-MOST_STEPS = 60
-MOST_SINGULAR = 8
+MOST_STEPS = 60  # sets of full cells; what has not settled is left to the cycles at the best of them
+MOST_SINGULAR = 8  # steps without a solution, for signs may pass through a closed line of void
 PATIENCE = 4  # steps without a fall of the residual by 10 %, after which sweeps take over for a while
 SWEEPS, RESCUE_SWEEPS, MOST_SWEEPS = 8, 32, 4096  # between two steps; where they have stalled, at first and at most
 
