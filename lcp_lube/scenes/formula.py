@@ -35,7 +35,7 @@ COMPARE: dict[type, Callable[..., Any]] = {
     ast.Gt: np.greater,
     ast.GtE: np.greater_equal,
 }
-MAX_LENGTH = 2000  # characters: longer than any film that a person writes; nested ones end Python's recursion near 10,000
+MAX_LENGTH = 2000  # characters: longer than any film that a person writes
 
 
 class Formula:
