@@ -88,6 +88,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     first, unit = round_ring(scene, first, finest)
     kinds = [model.sides[2 * k : 2 * k + 2] if isinstance(model, Model) else () for k in range(len(first))]
     meshes = [n + 1.0 - sum(1.0 - OFFSET[side.kind] for side in ends) for n, ends in zip(first, kinds, strict=True)]
+    ring = any(side.kind == "periodic" for ends in kinds for side in ends)
     ranks = ask.mpi.size
     rung = next(k for k in count() if ranks == 1 or finer(first, meshes, k, unit)[-1] >= 2 * ranks)
     if line and first[0] < FEW_KNOWN and (finest is None or finer(first, meshes, rung + 1, unit)[0] <= finest[0]):
@@ -109,7 +110,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     while not end:
         level_begin, before, earlier = perf_counter(), solution, before
         near = ask.start if before is None else _start(before, prod(shape)) if ask.nested is not False else None
-        stopping = _stopping(ask.stopping, tol, before)
+        stopping = _stopping(ask, tol, before) if before is not None or (pairs and not ring) else ask.stopping
         halved = ask.reduction and (len(shape) == 1 or prod(shape) > WHOLE[loops if before is None else before.asked == "fas"])
         this = replace(ask, accuracy=None, stopping=stopping, start=near, nested=False, reduction=halved)
         by_loops = loops and (plane or (line and shape[0] <= FEW_LINE))
@@ -193,13 +194,12 @@ def _end(estimates: Sequence[float], values: Sequence[float], tol: float, points
     return ""
 
 
-def _stopping(
-    given: Stopping | Mapping[str, Any] | None, tol: float, before: Solution | None
-) -> Stopping | Mapping[str, Any] | None:
+def _stopping(ask: Ask, tol: float, before: Solution | None) -> Stopping | Mapping[str, Any] | None:
     """The tolerances given, filled up for a method whose ||F|| is relative to the data: no tighter than `tol` needs."""
-    if isinstance(given, Stopping) or before is None or before.problem.kind != "lubrication":
+    given = ask.stopping
+    if isinstance(given, Stopping) or (before.asked if before is not None else ask.method) not in ("auto", *RELATIVE_NORM):
         return given
-    if before.asked not in RELATIVE_NORM or any(before.problem.grid.periodic):
+    if before is not None and (before.problem.kind != "lubrication" or any(before.problem.grid.periodic)):
         return given  # what feeds a ring is a small part of what goes round: its balance needs digits
     return {"eps1": float(np.clip(ALGEBRAIC * tol, 1e-12, 1e-4)), "eps2": inf, **(given or {})}
 

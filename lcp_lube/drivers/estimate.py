@@ -219,15 +219,14 @@ def misplaced_film(problem: Problem) -> float:
     if not isinstance(problem, LubricationProblem) or problem.integrals is not None:  # a line of which nothing is misplaced
         return 0.0
     grid = problem.grid
-    share = 0.0
-    for side in range(grid.dim):
+    share, alike = 0.0, level(problem.film) and not jumps_of(problem.film, "y")
+    for side in range(1 if alike else grid.dim):
         n, around = grid.shape[side], grid.with_neighbours(side)  # points, on the boundary and beyond it
         meshes = np.diff(around)
         fine = (around[:-1] + _LOOKS[:, None] * meshes).ravel()
         face = around[:-1] + 0.5 * meshes
         across = 1 - side
-        alike = side == 0 and level(problem.film) and not jumps_of(problem.film, "y")  # one line is as good as all
-        places = (np.arange(count := 1 if alike else LINES) + 0.5) / count
+        places = (np.arange(count := 1 if alike else LINES) + 0.5) / count  # one line is as good as all
         lines = np.zeros(1) if grid.dim == 1 else grid.origin[across] + places * grid.lengths[across]
         film = [
             np.broadcast_to(problem.film(*((at[None, :], lines[:, None])[:: 1 - 2 * side])), (lines.size, at.size))

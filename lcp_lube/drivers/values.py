@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cached_property
 from math import hypot, inf, isfinite
 from typing import Any
 
@@ -19,7 +20,7 @@ from .estimate import INTEGRALS, QUADRATURE, Estimate, estimate, follow, known_l
 LEAST_PAIR = 0.25  # weight of the estimate of two grids beside that of all: in the exponent, halved by each grid more
 APART = 1.8  # spacings of two grids over one another, at least, where two such are there: nearer ones tell little
 BLOCKS = 6  # parts of a side over which the change of the pressure is integrated
-SMALL = 10_000  # points up to which one rank takes the numbers where they are asked for
+LARGE = 1_000_000  # points beyond which a grid is not kept until its numbers are asked for
 
 
 class Values:
@@ -33,16 +34,15 @@ class Values:
     Attributes
     ----------
     line : a problem and its fields that have the numbers of a line that is known; None of other films.
-    estimates : value, error (in its unit) and extrapolated of every number that has an estimate, once `tell` has been called.
     """
 
     def __init__(self, line: bool, pairs: bool):
         self.line: tuple[LubricationProblem, Fields] | None = None
         self._known: Mapping[str, float] | None = None  # all numbers of it
-        self.estimates: dict[str, dict[str, Any]] = {}
         self.quantity, self.best = "", Estimate(np.nan, inf)
         self._is_line, self._pairs = line, pairs
         self._grids: list[Solution | Mapping[str, float]] = []  # those before the last, or their numbers
+        self._last: Mapping[str, float] = {}  # numbers of the last one, once they are told
         self._own: list[float] = []  # of the quantity
         self._sizes: list[float] = []
         self._misplaced: list[float] = []
@@ -98,22 +98,33 @@ class Values:
         return self._known.get(name, np.nan)
 
     def tell(self, solution: Solution, numbers: dict[str, Any]) -> dict[str, Any]:
-        """The last grid's numbers with the best value in the place of its own, in place; fills `estimates`. Collective."""
-        grids = [one if isinstance(one, Mapping) else _numbers(one) for one in self._grids]
-        grids.append({**sought(solution), **scalars(numbers)} if self._converged else {})
-        for name in {**grids[-1], self.quantity: 0.0}:
-            values = self._own if name == self.quantity else [found.get(name, np.nan) for found in grids]
-            if isfinite((best := self._best(name, values)).error):
-                self.estimates[name] = vars(best)
+        """The last grid's numbers with the best value in the place of its own, in place. Collective."""
+        self._last = {**sought(solution), **scalars(numbers)} if self._converged else {}
         if self.best.extrapolated and self.quantity in numbers:
             follow(numbers, self.quantity, self._own[-1], self.best.value)
+        if solution.problem.grid.comm.size > 1:  # what needs every rank is taken now
+            self.estimates  # noqa: B018
         return numbers
+
+    @cached_property
+    def estimates(self) -> dict[str, dict[str, Any]]:
+        """Value, error (in its unit) and extrapolated of every number that has an estimate, once `tell` has been called.
+
+        From the numbers of all grids, which are taken here. Collective the first time.
+        """
+        grids = [one if isinstance(one, Mapping) else _numbers(one) for one in self._grids] + [self._last]
+        out = {}
+        for name in {**self._last, self.quantity: 0.0}:
+            values = self._own if name == self.quantity else [found.get(name, np.nan) for found in grids]
+            if isfinite((best := self._best(name, values)).error):
+                out[name] = vars(best)
+        return out
 
 
 def carried(problem: Problem, fields: Fields, quantity: str) -> float | None:
     """An integral of the pressure without all other numbers, where a scene makes nothing else of it; else None. Collective."""
-    small = problem.grid.comm.size == 1 and problem.grid.size <= SMALL
-    if quantity not in INTEGRALS or not isinstance(problem, LubricationProblem) or not small or problem.more:
+    kept = problem.grid.comm.size == 1 and problem.grid.size <= LARGE
+    if quantity not in INTEGRALS or not isinstance(problem, LubricationProblem) or not kept or problem.more:
         return None
     if isinstance(problem, TurnedProblem) or (problem.extras is not None and problem.shaft is None):
         return None
