@@ -20,7 +20,9 @@ from .frozen_cycles import Cycles
 
 # Of J' less is asked: a derivative's error is at most about lambda's relative one, and 1e-6 is promised of it.
 RTOL, TRANSPOSED, MOST = 1e-9, 2e-7, 60
+FEW = 15  # cycles in single precision
 MANY = 10  # vectors that the basis has room for at first
+DROP = 1e-5  # down to which part of its start's error a basis in single precision is trusted
 AGREES, LEAST = 1e-7, 1e-13  # l' (J z) and b' z, relative: cycles go on until they do, down to the least residual
 
 
@@ -45,53 +47,82 @@ class Frozen(Cycles):
 
     def _pair(self, b: Array, transposed: bool, nu: float, z: Array | None) -> Any:
         given, over = self.held, self._over
-        self.of(len(b), transposed, nu)
+        self.of(len(b), transposed, nu, single=transposed)
         scale: Any = np.where(self.cavity, self.leaves + (1j * nu * self.stored if nu else 0.0), 1.0)  # type: ignore[operator]
         b = b / scale if transposed else b
         at = scale * z if transposed and z is not None else None
         if given is None or over is None:
-            x = self._gmres(b, at)
+            x = self._solved(b, at)
         elif transposed:
-            x = self._gmres(np.where(given, 0.0, b), None if at is None else np.where(given, 0.0, at))
+            x = self._solved(np.where(given, 0.0, b), None if at is None else np.where(given, 0.0, at))
             x = None if x is None else np.where(given, over * (b + self._rest(x, None).reshape(b.shape)), x)
         else:
             pressed = over * b
-            x = self._gmres(np.where(given, 0.0, b + self._rest(pressed, None).reshape(b.shape)))
+            x = self._solved(np.where(given, 0.0, b + self._rest(pressed, None).reshape(b.shape)))
             x = None if x is None else np.where(given, pressed, x)
         if x is None or transposed:
             return x
         return (x[0] + 1j * x[1]) / scale if nu else x / scale
 
+    def _solved(self, b: Array, z: Array | None = None) -> Array | None:
+        x = self._gmres(b, z)
+        if x is None and self.single:  # conductances that differ by many powers of ten
+            self.of(self.several, self.transposed)
+            x = self._gmres(b, z)
+        return x
+
     def _gmres(self, b: Array, z: Array | None = None) -> Array | None:
         """Of the free points, which z is zero beside; of J' until x' (J z) = b' z. None where cycles stall."""
-        norm, total, start = self.grid.reduce.norm, self.grid.comm.allreduce, np.zeros_like(b)
-        if self.transposed and np.isfinite(total(float(np.sum(nested := self.nested(b))))):
-            start = nested.reshape(b.shape)
-        sizes: Any = np.array([norm(one) or norm(asked) or 1.0 for one, asked in zip(start, b, strict=True)])
+        norm, x, most = self.grid.reduce.norm, np.zeros_like(b), self.work + self.several * (FEW if self.single else MOST + 1)
+        if self.transposed:
+            units = np.array([norm(asked) or 1.0 for asked in b]).reshape(-1, 1)  # single precision has few powers of ten
+            nested = self.nested(b / units).reshape(b.shape) * units
+            x = nested if np.isfinite(self.grid.comm.allreduce(float(np.sum(nested)))) else x
+        sizes: Any = np.array([norm(one) or norm(asked) or 1.0 for one, asked in zip(x, b, strict=True)])
         sizes = sizes.reshape(-1, 1) if self.passed[0][1] is None else np.hypot(*sizes)
-        b, start = b / sizes, (start / sizes).ravel()  # answers of one size, that both be as good
-        self._put(self.c[0], b)
-        V, H = np.empty((MANY, b.size)), np.zeros((MOST + 2, MOST + 1))
-        V[0] = self.change(start)
+        b, x = b / sizes, x / sizes  # answers of one size, that both be as good
+        settled = False
+        while not settled:
+            rest = b + self._rest(x, self.free[0]).reshape(b.shape) if self.transposed else b
+            found = self._improved(x, rest, b, z, most)
+            if found is None:
+                return None
+            x, settled = found
+        return x * sizes
+
+    def _improved(self, start: Array, rest: Array, b: Array, z: Array | None, most: int) -> tuple[Array, bool] | None:
+        """A better answer than one that leaves `rest`, and whether it is good enough; None where cycles stall.
+
+        In single precision it is at best so good that a part DROP of the start's error is left.
+        """
+        rtol, drop = TRANSPOSED if self.transposed else RTOL, DROP if self.single else 0.0
+        norm, total = self.grid.reduce.norm, self.grid.comm.allreduce
+        self._put(self.c[0], rest)
+        V, H = np.empty((MANY, rest.size), self.z[0].dtype), np.zeros((MOST + 2, MOST + 1))
+        self.change(None, V[0])
         self.c[0][:] = 0.0
-        first, y, rtol = norm(V[0]), np.zeros(0), TRANSPOSED if self.transposed else RTOL
-        size, rest = norm(start) or first, np.array([first])  # of the answer; the residual in the basis V
+        first, y = norm(V[0]), np.zeros(0)
+        size, left_over = norm(start) or first, np.array([first])  # of the answer; the residual in the basis V
         if not np.isfinite(first):
             return None
         V[0] /= first or 1.0
         for k in range(MOST + 1):
             # One more cycle takes x to x + rest; what it leaves of `rest` is taken to be what it leaves of the basis at most.
-            left = np.linalg.norm(rest) * min(1.0, np.linalg.norm(np.eye(k + 1, k) - H[: k + 1, :k], 2) if k else 1.0)
-            if left <= rtol * size:
-                x = start + (np.append(y, 0.0) + rest) @ V[: k + 1]
+            left = np.linalg.norm(left_over) * min(1.0, np.linalg.norm(np.eye(k + 1, k) - H[: k + 1, :k], 2) if k else 1.0)
+            if left <= max(rtol * size, drop * first):
+                x = start + ((np.append(y, 0.0) + left_over).astype(V.dtype) @ V[: k + 1]).reshape(start.shape)
                 size = min(size, norm(x))
-                if left <= rtol * size and (z is None or self._agree(x.reshape(b.shape), b, z)):
-                    return x.reshape(b.shape) * sizes
+                if left <= rtol * size and (z is None or self._agree(x, b, z)):
+                    return x, True
                 if left <= LEAST * size:
                     return None
+                if left <= drop * first:
+                    return x, False
+            if self.work >= most:
+                return None
             V = V if k + 1 < len(V) else np.concatenate([V, np.empty_like(V)])
             w = V[k + 1]
-            np.negative(self.change(V[k]), out=w)
+            np.negative(self.change(V[k], w), out=w)
             for _ in range(2 if k > 8 else 1):  # rounding has left long bases less orthogonal
                 part = total(V[: k + 1] @ w)
                 w -= part @ V[: k + 1]
@@ -102,7 +133,7 @@ class Frozen(Cycles):
             w /= H[k + 1, k] or 1.0
             target = np.append(first, np.zeros(k + 1))
             y = np.linalg.lstsq(H[: k + 2, : k + 1], target, rcond=None)[0]
-            rest = target - H[: k + 2, : k + 1] @ y
+            left_over = target - H[: k + 2, : k + 1] @ y
         return None
 
     def _agree(self, found: Array, b: Array, z: Array) -> bool:

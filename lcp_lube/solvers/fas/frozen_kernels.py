@@ -97,19 +97,20 @@ def transposed_sweep(
     The second one follows two lines behind the first (`kernels.sweep`): their chains overlap. Columns are unsigned for vector
     instructions. ring: the ends of a line are neighbours.
     """
+    one, none = l.dtype.type(1), l.dtype.type(0)
     several, ny, nx = l.shape[0], l.shape[1] - 2, l.shape[2] - 2
     step, first = (-1, ny) if down else (1, 1)
-    over, east, t = np.zeros((3, nx + 2)), np.zeros((3, nx + 2)), np.zeros((4, nx + 2))
+    over, east, t = np.zeros((3, nx + 2), l.dtype), np.zeros((3, nx + 2), l.dtype), np.zeros((4, nx + 2), l.dtype)
     for s in range(ny + 2):
         m, slot, behind = first + step * s, s % 3, (s - 2) % 3
         if s < ny:
             for i in range(np.uint32(1), np.uint32(nx + 1)):
-                part = 1.0 / ((kx[m, i] + kx[m, i + 1]) + (ky[m, i] + ky[m + 1, i])) if full[m, i] else 1.0
+                part = one / ((kx[m, i] + kx[m, i + 1]) + (ky[m, i] + ky[m + 1, i])) if full[m, i] else one
                 if free is not None:
-                    part = part if free[m, i] else 0.0
+                    part = part if free[m, i] else none
                 over[slot, i] = part
             for i in range(np.uint32(1), np.uint32(nx + 1)):
-                east[slot, i] = over[slot, i] * (kx[m, i + 1] if full[m, i] else 1.0 if carry is None else carry[m, i])
+                east[slot, i] = over[slot, i] * (kx[m, i + 1] if full[m, i] else one if carry is None else carry[m, i])
         for k in range(2):
             if 0 <= s - 2 * k < ny:
                 j, q = m - 2 * k * step, behind if k else slot
@@ -117,15 +118,15 @@ def transposed_sweep(
                     w = k * several + n
                     for i in range(np.uint32(1), np.uint32(nx + 1)):
                         others = kx[j, i] * l[n, j, i - 1] + (ky[j, i] * l[n, j - 1, i] + ky[j + 1, i] * l[n, j + 1, i])
-                        t[w, i] = over[q, i] * (c[n, j, i] + (others if full[j, i] else 0.0))
+                        t[w, i] = over[q, i] * (c[n, j, i] + (others if full[j, i] else none))
                     t[w, nx] += east[q, nx] * l[n, j, nx + 1]
         for k in range(several):  # two chains at once
-            one, two = 2 * k, 2 * k + 1
+            lead, two = 2 * k, 2 * k + 1
             by_one, by_two = (slot, behind) if several == 1 else (behind, behind) if k else (slot, slot)
-            a, b = t[one, nx], t[two, nx]
+            a, b = t[lead, nx], t[two, nx]
             for i in range(nx - 1, 0, -1):
-                a, b = t[one, i] + east[by_one, i] * a, t[two, i] + east[by_two, i] * b
-                t[one, i], t[two, i] = a, b
+                a, b = t[lead, i] + east[by_one, i] * a, t[two, i] + east[by_two, i] * b
+                t[lead, i], t[two, i] = a, b
         for k in range(2):
             if 0 <= s - 2 * k < ny:
                 j = m - 2 * k * step
@@ -159,5 +160,5 @@ def transposed_row(
         passed = east if carry is None else carry[m, i] * east
         rest = c[m, i] - (flows if full[m, i] else here - passed)
         if free is not None:
-            rest = rest if free[m, i] else 0.0
+            rest = rest if free[m, i] else l.dtype.type(0)
         out[i] = rest

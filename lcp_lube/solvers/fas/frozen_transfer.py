@@ -34,8 +34,8 @@ def correct(
     z: Array, full: Mask, coarse: Array, kx: Array, ky: Array, y0: int, by_x: bool, by_y: bool, ring: bool, fronts: bool
 ) -> None:
     """Add the interpolated coarse grid's answer; with fronts at the full points alone, as `sides_of` says."""
-    nx, size = z.shape[1] - 2, coarse.shape[1]
-    w, v, south, north = np.zeros(size - 1), np.zeros(nx + 2), np.zeros(nx + 2), np.zeros(nx + 2)
+    nx, size, one = z.shape[1] - 2, coarse.shape[1], z.dtype.type(1)
+    w, (v, south, north) = np.zeros(size - 1, z.dtype), np.zeros((3, nx + 2), z.dtype)
     for m in range(1, z.shape[0] - 1):
         row, last = coarse_rows(y0 + m - 1, y0, m, by_y)
         if by_x:
@@ -46,7 +46,7 @@ def correct(
             if fronts:
                 sides_of(ky, full, m, v, ring)
                 for i in range(1, nx + 1):
-                    south[i] = v[i] * south[i] + (1.0 - v[i]) * north[i]
+                    south[i] = v[i] * south[i] + (one - v[i]) * north[i]
             else:
                 mix(south, north, ky, m, True, south)
         if fronts and by_x:
@@ -65,7 +65,7 @@ def restrict(
 ) -> None:  # fmt: skip
     """Add to `out` what c - J' l of the full points gives to the coarse ones: `correct` with fronts, transposed."""
     nx, size = l.shape[1] - 2, out.shape[1]
-    w, v, here = np.zeros(size - 1), np.zeros(nx + 2), np.zeros(nx + 2)
+    w, v, here = np.zeros(size - 1, l.dtype), np.zeros(nx + 2, l.dtype), np.zeros(nx + 2, l.dtype)
     for m in range(1, l.shape[0] - 1):
         transposed_row(l, full, free, kx, ky, c, carry, m, here)
         fronts = 0
@@ -90,30 +90,32 @@ def restrict(
 @kernel
 def deal(r: Array, v: Array, w: Array, by_x: bool, ring: bool, south: Array, north: Array) -> None:
     """Half of what a line between two coarse ones, zero in the frame, gives to the points of these, v of it to the south."""
+    half, one = r.dtype.type(0.5), r.dtype.type(1)
     if not by_x:
         for i in range(1, r.size - 1):
             part = v[i] * r[i]
-            south[i] += 0.5 * part
-            north[i] += 0.5 * (r[i] - part)
+            south[i] += half * part
+            north[i] += half * (r[i] - part)
         return
     for k in range(1, south.size - 1):
-        west, east = 0.5 * (1.0 - w[k - 1]) * r[2 * k - 1], 0.5 * w[k] * r[2 * k + 1]
-        part = v[2 * k] * (0.5 * r[2 * k]) + (v[2 * k - 1] * west + v[2 * k + 1] * east)
+        west, east = half * (one - w[k - 1]) * r[2 * k - 1], half * w[k] * r[2 * k + 1]
+        part = v[2 * k] * (half * r[2 * k]) + (v[2 * k - 1] * west + v[2 * k + 1] * east)
         south[k] += part
-        north[k] += 0.5 * r[2 * k] + (west + east) - part
+        north[k] += half * r[2 * k] + (west + east) - part
     if ring:  # what goes to the frame belongs to the last point
-        first = 0.5 * w[0] * r[1]
+        first = half * w[0] * r[1]
         south[-2] += v[1] * first
-        north[-2] += (1.0 - v[1]) * first
+        north[-2] += (one - v[1]) * first
 
 
 @kernel
 def deal_to_one(r: Array, w: Array, by_x: bool, ring: bool, part: float, out: Array) -> None:
     """That part of what a line on a coarse one gives to its points."""
+    one, some = r.dtype.type(1), r.dtype.type(part)
     if not by_x:
-        out += part * r
+        out += some * r
         return
     for k in range(1, out.size - 1):
-        out[k] += part * (r[2 * k] + ((1.0 - w[k - 1]) * r[2 * k - 1] + w[k] * r[2 * k + 1]))
+        out[k] += some * (r[2 * k] + ((one - w[k - 1]) * r[2 * k - 1] + w[k] * r[2 * k + 1]))
     if ring:
-        out[-2] += part * w[0] * r[1]
+        out[-2] += some * w[0] * r[1]
