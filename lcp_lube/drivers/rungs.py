@@ -9,6 +9,7 @@ from ..scenes.scene import Solvable
 COARSEST = {1: 12, 2: 4}  # points a side at least on the first grid
 FEW = {1: 12, 2: 100}  # points of the first grid at least: coarser ones cost as much, and tell less
 JUMP, NEARLY = 1, 0.5  # doublings of the points a side at once, and part of a rung that is not worth one more
+FAR = 5  # rungs at once where two grids give an estimate
 ASYMPTOTIC = 0.1  # an estimate below it falls by second order at best
 MOST_ROUND, SAME = 720, 1e-9  # meshes that a turn is thought in to find edges, and by how much of a turn they may be off
 
@@ -51,14 +52,14 @@ def rungs_up(estimates: Sequence[float], tol: float, known: bool, dim: int, pair
     (of three grids, or of one whose error is known) falls by second order; of several at most JUMP doublings of the points a
     side.
 
-    pairs : two grids give an estimate, best with half the spacing on the second; a rung short is a grid more.
+    pairs : two grids give an estimate, for the first one best with half the spacing on the second; at most FAR rungs.
     """
     if pairs and not (len(estimates) >= 2 and estimates[-1] < ASYMPTOTIC):
         return dim
     if not (known or pairs or len(estimates) >= 3) or not estimates[-1] < ASYMPTOTIC:
         return 1
-    up = max(1, ceil(0.5 * dim * log2(estimates[-1] / tol) - NEARLY * (not pairs)))
-    return up if known else min(up, dim * JUMP)
+    up = max(1, ceil(0.5 * dim * log2(estimates[-1] / tol) - NEARLY))
+    return up if known else min(up, FAR if pairs else dim * JUMP)
 
 
 def round_ring(scene: Solvable, first: tuple[int, ...], finest: tuple[int, ...] | None = None) -> tuple[tuple[int, ...], int]:

@@ -233,13 +233,15 @@ def test_rungs():
 
 
 def test_grids_that_an_estimate_leaves_out():
-    """None before three values, nor while they are far off; at most half the spacing at once, but where the error is known."""
+    """None before three values, nor while they are far off; at most half the spacing at once, but where the error is known
+    or each two grids have an estimate."""
     assert rungs_up([math.inf, math.inf], 1e-2, False, 2) == 1
     assert rungs_up([math.inf, math.inf, 9e-2], 1e-2, False, 2) == 2
     assert rungs_up([math.inf, math.inf, 1.1e-2], 1e-2, False, 2) == 1
     assert rungs_up([5e-2], 1e-2, True, 1) == 1 and rungs_up([1e-4], 1e-8, True, 1) == 7
     assert rungs_up([math.inf], 1e-2, False, 2, True) == rungs_up([math.inf, 5e-2], 1e-2, False, 2, True) == 2
     assert rungs_up([math.inf, 1.4e-2], 1e-2, False, 2, True) == 1  # twice the points
+    assert rungs_up([math.inf, 4e-3], 1e-4, False, 2, True) == rungs_up([math.inf, 5e-2], 1e-4, False, 2, True) == 5
     assert rungs_up([math.inf, 1.5e-2, 1.1e-2], 1e-2, False, 2, True) == 1
 
 
@@ -275,8 +277,8 @@ def test_numbers_of_a_ladder_are_taken_when_they_are_asked_for():
 def test_estimate_of_two_grids():
     """Values that agree by chance have an estimate by what the pressure changed; the answer has 3/4 of the correction."""
     found = of_pair([1.0, 1.3], [0.0, 0.0], [16.0, 32.0], 0.1, "load")
-    assert found.value == pytest.approx(1.375) and found.error == pytest.approx(1.5 * 0.3 / 3) and found.extrapolated
-    assert of_pair([1.0, 1.0], [0.0, 0.0], [16.0, 32.0], 0.1, "load").error == pytest.approx(1.5 * 0.1 / 3)
+    assert found.value == pytest.approx(1.375) and found.error == pytest.approx(1.4 * 0.3 / 3) and found.extrapolated
+    assert of_pair([1.0, 1.0], [0.0, 0.0], [16.0, 32.0], 0.1, "load").error == pytest.approx(1.4 * 0.1 / 3)
     far = of_pair([1.0, 1.2, 1.3], [0.0] * 3, [16.0, 23.0, 32.0], 0.1, "load", -3)  # with the grid of twice the spacing
     assert far.value == found.value and far.error == found.error
     assert of_pair([1.0, 1.0], [0.0, 0.0], [16.0, 32.0], 0.1, "friction").error == pytest.approx(3 * 0.03 / 3)
