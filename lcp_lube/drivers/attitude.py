@@ -15,6 +15,7 @@ from ..scenes.scene import Solvable
 from .ask import Ask
 from .chain import Chain
 from .compose import Inner
+from .root import Search
 
 MOST_SOLVES, MOST_BETWEEN = 12, 20
 AROUND = 12  # attitudes, all round
@@ -70,7 +71,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
 
 
 def _around(off_at: Callable[[float], tuple[Solution, float]], attitude: float, tol: float) -> tuple[Solution, float, float]:
-    """The attitude between two of which the angle changes its sign (regula falsi), best where it rises. Collective."""
+    """The attitude between two of which the angle changes its sign, best where it rises. Collective."""
     attitude = math.remainder(attitude, 2.0 * math.pi)
     places = [attitude + 2.0 * math.pi * k / AROUND for k in range(AROUND + 1)]
     found = [(place, off_at(place)[1]) for place in places[:-1]]
@@ -80,14 +81,12 @@ def _around(off_at: Callable[[float], tuple[Solution, float]], attitude: float, 
         solution, off = off_at(attitude)
         return solution, attitude, off
     (a, at_a), (b, at_b) = max(pairs, key=lambda pair: pair[1][1] - pair[0][1])
+    search = Search(a, b, 1.0, explore=False, points=[(a, at_a), (b, at_b)])
     for _ in range(MOST_BETWEEN):
-        attitude = (a * at_b - b * at_a) / (at_b - at_a)
-        solution, off = off_at(attitude)
+        if (target := search.next()) is None:
+            break
+        solution, off = off_at(attitude := target)
         if not abs(off) > tol:
             break
-        if off * at_b < 0.0:
-            a, at_a = b, at_b
-        else:
-            at_a *= 0.5
-        b, at_b = attitude, off
+        search.add(attitude, off)
     return solution, attitude, off

@@ -5,11 +5,12 @@ Unknowns are t = log(s/(1 - s)) of s = e/e_touch, the eccentricity in parts of t
 which the logarithm of the load is nearly linear, and the attitude; the equations are log(W/load) = 0 and that the force lies
 in the load's line. The stiffness matrix of the film (`coefficients`) gives their derivatives, so a handful of solves do, each
 started from the last; coarse grids come first, where they cost next to nothing. Where none is found on one of them with the
-attitude open, as with a groove near the load, places all round are tried there, those of the likeliest forces first.
+attitude open, as with a groove near the load, places all round are looked at on the coarsest (`winding`), and the likeliest are
+followed through all grids. Where none is found, the answer is the place at which least of the load is left.
 """
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,7 @@ from .chain import Chain
 from .coefficients import by_film, motions_of, placed
 from .compose import Inner
 from .impedance import stiffness
+from .winding import places
 
 MOST_SOLVES = 25  # on a grid
 COARSEST, COARSE_TOL = (36, 7), 1e-2  # fewest points around and across, and how well a coarse grid's place is worth knowing
@@ -39,7 +41,6 @@ SHORTEST = 1e-4  # of a step that was halved
 WIDEST = 14.0  # of t: s from 1e-6 to 1 - 1e-6
 AWRY = 0.7  # rad from the load's line: then the force goes on in a line, not its logarithm
 ACROSS = 0.4  # of such a step, clearances
-ABOUT, AROUND, BEST = (-2.0, -1.0, 0.0, 1.0, 2.0), np.linspace(-math.pi, math.pi, 16, endpoint=False), 6  # of a scan
 HELD = 0.5  # part of a force that is there without eccentricity, from which on it goes on in a line
 DIRECTIONS = np.linspace(-0.5, 0.5, 2881)[1:-1] * math.pi  # from the attitude, in which the bore may be touched
 
@@ -68,73 +69,94 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     shapes = [scene.shape]
     if ask.nested is not False and not known:
         shapes = _coarse(scene, s)
-    near, counts = ask.start, list[int]()
     t = math.log(max(s, 1e-3) / max(1.0 - s, 1e-6))
-    for shape in shapes:
-        tol = table.tol if shape == shapes[-1] else max(table.tol, COARSE_TOL)
-        most = MOST_SOLVES if shape == shapes[-1] else MOST_COARSE
-        at = free.with_shape(shape)
-        solution, (t, phi), count, found = _on_grid(at, replace(ask, start=near), inner, t, phi, table.load, tol, most)
-        if not found and scene.attitude_deg is None and shape != shapes[-1]:
-            count += len(ABOUT) * len(AROUND)
-            for place in _scanned(at, ask, inner, guess, table.load):
-                other, q, more, found = _on_grid(at, ask, inner, *place, table.load, tol, most)
-                count += more
-                if found:
-                    solution.destroy()
-                    solution, (t, phi) = other, q
-                    break
-                other.destroy()
-        if near is not None and near is not ask.start:
-            near.destroy()  # type: ignore[union-attr]
-        near, counts = solution, [*counts, count]
-    solves, work = sum(counts), sum(n * math.prod(s) for n, s in zip(counts, shapes, strict=True)) / math.prod(shapes[-1])
+    counts, best = np.zeros(len(shapes), dtype=int), _Best()
+    elsewhere = scene.attitude_deg is None and not known and scene.shape[0] >= _fewest(scene, s)
+
+    def through(q: Array) -> tuple[Solution, Array, bool]:
+        """From a place on the coarsest grid through all, or to the first where none is found if others may be tried."""
+        near = ask.start
+        for k, shape in enumerate(shapes):
+            last = shape == shapes[-1]
+            tol, most, seen = (table.tol, MOST_SOLVES, best) if last else (max(table.tol, COARSE_TOL), MOST_COARSE, _Best())
+            at, here = free.with_shape(shape), replace(ask, start=near)
+            solution, q, count, found = _on_grid(at, here, inner, q, table.load, tol, most, seen)
+            counts[k] += count
+            if near is not None and near is not ask.start:
+                near.destroy()  # type: ignore[union-attr]
+            near = solution
+            if not found and elsewhere:
+                break
+        return solution, q, found
+
+    solution, q, found = through(np.array([t, phi]))
+    if not found and elsewhere:
+        solution.destroy()
+        chain = Chain(replace(ask, start=None), inner)
+
+        def left_at(t: float, phi: float) -> complex:
+            nonlocal solution
+            solution = chain.solve(_moved(free.with_shape(shapes[0]), max(t, -WIDEST), phi))
+            fx, fy = solution.problem.quantities(solution.fields)["force"]
+            return complex(fx / table.load + 1.0, fy / table.load) if solution.converged else complex(math.nan, math.nan)
+
+        likely, count = places(left_at, t)
+        counts[0] += count
+        for q in likely:
+            solution.destroy()
+            solution, q, found = through(q)
+            if found:
+                break
+        elsewhere = False
+        if not found and best.q is None:  # the last grid was not met
+            solution.destroy()
+            solution, q, found = through(likely[0] if likely else q)
+    if not found and best.q is not None:
+        q = best.q
+        solution.destroy()
+        solution = inner(_moved(free, *q), ask)
+        counts[-1] += 1
+    (t, phi), count, solves = q, int(counts[-1]), int(counts.sum())
+    work = sum(n * math.prod(s) for n, s in zip(counts.tolist(), shapes, strict=True)) / math.prod(shapes[-1])
     carried = solution.problem.quantities(solution.fields)["load"]
     value = eccentricity(scene, t, phi)
     answer = f"eccentricity = {value:.8g} at {math.degrees(phi):.6g} degrees carries {carried:.8g}"
     if solution.converged and not found:
-        solution.outcome, solution.message = Outcome.LOAD_NOT_CARRIED, f"{table.load:g} asked for; the nearest: {answer}"
-    record = {
-        "vary": "eccentricity",
-        "value": value,
-        "load": table.load,
-        "carried": carried,
-        "iterations": count,
-        "solves": solves,
-        "work": work,
-    }
+        solution.outcome = Outcome.LOAD_NOT_CARRIED
+        solution.message = f"{table.load:g} asked for; the nearest: {answer}, |F + W| = {best.miss:.3g} W"
+    record = {"vary": "eccentricity", "value": value, "load": table.load, "carried": carried}
     solution.settings |= {
-        "balance": record,
+        "balance": record | {"iterations": count, "solves": solves, "work": work},
         "attitude_deg": math.degrees(phi),
         "why": [*solution.settings["why"], f"balance: {answer}, found in {count} solves on this grid, {solves} in all"],
     }
     return solution
 
 
-def _scanned(scene: Any, ask: Ask, inner: Inner, s: float, load: float) -> list[tuple[float, float]]:
-    """Places (t, attitude) about s and all round at which the film's force is nearest to the one sought, from the nearest on.
+@dataclass
+class _Best:
+    """The place that came nearest: what is left of the load over the load, there."""
 
-    For a groove near the load, of which closed forms know nothing: places behind it, and nearer to the bore. Collective.
-    """
-    chain, tried = Chain(replace(ask, start=None), inner), list[tuple[float, float, float]]()
-    for t in math.log(s / (1.0 - s)) + np.array(ABOUT):
-        for phi in AROUND:
-            here = {"eccentricity": eccentricity(scene, t, phi), "attitude_deg": math.degrees(phi)}
-            solution = chain.solve(scene.model_copy(update=here))
-            force = solution.problem.quantities(solution.fields)["force"]
-            if solution.converged and (W := math.hypot(*force)) > 0:
-                tried.append((abs(math.log(W / load)) + abs(math.atan2(-force[1], -force[0])), float(t), float(phi)))
-    solution.destroy()
-    return [place for _, *place in sorted(tried)[:BEST]]  # type: ignore[misc]
+    q: Array | None = None
+    miss: float = math.inf
+
+    def add(self, q: Array, force: Array, load: float, given: bool) -> None:
+        miss = abs(float(np.hypot(*force)) / load - 1.0) if given else math.hypot(force[0] / load + 1.0, force[1] / load)
+        if miss < self.miss:
+            self.q, self.miss = q, miss
+
+
+def _fewest(scene: GroovedJournalScene, s: float) -> float:
+    """Points around of a grid with a few on the stretch where the film is thin at s."""
+    return max(COARSEST[0], 12 * len(scene.grooves_deg), 2.0 * math.pi / (SEEN * math.sqrt(2.0 * (1.0 - s))))
 
 
 def _coarse(scene: GroovedJournalScene, s: float) -> list[tuple[int, ...]]:
-    """Grids from coarse to fine, the coarsest with a few points on the stretch where the film is thin at s."""
-    around = max(COARSEST[0], 12 * len(scene.grooves_deg), 2.0 * math.pi / (SEEN * math.sqrt(2.0 * (1.0 - s))))
-    shapes = [scene.shape]
+    """Grids from coarse to fine."""
+    shapes, fewest = [scene.shape], math.ceil(_fewest(scene, s))
     while True:
         nx, ny = shapes[0]
-        coarser = max(nx // 2, math.ceil(around)), ny // 2 | 1 if ny >= 2 * COARSEST[1] else ny
+        coarser = max(nx // 2, fewest), ny // 2 | 1 if ny >= 2 * COARSEST[1] else ny
         if math.prod(coarser) > COARSER * nx * ny:
             return shapes
         shapes.insert(0, coarser)
@@ -152,6 +174,11 @@ def eccentricity(scene: GroovedJournalScene, t: float, phi: float) -> float:
     return touching(scene, phi) / (1.0 + math.exp(-t))
 
 
+def _moved(scene: Any, t: float, phi: float) -> Any:
+    """The scene with its journal there."""
+    return scene.model_copy(update={"eccentricity": eccentricity(scene, t, phi), "attitude_deg": math.degrees(phi)})
+
+
 def half_film_eccentricity(turning: Turning, mu: float, load: float, long: bool = False) -> float:
     """The eccentricity at which a journal with half a film carries the load, as a start.
 
@@ -167,17 +194,17 @@ def half_film_eccentricity(turning: Turning, mu: float, load: float, long: bool 
 
 
 def _on_grid(
-    scene: Any, ask: Ask, inner: Inner, t: float, phi: float, load: float, tol: float, most: int
+    scene: Any, ask: Ask, inner: Inner, q: Array, load: float, tol: float, most: int, best: _Best
 ) -> tuple[Solution, Array, int, bool]:
     """Newton's method on one grid: solution, t and attitude, number of solves, whether the place was found. Collective.
 
     A step that makes residuals larger, or leads to where no film is found, is taken again, half as long.
     """
     chain, given = Chain(ask, inner), scene.attitude_deg is not None
-    q, before, failed = np.array([t, phi]), None, 0  # before : place, residual and step
+    before, failed = None, 0  # before : place, residual and step
     for count in range(1, most + 1):
         t, phi = map(float, q)
-        at = scene.model_copy(update={"eccentricity": eccentricity(scene, t, phi), "attitude_deg": math.degrees(phi)})
+        at = _moved(scene, t, phi)
         solution = chain.solve(at)
         if not solution.converged:
             failed += 1
@@ -188,6 +215,7 @@ def _on_grid(
             q = before[0] + before[2]
             continue
         force = np.array(solution.problem.quantities(solution.fields)["force"])
+        best.add(q, force, load, given)
         W = float(np.hypot(*force))
         off = math.atan2(-force[1], -force[0])
         left = np.array([math.log(W / load) if W > 0 else -math.inf, 0.0 if given else off])

@@ -75,10 +75,24 @@ def test_a_groove_near_the_load_of_which_closed_forms_know_nothing(place, change
         assert solution.settings["balance"]["carried"] == pytest.approx(math.hypot(*force), rel=2e-6)
 
 
+def test_a_light_load_opposite_to_what_a_groove_under_pressure_pushes():
+    """The film that carries it is a saddle of forces away from every closed form; steps alone end at twenty times the load."""
+    values = {"D": 0.0388, "L_over_D": 0.39, "clearance": 2.88e-5, "speed_rpm": 670.0, "mu": 0.0121, "nx": 72, "ny": 5}
+    grooves = {"grooves_deg": [4.06], "groove_deg": 28.5, "p_groove": 1.24e6, "p_end": 898.0}
+    with solve(load_scene("two_groove_journal", values | grooves, balance={"load": 9.65})) as solution:
+        force = solution.problem.quantities(solution.fields)["force"]
+        assert solution.converged, solution.message
+        assert solution.settings["balance"]["solves"] <= 100
+        assert force == pytest.approx((-9.65, 0.0), abs=1e-5 * 9.65)
+
+
 def test_a_load_beyond_what_a_tilted_journal_carries_until_it_touches():
     solution = solve(load_scene("misaligned_journal", {"nx": 108, "ny": 7, "L_over_D": 1.0, "balance.load": 1e7}))
     assert solution.outcome is Outcome.LOAD_NOT_CARRIED and solution.settings["balance"]["solves"] < 40
+    fx, fy = solution.problem.quantities(solution.fields)["force"]
     solution.destroy()
+    left = math.hypot(fx + 1e7, fy) / 1e7
+    assert 0.0 < left < 1.0 and f"|F + W| = {left:.3g} W" in solution.message
 
 
 def test_with_effects_from_far_away():

@@ -1,0 +1,46 @@
+"""Where in a bore a journal may be in balance: cells of places all round, about which what is left of the load turns."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from ..base.parallel import Array
+
+AROUND = np.linspace(-math.pi, math.pi, 12, endpoint=False)
+WITHIN, OUTER, BEYOND, OUTMOST = -1.0, 2.5, 2.5, 6.5  # rings in t: from; to at least, beyond where closed forms see it, at most
+BEST = 6  # places that are tried without a turn about them
+
+
+def places(left_at: Callable[[float, float], complex], t: float) -> tuple[list[Array], int]:
+    """Places from which the one of balance may be found, the likeliest first, and the number of solves.
+
+    (F + W)/W is looked at in the middle and on rings. Where it turns once round as a place goes round a cell of four, it is nil
+    inside the cell; so it is in one cell at least if the outermost ring presses the journal back. Those where it turns in the
+    sense of the place, as a film with stiffness has it, come first, and behind all such cells the places with the least of it.
+
+    Parameters
+    ----------
+    left_at : (F + W)/W at t = log(s/(1 - s)) and an attitude (rad), s as in `position`; NaN without a film.
+    t : where closed forms see the journal.
+    """
+    rings = np.arange(WITHIN, min(max(t + BEYOND, OUTER), OUTMOST))
+    q = np.stack(np.meshgrid(rings, AROUND, indexing="ij"), axis=-1)
+    left = np.array([[left_at(*one) for one in ring] for ring in q])
+    # Four corners of each cell, the innermost between the middle and the first ring, in the sense of the attitude.
+    at = _cells(1.0 / (1.0 + np.exp(-q[..., 0])) * np.exp(1j * q[..., 1]), 0j)
+    about = _cells(left, left_at(-math.inf, 0.0))
+    turns = np.round(np.angle(np.roll(about, -1, axis=0) / about).sum(axis=0) / (2.0 * math.pi))
+    near = np.abs(about) ** -2.0
+    inside = (at * near).sum(axis=0) / near.sum(axis=0)
+    likely = [inside[turns == sign] for sign in (1.0, -1.0)]
+    found = [np.array([math.log(s / (1.0 - s)), np.angle(z)]) for z in np.concatenate(likely) if (s := max(abs(z), 1e-6))]
+    miss = np.abs(np.log(np.abs(left - 1.0))) + np.abs(np.angle(1.0 - left))
+    order = np.argsort(miss, axis=None)[: min(BEST, int(np.isfinite(miss).sum()))]
+    return [*found, *q.reshape(-1, 2)[order]], left.size + 1
+
+
+def _cells(rings: Array, middle: complex) -> Array:
+    """Corners by cell, of values on rings and in the middle."""
+    all_ = np.concatenate([np.full((1, AROUND.size), middle), rings])
+    return np.stack([all_[:-1], all_[1:], np.roll(all_[1:], -1, axis=1), np.roll(all_[:-1], -1, axis=1)])
