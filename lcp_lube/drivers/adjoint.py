@@ -94,10 +94,9 @@ class Adjoint:
     @cached_property
     def sizes(self) -> dict[str, float]:
         """Of the terms that every L is the sum of. Collective."""
-        eq = self.equations
-        terms, dot = eq.terms(self.p, self.r) / self.flow_unit, eq.grid.reduce.dot
+        terms = dict(zip(self.lambdas, self.equations.terms(self.p, list(self.lambdas.values())), strict=True))
         own = {name: sum(abs(w * self.numbers[part]) for part, w in weights.items()) for name, weights in self.parts.items()}
-        return {name: own[name] + dot(np.abs(one), terms) for name, one in self.lambdas.items()}
+        return {name: own[name] + float(terms[name]) for name in self.lambdas}
 
     @cached_property
     def near(self) -> NearFilms:

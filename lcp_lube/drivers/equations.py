@@ -127,11 +127,14 @@ class Equations:
         G = self.balance(p, r) / unit
         return G if self.held is None else np.where(self.held, G * unit / self.constant.p_unit, G)
 
-    def terms(self, p: Array, r: Array) -> Array:
-        """The size of the terms that G is the sum of, m2/s."""
-        s, problem = self.problem(p).scheme, self.constant
-        k = s.diagonal.ravel() * p / problem.p_unit
-        return (np.abs(k) + np.abs(s.couette_W).ravel() + np.abs(s.couette_E).ravel()) * s.flow_unit
+    def terms(self, p: Array, weights: Sequence[Array]) -> Array:
+        """Sums of weights' sizes times those of the terms that G is the sum of, in its unit of flow. Collective."""
+        grid, scheme = self.grid, self.problem(p).scheme
+        p, w, out = (p / self.constant.p_unit).reshape(grid.box), [a.reshape(grid.box) for a in weights], np.zeros(len(weights))
+        for rows, s in scheme.in_strips(grid):
+            size = np.abs(s.diagonal * p[rows]) + np.abs(s.couette_W) + np.abs(s.couette_E)
+            out += [np.einsum("ji,ji->", np.abs(a[rows]), size) for a in w]
+        return np.asarray(grid.comm.allreduce(out))
 
     def numbers(self, p: Array, r: Array, wanted: Collection[str] | None = None, rest: Any = None) -> dict[str, float]:
         """`slopes.numbers` as the scene has them; rest : the values of those that are not wanted. Collective."""

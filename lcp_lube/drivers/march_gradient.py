@@ -129,7 +129,7 @@ class MarchGradient:
         some += [right_side(by_flow, one, cavity) for one in off]
         solved = linear.solve_transposed(some, z)
         linear.destroy()
-        self.units[n], terms = problem.scheme.flow_unit, eq.terms(p, r) / problem.scheme.flow_unit
+        self.units[n] = problem.scheme.flow_unit
         found = dict(zip(rows, solved, strict=False))
         pushed, off_by = solved[len(rows) : len(rows) + len(forces)], solved[len(rows) + len(forces) :]
         if forces or off:
@@ -143,7 +143,7 @@ class MarchGradient:
                 own = sum((w * giving(problem, part) for part, w in gives.items()), np.zeros(one.size))
                 self.left[name][n] = np.where(eq.given, volume_unit(problem) * own, one)
             size = sum(abs(w * numbers[part]) for part, w in parts.get(name, {}).items())
-            self.sizes[name] += size + grid.reduce.dot(np.abs(one), terms)
+            self.sizes[name] += size + float(eq.terms(p, [one])[0])
         eq.destroy()
 
     def _follow(

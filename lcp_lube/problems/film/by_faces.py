@@ -22,6 +22,7 @@ from .lubrication import LubricationProblem
 from .reynolds import sides
 from .strip import line_weights, stream_weights
 
+EQUAL = 1e-15  # relative: ratios that differ by rounding alone
 NEAR = 1e-6  # of a cell: an edge so near it counts as inside
 Rows = NDArray[np.int64]
 
@@ -41,7 +42,7 @@ class ByFaces:
         (ny, nx), self.count = grid.box, len(rows)
         at_face, before = scheme != "upwind", scheme != "face"  # where the wall's film is taken, and where the void's
         along, wall, void = (np.zeros((self.count, ny, nx + 1)) for _ in range(3))
-        across, w = np.zeros((self.count, ny + 1, nx)), np.array([row.reshape(grid.box) for row in rows])
+        across, w = np.zeros((self.count, ny + 1, nx)), [row.reshape(grid.box) for row in rows]
         void = wall if at_face != before else void
         enters = problem.r_in if grid.ends[0][0] == "open" else 0.0
         frames = ghosted(grid, q, 0.0), ghosted(grid, r, enters)
@@ -49,16 +50,16 @@ class ByFaces:
             faces = slice(lines.start, lines.stop + 1)
             p, r = (frame(lines) for frame in frames)
             for k in range(self.count):
-                loop_by_faces(w[k, lines], p, r, along[k, lines], across[k, faces], wall[k, lines], void[k, lines])
+                loop_by_faces(w[k][lines], p, r, along[k, lines], across[k, faces], wall[k, lines], void[k, lines])
         for end, owned in ((0, grid.y_start == 0), (-1, grid.y_end == grid.shape[1])):
             if owned and grid.ends[1][end] in ("closed", "mirror"):
                 across[:, end] = 0.0
         self._along, self._across = along, across
         self._at_face, self._before = wall if at_face else None, void if before else None
         west, east, south, north = (float(mask.any()) for mask in sides(grid))
-        self._beside = -west * w[:, :, :1], -east * w[:, :, -1:]
-        self._ends = -south * w[:, 0], -north * w[:, -1]
-        self._known: dict[bytes, list[Any]] = {}
+        self._beside = [-mask * np.array([one[:, at] for one in w]) for mask, at in ((west, slice(1)), (east, slice(-1, None)))]
+        self._ends = -south * np.array([one[0] for one in w]), -north * np.array([one[-1] for one in w])
+        self._known: dict[tuple[int, bytes], tuple[Array, Array]] = {}
 
     def sums(self, gap: Any, grid: Grid) -> Array | None:
         """What the pressures (m2/s Pa s) and the wall (m) make of each, and by what it grows with each side's pressure: shape
@@ -89,18 +90,28 @@ class ByFaces:
         return None if total[-1] else total[:-1].reshape(out.shape)
 
     def _parts(self, grid: Grid, lines: Rows, faces: Rows) -> list[Any]:
-        """The sums' parts of rows that are alike, with the weights that are left; those of the problem's grid are kept."""
-        key = lines.tobytes() + faces.tobytes()
-        if grid is self.grid and key in self._known:
-            return self._known[key]
+        """The sums' parts of rows that are alike, with the weights that are left."""
         pressed, across = _weights(grid)
         dragged = stream_weights(grid)[:, 0]
         of_lines = [(self._along, pressed), (self._at_face, dragged), (self._before, dragged)]
         of_lines += [(one, pressed) for one in self._beside]
-        found = [[None if a is None else _added(a, b, lines) for a, b in of_lines], _added(self._across, across, faces)]
-        if grid is self.grid:
-            self._known[key] = found
-        return found
+        return [
+            [None if a is None else self._added(a, b, lines) for a, b in of_lines],
+            self._added(self._across, across, faces),
+        ]
+
+    def _added(self, a: Array, weights: Array, first: Rows) -> tuple[Array, Array]:
+        """Runs of rows added up with their weights, shape (weights, runs, columns), which are kept, and what is left of the
+        weights: the same for all where lines have only moved apart. Rows that are all apart stay as they are."""
+        if first.size == weights.size:
+            return a, weights
+        added, of = self._known.get((id(a), first.tobytes()), (a, np.nan * weights))
+        ratio = weights / of
+        if not np.ptp(ratio) <= EQUAL * ratio[0]:
+            runs, ratio = [slice(*ends) for ends in pairs(np.append(first, weights.size)).T], np.ones(1)
+            added = np.array([[np.einsum("j,ji->i", weights[run], one[run]) for run in runs] for one in a])
+            self._known[id(a), first.tobytes()] = added, weights
+        return added, np.full(first.size, ratio[0])
 
 
 def _weights(grid: Grid) -> tuple[Array, Array]:
@@ -117,14 +128,6 @@ def _alike(jumps: Sequence[float], low: Array, high: Array) -> Rows:
     alone = (np.searchsorted(places, high + slack) > below) | (high <= low)
     new = np.append(True, alone[1:] | alone[:-1] | (below[1:] != below[:-1]))
     return np.flatnonzero(new)
-
-
-def _added(a: Array, weights: Array, first: Rows) -> tuple[Array, Array]:
-    """Runs of rows added up with their weights, shape (weights, runs, columns); rows that are all apart stay as they are."""
-    if first.size == weights.size:
-        return a, weights
-    runs = [slice(*ends) for ends in pairs(np.append(first, weights.size)).T]
-    return np.array([[np.einsum("j,ji->i", weights[run], one[run]) for run in runs] for one in a]), np.ones(first.size)
 
 
 def _strips(rows: Rows, columns: int) -> Iterator[tuple[slice, Rows]]:
