@@ -123,3 +123,13 @@ def test_fronts_in_files_whatever_the_ranks(cli, tmp_path):
     one, three = (np.load(tmp_path / f"{ranks}.npz")["fronts"] for ranks in (1, 3))
     assert one.shape[1] == 3 and one[-1, 0] >= 24
     np.testing.assert_allclose(three, one, rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize("n", [9, 14])
+def test_a_supply_of_one_point_is_the_top(n):
+    """At rest nothing is above what feeds the film."""
+    feed = {"shape": "rectangle", "x": [0.0091, 0.0093], "y": [0.004, 0.0042], "p": 3e5}
+    film = [{"shape": "linear", "h_start": 1.2e-5, "h_end": 5e-6}]
+    with solve(load_scene({**WEDGE, "U": 0.0, "film": film, "supply": [feed], "n": n})) as s:
+        assert s.numbers["p_max"] == pytest.approx(3e5, rel=1e-12)
+        assert s.gradient("p_max", "supply.1.p") == {"supply.1.p": pytest.approx(1.0, rel=1e-9)}

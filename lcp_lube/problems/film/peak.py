@@ -3,7 +3,7 @@
 From the largest of all points on, a parabola along x and one along y, with the mixed derivative. Pressures have kinks where
 films jump, and a line of points lies on each straight edge: so each side of the point has a parabola of its own, whose
 curvature is the lesser one of those at the point and at its neighbour there, the one without a kink (as ENO schemes choose).
-A top that is a kink stays what it is.
+A top that is a kink stays what it is, and so does a point that a supply holds.
 """
 
 from collections.abc import Sequence
@@ -25,9 +25,12 @@ class Window:
     Parameters
     ----------
     p : owned points. p_sides : west, east, south, north, in the unit of p; read where the end is open.
+    held : owned points whose pressure a supply holds: one of them is the top, as oil flows from it to all sides.
     """
 
-    def __init__(self, grid: Grid, p: Array, place: Sequence[float], p_sides: Sequence[float]):
+    def __init__(
+        self, grid: Grid, p: Array, place: Sequence[float], p_sides: Sequence[float], held: NDArray[np.bool_] | None = None
+    ):
         (self._x, columns), (self._y, rows) = (_around(grid, axis, place) for axis in (0, 1))
         self._dim = grid.dim
         self._mine = [  # row and column of the window, number of the owned point
@@ -38,7 +41,9 @@ class Window:
         ]
         own = np.zeros((5, 5))
         for n, m, k in self._mine:
-            own[n, m] = p[k]
+            own[n, m] += p[k]
+            if n == m == 2 and held is not None and held.ravel()[k]:
+                own += np.where(np.arange(25).reshape(5, 5) == 12, 0.0, np.nan)  # nothing beside it has a say
         self._p = grid.comm.allreduce(own)
         for side, (numbers, across) in enumerate(((columns, self._p.T), (rows, self._p))):
             across[numbers == FIRST_SIDE], across[numbers == LAST_SIDE] = p_sides[2 * side : 2 * side + 2]

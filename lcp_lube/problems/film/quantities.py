@@ -160,7 +160,7 @@ def largest_pressure(problem: LubricationProblem, p_pa: Array) -> tuple[float, l
     grid = problem.grid
     largest, place = largest_of(problem, p_pa.reshape(grid.box), grid.x[0], grid.y[:, 0])
     if problem.tops and place is not None:
-        largest, place = Window(grid, p_pa, place, problem.p_sides).top()
+        largest, place = Window(grid, p_pa, place, problem.p_sides, problem.scheme.held).top()
     low = [*grid.origin[: grid.dim]]
     middle = [a + 0.5 * length for a, length in zip(low, grid.lengths, strict=True)]
     for k, p_side in enumerate(open_pressures(problem)):

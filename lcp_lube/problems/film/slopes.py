@@ -148,7 +148,7 @@ def _largest(problem: LubricationProblem, p: Array, last: bool) -> Slope:
         seen = np.where(near & (index != chosen), 0.0, p)
         place = largest_of(problem, seen.reshape(grid.box), grid.x[0], grid.y[:, 0])[1]
         assert place is not None  # a solution's pressures are numbers
-        window = Window(grid, p, place, p_sides)
+        window = Window(grid, p, place, p_sides, problem.scheme.held)
         by_p, largest = window.slopes(p.size), window.top()[0]
     at_side = max((q for q in p_sides if q), default=0.0) > largest
     return Slope(by_p * (0.0 if at_side else problem.p_unit), np.zeros(p.size), 0 if at_side else ties)
