@@ -33,6 +33,7 @@ from .coefficients import placed
 from .coupled_response import CoupledResponse
 from .loop import Loop
 from .supplies import Fed
+from .turned import Mirrored
 
 STEP = 1e-4  # of a number, relative, and of the fields
 LARGER, ROUNDING = 10, 1e-14  # powers of ten by which a step from zero may grow; of a number: a smaller change of it is none
@@ -59,12 +60,12 @@ class CoupledGradient(CoupledResponse):
     def __init__(self, scene: Scene, solution: Solution, quantities: Sequence[str], flip: bool = False):
         if not solution.converged:
             raise InputError(f"{scene.name}: {solution.outcome.sentence}: no solution, no derivatives")
-        if isinstance(solution.problem, TurnedProblem):
-            raise InputError(
-                f"{scene.name}: its wall moves to smaller x: derivatives through effects are of the mirror image, with -U"
-            )
         self.scene: Any = placed(scene, solution)
-        super().__init__(self.scene, solution, [], flip)
+        problem, seen = solution.problem, solution
+        self.turned = problem if isinstance(problem, TurnedProblem) else None
+        if self.turned is not None:  # the equations are those of the mirror image
+            seen = replace(solution, problem=self.turned.moving, fields=self.turned.there(solution.fields))
+        super().__init__(self._facing(self.scene), seen, [], flip)
         self.found, self.conditions = conditions_of(scene, solution)
         self.report = self._numbers(self.loop, 0.0 * self.p, self.x)
         for name in (*quantities, *self.conditions):
@@ -74,6 +75,10 @@ class CoupledGradient(CoupledResponse):
         self.names = [name for name in dict.fromkeys([*quantities, *self.conditions]) if name not in self.found]
         self.switching = int(self.loop.base.reduce.sum(self.changing.astype(float)))
         self.ties: dict[str, int] = {}
+
+    def _facing(self, scene: Any) -> Any:
+        """The scene whose wall moves to larger x."""
+        return scene if self.turned is None else Mirrored(scene)
 
     @property
     def lambdas(self) -> dict[str, None]:
@@ -95,6 +100,7 @@ class CoupledGradient(CoupledResponse):
             at.problem.more |= effect.report(at).numbers
         fields = {"p": at.p / at.problem.p_unit, "r": at.r}
         told = at.problem.quantities(fields)
+        told = told if self.turned is None else self.turned.told(told)
         out = {name: value for name, value in totals(at.problem, at.p).items() if name.startswith(PIVOT)}
         for name, value in told.items():
             parts = {"": value}
@@ -235,7 +241,7 @@ class CoupledGradient(CoupledResponse):
 
     def _beside(self, key: str, value: float) -> State:
         """R, what sources and film disagree by, and the numbers of the scene with another value, at the solution's state."""
-        scene: Any = with_values(self.scene, {key: value})
+        scene = self._facing(with_values(self.scene, {key: value}))
         if self.free:
             held = zip(scene.model.supplies, self.supplies, strict=True)
             scene = Fed(scene, tuple(Supply(one.region, known.p) for one, known in held))

@@ -58,6 +58,19 @@ def test_every_number_of_a_pad():
         assert not off(scene, solution, ["load", "p_max", "friction", "temperature_max"], keys)
 
 
+def test_a_wall_that_moves_to_smaller_x():
+    """By equations of the mirror image: its numbers are those of the film with -U, and dQ/dh is turned back with the fields."""
+    ends = {"film.linear.h_start_um": 20, "film.linear.h_end_um": 40, "U": -4.0, "p_in": 3e5}
+    scene = load_scene("lined_pad", {"n": 24, **ends})
+    image = load_scene("lined_pad", {"n": 24, "p_out": 3e5})
+    names = ["load", "friction", "temperature_max"]
+    with answer(scene) as solution, answer(image) as other:
+        assert not off(scene, solution, names, ["U", "film.linear.h_end", "temperature.T_in", "p_in"])
+        fields, others = film_fields(scene, solution, names), film_fields(image, other, names)
+        for name, sign in zip(names, (1.0, -1.0, 1.0), strict=True):
+            assert np.abs(fields[name][::-1] - sign * others[name]).max() < 1e-5 * np.abs(fields[name]).max(), name
+
+
 def test_through_a_journals_place():
     """The eccentricity and the attitude at which a load is carried, oil carried over in grooves."""
     scene = load_scene("adiabatic_journal", {"n": 40, "balance.tol": 1e-11})  # of the differences

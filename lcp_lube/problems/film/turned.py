@@ -86,7 +86,11 @@ class TurnedProblem(LubricationProblem):
 
     def quantities(self, fields: Fields) -> dict[str, Any]:
         """Those of the mirror image, their places and directions turned back. Collective."""
-        out, L = self.moving.quantities(self.there(fields)), self.grid.lengths[0]
+        return self.told(self.moving.quantities(self.there(fields)))
+
+    def told(self, of_image: dict[str, Any]) -> dict[str, Any]:
+        """What is told of the mirror image as it is told of the film as it stands."""
+        out, L = dict(of_image), self.grid.lengths[0]
         for name in ("p_max_at", "min_h_at"):
             out[name] = [L - out[name][0], *out[name][1:]] if out[name] is not None else None
         for name in ("rupture", "reformation"):
