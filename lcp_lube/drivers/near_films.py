@@ -1,4 +1,4 @@
-"""L of a film's integrals at scenes near by, without their problems: what another film or fluid changes of lambda' G alone.
+"""L of a film's integrals and of its largest pressure at scenes near by, without problems: what they change of lambda' G.
 
 A problem's coefficients and its balance cost many times what its film at the faces does (`problems/film/by_faces`), and a
 viscosity, a speed or a pressure of a side costs nothing, as the balance is linear in them.
@@ -19,6 +19,7 @@ from ..problems.film.by_faces import ByFaces
 from ..problems.film.fluid import Law
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
+from ..problems.film.quantities import largest_pressure
 from ..problems.film.weighed import can
 from ..problems.grid import Grid
 from ..problems.strips import moved
@@ -32,7 +33,7 @@ FREE |= {"lengths", "polar", "places"}  # where its lines of points lie
 
 
 class NearFilms:
-    """lambda' G, and the numbers that are integrals of the pressure, of films on as many points. Collective, as its method.
+    """lambda' G, and the numbers that the pressure alone makes, of films on as many points. Collective, as its method.
 
     Parameters
     ----------
@@ -54,7 +55,7 @@ class NearFilms:
         self.wanted = {part for one in parts.values() for part in one}
         constant = not (equations.law and equations.law.dowson_higginson)
         alone = constant and can(equations.constant, self.model, SMALL)
-        self.known = alone and self.wanted <= set(forces.weights(equations.constant))
+        self.known = alone and self.wanted <= {*forces.weights(equations.constant), "p_max"}
 
     @cached_property
     def _own(self) -> ByFaces:
@@ -73,8 +74,10 @@ class NearFilms:
         return self._totals(self.equations.constant)
 
     def _totals(self, problem: LubricationProblem) -> dict[str, float]:
-        """The numbers, with the integrals of a film's pressure, which is held."""
+        """The numbers, with the integrals of a film's pressure, which is held, and its largest one."""
         found = forces.totals(problem, self.p, wanted=self.wanted, columns=self._columns)
+        if "p_max" in self.wanted:
+            found["p_max"] = largest_pressure(problem, self.p)[0] + problem.p_c
         return self.numbers | {name: found[name] for name in self.wanted}
 
     def lagrangians(self, scene: Scene) -> Array | None:
