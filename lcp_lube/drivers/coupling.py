@@ -183,7 +183,7 @@ def _told(ask: Ask, loop: Loop) -> Solution:
     count = f"{loop.solves} film{'s' * (loop.solves > 1)} solved"
     inside = f"; {', '.join(loop.names)} by Anderson's method" if loop.effects else ""
     by_q = "; viscosity with pressure by a change of unknown" if law.barus else ""
-    settings = {**first.settings, "why": [f"coupling: {count}{inside}{by_q}", *first.settings["why"]]}
+    settings = {**first.settings, "why": [f"coupling: {count}{inside}{by_q}", *loop.told, *first.settings["why"]]}
     if loop.rescued is not None:
         settings |= {"method": loop.rescued.method, "took_over": loop.rescued.asked}
     settings["details"] = {**first.settings["details"], "fluid_solves": loop.solves, "coupling_work": loop.work}

@@ -19,6 +19,7 @@ from .ask import Ask, Start
 from .chain import added
 from .compose import Inner
 from .frozen import Frozen
+from .nonlinear import steps
 from .settled import settled
 
 MOST_SOLVES, LONG = 100, 300  # films; and while the least change has fallen to a tenth within as many as
@@ -27,6 +28,9 @@ MEMORY = 30  # answers that Anderson's method combines; -coupling_snes_anderson_
 CYCLE = 25  # steps after which it begins anew: its least squares see no changes 1e-8 of the largest that they remember
 FEW, NEAR, AWAY = 1, 0.3, 30.0  # answers combined while a coefficient changes by more than NEAR; AWAY: times the least change
 WARMER = 1.0  # of log(viscosity): where a second start is
+VAIN = 100  # films of Newton's method in which the change has to halve
+NEWTON = {"snes_mf": "", "snes_linesearch_type": "bt", "mat_mffd_err": 1e-6, "snes_ksp_ew": "", "ksp_max_it": 60}
+NEWTON |= {"ksp_gmres_restart": 60, "snes_max_linear_solve_fail": LONG}  # what 60 products give of a step is taken
 LONGEST = 1.0  # relative change of a coefficient in one step, before answers are combined
 LEAST_LIFT = -0.9  # of the rigid film, of an iterate
 STEEPEST = 0.9  # of q, over 1/b, where the pressure is without bound: of an iterate, whose viscosity is then 10 times mu
@@ -67,6 +71,7 @@ class Loop:
         self.beyond = False  # whether no pressure carries the last film's flow
         self.start: Solution | Start | None = ask.start
         self.begun = self.last = np.zeros(0)  # the vectors of fields that the loop began with, and of the last film's
+        self.told: list[str] = []  # how it went on where Anderson's method did not settle
         self.log: list[Array] = []  # what the effects have made of each film's answer
         self.given: list[Array] = []  # those that were found before, by an earlier run say: they are taken instead of films
 
@@ -172,13 +177,15 @@ class Loop:
 
         Far from the answer old steps mislead: there it combines two answers alone, and many once coefficients change by less
         than `NEAR`. Where steps lead away from the best fields so far, or a cycle ends, it begins anew from these; where that
-        leads no further, once from thinner oil: what hardly moves against a supply gets hot, and then flows back from it.
+        leads no further, once from thinner oil: what hardly moves against a supply gets hot, and then flows back from it. Soft
+        walls, whose film drags what it has, go on by Newton's method from the best fields. What is left in the end are these.
         watch : called after every film.
         """
         x = PETSc.Vec().createMPI((len(self.names) * self.h.size, None), comm=self.base.grid.petsc_comm)
         x.setArray(begin)
         self.begun = begin
         best, last, near, idle = (np.inf, begin), (begin + 1.0, begin), False, 0  # idle: cycles without better fields
+        least = best  # of both starts
         mark = (np.inf, 0)  # a least change, and the films after which it was found
         warm = None if "warmth" not in self.names or self.model.stored is not None else self._warmer(begin)
 
@@ -186,7 +193,7 @@ class Loop:
             return self.solves >= (LONG if self.solves - mark[1] < PATIENCE else MOST_SOLVES)
 
         def residual(snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
-            nonlocal best, last, mark
+            nonlocal best, last, least, mark
             before = x.array_r.copy()
             if self.base.reduce.max(np.abs(before - last[0])) > 0.0:  # not those that the cycle before has ended with
                 self.last = before
@@ -196,6 +203,7 @@ class Loop:
                 last, self.change = (before, after), self.base.reduce.max(np.abs(after))
                 if self.change < best[0]:
                     best = self.change, before
+                least = min(least, best, key=lambda one: one[0])
                 if best[0] <= 0.1 * mark[0]:
                     mark = best[0], self.solves
             f.setArray(np.clip(last[1], -LONGEST, LONGEST))
@@ -210,7 +218,7 @@ class Loop:
 
         while not (ends() or self.found or np.isnan(self.change)):  # NaN: no film
             before = best[0]
-            self._cycle(x, residual, ended, MEMORY if near else FEW)
+            steps(x, "anderson", residual, ended, CYCLE, {"snes_anderson_m": MEMORY if near else FEW})
             near, idle = not near, idle + 1 if best[0] >= before else 0
             if best[0] < self.change < np.inf:
                 x.setArray(best[1])
@@ -218,8 +226,44 @@ class Loop:
                 if warm is None:
                     break
                 x.setArray(warm)
+                self.told.append(f"from film {self.solves + 1} on from oil of 1/e of the viscosity")
                 best, warm, near, idle, mark = (np.inf, warm), None, False, 0, (np.inf, self.solves)
+        if "lift" in self.names and self.model.stored is None and not self.found and np.isfinite(self.change):
+            x.setArray(least[1])
+            self.told.append(f"from film {self.solves + 1} on by Newton's method with films for its products")
+            least = self._newton(x, least, watch)
+            self.change = np.nan_to_num(self.change, nan=np.inf)
+        if not self.found and least[0] < self.change:
+            self.change = self._off(least[1], watch)[0]
         x.destroy()
+
+    def _off(self, x: Array, watch: Callable[[], None]) -> tuple[float, Array]:
+        """By how much the effects change these fields at most, and the change."""
+        self.last, found = x, self._found(x, watch)
+        with np.errstate(all="ignore"):
+            off = x - found
+        return self.base.reduce.max(np.abs(off)), off
+
+    def _newton(self, x: PETSc.Vec, least: tuple[float, Array], watch: Callable[[], None]) -> tuple[float, Array]:
+        """Newton's method from x on, whose products with the Jacobian are differences of films: the best fields. Collective."""
+        marks = [(least[0], self.solves)]
+
+        def residual(snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
+            nonlocal least
+            before = x.array_r.copy()
+            self.change, off = self._off(before, watch)
+            least = min(least, (self.change, before), key=lambda one: one[0])
+            f.setArray(off)
+
+        def ended(snes: PETSc.SNES, it: int, norms: tuple[float, float, float]) -> int:
+            if least[0] <= 0.5 * marks[-1][0]:
+                marks.append((least[0], self.solves))
+            vain = self.solves - marks[-1][1] > VAIN or not np.isfinite(norms[2])
+            done, failed = PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS, PETSc.SNES.ConvergedReason.DIVERGED_DTOL
+            return int(done if self.found else failed if vain else 0)
+
+        steps(x, "newtonls", residual, ended, LONG, NEWTON)
+        return least
 
     def _warmer(self, x: Array) -> Array:
         """These fields, with warmer oil."""
@@ -236,22 +280,3 @@ class Loop:
             self.log.append(self.vector(self.made()) if self.film(self.cells(x)) else np.full_like(x, np.nan))
         watch()
         return self.log[-1]
-
-    def _cycle(self, x: PETSc.Vec, residual: Any, ended: Any, memory: int) -> None:
-        """Some steps of Anderson's method. Collective."""
-        snes, f = PETSc.SNES().create(x.comm), x.duplicate()
-        snes.setOptionsPrefix("coupling_")
-        snes.setType("anderson")
-        snes.setTolerances(max_it=CYCLE)
-        snes.setFunction(residual, f)
-        snes.setConvergenceTest(ended)
-        options = PETSc.Options("coupling_")
-        ours = not options.hasName("snes_anderson_m")
-        if ours:
-            options["snes_anderson_m"] = memory
-        snes.setFromOptions()
-        if ours:
-            options.delValue("snes_anderson_m")
-        snes.solve(None, x)
-        for obj in (snes, f):
-            obj.destroy()

@@ -61,3 +61,4 @@ def test_oil_that_flows_back_from_a_supply():
     with solve({**pad, "temperature": heat, "shear": {"law": "eyring", "tau_0": 5448}}, model="full") as s:
         assert s.converged, s.message
         assert s.certificate.measures["coupling"] <= 1e-9 and s.certificate.measures["energy_residual"] <= 1e-9
+        assert any("from oil of 1/e of the viscosity" in one for one in s.settings["why"])

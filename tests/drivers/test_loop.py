@@ -1,0 +1,40 @@
+"""The loop of effects where Anderson's method does not settle: Newton's method goes on, and what is told is the best state."""
+
+import numpy as np
+import pytest
+
+from lcp_lube import solve
+from lcp_lube.drivers import loop
+
+FILM = [{"shape": "linear", "h_start": 4e-5, "h_end": 2e-5}]
+SOFT = {"family": "bearing", "L": 0.1, "U": 5.0, "n": 24, "fluid": {"mu": 0.02, "p_supply": 1e5}, "film": FILM}
+SOFT["elastic"] = {"compliance": 3e-10}  # it drags more than pressure drives through a mesh
+
+
+def test_newton_goes_on_between_soft_walls(monkeypatch):
+    monkeypatch.setattr(loop, "MOST_SOLVES", 30)
+    monkeypatch.setattr(loop, "PATIENCE", 0)
+    with solve(SOFT, model="full") as s:
+        assert s.converged and s.certificate.holds and s.certificate.measures["coupling"] < 1e-8
+        assert any("Newton's method with films" in one for one in s.settings["why"])
+        h, p = s.problem.scheme.h.ravel(), s.fields["p"] * s.problem.p_unit
+        rigid = 2e-5 + 2e-5 * (1.0 - s.problem.grid.x / 0.1)
+        assert h == pytest.approx(rigid.ravel() + 3e-10 * p, rel=1e-7)
+
+
+def test_what_does_not_settle_ends_at_its_best(monkeypatch):
+    """Not at the last film, and says where it began anew."""
+    changes, found = [], loop.Loop._found
+
+    def recorded(self, x, watch):
+        made = found(self, x, watch)
+        changes.append(np.max(np.abs(x - made)))
+        return made
+
+    monkeypatch.setattr(loop, "MOST_SOLVES", 30)
+    monkeypatch.setattr(loop, "PATIENCE", 0)
+    monkeypatch.setattr(loop, "VAIN", -1)
+    monkeypatch.setattr(loop.Loop, "_found", recorded)
+    with solve(SOFT, model="full") as s:
+        assert s.outcome == "max_iterations" and f"{min(changes):.1e}" in s.message
+        assert s.certificate.measures["coupling"] == pytest.approx(min(changes), rel=1e-6)
