@@ -191,7 +191,7 @@ def exact_slope(scene: Any, solution: Solution, unknown: Variable, t: float, W: 
         e, along = unknown.to_value(t), atan2(-fy, -fx) - turning.widest
         move = turning.c * e * (1.0 - e) * np.array([-cos(along), sin(along)])  # away from the widest gap, in the load's axes
         with suppress(NotFound):
-            (one,) = coefficients(scene, solution)
+            (one,) = coefficients(scene, solution, damped=False)
             return float(one.K[0] @ move) / W
     if turning is None and (key == "h_offset" or (key == "h_min" and isinstance(scene, ThrustScene))):
         alike = 1
@@ -200,7 +200,7 @@ def exact_slope(scene: Any, solution: Solution, unknown: Variable, t: float, W: 
             scene, fields = Mirrored(scene), turned.there(solution.fields)
             solution = replace(solution, problem=turned.moving, fields=fields)
         with suppress(NotFound):
-            (one,) = coefficients(scene, solution)
+            (one,) = coefficients(scene, solution, damped=False)
             return -alike * float(one.K[0, 0]) * exp(t) / W
     return None
 

@@ -27,7 +27,7 @@ from ..scenes.thrust import ThrustScene
 from ..scenes.tilting import TiltingPadScene
 from .coupled_response import CoupledResponse
 from .grooves import SolvedFilm, films_of
-from .impedance import impedance
+from .impedance import impedance, stiffness
 from .pad_coordinates import Bearing, JournalPads, ThrustPads, bearing_of
 from .response import Change, Moved, Response
 
@@ -64,7 +64,12 @@ def motions_of(turning: Turning | None, tilt: bool, middle: float, along: float 
 
 
 def coefficients(
-    scene: Scene, solution: Solution, frequencies: Sequence[float] = (0.0,), tilt: bool = False, stored: bool = True
+    scene: Scene,
+    solution: Solution,
+    frequencies: Sequence[float] = (0.0,),
+    tilt: bool = False,
+    stored: bool = True,
+    damped: bool = True,
 ) -> list[Coefficients]:
     """K and C of a converged solution. Collective.
 
@@ -74,6 +79,7 @@ def coefficients(
     frequencies : of the motion, rad/s, >= 0; 0: the limit of slow motion.
     tilt : with the slopes of a journal's axis, 4 x 4 (2D).
     stored : False: as if void were not stored in the cavity; what others leave out (above 0 rad/s).
+    damped : False: K alone, at 0 rad/s; of what is no pad that spares half of the solves.
 
     Raises
     ------
@@ -106,7 +112,8 @@ def coefficients(
         own = _of_pads(scene, solution, frequencies, follow, has_effects(model), stored)
         total = turn.T @ own @ turn if turning is not None else own
     else:
-        total = by_film(partial(impedance, frequencies=frequencies, stored=stored), scene, solution, motions)
+        of = partial(impedance, frequencies=frequencies, stored=stored) if damped else lambda one: stiffness(one)[None]
+        total = by_film(of, scene, solution, motions)
     total = total * (scene.pads if isinstance(scene, ThrustScene) else 1)  # one of which was solved
     return [
         Coefficients(nu, one.real, one.imag / nu if nu > 0 else one.imag, names)

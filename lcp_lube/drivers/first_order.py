@@ -42,6 +42,7 @@ from .turned import Mirrored
 STEP = 1e-4  # of an effect: its derivative is a difference of two values of L
 THINNEST = -0.9  # of the rigid film, of a lift
 SOME = 1e-300  # Pa
+MOST = 30.0  # of log(Q), up or down, by an effect: more tells nothing, and less than exp(-36) is no digit of 1 + dQ/Q
 
 
 class FirstOrder:
@@ -109,9 +110,8 @@ class FirstOrder:
         if "contact" in largest:
             largest["contact"] /= max(self.base.reduce.max(self.p), SOME)
         size = max(largest.values(), default=0.0)
-        if not self.value or not np.isfinite(total / self.value) or total / self.value > 100.0:
-            return None, size
-        return expm1(sign * total / self.value), size
+        grows = sign * total / self.value if self.value else np.nan
+        return (expm1(grows) if abs(grows) <= MOST else None), size
 
     def second(self, name: str) -> float:
         """dQ/Q by an effect that was not solved for, to second order; NaN where there is none. Collective.

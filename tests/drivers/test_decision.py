@@ -118,6 +118,15 @@ def test_the_film_that_was_looked_at_is_the_first_of_the_loop():
         assert films[0] == films[1] and s.load == pytest.approx(named.load, rel=1e-7)
 
 
+def test_a_value_that_is_next_to_nothing():
+    """The film as it is carries the load, the level that is found is next to 0: in parts of it all effects are huge."""
+    film = [{"shape": "sinusoid", "h_min": 1.0558600561641131e-05, "h_max": 2.8870516946439532e-05}]
+    pad = {"family": "bearing", "L": 0.13882698275020075, "U": 0.38099638231809113, "n": 777, "film": film}
+    pad |= {"fluid": {"mu": 0.04989193546328417, "barus": 5.9e-11}, "temperature": {"T_in": 297.66, "beta": 1.66e-5}}
+    with solve({**pad, "balance": {"load": 1.9009e5}}) as s:
+        assert s.converged and not s.settings["model"]["left_out"] and abs(s.settings["balance"]["value"]) < 1e-7
+
+
 def test_least_and_named():
     plain = load_scene({**SCENES["cavity"], "fluid": {"mu": 0.02, "p_supply": 1e5}, "temperature": None})
     with solve(plain) as reference, solve(SCENES["cavity"], model="least") as least:
