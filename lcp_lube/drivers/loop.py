@@ -19,7 +19,6 @@ from .ask import Ask, Start
 from .chain import added
 from .compose import Inner
 from .frozen import Frozen
-from .nonlinear import steps
 from .settled import settled
 
 MOST_SOLVES, LONG = 100, 300  # films; and while the least change has fallen to a tenth within as many as
@@ -181,6 +180,8 @@ class Loop:
         walls, whose film drags what it has, go on by Newton's method from the best fields. What is left in the end are these.
         watch : called after every film.
         """
+        from .nonlinear import steps  # here, and below: films without effects have no loop
+
         x = PETSc.Vec().createMPI((len(self.names) * self.h.size, None), comm=self.base.grid.petsc_comm)
         x.setArray(begin)
         self.begun = begin
@@ -246,6 +247,8 @@ class Loop:
 
     def _newton(self, x: PETSc.Vec, least: tuple[float, Array], watch: Callable[[], None]) -> tuple[float, Array]:
         """Newton's method from x on, whose products with the Jacobian are differences of films: the best fields. Collective."""
+        from .nonlinear import steps
+
         marks = [(least[0], self.solves)]
 
         def residual(snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
