@@ -82,7 +82,8 @@ class Part(Derived):
         south = south if south.kind == "open" else Side("closed")
         half = (west, east, south, Side("mirror" if ny % 2 else "closed"))
         lengths = (model.lengths[0], 0.5 * model.lengths[1])
-        return replace(model, lengths=lengths, sides=half, exact=None, places=(x, y)), (nx, (ny + 1) // 2)
+        supplies = tuple(one.half for one in model.supplies)
+        return replace(model, lengths=lengths, sides=half, supplies=supplies, exact=None, places=(x, y)), (nx, (ny + 1) // 2)
 
     def grid(self, comm: PETSc.Comm | None = None) -> Grid:
         """The part's points."""

@@ -56,6 +56,8 @@ class Frozen(Derived):
         problem = self.constant.build(self.shape, comm) if self.base is None else copy(self.base)
         problem.shares_grid = problem.shares_grid or self.base is not None
         problem.coefficients_for = None  # what is certified is another problem, made from this one
+        if problem.held is not None and self.law.barus:
+            problem.held = replace(problem.held, law=self.law)
         return problem if self.by is None else self.by.film(problem)
 
     def factored(self, problem: Any, j: NDArray[np.int64], i: NDArray[np.int64]) -> Any:

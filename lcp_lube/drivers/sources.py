@@ -16,12 +16,12 @@ import numpy as np
 from ..base.parallel import Array
 from ..problems.film.flows import volume_unit
 from ..problems.film.fluid import Law
+from ..problems.film.sources import balanced
 from ..problems.film.supplies import Supply, supply_flows
 from .linearised import Feed, Linear
 
 CONSTANT = Law()
 SWEEPS = 16  # of a step's film, once some steps have not put its signs right
-SMALL, SAME = 30, 1e-14  # steps of Newton's method for the pressures alone, and of these what rounding is
 
 
 def z_of(near: Any, p_unit: float) -> Array:
@@ -68,7 +68,8 @@ class Sources:
         try:
             d, *answers = linear.solve([G, *(feed.pushed(t) for t in feed.free)])
             flows = np.array(supply_flows(film, np.maximum(z, 0.0), np.maximum(-z, 0.0))) - feed.taken(d)
-            new = self._balanced(P[self.free], self.like * flows[self.free], self.like * feed.slopes(answers))
+            some = [one for one in self.supplies if one.open]
+            new = balanced(some, P[self.free], self.like * flows[self.free], self.like * feed.slopes(answers), self.law)
         finally:
             linear.destroy()
             feed.destroy()
@@ -77,22 +78,3 @@ class Sources:
         dP = np.zeros(P.size)
         dP[self.free] = new - P[self.free]
         return sum((by * answer for by, answer in zip(dP[self.free], answers, strict=True)), -d), dP
-
-    def _balanced(self, P: Array, flows: Array, slopes: Array) -> Array | None:
-        """Pressures at which the sources give flows + slopes (x - P)."""
-        x, some = P, [one for one in self.supplies if one.open]
-        for _ in range(SMALL):
-            with np.errstate(all="ignore"):
-                p, taken = self.law.pressure(x), flows + slopes @ (x - P)
-                off, by_p, by_flow = np.array([one.sought(*at) for one, *at in zip(some, p, taken, strict=True)]).T
-                matrix = by_flow[:, None] * slopes + np.diag(by_p * self.law.viscosity(p))  # dp/dq
-            if not (np.isfinite(matrix).all() and np.isfinite(off).all()):
-                return None
-            try:
-                dx = np.linalg.solve(matrix, -off)
-            except np.linalg.LinAlgError:
-                return None
-            x = x + dx
-            if np.max(np.abs(dx)) <= SAME * np.max(np.abs(x)):
-                break
-        return x if (x > 0.0).all() else None

@@ -22,7 +22,8 @@ from ..problems.facts import Facts
 from ..problems.film.cavity import cavity_sign
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
-from ..problems.film.supplies import Supply, supply_defects, supply_flows
+from ..problems.film.sources import supply_defects
+from ..problems.film.supplies import Supply, supply_flows
 from ..problems.solution import Enclosure, Fields, Outcome, Solution
 from ..scenes.scene import Derived, Scene, Solvable
 from .ask import Ask
@@ -80,7 +81,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     if model.stored is not None:
         from . import supply_step  # here: of marches alone
 
-        if (by_steps := supply_step.solve(scene, ask)) is not None:
+        if (by_steps := supply_step.solve(scene, ask, inner)) is not None:
             return by_steps
     shut = not model.grooves and not any(side.kind == "open" for side in model.sides[: 2 * len(scene.shape)])
     if shut and all(one.flow is not None for one in supplies):

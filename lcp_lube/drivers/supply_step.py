@@ -4,7 +4,7 @@
 here both are unknowns of each step (`sources`). A film of constant density is linear at its signs, and exact once these stay;
 of one whose density follows the pressure `density_step` takes the steps. Inside of the loop of `coupling` it is such a film
 that is solved, so that pressures and effects are found by one loop. Where film and supplies are symmetric about the middle of
-the width half is solved of large films.
+the width half is solved of large films. Multigrid has the pressures on its grids (`solvers/fas/following`).
 """
 
 from dataclasses import replace
@@ -22,6 +22,7 @@ from ..scenes.scene import Solvable
 from ..solvers.relaxation import relaxation
 from . import coupling, film_part, symmetry
 from .ask import Ask
+from .compose import Inner
 from .frozen import Frozen
 from .sources import CONSTANT, SWEEPS, Sources, z_of
 
@@ -30,14 +31,17 @@ MOST = 12  # steps, after which `supplies` takes over
 HALVED = 3000  # points of symmetric films from which two builds and half the factors cost less than one of each
 
 
-def solve(scene: Solvable, ask: Ask) -> Solution | None:
+def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution | None:
     """The film at the step's end with the pressures of its supplies; None where it is not found so. Collective."""
     model: Model = scene.model  # type: ignore[attr-defined]
-    plain = ask.method == "active-set" and not ask.certify and not model.grooves
-    if not plain or model.stored is None or ask.start is None or "supply_pressures" not in ask.start.settings:
+    begun = model.stored is not None and ask.start is not None and "supply_pressures" in ask.start.settings
+    if not begun or ask.certify or ask.method not in ("active-set", "fas"):
         return None
     try:
-        solution = coupling.solve(scene, ask, _film) if coupling.applies(scene, ask) else _film(scene, ask)
+        if ask.method == "fas":
+            solution = inner(scene, replace(ask, rescue=False))
+        else:
+            solution = coupling.solve(scene, ask, _film) if coupling.applies(scene, ask) else _film(scene, ask)
     except _NotFound:
         return None
     problem: Any = solution.problem

@@ -107,6 +107,10 @@ def solve_part(part: Part, problem: Problem, ask: Ask, inner: Inner) -> Solution
     fields = {name: spread(values) for name, values in solution.fields.items()}
     if (dry := getattr(small_problem, "dry", None)) is not None:
         problem = problem.revised(spread(dry))  # type: ignore[attr-defined]
+    if (held := getattr(small_problem, "held", None)) is not None:  # pressures of supplies may have followed
+        of_whole: Any = problem
+        pairs = zip(of_whole.held.supplies, held.supplies, strict=True)
+        of_whole.hold_at([replace(one, p=found.p) for one, found in pairs])
     spread.destroy()
     small_problem.destroy()
     settings = {

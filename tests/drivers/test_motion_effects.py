@@ -178,7 +178,7 @@ def test_pressures_of_supplies_follow(effect, monkeypatch):
     data |= {"fluid": {"mu": 0.03, "p_supply": 1e5, **fluid}, "motion": {"t_end": 0.003, "steps": 9}}
     data |= {"elastic": {"compliance": 1e-13}} if effect == "walls" else {}
     loads, counts = [], []
-    for way in (supply_step.solve, lambda scene, ask: None):  # and around films with given pressures
+    for way in (supply_step.solve, lambda *_: None):  # and around films with given pressures
         monkeypatch.setattr(supply_step, "solve", way)
         with solve(data, model="full") as solution:
             assert solution.converged and solution.mass_defect < 1e-10 and solution.mass_defect_run < 1e-10
@@ -210,3 +210,29 @@ def test_half_of_a_symmetric_film_and_its_supplies_is_solved(ny, monkeypatch):
             assert solution.converged and solution.mass_defect_run < 1e-10
             found.append([row["load"] for row in solution.history])
     assert looks[0] >= looks[1] + 4 and found[0] == pytest.approx(found[1], rel=1e-10)
+
+
+@pytest.mark.parametrize("effect", ["none", "density", "walls"])
+def test_pressures_of_supplies_follow_in_cycles_of_multigrid(effect):
+    """One more unknown each on every grid: the answer of Newton's method, in as many cycles as with given pressures."""
+    sources = [
+        {"restrictor": "capillary", "K": 4e-12, "p_s": 3e6},
+        {"restrictor": "orifice", "K": 4e-9, "p_s": 3e6},
+        {"flow": 2e-6},
+    ]
+    sides = [[6, 14], [3, 11], [6, 14]] if effect == "none" else [[6, 14]] * 3  # else half of the film is solved
+    places = [{"x_mm": [9 + 12 * k, 15 + 12 * k], "y_mm": y} for k, y in enumerate(sides)]
+    film = {"shape": "formula", "h": "4e-5*(1+20*x)*(1+0.3*sin(314*t))"}
+    data: dict[str, Any] = {"family": "bearing", "dimension": 2, "L": 0.05, "width": 0.02, "U": 2.0, "nx": 64, "ny": 40}
+    fluid = {"density": {"density": "dowson-higginson"}, "walls": {"barus": 2e-8}}.get(effect, {})
+    data |= {"film": film, "fluid": {"mu": 0.03, "p_supply": 1e5, **fluid}, "motion": {"t_end": 0.0012, "steps": 8}}
+    data |= {"supply": [{**x, **q} for x, q in zip(places, sources, strict=True)]}
+    data |= {"elastic": {"compliance": 1e-13}} if effect == "walls" else {}
+    found = []
+    for method in ("active-set", "fas"):
+        with solve(data, method=method) as solution:
+            assert solution.converged and solution.mass_defect < 1e-10 and solution.mass_defect_run < 1e-10
+            found.append([row["load"] for row in solution.history])
+            iterations = np.mean([row["iterations"] for row in solution.history[3:]])
+    assert found[1] == pytest.approx(found[0], rel=1e-4)  # the formula's error is some 1e-2
+    assert iterations <= (4.5 if effect == "walls" else 2.5)

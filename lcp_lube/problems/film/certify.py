@@ -12,8 +12,9 @@ from ..certificate import Certificate, certificate_tol
 from ..strips import MANY, each_strip, ghosted
 from .graded import GradedJacobian, Pivots, within_reach
 from .reynolds import side_points
+from .sources import supply_defects
 from .stored import storing
-from .supplies import pressed, supply_defects, supply_flows
+from .supplies import pressed, supply_flows
 
 if TYPE_CHECKING:
     from .lubrication import LubricationProblem

@@ -257,7 +257,8 @@ def answer(
         by = replace(by, values={**by.values, "mu": by.values["mu"] * at_face})
     held = base.held
     if held is not None and law.barus:  # back from q
-        held = replace(held, supplies=tuple(replace(one, p=float(law.pressure(np.array(one.p)))) for one in held.supplies))
+        supplies = tuple(replace(one, p=float(law.pressure(np.array(one.p)))) for one in held.supplies)
+        held = replace(held, supplies=supplies, law=None)
     film = scaled(base, by, mobility, p_sides, held)  # type: ignore[arg-type]
     film.thick = (base.mu, law) if law.barus and not cells else None
     if "lift" in cells:

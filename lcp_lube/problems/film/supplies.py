@@ -21,6 +21,7 @@ from ...base.parallel import Array
 from ...errors import InputError
 from ..grid import Grid
 from .flows import volume_unit
+from .fluid import Law
 from .reynolds import BoxScheme
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 
 MARGIN = 1e-9  # of a shape's extent: a point so near an edge is on it, and belongs to the supply
 NEAREST = 1e-4  # part of a spacing: a face to an edge that is nearer resists over this
-KNOWN, IDLE, ROUNDINGS = 1e-8, 1e-8, 64  # parts of a pressure and a flow that count as none; of 2^-53 in a supply's flows
+KNOWN = 1e-8  # part of a pressure that counts as none
 WAYS = ((0, -1), (0, 1), (-1, 0), (1, 0))  # dj, di to the neighbours west, east, south, north
 HALVINGS = 40  # of the interval in which an edge is looked for: derivatives see no steps, both cells of a face find the same
 
@@ -131,6 +132,11 @@ class Supply:
         """Whether its pressure has to be found."""
         return self.flow is not None or self.law is not None
 
+    @property
+    def half(self) -> Supply:
+        """What half of a film that is symmetric about it gets."""
+        return replace(self, K=0.5 * self.K, flow=None if self.flow is None else 0.5 * self.flow)
+
     def misfit(self, p: float, flow: float) -> tuple[float, float, float]:
         """What source and film disagree by where the film takes `flow` at the pressure p, and its derivatives by both.
 
@@ -170,10 +176,14 @@ class Supply:
 
 @dataclass(frozen=True)
 class Held:
-    """The supplies of a problem, and the number of the supply at each owned point, -1 outside, shape (ny, nx)."""
+    """The supplies of a problem, and the number of the supply at each owned point, -1 outside, shape (ny, nx).
+
+    law : whose q the supplies' p are; None: pressures.
+    """
 
     supplies: tuple[Supply, ...]
     owner: NDArray[np.int64]
+    law: Law | None = None
 
     @property
     def mask(self) -> NDArray[np.bool_]:
@@ -280,21 +290,3 @@ def supply_flows(problem: LubricationProblem, p: Array, r: Array) -> list[float]
     given = problem.face_flows(p, r).reshape(problem.grid.box)
     unit = volume_unit(problem)
     return [unit * problem.reduce.sum(np.where(held.owner == k, given, 0.0)) for k in range(len(held.supplies))]
-
-
-def supply_defects(problem: LubricationProblem, flows: Sequence[float]) -> list[float]:
-    """What each source gives and the film takes differ by, as `Supply.defect` tells; 0 where p is given. Collective.
-
-    flows : of `supply_flows`. A part of what the pressures drive through a supply's own faces is next to nothing.
-    """
-    held, s = problem.held, problem.scheme
-    if held is None or not any(one.open for one in held.supplies):
-        return []
-    unit = volume_unit(problem)
-    moved = unit * (s.diagonal * held.pressures(problem.p_unit) + np.abs(s.couette_W) + np.abs(s.couette_E))
-    pressed = [problem.reduce.sum(np.where(held.owner == k, moved, 0.0)) for k in range(len(flows))]
-    largest = max(map(abs, [*flows, *(one.flow or 0.0 for one in held.supplies)]))
-    return [
-        one.defect(one.p, flow, largest, IDLE * by, ROUNDINGS * 2.0**-53 * by) if one.open else 0.0
-        for one, flow, by in zip(held.supplies, flows, pressed, strict=True)
-    ]

@@ -18,11 +18,11 @@ import numpy as np
 from ...base.parallel import Array
 from ...problems.film.certify import filled
 from ...problems.film.lubrication import LubricationProblem
-from ...problems.film.stored import storing
 from ...problems.solution import Fields, Step
 from ..job import Job
 from ..method_options import one_of, option
 from ..newton import StalledError
+from .closing import closing
 from .cycles import COARSEST_SWEEPS, WINDOW, CycleOptions, Cycles
 
 EPS = float(np.finfo(float).eps)
@@ -32,7 +32,6 @@ DIRECT = 230  # points of the coarsest grid: elimination takes less time than th
 OWN = 17_000  # points of a problem that is then solved so itself
 EXTREME = 1000.0  # film ratio above which a small ||G|| says little of p, and the corrections have to be small too
 SETTLED = 1e-8  # of the largest pressure: what they may then be in the mean
-SCALED = 1e-3  # the most by which all pressures and voids are scaled (`Fas._balance`)
 CLOSE = 1e-6  # ||G|| below which a ring that is hardly fed is not what has stalled
 FED = 3e-5  # of the certificate's tolerance: the flow that a film with supplies may lose, 3e-12 in parts of what flows
 BORDER = 4  # lines on either side of the border between two ranks
@@ -64,10 +63,11 @@ class Fas(Cycles):
         super().__init__(job)
         problem, options, start = self.problem, self.options, job.start
         # numba starts with this import, 0.4 s: only where the method is used.
-        from . import finest, fronts, kernels, levels, loops
+        from . import finest, following, fronts, kernels, levels, loops
 
         self._kernels, self._fronts, self._loops, self._tools, self._finest = kernels, fronts, loops, levels, finest
         self._harmonic, self._truncation = options.weights == "harmonic", TRUNCATIONS[options.truncation]
+        follows = start is not None and following.foreseen(problem, start["p"])
         with self.stages("assembly"):
             self._levels = levels.hierarchy(finest.finest(problem), self._harmonic, DIRECT)
         # A corrected pressure counts beside a corrected flow of void as the flow that it drives: units of pressure are any.
@@ -83,6 +83,7 @@ class Fas(Cycles):
         self._extreme = problem.held is not None or problem.reduce.max(h) > EXTREME * problem.reduce.min(h)
         if start is not None:
             self.z = start["p"] + problem.scheme.b_C.ravel() * start["r"]
+        self._following: Any = following.Following(problem, self._levels, self.fields) if follows else None
         self.norm = self._first = self._norm()
         if start is not None and problem.scheme.storage is not None and options.rest:
             self._rest, self._share = max(self.eps1, min(options.rest * self.norm, self.eps1**0.5)), 0.5
@@ -134,22 +135,9 @@ class Fas(Cycles):
         for coarse in self._levels[1:]:
             coarse.rest()
         self.certificate = seen = self.problem.certify(self.fields, self.eps1)
-        lost = seen.measures["mass_defect"] / (self._share if self.problem.held is None else FED)
+        fed = self.problem.held is not None and self._levels[0].carry is None  # of a step `closing` leaves nothing
+        lost = seen.measures["mass_defect"] / (FED if fed else self._share)
         return max(norm, self._rest * max(lost, seen.measures["residual"] / self._share) / seen.tol)
-
-    def _balance(self) -> None:
-        """Scale pressures up and voids down, or the reverse, so that what enters the film is what it stores. Collective.
-
-        Either takes liquid out: together they do wherever any can leave. They change far less than what a cycle leaves.
-        """
-        lost, fields = [], self.fields
-        for part in (0.0, 1.0):
-            p, r = (1.0 + part) * fields["p"], (1.0 - part) * fields["r"]
-            west, east, south, north = self.problem.boundary_flows(p, r)
-            lost.append(west - east + south - north - storing(self.problem, p, r))
-        part = lost[0] / (lost[0] - lost[1]) if lost[0] != lost[1] else 0.0
-        if abs(part) < SCALED:
-            self.z = self.z + part * np.abs(self.z)
 
     def advance(self) -> Step:
         """Full multigrid, or one cycle; the step is what the coarse grids corrected. Collective.
@@ -177,8 +165,11 @@ class Fas(Cycles):
                 self._cycle(0, self._kind())
         self._count()
         with self.stages("norm"):
-            if self._levels[0].carry is not None and self.problem.held is None:
-                self._balance()
+            if self._levels[0].carry is not None:
+                part, pressures = closing(self.problem, self.fields, self._following)
+                self.z = self.z + part * np.abs(self.z)
+                if pressures is not None:
+                    self._following.put(pressures)
             self.norm = self._norm()
         if not np.isfinite(self.norm):
             self.z = np.zeros(self.problem.grid.local_size)  # as above
@@ -208,7 +199,8 @@ class Fas(Cycles):
         The finest grid that can be solved exactly takes their place: the problem's own one if it is small.
         """
         own = self._levels[0].nx * self._levels[0].ny
-        if self._levels[0].periodic[0] and own > OWN and self.norm > CLOSE:  # what goes round has no coarse grid
+        around = self._levels[0].periodic[0] and own > OWN and self.norm > CLOSE  # what goes round has no coarse grid
+        if around or self._following is not None:
             return False
         for points in EXACT if own > OWN else (OWN,):
             for k, level in enumerate(self._levels[: self._depth - 1]):
@@ -235,11 +227,15 @@ class Fas(Cycles):
         if not self._tools.solve(level):
             for s in range(2):
                 self._relax(level, max(COARSEST_SWEEPS, 2 * level.nx, 2 * level.ny) // 2, s == 1)
+        elif self._following:
+            self._following.solve(k)
 
     def _descend(self, k: int) -> None:
         level, coarse = self._levels[k], self._levels[k + 1]
         coarse.work_on()
         self._relax(level, self.options.pre, False)
+        if self._following:
+            self._following.relax(k)
         self._tools.held.settle(level)
         self._tools.restrict(level, coarse, coarse.c, self._harmonic)
         self._loops.inject(level.z, coarse.part(coarse.old), level.first, level.by_x, level.by_y)
@@ -248,12 +244,16 @@ class Fas(Cycles):
             np.multiply(coarse.old, coarse.scale, out=coarse.old, where=coarse.old < 0.0)
         coarse.z[:] = coarse.old
         self._loops.add_balance(coarse.old, coarse.kx, coarse.ky, coarse.c, coarse.carry)
+        if self._following:
+            self._following.descend(k)
 
     def _ascend(self, k: int) -> None:
         o, level, coarse = self.options, self._levels[k], self._levels[k + 1]
         where = (level.first, level.by_x, level.by_y)
         new, old = (coarse.part(coarse.seen(z)) for z in (coarse.z, coarse.old))
         fine = (level.z, new, old, level.kx, level.ky)
+        if self._following:
+            self._following.ascend(k)
         at_supplies = None if level.held is None else level.z[level.held]
         rules = (self._harmonic, self._truncation, level.periodic[0], self._unit)
         self._correction = self._loops.correct(*fine, *where, *rules)

@@ -22,10 +22,10 @@ def finest(problem: LubricationProblem) -> Level:
                 put(level, grid, into, values)
         carried(level)
     if problem.held is not None:
-        mask, pressures = np.zeros_like(level.z), np.zeros_like(level.z)
-        put(level, grid, mask, problem.held.mask.astype(float))
+        owner, pressures = np.zeros_like(level.z), np.zeros_like(level.z)
+        put(level, grid, owner, problem.held.owner + 1.0)
         put(level, grid, pressures, problem.held.pressures(problem.p_unit))
-        held.hold(level, mask, pressures)
+        held.hold(level, pressures, owner)
     return level
 
 

@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from .levels import Level
 
 
-def hold(level: Level, mask: Array, pressures: Array) -> None:
-    """Hold a level's cells; mask (1 where held) and pressures have frames that are up to date."""
-    level.held = mask > 0.0
+def hold(level: Level, pressures: Array, owner: Array) -> None:
+    """Hold a level's cells; pressures and owner (which supply's, from 1 on) have frames that are up to date."""
+    level.held, level.owner = owner > 0.0, np.rint(owner)
     level.spans = free_spans(level.held)
     level.given = pressures[level.held]
     level.z[level.held] = level.given
@@ -44,8 +44,9 @@ def coarser(fine: Level, coarse: Level) -> None:
     where = (fine.first, fine.by_x, fine.by_y)
     mask, pressures = fine.held.astype(float), np.where(fine.held, fine.z, 0.0)
     pressures[fine.held] = fine.given
-    of_coarse = [np.zeros_like(coarse.z) for _ in range(2)]
-    for values, out in zip((mask, pressures), of_coarse, strict=True):
+    of_fine = (mask, pressures, fine.owner)
+    of_coarse = [np.zeros_like(coarse.z) for _ in of_fine]
+    for values, out in zip(of_fine, of_coarse, strict=True):
         transfer.inject(values, coarse.part(out), *where)
         coarse.gather(out)
     seen = np.zeros_like(fine.z)
@@ -55,17 +56,17 @@ def coarser(fine: Level, coarse: Level) -> None:
     lonely = fine.held & (seen == 0.0)
     lonely[0], lonely[-1], lonely[:, 0], lonely[:, -1] = False, False, False, False
     fine.slips = lonely if lonely.any() else None  # what is swept as fronts are
-    parts = [np.zeros_like(coarse.z) for _ in range(2)]
-    for values, out in zip((mask, pressures), parts, strict=True):
+    parts = [np.zeros_like(coarse.z) for _ in of_fine]
+    for values, out in zip(of_fine, parts, strict=True):
         given = np.where(lonely, values, 0.0)
         into = (fine.z, *ones, given, coarse.part(out))
         transfer.restrict(*into, *where, False, fine.periodic[0], False, None)  # type: ignore[arg-type]
         coarse.collect(out)
         coarse.share(out)
     added = (parts[0] > 0.0) & (of_coarse[0] == 0.0)
-    of_coarse[0][added] = 1.0
-    of_coarse[1][added] = parts[1][added] / parts[0][added]
-    hold(coarse, *of_coarse)
+    for out, part in zip(of_coarse[1:], parts[1:], strict=True):
+        out[added] = part[added] / parts[0][added]
+    hold(coarse, *of_coarse[1:])
 
 
 def marked(level: Level) -> tuple[Array, Array]:

@@ -34,8 +34,8 @@ class Level:
     by_x, by_y : which points the next coarser grid leaves out.
     carry : of a time step (`kernels`); void : what it is made of, what of b_C r leaves, what is stored of it, and what cells
         store more by p = 1; scale : z of a cavitated cell over that of the finer grid's, which is smaller.
-    held, given, spans, slips : of a film with supplies (`held`): which points are held, their pressures, the runs of free
-        points, and the held points that the next coarser grid sees beside their place.
+    held, owner, given, spans, slips : of a film with supplies (`held`): which points are held, by which supply (from 1 on),
+        their pressures, the runs of free points, and the held points that the next coarser grid sees beside their place.
     """
 
     nx: int
@@ -56,6 +56,7 @@ class Level:
     void: Array | None = None
     scale: Array | None = None
     held: NDArray[np.bool_] | None = None
+    owner: Array = field(default_factory=lambda: np.zeros((0, 0)))
     given: Array = field(default_factory=lambda: np.zeros(0))
     spans: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int32))
     slips: NDArray[np.bool_] | None = None
