@@ -20,9 +20,9 @@ from ..base.parallel import Array
 from ..errors import InputError
 from ..problems.facts import Facts
 from ..problems.film.cavity import cavity_sign
+from ..problems.film.certify import supply_defects
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
-from ..problems.film.sources import supply_defects
 from ..problems.film.supplies import Supply, supply_flows
 from ..problems.solution import Enclosure, Fields, Outcome, Solution
 from ..scenes.scene import Derived, Scene, Solvable

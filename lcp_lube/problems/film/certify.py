@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 UNIT = 2.0**-53  # largest relative error of one operation
 IDLE = 1e-8  # share of what the pressures alone would drive through the sides, below which a flow is none
+ROUNDINGS = 64  # of 2^-53 in a supply's flows
 UNEVEN = 1e-4  # part of the flow that the rounding of pressures inside may make of a mass defect, at most
 BLOCK = 16_384  # cells of a line that are looked at together
 LEAST = 1e-200  # below any void or pressure
@@ -216,6 +217,25 @@ def cell_misfit(
     pushed = np.minimum(np.maximum(k * p_max / -b_C, LEAST), 1.0)
     gap = np.abs(np.minimum(here / (p_max or 1.0), void / pushed))
     return a, b, left, k * here, b_C, size + k * above, worst, gap
+
+
+def supply_defects(problem: "LubricationProblem", flows: Sequence[float]) -> list[float]:
+    """What each source gives and the film takes differ by, as `Supply.defect` tells; 0 where p is given. Collective.
+
+    flows : of `supply_flows`. A part of what the pressures drive through a supply's own faces is next to nothing.
+    """
+    held, s = problem.held, problem.scheme
+    if held is None or not any(one.open for one in held.supplies):
+        return []
+    unit, P = volume_unit(problem), np.array([one.p for one in held.supplies])
+    P = P if held.law is None else held.law.pressure(P)
+    moved = unit * (s.diagonal * held.pressures(problem.p_unit) + np.abs(s.couette_W) + np.abs(s.couette_E))
+    pressed = [problem.reduce.sum(np.where(held.owner == k, moved, 0.0)) for k in range(len(flows))]
+    largest = max(map(abs, [*flows, *(one.flow or 0.0 for one in held.supplies)]))
+    return [
+        one.defect(p, flow, largest, IDLE * by, ROUNDINGS * UNIT * by) if one.open else 0.0
+        for one, p, flow, by in zip(held.supplies, P.tolist(), flows, pressed, strict=True)
+    ]
 
 
 def mass_defect(problem: "LubricationProblem", p: Array, r: Array, supplies: Sequence[float], found: Misfits) -> float:
