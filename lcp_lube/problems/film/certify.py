@@ -10,9 +10,9 @@ from ...base.compiled import has_numba
 from ...base.parallel import Array
 from ..certificate import Certificate, certificate_tol
 from ..strips import MANY, each_strip, ghosted
+from .flows import volume_unit
 from .graded import GradedJacobian, Pivots, within_reach
 from .reynolds import side_points
-from .sources import supply_defects
 from .stored import storing
 from .supplies import pressed, supply_flows
 
