@@ -122,6 +122,13 @@ def test_deep_dimples_are_not_handed_over(changes):
     other.destroy()
 
 
+@pytest.mark.parametrize("name, n, most", [("problem4", 1023, 1), ("journal", 127, 1)])
+def test_one_cycle_after_full_multigrid_does(name, n, most):
+    """A cubic start and overrelaxed strips at the fronts: to 1e-6 smooth films took two cycles."""
+    with run(name, {"nx": n, "ny": n}, stopping={"eps1": 1e-6}) as solution:
+        assert solution.converged and solution.settings["details"]["cycles"] <= most
+
+
 class Pad:
     """A tilted pad with a square pocket."""
 

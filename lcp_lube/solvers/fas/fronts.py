@@ -7,16 +7,28 @@ from ...base.compiled import kernel
 from ...base.parallel import Array
 
 REACH = 8  # cells within which a cavity ends, if it does so at the front that is looked at
+RARE, WIDER = 0.1, 5  # part of the points that a strip this many times as wide may take
+OVER, LAST = 1.7, 2  # overrelaxation of the sweeps near fronts, but for so many that leave smooth what remains
 
 
 @kernel
 def relax_pairs(
-    z: Array, kx: Array, ky: Array, c: Array, m: int, start: int, end: int, carry: Array | None = None, ring: bool = False
+    z: Array,
+    kx: Array,
+    ky: Array,
+    c: Array,
+    m: int,
+    start: int,
+    end: int,
+    carry: Array | None = None,
+    ring: bool = False,
+    over: float = 1.0,
 ) -> None:
     """`relax`, but a point of full film behind a cavitated one is solved for together with that one.
 
     What flows back from it into the cavity returns as void: in a deep dimple that is much more than what flows on, and the
-    point by itself, which takes the void for given, would hardly move.
+    point by itself, which takes the void for given, would hardly move. over : by how much more than what its balance asks for
+    a point moves that was full and stays so.
     """
     nx = z.shape[1] - 2
     west = z[m, start - 1]
@@ -27,13 +39,16 @@ def relax_pairs(
         passed, gives = (1.0, 0.0) if carry is None else (carry[0, m, i - 1], carry[1, m, i])
         t += k_W * west if west > 0.0 else passed * west
         if here > 0.0 and west <= 0.0 and (i > start or (ring and i == 1)):
-            over = k_E + k_S + k_N if carry is None else k_E + k_S + k_N + (1.0 - passed) * k_W + gives
-            p = (t - passed * k_W * here) / over if over > 0.0 else 0.0
+            sent = k_E + k_S + k_N if carry is None else k_E + k_S + k_N + (1.0 - passed) * k_W + gives
+            p = (t - passed * k_W * here) / sent if sent > 0.0 else 0.0
             before = west + k_W * (p - here)
             if p > 0.0 and before <= 0.0:
                 z[m, i - 1 if i > 1 else nx], z[m, i], west = before, p, p
                 continue
         west = t / (k_W + k_E + k_S + k_N + gives) if t > 0.0 else t
+        if over > 1.0 and west > 0.0 and here > 0.0:
+            further = here + over * (west - here)
+            west = further if further > 0.0 else west
         z[m, i] = west
     if ring and (start == 1 or end == nx + 1):
         z[m, 0], z[m, nx + 1] = z[m, nx], z[m, 1]
@@ -57,23 +72,27 @@ def relax_front(
     held : points that are left out; slips : those of them about which points are swept as they are at fronts; ring : the
     ends of a line are neighbours, and kept so.
 
-    Where fronts are rare, and twice as wide a strip takes in less than a tenth of the points, it is that, swept twice as often.
+    Where fronts are rare, and strips of twice or WIDER times the width take in less than a tenth of the points, it is these,
+    swept twice as often. Only in steady films without supplies the sweeps overrelax, in strips of more than twice the width.
     """
+    plain = carry is None and held is None
+    wider, most = (WIDER, OVER) if plain else (2, 1.0)
     nx = z.shape[1] - 2
-    seen = z if slips is None else np.where(slips, -1.0, z)
-    spans, found = front_spans(seen, 2 * width, ring)
+    seen, rare = z if slips is None else np.where(slips, -1.0, z), RARE * (z.shape[0] - 2) * nx
+    spans, found = front_spans(seen, wider * width, ring)
     points = (spans[:found, 2] - spans[:found, 1]).sum()
-    if points > 0.1 * (z.shape[0] - 2) * nx:
-        spans, found = front_spans(seen, width, ring)
-        points = (spans[:found, 2] - spans[:found, 1]).sum()
-    else:
+    if points <= 0.5 * wider * rare:
         count *= 2
+    if points > rare:
+        spans, found = front_spans(seen, 2 * width if points <= 0.5 * wider * rare else width, ring)
+        points = (spans[:found, 2] - spans[:found, 1]).sum()
     if held is not None:
         spans, found = without(spans, found, held)
     for s in range(count):
+        over = most if s < count - LAST else 1.0
         for k in range(found):
             at = found - 1 - k if s % 2 == 1 else k
-            relax_pairs(z, kx, ky, c, spans[at, 0], spans[at, 1], spans[at, 2], carry, ring)
+            relax_pairs(z, kx, ky, c, spans[at, 0], spans[at, 1], spans[at, 2], carry, ring, over)
     return count * points
 
 

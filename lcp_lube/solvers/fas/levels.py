@@ -9,7 +9,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ...base.parallel import Array
-from . import coarsen, exact, held, loops, transfer
+from . import coarsen, exact, held, loops, starts, transfer
 
 FEWEST = 3  # points a side of the coarsest grid, at least
 FEWEST_LINES = 16  # of a rank; grids with fewer are held whole by every rank. With 8 a dimpled pad stalls on three
@@ -126,6 +126,13 @@ class Level:
         return z if self.scale is None else np.where(z < 0.0, z / self.scale, z)
 
     @property
+    def sides(self) -> tuple[bool, bool, bool, bool]:
+        """Whether the coarser grid's frame has a side to the west, east, south and north, a whole mesh of that grid away."""
+        x, y = (not ring for ring in self.periodic)
+        south, north = (not self.split or self.y0 == 0), (not self.split or self.y1 == self.ny)
+        return x, x and self.nx % 2 == 1, y and south, y and north and self.ny % 2 == 1
+
+    @property
     def split(self) -> bool:
         """Whether other ranks hold other lines."""
         return self.comm is not None and not self.whole
@@ -228,6 +235,12 @@ def right_sides(levels: Sequence[Level], harmonic: bool) -> None:
         restrict(fine, coarse, coarse.c, harmonic, fine.c)
     if levels[-1].held is not None:
         levels[-1].c[levels[-1].held] = 0.0
+
+
+def smooth(level: Level) -> bool:
+    """Whether the film has no steps that this grid sees (`starts.smooth`). Collective."""
+    found = starts.smooth(level.kx, level.ky)
+    return found if level.comm is None else level.comm.allreduce(found, MPI.LAND)
 
 
 def solve(level: Level) -> bool:

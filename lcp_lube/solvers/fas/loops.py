@@ -14,7 +14,7 @@ from ...problems.film.reynolds import BoxScheme
 from ...problems.grid import Grid
 from ...problems.solution import Fields
 from ...problems.strips import each_strip
-from . import kernels, transfer
+from . import kernels, starts, transfer
 from .waiting import LINE, SLOTS
 
 COLUMNS = 128  # of a part of a line, at least
@@ -47,7 +47,7 @@ def correct(z: Array, *others: Any) -> float:
 
 
 def interpolate(z: Array, *others: Any) -> None:
-    _by_rows(lambda start, end: transfer.interpolate(*(z, *others, start, end)), z)
+    _by_rows(lambda start, end: starts.interpolate(*(z, *others, start, end)), z)
 
 
 def restrict(z: Array, kx: Array, ky: Array, c: Array, out: Array, *others: Any) -> None:

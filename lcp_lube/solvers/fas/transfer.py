@@ -1,4 +1,4 @@
-"""Between a grid and the next coarser one: residuals, corrections and starts; arrays as in `kernels`."""
+"""Between a grid and the next coarser one: residuals and corrections; arrays as in `kernels`."""
 
 import numpy as np
 
@@ -224,33 +224,3 @@ def mix(south: Array, north: Array, ky: Array, m: int, harmonic: bool, out: Arra
     for i in range(1, out.size - 1):
         v = share(ky[m, i], ky[m + 1, i], harmonic)
         out[i] = v * south[i] + (1.0 - v) * north[i]
-
-
-@kernel
-def interpolate(
-    z: Array, coarse: Array, kx: Array, ky: Array, y0: int, by_x: bool, by_y: bool, harmonic: bool, start: int, end: int
-) -> None:
-    """Rows start to end - 1 of a start from the coarse grid's answer: p and q interpolated one by one, the larger flow decides
-    which one a point has."""
-    nx, size = z.shape[1] - 2, coarse.shape[1]
-    w, part, flows = np.zeros(size - 1), np.zeros(size), np.zeros((2, nx + 2))  # flows: p, q
-    south, north = np.zeros(nx + 2), np.zeros(nx + 2)
-    for m in range(start, end):
-        row, last = coarse_rows(y0 + m - 1, y0, m, by_y)
-        if by_x:
-            west_shares(kx, m, harmonic, w)
-        for s in range(2):
-            sign = 1.0 - 2.0 * s
-            for k in range(size):
-                part[k] = max(sign * coarse[row, k], 0.0)
-            interpolate_row(part, w, by_x, south)
-            for k in range(size):
-                part[k] = max(sign * coarse[last, k], 0.0)
-            interpolate_row(part, w, by_x, north)
-            if last > row:
-                mix(south, north, ky, m, harmonic, flows[s])
-            else:
-                flows[s] = south
-        for i in range(1, nx + 1):
-            p, q = flows[0, i], flows[1, i]
-            z[m, i] = p if p * (kx[m, i] + kx[m, i + 1] + ky[m, i] + ky[m + 1, i]) > q else -q

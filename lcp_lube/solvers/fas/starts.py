@@ -1,0 +1,109 @@
+"""Full multigrid's start on a grid from the next coarser one's answer; arrays as in `kernels`."""
+
+import numpy as np
+
+from ...base.compiled import kernel
+from ...base.parallel import Array
+from .transfer import coarse_rows, interpolate_row, mix, west_shares
+
+SMOOTH = 1.5  # by so much at most conductances of neighbouring faces differ where a film is smooth
+
+
+@kernel
+def interpolate(
+    z: Array,
+    coarse: Array,
+    kx: Array,
+    ky: Array,
+    y0: int,
+    by_x: bool,
+    by_y: bool,
+    harmonic: bool,
+    is_smooth: bool,
+    sides: tuple[bool, bool, bool, bool],
+    start: int,
+    end: int,
+) -> None:
+    """Rows start to end - 1 of a start from the coarse grid's answer: p and q interpolated one by one, the larger flow decides
+    which one a point has.
+
+    Where the film is full, and smooth everywhere (`smooth`), p is a cubic polynomial's. sides : whether what the frame has to
+    the west, east, south and north are sides' pressures, a coarse mesh beyond the last coarse points.
+    """
+    nx, size, rows, top = z.shape[1] - 2, coarse.shape[1], coarse.shape[0], ky.shape[0] - 2
+    w, part, flows = np.zeros(size - 1), np.zeros(size), np.zeros((2, nx + 2))  # flows: p, q
+    south, north, bend, step = np.zeros(nx + 2), np.zeros(nx + 2), np.zeros(nx + 2), 2 if by_x else 1
+    for m in range(start, end):
+        row, last = coarse_rows(y0 + m - 1, y0, m, by_y)
+        if by_x:
+            west_shares(kx, m, harmonic, w)
+        for s in (1, 0):  # p last: its rows are used below
+            sign = 1.0 - 2.0 * s
+            for line, out in ((row, south), (last, north)):
+                for k in range(size):
+                    part[k] = max(sign * coarse[line, k], 0.0)
+                interpolate_row(part, w, by_x, out)
+                if by_x and s == 0 and is_smooth:
+                    smooth_row(part, kx, m, sides[0], sides[1], out)
+            if last > row:
+                mix(south, north, ky, m, harmonic, flows[s])
+            else:
+                flows[s] = south
+        if last > row and rows >= 4 and is_smooth:
+            r, wa, wb, wc, wd = cubic(row, rows)
+            for k in range(size):
+                i = min(step * k, nx)
+                first, final = r == 0 and sides[2] and ky[1, i] > 0.0, r + 4 == rows and sides[3] and ky[top, i] > 0.0
+                a, b, c, d = coarse[r, k], coarse[r + 1, k], coarse[r + 2, k], coarse[r + 3, k]
+                full = (a > 0.0 or first) and b > 0.0 and c > 0.0 and (d > 0.0 or final)
+                p = (wa * a + wb * b) + (wc * c + wd * d) if full else np.nan
+                # Beyond a side p does not vary along it.
+                part[k] = 0.0 if sides[0] and (k == 0 or k == size - 1) else p - 0.5 * (coarse[row, k] + coarse[last, k])
+            interpolate_row(part, w, by_x, bend)
+            for i in range(1, nx + 1):
+                p = 0.5 * (south[i] + north[i]) + bend[i]
+                if p > 0.0:
+                    flows[0, i] = p
+        for i in range(1, nx + 1):
+            p, q = flows[0, i], flows[1, i]
+            z[m, i] = p if p * (kx[m, i] + kx[m, i + 1] + ky[m, i] + ky[m + 1, i]) > q else -q
+
+
+@kernel
+def cubic(k: int, n: int) -> tuple[int, float, float, float, float]:
+    """The first of four of n values, at least, and their weights in what the cubic polynomial through them has in the middle
+    between values k and k + 1."""
+    if k == 0:
+        return 0, 0.3125, 0.9375, -0.3125, 0.0625
+    if k >= n - 2:
+        return n - 4, 0.0625, -0.3125, 0.9375, 0.3125
+    return k - 1, -0.0625, 0.5625, 0.5625, -0.0625
+
+
+@kernel
+def smooth_row(coarse: Array, kx: Array, m: int, west: bool, east: bool, out: Array) -> None:
+    """The pressures of a line between two coarse points where the film is full and smooth. west, east : as `sides`."""
+    n, last = coarse.size, kx.shape[1] - 2
+    west, east = west and kx[m, 1] > 0.0, east and kx[m, last] > 0.0
+    for k in range(min(out.size // 2, n - 1) if n >= 4 else 0):
+        r, wa, wb, wc, wd = cubic(k, n)
+        a, b, c, d = coarse[r], coarse[r + 1], coarse[r + 2], coarse[r + 3]
+        p = (wa * a + wb * b) + (wc * c + wd * d)
+        if p > 0.0 and (a > 0.0 or (r == 0 and west)) and b > 0.0 and c > 0.0 and (d > 0.0 or (r + 4 == n and east)):
+            out[2 * k + 1] = p
+
+
+@kernel
+def smooth(kx: Array, ky: Array) -> bool:
+    """Whether no two neighbouring faces, but at sides, conduct so differently that the film has a step there. Beside steps
+    pressures have kinks, and in a deep pocket the weights by conductances keep what differs by next to nothing."""
+    steps = 0
+    for m in range(1, kx.shape[0] - 1):
+        for i in range(2, kx.shape[1] - 3):
+            a, b = kx[m, i], kx[m, i + 1]
+            steps += (a > SMOOTH * b) | (b > SMOOTH * a)
+    for m in range(2, ky.shape[0] - 3):
+        for i in range(1, ky.shape[1] - 1):
+            a, b = ky[m, i], ky[m + 1, i]
+            steps += (a > SMOOTH * b) | (b > SMOOTH * a)
+    return steps == 0
