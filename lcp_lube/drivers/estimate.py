@@ -159,6 +159,8 @@ def _of_film(steps: np.ndarray, misplaced: Sequence[float], value: float) -> flo
 def follow(numbers: dict[str, Any], quantity: str, value: float, best: float) -> None:
     """Put the best value in the place of the grid's own, and let what is this number times others follow, in place."""
     numbers[quantity] = best
+    if not value:  # nothing has no direction, and nothing to scale by
+        return
     for name, power in FOLLOWING.get(quantity, {}).items():
         if numbers.get(name) is not None:
             numbers[name] *= (best / value) ** power

@@ -352,6 +352,8 @@ def test_finest_grid_allowed(cli):
     assert run.json["outcome"] == "accuracy_not_reached"
     assert run.json["nx"] <= 60
     assert "60 is not allowed" in run.json["message"]
+    run = cli("solve", "problem4", "--accuracy", "1e-7", "--n", 45)
+    assert run.status == 1 and "extrapolated, this grid's own is" in run.out
     run = cli("solve", "problem1", "--quantity", "load")
     assert run.status == 2
     assert "--accuracy TOL is needed" in run.err
@@ -385,3 +387,13 @@ def test_a_load_on_a_ring_with_grooves_to_a_per_cent():
     with solve(scene, accuracy=1e-2) as found:
         assert found.converged and found.problem.grid.shape == (288, 15)
         assert abs(found.load / 1554.3 - 1) < 1e-2  # limit of 720 and 1440 points around
+
+
+def test_a_film_that_carries_nothing_ends_early_and_says_so():
+    """A dimple in a flat film, no pressure around: its load is rounding, which no grid brings to a per cent."""
+    film = [{"shape": "constant", "h": 5e-6}, {"shape": "dimples", "depth": 3e-6, "columns": 1, "rows": 1, "size": 3e-3}]
+    data = {"family": "bearing", "dimension": 2, "L": 0.01, "width": 0.01, "U": 1.0, "n": 60, "film": film}
+    with solve({**data, "fluid": {"mu": 0.01, "p_supply": 0.0}}, accuracy=1e-2) as found:
+        assert abs(found.load) < 1e-9
+        assert found.problem.grid.size < 300**2
+        assert found.converged or (found.outcome == "accuracy_not_reached" and "rounding" in found.message)
