@@ -197,7 +197,7 @@ def _end(estimates: Sequence[float], values: Sequence[float], tol: float, points
 
 
 def _rounding(problem: Any) -> float:
-    """What rounding of the flows may make of an integral of the pressure, N: a film that carries nothing has that. Collective."""
+    """What rounding of the flows may make of an integral of the pressure, N: all that some films carry. Collective."""
     wall = 6.0 * problem.mu * abs(problem.U) * problem.grid.lengths[0] / problem.reduce.min(problem.scheme.h.ravel()) ** 2
     return 10.0 * np.finfo(float).eps * max(wall, *problem.p_sides) * prod(problem.grid.lengths)
 
