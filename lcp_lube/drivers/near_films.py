@@ -1,4 +1,4 @@
-"""L of a film's integrals and of its largest pressure at scenes near by, without problems: what they change of lambda' G.
+"""L of a film's integrals, drag and largest pressure at scenes near by, without problems: what they change of lambda' G.
 
 A problem's coefficients and its balance cost many times what its film at the faces does (`problems/film/by_faces`), and a
 viscosity, a speed or a pressure of a side costs nothing, as the balance is linear in them.
@@ -25,7 +25,7 @@ from ..problems.grid import Grid
 from ..problems.strips import moved
 from ..registry import SMALL
 from ..scenes.scene import Scene
-from .equations import Equations, followed
+from .equations import DRAGS, Equations, followed
 from .turned import Mirrored
 
 FREE = {"gap", "mu", "U", "p_unit", "p_c", "sides", "exact", "extras", "shaft", "levers", "law"}  # what may differ
@@ -33,7 +33,7 @@ FREE |= {"lengths", "polar", "places"}  # where its lines of points lie
 
 
 class NearFilms:
-    """lambda' G, and the numbers that the pressure alone makes, of films on as many points. Collective, as its method.
+    """lambda' G, and the numbers that pressure and drag make, of films on as many points. Collective, as its method.
 
     Parameters
     ----------
@@ -55,7 +55,9 @@ class NearFilms:
         self.wanted = {part for one in parts.values() for part in one}
         constant = not (equations.law and equations.law.dowson_higginson)
         alone = constant and can(equations.constant, self.model, SMALL)
-        self.known = alone and self.wanted <= {*forces.weights(equations.constant), "p_max"}
+        self.drags = tuple(name for name in DRAGS if name in self.wanted)
+        by_p = {*forces.weights(equations.constant), "p_max"}
+        self.known = alone and self.wanted <= by_p | (set() if equations.law else {*DRAGS})
 
     @cached_property
     def _own(self) -> ByFaces:
@@ -63,7 +65,7 @@ class NearFilms:
 
     def _by_faces(self, law: Law) -> ByFaces:
         problem, rows = self.equations.constant, list(self.lambdas.values())
-        return ByFaces(problem, self.model.scheme, law.reduced(self.p), self.r, rows)
+        return ByFaces(problem, self.model.scheme, law.reduced(self.p), self.r, rows, self.drags)
 
     @cached_property
     def _here(self) -> Array | None:
@@ -78,7 +80,7 @@ class NearFilms:
         found = forces.totals(problem, self.p, wanted=self.wanted, columns=self._columns)
         if "p_max" in self.wanted:
             found["p_max"] = largest_pressure(problem, self.p)[0] + problem.p_c
-        return self.numbers | {name: found[name] for name in self.wanted}
+        return self.numbers | {name: found[name] for name in self.wanted.difference(DRAGS)}
 
     def lagrangians(self, scene: Scene) -> Array | None:
         """L of every quantity; None where it is not that of another film at these points."""
@@ -94,7 +96,9 @@ class NearFilms:
         if grid is None or sums is None:
             return None
         q_sides = [float(law.reduced(np.array(p))) for p in p_sides]
-        G = (sums[:, 0] + sums[:, 2:] @ np.array(q_sides)) / model.mu + model.U * sums[:, 1]
+        pressed, dragged = sums[:, 0] + sums[:, 2:] @ np.array(q_sides), model.U * sums[:, 1]
+        G = (pressed / model.mu + dragged)[: len(self.lambdas)]
+        drags = (-1.0 if eq.turned else 1.0) * (pressed + model.mu * dragged)[len(self.lambdas) :]
         lean, near = copy(eq), copy(eq.constant)
         near.grid = grid
         near.mu, near.U, near.p_c, near.p_sides = model.mu, model.U, model.p_c, p_sides  # type: ignore[assignment]
@@ -102,7 +106,8 @@ class NearFilms:
         near.levers, own = model.levers, self.model
         same = (eq._p_sides, eq.constant.p_c) == (p_sides, near.p_c) and grid is eq.grid
         same = same and _same((own.shaft, own.levers), (near.shaft, near.levers))
-        report = lean.report(self._told if same else self._totals(near))
+        numbers = self._told if same else self._totals(near)
+        report = lean.report(numbers | dict(zip(self.drags, map(float, drags), strict=True)))
         return np.array([report[name] for name in self.lambdas]) - G / eq.constant.scheme.flow_unit
 
     def _sums(self, gap: Any, law: Law, grid: Grid) -> Array | None:

@@ -43,7 +43,9 @@ def test_films_near_by_have_the_lagrangians_of_their_problems(monkeypatch, name)
     monkeypatch.setattr(near_films, "SMALL", 1)
     scene = made(name)
     with solve(scene, reduction=False) as solution:
-        adjoint = Adjoint(scene, solution, ["load", "p_max"])
+        drags = ["friction"] if name != "fed" else []  # a fluid with a law drags by its own viscosity
+        drags += ["friction_torque"] if name == "thrust" else []
+        adjoint = Adjoint(scene, solution, ["load", "p_max", *drags])
         sizes, found = np.array(list(adjoint.sizes.values())), 0
         for key, value in values_of(adjoint.scene).items():
             if not value:

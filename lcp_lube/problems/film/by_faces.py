@@ -5,7 +5,8 @@ With G_i the balance of a point (`reynolds`), w' G is linear in the conductances
     w' G = sum of C k (w_i - w_j)(p_i - p_j)/(6 mu)  +  U sum of H s (w_i - w_j)(1 - r_i),
 
 k and s being products of what a column and what a line of the grid has. Where a film is the same along y from edge to edge, the
-lines between two edges are added up once, and another film costs its values on one of them.
+lines between two edges are added up once, and another film costs its values on one of them. The drag at the wall (`flows.drag`)
+is such a sum too, of h and 1/h at the faces.
 """
 
 from collections.abc import Iterator, Sequence
@@ -18,6 +19,7 @@ from ...base.parallel import Array
 from ..grid import Grid
 from ..strips import STRIP, ghosted, in_strips
 from .edges import Around, face_film, jumps_of, level, pairs
+from .flows import line_shares, sheared_lines
 from .lubrication import LubricationProblem
 from .reynolds import sides
 from .strip import line_weights, stream_weights
@@ -33,9 +35,12 @@ class ByFaces:
     Parameters
     ----------
     q : owned points, Pa above p_c; of Barus' law the reduced pressure. r : owned points. rows : the weights w.
+    drags : of them `friction` and `friction_torque`, which follow the rows' sums; where q is the pressure.
     """
 
-    def __init__(self, problem: LubricationProblem, scheme: str, q: Array, r: Array, rows: Sequence[Array]):
+    def __init__(
+        self, problem: LubricationProblem, scheme: str, q: Array, r: Array, rows: Sequence[Array], drags: Sequence[str] = ()
+    ):
         from .cell_loops import loop_by_faces
 
         self.grid = grid = problem.grid
@@ -48,9 +53,9 @@ class ByFaces:
         frames = ghosted(grid, q, 0.0), ghosted(grid, r, enters)
         for lines in in_strips(grid):
             faces = slice(lines.start, lines.stop + 1)
-            p, r = (frame(lines) for frame in frames)
+            near_p, near_r = (frame(lines) for frame in frames)
             for k in range(self.count):
-                loop_by_faces(w[k][lines], p, r, along[k, lines], across[k, faces], wall[k, lines], void[k, lines])
+                loop_by_faces(w[k][lines], near_p, near_r, along[k, lines], across[k, faces], wall[k, lines], void[k, lines])
         for end, owned in ((0, grid.y_start == 0), (-1, grid.y_end == grid.shape[1])):
             if owned and grid.ends[1][end] in ("closed", "mirror"):
                 across[:, end] = 0.0
@@ -59,11 +64,19 @@ class ByFaces:
         west, east, south, north = (float(mask.any()) for mask in sides(grid))
         self._beside = [-mask * np.array([one[:, at] for one in w]) for mask, at in ((west, slice(1)), (east, slice(-1, None)))]
         self._ends = -south * np.array([one[0] for one in w]), -north * np.array([one[-1] for one in w])
+        self.drags, self._nodal = drags, scheme == "nodal"
+        if drags:
+            own = np.append(west, np.ones(nx))  # the first face is the neighbour's, but at a side
+            self._pull = own * np.diff(grid.ghosted(q, 0.0)[1:-1])[None]
+            self._whole = np.broadcast_to(own, self._pull.shape)
+            self._void = -np.insert(r.reshape(grid.box), 0, 0.0, axis=1)[None]
+            self._outer = [np.full((1, ny, 1), side) for side in (-west, east)]
         self._known: dict[tuple[int, bytes], tuple[Array, Array]] = {}
 
     def sums(self, gap: Any, grid: Grid) -> Array | None:
         """What the pressures (m2/s Pa s) and the wall (m) make of each, and by what it grows with each side's pressure: shape
-        (weights, 6); None for a film that is not positive. grid : the problem's, or the same points elsewhere."""
+        (weights, 6); None for a film that is not positive. Of drags what the pressures (N) and mu U (m) make.
+        grid : the problem's, or the same points elsewhere."""
         film, (y_nodes, y_faces) = Around(gap, grid), grid.nodes_and_faces(1)
         cut = [jumps_of(film, axis) for axis in "xy"]
         y, across = grid.y[:, 0], pairs(grid.steps(1))
@@ -71,21 +84,28 @@ class ByFaces:
         if level(film):
             lines = _alike(cut[1], y - 0.5 * across[0], y + 0.5 * across[1])
             faces = _alike(cut[1], *pairs(y_nodes))
-        out, positive = np.zeros((self.count, 6)), True
+        out, positive = np.zeros((self.count + len(self.drags), 6)), True
+        balances = out[: self.count]
         of_lines, of_faces = self._parts(grid, lines, faces)
+        of_drags = self._drag_parts(grid, lines) if self.drags else []
         for some, rows in _strips(lines, grid.box[1]):
             C, H, before = _along(film, grid, y[rows], across[:, rows], cut)
             positive = positive and all(bool((a > 0.0).all()) for a in (C, H, before))
+            if self.drags and positive:
+                films = self._sheared(film, grid, y[rows], across[:, rows], before / H)
+                for k, parts in enumerate(of_drags, start=self.count):
+                    for column, part, of in zip((0, 1, 1, 2, 3), parts, films, strict=True):
+                        out[k, column] += _total(part, some, of)[0]
             C = C / grid.steps(0)
-            for k, part, films in zip((0, 1, 1, 2, 3), of_lines, (C, H, before, C[:, :1], C[:, -1:]), strict=True):
+            for k, part, values in zip((0, 1, 1, 2, 3), of_lines, (C, H, before, C[:, :1], C[:, -1:]), strict=True):
                 if part is not None:
-                    out[:, k] += _total(part, some, films)
+                    balances[:, k] += _total(part, some, values)
         for some, rows in _strips(faces, grid.box[1]):
             C = _across(film, grid, pairs(y_nodes)[:, rows], y_faces[rows], cut) * grid.widths(0)
             positive = positive and bool((C > 0.0).all())
-            out[:, 0] += _total(of_faces, some, C)
+            balances[:, 0] += _total(of_faces, some, C)
             for k, end, here in ((4, 0, some.start == 0), (5, -1, some.stop == faces.size)):
-                out[:, k] += here * _weights(grid)[1][end] * (self._ends[end] @ C[end])
+                balances[:, k] += here * _weights(grid)[1][end] * (self._ends[end] @ C[end])
         total = grid.comm.allreduce(np.append(out, float(not positive)))
         return None if total[-1] else total[:-1].reshape(out.shape)
 
@@ -99,6 +119,21 @@ class ByFaces:
             [None if a is None else self._added(a, b, lines) for a, b in of_lines],
             self._added(self._across, across, faces),
         ]
+
+    def _drag_parts(self, grid: Grid, lines: Rows) -> list[Any]:
+        """The same of the drags'."""
+        shears, pulls = (share[:, 0] for share in np.broadcast_arrays(*line_shares(grid)))
+        levers = [grid.polar[0] + grid.y[:, 0] if name == "friction_torque" and grid.polar else 1.0 for name in self.drags]
+        of = [(self._pull, pulls), (self._whole, shears), (self._void, shears), *((one, pulls) for one in self._outer)]
+        return [[self._added(a, b * lever, lines) for a, b in of] for lever in levers]
+
+    def _sheared(self, film: Around, grid: Grid, y: Array, across: Array, void: Array) -> list[Array]:
+        """By what `_drag_parts` count on the x faces of some lines. void : the film of the void, in parts of the wall's."""
+        at, steps = grid.x[0], grid.steps(0)
+        x = np.append(at[0] - steps[0] / 2, at + steps[1:] / 2)[None]
+        h, resting, moving = sheared_lines(film, x, y[:, None], across)
+        pull, full = 0.5 * h, steps / moving
+        return [pull, steps * resting + full, full * void if self._nodal else full, pull[:, :1], pull[:, -1:]]
 
     def _added(self, a: Array, weights: Array, first: Rows) -> tuple[Array, Array]:
         """Runs of rows added up with their weights, shape (weights, runs, columns), which are kept, and what is left of the

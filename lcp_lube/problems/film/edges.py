@@ -146,11 +146,12 @@ def strips(
 ) -> tuple[NDArray[np.int64], Array, Array]:
     """Lines whose cells an edge y = const divides, and the film at x, m, in their strips: shape (strips, such lines, x.size).
 
+    steps : distances before and behind each line, shape (2, lines).
     Returns the numbers of the lines, the films, and the strips' shares of a cell's width, shape (strips, such lines, 1).
     """
-    rows, ends = _pieces(lines - 0.5 * steps[:-1], lines + 0.5 * steps[1:], jumps)
+    rows, ends = _pieces(lines - 0.5 * steps[0], lines + 0.5 * steps[1], jumps)
     parts = list(pairwise(ends))
-    shares = np.array([(b - a) / (0.5 * (steps[:-1] + steps[1:])[rows]) for a, b in parts])
+    shares = np.array([(b - a) / (0.5 * (steps[0] + steps[1])[rows]) for a, b in parts])
     films = [np.broadcast_to(film(x[None, :], 0.5 * (a + b)[:, None]), (rows.size, x.size)) for a, b in parts]
     return rows, np.array(films), shares[..., None]
 

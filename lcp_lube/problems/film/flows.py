@@ -12,7 +12,7 @@ from ...base.parallel import Array
 from ..grid import Grid
 from ..strips import MANY, each_strip, places_of
 from .cavity import cavitated
-from .edges import Around, strips
+from .edges import Around, pairs, strips
 from .reynolds import BoxScheme, sides
 from .strip import line_weights, stream_weights
 
@@ -122,12 +122,16 @@ def _drag_sum(problem: LubricationProblem, p: Array, r: Array, lever: Array | fl
 
 def _shares(problem: LubricationProblem) -> tuple[Array, Array, Array]:
     """What shears a face counts by the product of the first two, of its column and of its line, pressure by the third."""
-    grid = problem.grid
+    return problem.mu * problem.U * problem.grid.steps(0)[1:], *line_shares(problem.grid)
+
+
+def line_shares(grid: Grid) -> tuple[Array, Array]:
+    """By what the faces of a line count: what shears them, and pressure."""
     weight, rims = line_weights(grid), grid.rims(1) if grid.dim == 2 else (0.0, 0.0)
     *_, south, north = sides(grid)
     scale = weight * (grid.spacing[1] if grid.dim == 2 else 1.0)
     lines = scale * grid.stretch(grid.y) ** 2 * (1.0 + 0.5 * (rims[0] * south + rims[1] * north) / weight)
-    return problem.mu * problem.U * grid.steps(0)[1:], lines, scale
+    return lines, scale
 
 
 def _before_first(problem: LubricationProblem, p: Array, lifted: complex) -> tuple[Array, Array]:
@@ -199,13 +203,21 @@ def sheared_faces(problem: LubricationProblem, x: Array, lifted: complex = 0.0) 
     t/h^2, and 1/h. That is linear in what flows between a film that is full in the thinnest strip alone and one that is full.
     """
     grid, film = problem.grid, Around(problem.film, problem.grid)
+    if problem.edged:
+        return sheared_lines(film, x, grid.y, pairs(grid.steps(1)) if grid.dim == 2 else None, lifted)
     at, d = (lambda x: film(x, grid.y) + lifted), 1e-6 * grid.spacing[0]
-    h: Any = at(x) if problem.edged else 2.0 / (1.0 / at(x - d) + 1.0 / at(x + d))  # an edge may lie on the face
+    h: Any = 2.0 / (1.0 / at(x - d) + 1.0 / at(x + d))  # an edge may lie on the face
     h = np.broadcast_to(h, (grid.box[0], x.shape[1]))
+    return h, np.broadcast_to(h.dtype.type(0.0), h.shape), h
+
+
+def sheared_lines(film: Around, x: Array, y: Array, across: Array | None, lifted: complex = 0.0) -> tuple[Array, Array, Array]:
+    """`sheared_faces` of some lines, y a column of them, with what lies before and behind each; None: of a film in 1D."""
+    h: Any = np.broadcast_to(film(x, y) + lifted, (y.shape[0], x.shape[1]))
     resting, moving = np.broadcast_to(h.dtype.type(0.0), h.shape), h
-    jumps = film.jumps("y") if grid.dim == 2 and problem.edged else ()
-    if jumps:
-        rows, in_strips, shares = strips(film, x[0], grid.y[:, 0], grid.steps(1), jumps)
+    jumps = film.jumps("y") if across is not None else ()
+    if across is not None and jumps:
+        rows, in_strips, shares = strips(film, x[0], y[:, 0], across, jumps)
         if rows.size:
             thinnest, uneven = in_strips.min(axis=0) + lifted, np.ptp(in_strips, axis=0) > 1e-9 * in_strips.max(axis=0)
             parts = in_strips + lifted
