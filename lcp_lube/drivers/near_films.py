@@ -92,6 +92,8 @@ class NearFilms:
         if model.U <= 0.0 or model.effects or model.dense or not self._alike(model) or film.shape != eq.grid.shape:
             return None
         grid, law, p_sides = self._grid(model), model.law or Law(), model.p_sides
+        if self.drags and model.law:  # which drags by the viscosity at every point
+            return None
         sums = None if grid is None else self._sums(model.gap, law, grid)
         if grid is None or sums is None:
             return None

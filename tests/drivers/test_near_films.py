@@ -71,3 +71,17 @@ def test_the_film_s_own_derivative_is_that_of_its_arrays(monkeypatch, name):
             fields.append(FilmGradient(adjoint).field("load"))
             adjoint.destroy()
     assert fields[0] == pytest.approx(fields[1], abs=1e-12 * np.abs(fields[1]).max())
+
+
+def test_friction_builds_a_problem_for_a_law_s_number_alone(monkeypatch):
+    monkeypatch.setattr(near_films, "SMALL", 1)
+    scene, built = made("dimpled_pad"), []
+    with solve(scene, reduction=False) as solution:
+        adjoint = Adjoint(scene, solution, ["friction"])
+        slow = adjoint.lagrangians
+        monkeypatch.setattr(adjoint, "lagrangians", lambda other: built.append(values_of(other)["fluid.barus"]) or slow(other))
+        for key in (key for key in values_of(scene) if not key.startswith("sides")):  # films full at the sides stay so
+            adjoint.slopes(key)
+        adjoint.destroy()
+    assert 0 < np.count_nonzero(built) <= 4  # by Barus' number the viscosity, 0 there, grows with pressure
+    assert built.count(0.0) == 1  # the scene itself
