@@ -193,7 +193,7 @@ def integrals(
     cells = lambda: stream_weights(grid) * grid.widths(0)  # noqa: E731
     inside: Array = sum(each_strip(grid, add_up))
     total = lambda part, above, weight: problem.reduce.summed(  # noqa: E731
-        float(part), lambda: (p - above) * weight(grid.x, grid.y) * cells()
+        float(part), lambda: (p[:] - above) * weight(grid.x, grid.y) * cells()
     )
     return [float(grid.cell * (total(part, *one) + _in_rims(problem, *one))) for part, one in zip(inside, asked, strict=True)]
 

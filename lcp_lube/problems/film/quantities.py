@@ -62,7 +62,7 @@ def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any
     p, r : owned points; p in units of p_unit above the cavitation pressure.
     """
     grid, reduce = problem.grid, problem.reduce
-    p_pa = p * problem.p_unit
+    p_pa: Any = Scaled(p, problem.p_unit)
     cavity = cavitated(reduce, p, r)
     min_h, min_h_at = thinnest(problem)
     known = None
@@ -72,7 +72,7 @@ def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any
         known = known_of(problem)
     read = _read(problem, p_pa, r, p, cavity)
     if known is not None:
-        off = reduce.max(np.abs(p_pa - known.p_pa)), reduce.max(np.abs(r - known.r))
+        off = reduce.max(np.abs(p_pa[:] - known.p_pa)), reduce.max(np.abs(r - known.r))
         most = reduce.max(known.p_pa)
         same = off[0] <= SAME * most + LEAST and off[1] <= SAME
         exact = off[0] <= ROUNDING * most and off[1] <= ROUNDING  # read by itself, the discrete solution would say the same
@@ -141,6 +141,25 @@ class _Read:
             self.cavitated_area + (line.cavitated - discrete.cavitated_area),
             *(line.fronts if same_fronts else (self.ruptures, self.reformations)),
         )
+
+
+class Scaled:
+    """An array times a positive number, of which parts are made when they are asked for."""
+
+    def __init__(self, a: Array, by: float):
+        self._a, self._by, self.shape = a, by, a.shape
+
+    def __getitem__(self, part: Any) -> Any:
+        return self._a[part] * self._by
+
+    def max(self, axis: int) -> Array:
+        return np.asarray(self._a.max(axis=axis) * self._by)
+
+    def reshape(self, shape: tuple[int, ...]) -> Scaled:
+        return Scaled(self._a.reshape(shape), self._by)
+
+    def ravel(self) -> Array:
+        return np.asarray(self[:].ravel())
 
 
 def _read(problem: LubricationProblem, p_pa: Array, r: Array, p: Array, cavity: NDArray[np.bool_]) -> _Read:

@@ -95,6 +95,7 @@ class Fas(Cycles):
 
     @z.setter
     def z(self, value: Array) -> None:
+        self._own()
         level, self._fields = self._levels[0], None
         self._finest.put(level, self.problem.grid, level.z, value)
         if level.held is not None:
@@ -102,6 +103,7 @@ class Fas(Cycles):
 
     def _own(self) -> Array:
         level = self._levels[0]
+        self._finest.take_back(level, self.problem, self._fields)
         return self._finest.own(level, self.problem.grid, level.z)  # type: ignore[no-any-return]
 
     @property
@@ -132,8 +134,7 @@ class Fas(Cycles):
         self.certificate = None
         if not norm <= self._rest:
             return norm
-        for coarse in self._levels[1:]:
-            coarse.rest()
+        self._fields = self._fields or self._finest.give_up(self._levels, self.problem)
         self.certificate = seen = self.problem.certify(self.fields, self.eps1)
         fed = self.problem.held is not None and self._levels[0].carry is None  # of a step `closing` leaves nothing
         lost = seen.measures["mass_defect"] / (FED if fed else self._share)
@@ -146,6 +147,7 @@ class Fas(Cycles):
         ------
         StalledError : ||G|| has stalled.
         """
+        self._own()
         anew, self._fields = self._taken == 0, None
         if self._stalled and self.norm > self.eps1:
             if not self._retreat():
@@ -251,12 +253,11 @@ class Fas(Cycles):
         o, level, coarse = self.options, self._levels[k], self._levels[k + 1]
         where = (level.first, level.by_x, level.by_y)
         new, old = (coarse.part(coarse.seen(z)) for z in (coarse.z, coarse.old))
-        fine = (level.z, new, old, level.kx, level.ky)
         if self._following:
             self._following.ascend(k)
         at_supplies = None if level.held is None else level.z[level.held]
         rules = (self._harmonic, self._truncation, level.periodic[0], self._unit)
-        self._correction = self._loops.correct(*fine, *where, *rules)
+        self._correction = self._loops.correct(level.z, new, old, level.kx, level.ky, *where, *rules)
         if level.held is not None:
             level.z[level.held] = at_supplies
         level.share(level.z)
@@ -279,8 +280,7 @@ class Fas(Cycles):
 
         That makes up for what these did not hear of: the factor is that of one rank, where without it it doubles.
         """
-        arrays = (level.z, level.kx, level.ky, level.c)
-        ring = level.periodic[0]
+        arrays, ring = (level.z, level.kx, level.ky, level.c), level.periodic[0]
         if level.held is not None:
             for _ in range(sweeps):
                 self._tools.held.sweep(*arrays, level.spans, 1, level.z.shape[0], down, level.carry, ring)

@@ -7,7 +7,10 @@ import numpy as np
 from ...base.parallel import Array
 from ...problems.film.lubrication import LubricationProblem
 from ...problems.grid import Grid
+from ...problems.solution import Fields
+from ...problems.strips import in_strips
 from . import held
+from .kernels import pressure_and_void
 from .levels import FEWEST_LINES, Level, carried
 
 
@@ -92,3 +95,28 @@ def put(level: Level, grid: Grid, into: Any, values: Any) -> None:
     box = values.reshape(grid.box)
     into[1:-1, 1:-1] = whole(grid, box) if level.comm is None and grid.comm.size > 1 else box
     level.share(into)
+
+
+def give_up(levels: list[Level], problem: LubricationProblem) -> Fields | None:
+    """Leave memory to the certificate: of coarse grids what cycles fill, and z, in whose place p is made. p and r then.
+
+    None where z is needed beside them, or is not of this rank's points alone.
+    """
+    level, grid = levels[0], problem.grid
+    for coarse in levels[1:]:
+        coarse.rest()
+    z = level.z
+    if level.held is not None or level.void is not None or z.shape != (grid.box[0] + 2, grid.box[1] + 2):
+        return None
+    p, r = z.ravel()[: grid.local_size].reshape(grid.box), np.empty(grid.box)
+    for rows in in_strips(grid):  # one after the other: a point of p lies before the z that it is made of
+        pressure_and_void(z[1:-1, 1:-1][rows], problem.scheme.rows(rows).b_C, p[rows], r[rows])
+    level.z = np.zeros((0, 0))
+    return {"p": p.ravel(), "r": r.ravel()}
+
+
+def take_back(level: Level, problem: LubricationProblem, fields: Fields | None) -> None:
+    """z of the fields for which it was given up. Collective."""
+    if not level.z.size and fields is not None:
+        level.z = np.zeros_like(level.c)
+        put(level, problem.grid, level.z, fields["p"] + problem.scheme.b_C.ravel() * fields["r"])
