@@ -1,5 +1,6 @@
 """The finest grid of the nonlinear multigrid: a problem's own, whose coefficients are not stored twice."""
 
+import ctypes
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,8 @@ from ...problems.strips import in_strips
 from . import held
 from .kernels import pressure_and_void
 from .levels import FEWEST_LINES, Level, carried
+
+LARGE = 1_000_000  # points of a grid whose coarser ones are worth being given back to the system
 
 
 def finest(problem: LubricationProblem) -> Level:
@@ -105,6 +108,8 @@ def give_up(levels: list[Level], problem: LubricationProblem) -> Fields | None:
     level, grid = levels[0], problem.grid
     for coarse in levels[1:]:
         coarse.rest()
+    if grid.local_size >= LARGE and (trim := getattr(ctypes.CDLL(None), "malloc_trim", None)):  # glibc's
+        trim(0)  # what rests of a fourth of the points is kept by the heap otherwise, beside r
     z = level.z
     if level.held is not None or level.void is not None or z.shape != (grid.box[0] + 2, grid.box[1] + 2):
         return None
