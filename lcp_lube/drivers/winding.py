@@ -26,7 +26,11 @@ def places(left_at: Callable[[float, float], complex], t: float) -> tuple[list[A
     """
     rings = np.arange(WITHIN, min(max(t + BEYOND, OUTER), OUTMOST))
     q = np.stack(np.meshgrid(rings, AROUND, indexing="ij"), axis=-1)
-    left = np.array([[left_at(*one) for one in ring] for ring in q])
+    left = np.full(q.shape[:2], np.nan + 0j)
+    for k, ring in enumerate(q):
+        left[k] = [left_at(*one) for one in ring]
+        if not np.isfinite(left).any():  # nor will there be a film nearer the bore
+            return [], (k + 1) * AROUND.size
     # Four corners of each cell, the innermost between the middle and the first ring, in the sense of the attitude.
     at = _cells(1.0 / (1.0 + np.exp(-q[..., 0])) * np.exp(1j * q[..., 1]), 0j)
     about = _cells(left, left_at(-math.inf, 0.0))

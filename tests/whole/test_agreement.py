@@ -11,6 +11,7 @@ import pytest
 
 from lcp_lube import InputError, load_scene, solve
 from lcp_lube.registry import METHODS, scene_names
+from lcp_lube.scenes.effects.named import named
 from lcp_lube.scenes.moving import motion_of
 
 ANSWERED = ("p", "v")
@@ -19,13 +20,17 @@ AGREE = 1e-6  # of the largest value; the interior methods stop at ||F|| = 1e-8,
 
 @cache
 def small(name):
-    """The scene on few points, on an eighth of its own in each direction or the fewest that its rules allow; few time steps."""
-    shape, motion = load_scene(name).shape, motion_of(load_scene(name))
-    steps = {}
+    """The scene on few points, on an eighth of its own in each direction or the fewest that its rules allow; few time steps.
+
+    With effects it is looked at where it stands: a balance would try places with films that some methods do not find.
+    """
+    scene = load_scene(name)
+    shape, motion = scene.shape, motion_of(scene)
+    steps = {"balance": None} if named(scene) and getattr(scene, "balance", None) is not None else {}
     if name == "squeeze":
-        steps = {"steps": 12}  # of any length: its film ruptures late
+        steps |= {"steps": 12}  # of any length: its film ruptures late
     elif motion:
-        steps = {"motion.steps": 12, "motion.t_end": motion.t_end * 12 / motion.steps}
+        steps |= {"motion.steps": 12, "motion.t_end": motion.t_end * 12 / motion.steps}
     for factor in (8, 4, 2):
         few = [max(9, (n + 1) // factor - 1) for n in shape]
         try:
