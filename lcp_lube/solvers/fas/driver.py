@@ -270,9 +270,9 @@ class Fas(Cycles):
         front, width = ((1 if level.carry is None else 2) * n for n in (self.options.front, self.options.width))
         # What lies beyond a periodic side, or is another rank's, must be new at each sweep: else fronts that cross it wander.
         ring, parts = level.periodic[0], front if level.periodic[1] or level.split else 1
-        for count in (front // parts + (n < front % parts) for n in range(parts)):
-            arrays = (level.z, level.kx, level.ky, level.c)
-            level.work += self._fronts.relax_front(*arrays, count, width, level.carry, level.held, level.slips, ring)
+        for n, count in enumerate(front // parts + (n < front % parts) for n in range(parts)):
+            arrays, rest = (level.z, level.kx, level.ky, level.c), (level.carry, level.held, level.slips, ring, n + 1 < parts)
+            level.work += self._fronts.relax_front(*arrays, count, width, *rest)
             level.share(level.z)
 
     def _relax(self, level: Any, sweeps: int, down: bool) -> None:

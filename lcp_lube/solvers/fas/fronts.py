@@ -66,14 +66,15 @@ def relax_front(
     held: NDArray[np.bool_] | None = None,
     slips: NDArray[np.bool_] | None = None,
     ring: bool = False,
+    more: bool = False,
 ) -> int:
     """`count` sweeps, to and fro, over the points within `width` cells of a front; returns how many points were relaxed.
 
     held : points that are left out; slips : those of them about which points are swept as they are at fronts; ring : the
-    ends of a line are neighbours, and kept so.
+    ends of a line are neighbours, and kept so; more : further sweeps follow, once other ranks have heard of these.
 
     Where fronts are rare, and strips of twice or WIDER times the width take in less than a tenth of the points, it is these,
-    swept twice as often. Only in steady films without supplies the sweeps overrelax, in strips of more than twice the width.
+    swept twice as often. Only in steady films without supplies the sweeps overrelax, and strips are more than twice as wide.
     """
     plain = carry is None and held is None
     wider, most = (WIDER, OVER) if plain else (2, 1.0)
@@ -89,7 +90,7 @@ def relax_front(
     if held is not None:
         spans, found = without(spans, found, held)
     for s in range(count):
-        over = most if s < count - LAST else 1.0
+        over = most if more or s < count - LAST else 1.0
         for k in range(found):
             at = found - 1 - k if s % 2 == 1 else k
             relax_pairs(z, kx, ky, c, spans[at, 0], spans[at, 1], spans[at, 2], carry, ring, over)
