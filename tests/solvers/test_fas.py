@@ -392,7 +392,7 @@ def test_any_number_of_ranks(tmp_path: Path, serial, ranks):
 
 
 def test_a_border_between_ranks_costs_no_cycle(cli):
-    """Sweeps near fronts that cross it overrelax as those of one rank: with plain ones it takes 6 cycles at 255 a side, not 5."""
+    """Sweeps near fronts that cross it overrelax as those of one rank: plain ones take 6 cycles at 255 a side, not 5."""
     words = ("solve", "problem4", "--n", 255, "--method", "fas", "--json")
     assert cli(*words, ranks=2).json["cycles"] == cli(*words).json["cycles"]
 
