@@ -271,8 +271,8 @@ class Fas(Cycles):
         # What lies beyond a periodic side, or is another rank's, must be new at each sweep: else fronts that cross it wander.
         ring, parts = level.periodic[0], front if level.periodic[1] or level.split else 1
         for n, count in enumerate(front // parts + (n < front % parts) for n in range(parts)):
-            arrays: Any = (level.z, level.kx, level.ky, level.c, count, width, level.carry, level.held, level.slips)
-            level.work += self._fronts.relax_front(*arrays, ring, n + 1 < parts)
+            arrays, rest = (level.z, level.kx, level.ky, level.c), {"ring": ring, "more": n + 1 < parts}
+            level.work += self._fronts.relax_front(*arrays, count, width, level.carry, level.held, level.slips, **rest)
             level.share(level.z)
 
     def _relax(self, level: Any, sweeps: int, down: bool) -> None:
