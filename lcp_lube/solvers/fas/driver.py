@@ -268,8 +268,8 @@ class Fas(Cycles):
     def _relax_fronts(self, level: Any) -> None:
         """Sweeps near the fronts; in a time step, in which these have moved by some cells, twice as many twice as far."""
         front, width = ((1 if level.carry is None else 2) * n for n in (self.options.front, self.options.width))
-        # What lies beyond a periodic side, or is another rank's, must be new at each sweep: else fronts that cross it wander.
-        ring, parts = level.periodic[0], front if level.periodic[1] or level.split else 1
+        # What lies beyond a periodic side, or is another rank's, must be new every sweep or two: else fronts across it wander.
+        ring, parts = level.periodic[0], front if level.periodic[1] else (front + 1) // 2 if level.split else 1
         for n, count in enumerate(front // parts + (n < front % parts) for n in range(parts)):
             arrays, rest = (level.z, level.kx, level.ky, level.c), {"ring": ring, "more": n + 1 < parts}
             level.work += self._fronts.relax_front(*arrays, count, width, level.carry, level.held, level.slips, **rest)
