@@ -134,7 +134,8 @@ class MarchGradient:
         pushed, off_by = solved[len(rows) : len(rows) + len(forces)], solved[len(rows) + len(forces) :]
         if forces or off:
             self._follow(n, found, pushed, off_by, later)
-        for name, one in found.items():
+        terms = eq.terms(p, list(found.values()))
+        for (name, one), driven in zip(found.items(), terms.tolist(), strict=True):
             self.lambdas[name][n] = self.left[name][n] = one
             if eq.given is not None:  # what was left in a supply is missing in what it gives
                 gives = {part: -w for part, w in parts.get(name, {}).items() if part.startswith(GIVEN)}
@@ -143,7 +144,7 @@ class MarchGradient:
                 own = sum((w * giving(problem, part) for part, w in gives.items()), np.zeros(one.size))
                 self.left[name][n] = np.where(eq.given, volume_unit(problem) * own, one)
             size = sum(abs(w * numbers[part]) for part, w in parts.get(name, {}).items())
-            self.sizes[name] += size + float(eq.terms(p, [one])[0])
+            self.sizes[name] += size + driven
         eq.destroy()
 
     def _follow(
