@@ -36,6 +36,7 @@ CANCELLED = 1e-10  # of its parts: what lambda errs by may make so much of a sum
 ROUNDED = 1e-8  # of what is small of what was found: a 0 that rounding has moved, the attitude of pads about the load
 FEWER = 2_000  # points from which multigrid solves for an answer that multigrid gave: its loops are loaded
 DIRECT = {"load", "friction", "p_max", "force_x", "force_y"}  # numbers that are mostly made of no others but these
+GUESS = 1e-2  # what a number that is zero, of a unit that the film has no measure of, is changed by parts of
 SUPPLY = "supply.{}.p"  # the key of a supply's pressure, Pa above p_c
 
 
@@ -222,7 +223,7 @@ def scale_of(scene: Scene, key: str, problem: LubricationProblem, p: Array, foun
     unit = units.get(key, units.get(key.rpartition(".")[0], ""))
     p_max = max(problem.reduce.max(p) * problem.p_unit, *map(abs, problem.p_sides)) or problem.p_unit
     thinnest = problem.reduce.min(problem.scheme.h)
-    small = {"Pa": p_max, "1/Pa": 1.0 / p_max, "m": thinnest, "rad": thinnest / max(problem.grid.lengths)}.get(unit, 1e-2)
+    small = {"Pa": p_max, "1/Pa": 1.0 / p_max, "m": thinnest, "rad": thinnest / max(problem.grid.lengths)}.get(unit, GUESS)
     return value if value > ROUNDED * small else small
 
 

@@ -30,6 +30,7 @@ from .grooves import SolvedFilm, films_of
 from .impedance import impedance, stiffness
 from .pad_coordinates import Bearing, JournalPads, ThrustPads, bearing_of
 from .response import Change, Moved, Response
+from .turned import Mirrored
 
 FASTEST = 1e100  # rad/s: beyond it a factorisation overflows, and K and C are long those of void that has no time to change
 JOURNAL, TILTED, FLAT = ("x", "y"), ("x", "y", "tilt", "tilt_across"), ("z",)  # names of the motions
@@ -64,7 +65,7 @@ def motions_of(turning: Turning | None, tilt: bool, middle: float, along: float 
 
 
 def coefficients(
-    scene: Scene,
+    scene: Any,
     solution: Solution,
     frequencies: Sequence[float] = (0.0,),
     tilt: bool = False,
@@ -83,7 +84,7 @@ def coefficients(
 
     Raises
     ------
-    InputError : a scene without a film, or whose wall moves to smaller x, a frequency below zero, tilt of what has no axis.
+    InputError : a scene without a film, a frequency below zero, tilt of what has no axis.
     NotFound : effects whose linearised equations GMRES does not solve.
     """
     pads, scene = bearing_of(scene), placed(scene, solution)
@@ -92,13 +93,14 @@ def coefficients(
         raise InputError(f"scene {scene.name}: coefficients are of films; it has no part that could be displaced")
     if motion_of(scene) is not None:
         raise InputError(f"scene {scene.name}: coefficients are of films at rest in time; leave [motion] out")
-    if isinstance(solution.problem, TurnedProblem):
-        raise InputError(f"scene {scene.name}: its wall moves to smaller x; give its mirror image, with -U")
     turning: Turning | None = getattr(scene, "turning", None)
     if tilt and (turning is None or len(model.lengths) == 1 or isinstance(scene, TiltingPadScene)):
         raise InputError(f"scene {scene.name}: --tilt is of journals with a width")
     check_frequencies(frequencies)
     ring = solution.problem
+    if isinstance(ring, TurnedProblem):  # a flat film: its mirror image answers to motions along the normal as it does
+        scene, fields, ring = Mirrored(scene), ring.there(solution.fields), ring.moving
+        solution = replace(solution, problem=ring, fields=fields)
     assert isinstance(ring, LubricationProblem)  # as a scene with a `model` has
     along = 0.0
     if turning is not None:

@@ -27,7 +27,7 @@ from ..problems.film.turned import TurnedProblem
 from ..problems.solution import Solution
 from ..scenes.scene import Scene
 from ..scenes.values import values_of, with_values
-from .adjoint import conditions_of, scale_of
+from .adjoint import GUESS, conditions_of, scale_of
 from .ask import Ask
 from .coefficients import placed
 from .coupled_response import CoupledResponse
@@ -227,9 +227,13 @@ class CoupledGradient(CoupledResponse):
         return *self._rest(self.loop), self.report
 
     def _step(self, key: str, a: float) -> float:
-        """A small change of a number; of one that is zero one that changes the equations by more than rounding does."""
-        d = STEP * scale_of(self.scene, key, self.loop.base, self.p, key in self.found)
-        if a:
+        """A small change of a number; of one whose size is a guess one that changes the equations by more than rounding does.
+
+        No other is made larger: where nearly all of a film is cavitated its level hardly changes the equations, and they bend.
+        """
+        scale = scale_of(self.scene, key, self.loop.base, self.p, key in self.found)
+        d = STEP * scale
+        if a or scale != GUESS:
             return d
         with suppress(InputError):  # so large a value is not allowed
             here = self._beside(key, 0.0)[0]

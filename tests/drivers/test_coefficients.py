@@ -245,6 +245,22 @@ def test_multigrid_has_the_coefficients_of_the_matrix(monkeypatch, name, changes
     solution.destroy()
 
 
+@pytest.mark.parametrize("effects", [{}, {"elastic": {"compliance": 1e-14}}], ids=["rigid", "soft"])
+def test_a_wall_that_moves_to_smaller_x(effects):
+    """The film that was turned round answers as it stands."""
+    found = []
+    for U, ends, pocket in ((2.0, (40, 20), [2, 8]), (-2.0, (20, 40), [12, 18])):
+        film = [
+            {"shape": "linear", "h_start_um": ends[0], "h_end_um": ends[1]},
+            {"shape": "pocket", "depth_um": 15, "x_mm": pocket},
+        ]
+        data = {"family": "bearing", "L_mm": 20, "U": U, "n": 60, "film": film, "fluid": {"mu": 0.02, "barus": 2e-8}, **effects}
+        with solve(data, p_in=3e5 if U > 0 else 0.0, p_out=0.0 if U > 0 else 3e5) as solution:
+            found += solution.coefficients([0.0, 500.0])
+    for one, other in zip(found[:2], found[2:], strict=True):
+        assert (pytest.approx(one.K, rel=1e-6), pytest.approx(one.C, rel=1e-6)) == (other.K, other.C)
+
+
 def test_multigrid_on_ranks(cli):
     scene = load_scene("dimpled_pad", nx=191, ny=221)
     found = cli("coefficients", "dimpled_pad", "--nx", 191, "--ny", 221, "--frequency", "0,200", "--json", ranks=2).json

@@ -11,6 +11,7 @@ from lcp_lube.drivers.film_gradient import areas
 from lcp_lube.drivers.gradient import film_fields, gradients
 from lcp_lube.drivers.transposed import CoupledFilm
 from lcp_lube.problems.film.views import LiftedFilm
+from lcp_lube.scenes.effects.named import without
 from lcp_lube.scenes.values import values_of, with_values
 
 TIGHT = {"eps1": 1e-11, "max_it": 200}
@@ -69,6 +70,15 @@ def test_a_wall_that_moves_to_smaller_x():
         fields, others = film_fields(scene, solution, names), film_fields(image, other, names)
         for name, sign in zip(names, (1.0, -1.0, 1.0), strict=True):
             assert np.abs(fields[name][::-1] - sign * others[name]).max() < 1e-5 * np.abs(fields[name]).max(), name
+
+
+def test_by_the_level_of_a_film_that_is_nearly_all_cavitated():
+    """A change of the level hardly moves its equations: one that did would be so large that they bend."""
+    ends = {"film.linear.h_start_um": 17.4, "film.linear.h_end_um": 58.2, "U": 7.3, "L_mm": 51.5, "p_in": 3e5, "p_out": 0.0}
+    scene = without(load_scene("lined_pad", {"n": 48, "fluid.barus": 0.0, **ends}), ["temperature", "elastic"])
+    with answer(scene) as solution:
+        field = float(film_fields(scene, solution, ["load"])["load"] @ areas(solution.problem.grid))
+        assert gradients(scene, solution, ["load"], ["h_offset"])[0].gradient["h_offset"] == pytest.approx(field, rel=1e-6)
 
 
 def test_through_a_journals_place():
