@@ -10,6 +10,7 @@ from ..base.parallel import Array
 from ..errors import InputError
 from ..problems.film.forces import PIVOT
 from ..problems.film.stored import Stored, mean_film
+from ..problems.film.turned import TurnedProblem
 from ..problems.grid import Grid
 from ..scenes.scene import Scene
 from .equations import Equations, followed
@@ -25,7 +26,10 @@ PLACES = ("journal_x", "journal_y", "h_offset", "pitch", "roll")
 
 @dataclass(frozen=True)
 class Kept:
-    """A step's end; p in Pa above p_c. dry : as the film's own. place : of all coordinates. pressures : of the supplies."""
+    """A step's end; p in Pa above p_c; where U < 0 all fields in the mirror image's frame.
+
+    dry : as the film's own. place : of all coordinates. pressures : of the supplies.
+    """
 
     t: float
     dt: float
@@ -45,11 +49,18 @@ class Trace:
 
     def __call__(self, moment: Moment) -> None:
         problem, row = moment.problem, moment.row
+        turned, problem = (problem, problem.moving) if isinstance(problem, TurnedProblem) else (None, problem)
+
+        def of(fields: Any) -> tuple[Array, Array]:
+            seen = {name: fields[name] for name in ("p", "r")}
+            seen = seen if turned is None else turned.there(seen)
+            return seen["p"] * problem.p_unit, seen["r"].copy()
+
         if not self.steps and moment.before is not None:
-            p = moment.before["p"] * problem.p_unit
-            self.begun = Kept(0.0, 0.0, p, moment.before["r"].copy(), None, moment.place, _pressures(problem, p))
+            p, r = of(moment.before)
+            self.begun = Kept(0.0, 0.0, p, r, None, moment.place, _pressures(problem, p))
         place = np.array([row[name] for name in PLACES if name in row])
-        p, r = moment.fields["p"] * problem.p_unit, moment.fields["r"].copy()
+        p, r = of(moment.fields)
         self.steps.append(Kept(moment.t, row["dt"], p, r, problem.dry, place, _pressures(problem, p)))
 
 
@@ -68,7 +79,6 @@ def check_march(scene: Scene) -> None:
     follow = getattr(scene, "pads_follow", False)
     for found, what in (
         (bool(model.effects), "effects"),
-        (model.U < 0, "a wall that moves to smaller x (give the mirror image, with -U)"),
         (hasattr(scene, "observer"), "events"),
         (follow and model.polar is None, "pads that follow a journal"),
     ):
@@ -77,11 +87,19 @@ def check_march(scene: Scene) -> None:
 
 
 class Course:
-    """A march at the times, voids and places of a trace. near : whose grid's edges are followed."""
+    """A march at the times, voids and places of a trace; where U < 0 that of the mirror image, but for what is told.
+
+    near : whose grid's edges are followed.
+
+    Raises
+    ------
+    InputError : by most methods, a wall that turns back.
+    """
 
     def __init__(self, scene: Any, trace: Trace, comm: Any, near: "Course | None" = None):
         self.scene, self.trace, self.comm, self.table = scene, trace, comm, scene.motion
-        self.models, self._given = scene.models(), scene.motion.course(scene._folder, len(scene.place))
+        self._models, self._given = scene.models(), scene.motion.course(scene._folder, len(scene.place))
+        self.turned: bool | None = None  # known with the first film
         of = Coordinates(scene, self.table)
         self.free = free = np.flatnonzero(of.free)
         names = [*(("force_x", "force_y") if of.journal else ("load",)), f"{PIVOT}1", f"{PIVOT}2"]
@@ -101,6 +119,14 @@ class Course:
         self.grid: Grid = problem.grid
         problem.destroy()
         self.known: dict[int, Array] = {}
+
+    def models(self, t: float, place: Any) -> Any:
+        """The film at a time."""
+        model = self._models(t, place)
+        self.turned = model.U < 0 if self.turned is None else self.turned
+        if self.turned != (model.U < 0):
+            raise InputError(f"scene {self.scene.name}: [motion]: no derivatives in time where the wall turns back")
+        return model.mirrored if self.turned else model
 
     def kept(self, n: int) -> Kept | None:
         """What step n left; None where no equation gave the film at t = 0."""
@@ -165,7 +191,9 @@ class Course:
             old = formula.old([self.content(n - 1), self.content(n - 2) if formula.before else None])
             model = replace(model, stored=Stored(formula.weight, old, self.grid))
         pressures = kept.pressures if pressures is None else pressures
-        return Equations(TimeStep(self.scene, model, self.grid), self.comm, pressures, dry=kept.dry)  # type: ignore[arg-type]
+        found = Equations(TimeStep(self.scene, model, self.grid), self.comm, pressures, dry=kept.dry)  # type: ignore[arg-type]
+        found.turned = bool(self.turned)
+        return found
 
     def by_followed(self, n: int, at: Any, unit: float) -> list[tuple[Array, Array, dict[str, float]]]:
         """Derivatives of G in a unit of flow, the film and the numbers told, by each place and pressure that follows."""
