@@ -146,7 +146,8 @@ class Equations:
                 told = totals(problem, fields["p"] * problem.p_unit, known_of(problem), wanted)
             else:
                 told = _flat(problem.quantities(fields))
-            discrete = slopes.numbers(problem, fields["p"], fields["r"], wanted)
+            own = problem if self.law is None else self.problem(fields["p"] * problem.p_unit)
+            discrete = slopes.numbers(own, fields["p"], fields["r"], wanted)
             found = {name: value + (told.get(name, discrete[name]) - discrete[name]) for name, value in found.items()}
         if self.turned:
             found = {FLIPPED.get(name, name): -value if name in DRAGS else value for name, value in found.items()}

@@ -5,9 +5,12 @@ import pytest
 from films import MU, FilmScene, L, Pieces, U, dense, knots, random_films
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 from lcp_lube import InputError, load_scene, solve
 from lcp_lube.problems.film.exact import exact_solution
+from lcp_lube.problems.film.fluid import Law
 from lcp_lube.problems.film.integrals import LineIntegrals
 from lcp_lube.problems.film.known import known_of
 from lcp_lube.problems.film.line import solve_line, solve_points
@@ -267,3 +270,32 @@ def test_viscosity_by_pressure():
     assert found["rupture"] == pytest.approx(exact.rupture, rel=1e-9)
     for name in ("pressure_integral", "friction", "p_max"):
         assert found[name] == pytest.approx(finer[name], rel=1e-8)
+
+
+@pytest.mark.parametrize("barus", [0.0, 2e-9])
+def test_density_that_follows_the_pressure(barus):
+    """p' = 6 mu(p) (U/h^2 - Q/(rho h^3)) by SciPy's integrator, upstream to where U h = Q; U < 0 and a supply on two grids."""
+    h_1, h_2, L, U, p_b = 3e-6, 1.5e-6, 0.01, 5.0, 3e7
+    fluid, law = {"mu": 0.02, "p_c": 0.0, "density": "dowson-higginson", "barus": barus}, Law(barus, True)
+    film = [{"shape": "linear", "h_start": h_1, "h_end": h_2}]
+    base = {"family": "bearing", "L": L, "U": U, "fluid": fluid, "film": film, "scheme": "face"}
+    base["sides"] = {"west": 0, "east": p_b}
+
+    def along(x, y, Q):
+        h, mu = h_1 + (h_2 - h_1) * x / L, 0.02 * law.viscosity(y[0])
+        slope = 6 * mu * (U / h**2 - Q / (law.density(y[0]) * h**3))
+        return slope, y[0], mu * U / h + 0.5 * h * slope
+
+    def upstream(Q):
+        return solve_ivp(along, (L, 0.0), [p_b, 0.0, 0.0], args=(Q,), rtol=1e-12, atol=1e-6, method="DOP853").y[:, -1]
+
+    Q = brentq(lambda Q: upstream(Q)[0], U * h_2, U * h_1, xtol=1e-20, rtol=1e-14)
+    _, load, friction = -upstream(Q)
+    for n in (7, 100):
+        values, _ = answer(load_scene({**base, "n": n}), model="full")
+        assert values["load"] == pytest.approx(load, rel=1e-8) and values["friction"] == pytest.approx(friction, rel=1e-8)
+        assert 2 * values["flow"]["east"] == pytest.approx(Q, rel=1e-9)
+    supply = [{"x": [3e-3, 4e-3], "flow": 4e-6}]
+    turned = [answer(load_scene({**base, "U": -U, "supply": supply, "n": n}), model="full")[0] for n in (9, 100)]
+    for name in ("load", "friction", "p_max", "supply_p", "cavitated_area"):
+        assert turned[0][name] == pytest.approx(turned[1][name], rel=1e-8), name

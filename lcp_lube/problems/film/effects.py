@@ -260,7 +260,8 @@ def answer(
         supplies = tuple(replace(one, p=float(law.pressure(np.array(one.p)))) for one in held.supplies)
         held = replace(held, supplies=supplies, law=None)
     film = scaled(base, by, mobility, p_sides, held)  # type: ignore[arg-type]
-    film.thick = (base.mu, law) if law.barus and not cells else None
+    alone = (law.barus or cells) and {*cells} == ({"density"} if law.dowson_higginson else set())
+    film.thick = (base.mu, law) if alone else None
     if "lift" in cells:
         film = film.with_lift(cells["lift"])
     return Answer(film, p, r, cells, law, base, by.values)

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
+from numpy.polynomial.polynomial import polyint, polyval
 from numpy.typing import NDArray
 
 from ...base.parallel import Array
@@ -26,6 +27,8 @@ from ..grid import Grid
 from .edges import marks_of
 
 _XI, _WEIGHT = np.polynomial.legendre.leggauss(8)
+TO_POWERS = np.linalg.inv(np.vander(_XI, increasing=True))  # of what has values at Gauss points
+_UPTO = polyval(_XI, polyint(TO_POWERS, lbnd=-1.0))  # its integrals up to them
 TOL = 1e-11  # of a panel's Int h^-3; less would chase the rounding of h
 FIRST = 512  # panels at least before any is halved: a ridge of a thousandth of the line meets a Gauss point
 PANELS = 200_000  # beyond the first ones, about the most
@@ -40,18 +43,27 @@ class LineIntegrals:
     ----------
     film : h(x, y) in m for arrays that broadcast. points : x of two points and more, ascending, m. edges : x of the film's
         jumps and kinks, m; those outside are not heeded. fine : the points are ends of panels that need no halving.
+    swell : rho_0/rho at places, by which h^-3 is multiplied wherever it is integrated; None: 1.
 
     Attributes
     ----------
     parts : the three integrals between neighbouring points, shape (3, points - 1), in 1, 1/m, 1/m2.
+    swollen : rho_0/rho at the panels' Gauss points.
 
     Raises
     ------
     InputError : a film that is not positive somewhere between the points.
     """
 
-    def __init__(self, film: Callable[[Array, Array], Array], points: Array, edges: Iterable[float] = (), fine: bool = False):
-        self.film, self.points = film, points
+    def __init__(
+        self,
+        film: Callable[[Array, Array], Array],
+        points: Array,
+        edges: Iterable[float] = (),
+        fine: bool = False,
+        swell: Callable[[Array], Array] | None = None,
+    ):
+        self.film, self.points, self.swell = film, points, swell
         self.known: dict[tuple[float, ...], Any] = {}  # `known.known_of` by what else it needs
         self.spans: tuple[Any, ...] | None = None  # between supplies (`known.Span`)
         self.ring: tuple[float, float] | None = None  # where a turn begins, and its length, m
@@ -59,13 +71,22 @@ class LineIntegrals:
         self.ends = points if fine else self._panels(self.edges)
         self.at_gauss = _gauss_points(self.ends[:-1], self.ends[1:])  # shape (panels, 8)
         self.h = self.film_at(self.at_gauss)
+        self.swollen = self.swell_at(self.at_gauss)
         self.first = np.searchsorted(self.ends, points)  # the panel behind each point
-        self._of_panels = self._integrals(self.ends[:-1], self.ends[1:], self.h)
+        self._of_panels = self._integrals(self.ends[:-1], self.ends[1:], self.h, self.swollen)
         self.parts = np.add.reduceat(self._of_panels, self.first[:-1], axis=1)
 
     def film_at(self, x: Array) -> Array:
         """h at places of the line, m."""
         return np.broadcast_to(self.film(x, np.zeros(1)), x.shape)
+
+    def swell_at(self, x: Array) -> Any:
+        """rho_0/rho at places of the line."""
+        return 1.0 if self.swell is None else self.swell(x)
+
+    def carries(self, x: Array) -> Array:
+        """What a wall drags through places where the film is full, over its speed: h rho/rho_0, m."""
+        return self.film_at(x) / self.swell_at(x)  # type: ignore[no-any-return]
 
     def _panels(self, edges: Array) -> Array:
         """Ends of the panels; each point among them, to the bit."""
@@ -101,9 +122,9 @@ class LineIntegrals:
         return 0.5 * (b - a) * (h**-3.0 @ _WEIGHT)
 
     @staticmethod
-    def _integrals(a: Array, b: Array, h: Array) -> Array:
+    def _integrals(a: Array, b: Array, h: Array, swollen: Any = 1.0) -> Array:
         inverse = 1.0 / h
-        return 0.5 * (b - a) * np.stack([inverse @ _WEIGHT, inverse**2 @ _WEIGHT, inverse**3 @ _WEIGHT])
+        return 0.5 * (b - a) * np.stack([inverse @ _WEIGHT, inverse**2 @ _WEIGHT, (inverse**3 * swollen) @ _WEIGHT])
 
     def lifted(self, by: complex) -> LineIntegrals:
         """Those of the film with a number added."""
@@ -128,10 +149,10 @@ class LineIntegrals:
 
     @cached_property
     def looks(self) -> tuple[Array, Array]:
-        """Places in every panel, its ends from within among them, and the film there, shape (panels, 10)."""
+        """Places in every panel, its ends from within among them, and what they `carries`, shape (panels, 10)."""
         low, high = np.nextafter(self.ends[:-1], np.inf), np.nextafter(self.ends[1:], -np.inf)
         places = np.concatenate([low[:, None], self.at_gauss, high[:, None]], axis=1)
-        return places, self.film_at(places)
+        return places, self.carries(places)
 
     @property
     def films(self) -> Array:
@@ -148,13 +169,18 @@ class LineIntegrals:
         a, at = self.ends[k], np.array(self._sums[:, k])
         inside = x > a  # at an end nothing is added: the film beyond is not asked for
         a, x = a[inside], x[inside]
-        at[:, inside] += self._integrals(a, x, self.film_at(_gauss_points(a, x)))
+        within = _gauss_points(a, x)
+        at[:, inside] += self._integrals(a, x, self.film_at(within), self.swell_at(within))
         return at
 
     @property
     def interval(self) -> NDArray[np.int64]:
         """For each panel the number of the point before it."""
         return np.searchsorted(self.first, np.arange(self.ends.size - 1), side="right") - 1
+
+    def within(self, at_gauss: Array) -> Array:
+        """Integrals from the start of every panel to its Gauss points of what has these values there, shape (panels, 8)."""
+        return 0.5 * np.diff(self.ends)[:, None] * (at_gauss @ _UPTO)
 
     def weigh(self, at_gauss: Array) -> Array:
         """Integrals over the panels of what has these values at the Gauss points, shape (panels, 8)."""

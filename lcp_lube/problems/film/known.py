@@ -21,6 +21,7 @@ from .fluid import Law
 from .integrals import LineIntegrals
 from .line import ISOVISCOUS, Flow, Line, line_flow, solve_line, solve_points
 from .supplies import Supply
+from .swollen import swollen, swollen_parts
 
 if TYPE_CHECKING:
     from .lubrication import LubricationProblem
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 KINDS = {"open", "closed"}  # ends of a line that is known, if it does not go round
 SIDE = -1  # in the place of a supply's number
 MOST, DIGITS = 60, 1e-14  # steps for the pressures of supplies, and their last relative change
+SETTLED = 1e-12  # of densities, which then are off by a part of it
+NEAR = 1e-9  # relative: of such changes those that grow are rounding
 
 
 @dataclass(frozen=True)
@@ -202,16 +205,34 @@ def _solved(
         return solve_points(span.parts, mu, problem.U, *ends(span, P))[2]
 
     begin = np.array([one.p for one in supplies])
-    P_film, P = (_balanced(supplies, spans, begin, law, of) for of in (of_film, of_points))
-    if P_film is None or P is None:
-        return None
-    lines = tuple(solve_line(span.line, mu, problem.U, *ends(span, P_film), law) for span in spans)
     (p, r), more = np.zeros((2, problem.grid.shape[0])), np.zeros(len(spans))
-    for k, (span, one) in enumerate(zip(spans, lines, strict=True)):
-        q, r[span.owned], flow = solve_points(span.parts, mu, problem.U, *ends(span, P))
-        p[span.owned], more[k] = law.pressure(q), one.Q - flow.Q
-        if not (np.isfinite(one.Q) and np.isfinite(one.p).all() and np.isfinite(p).all()):
+    films, points, last = list(spans), list(spans), np.inf  # with the densities that they have
+    for _ in range(MOST):
+        P_film, P = _balanced(supplies, films, begin, law, of_film), _balanced(supplies, points, begin, law, of_points)
+        if P_film is None or P is None:
             return None
+        lines = tuple(solve_line(span.line, mu, problem.U, *ends(span, P_film), law) for span in films)
+        off = 0.0
+        for k, (span, one) in enumerate(zip(spans, lines, strict=True)):
+            q, r[span.owned], flow = solve_points(points[k].parts, mu, problem.U, *ends(span, P))
+            p[span.owned], more[k] = law.pressure(q), one.Q - flow.Q
+            if not (np.isfinite(one.Q) and np.isfinite(one.p).all() and np.isfinite(p).all()):
+                return None
+            if law.dowson_higginson:
+                at_ends = law.pressure(np.array(ends(span, P)[:2]))
+                film = swollen(span.line, one, law)
+                parts = swollen_parts(span.parts, np.array([at_ends[0], *p[span.owned], at_ends[1]]), law)
+                off = max(
+                    off,
+                    np.abs(film.swollen - films[k].line.swell_at(film.at_gauss)).max(),
+                    np.abs(parts[2] / points[k].parts[2] - 1.0).max(),
+                )
+                films[k], points[k] = replace(span, line=film), replace(span, parts=parts)
+        if off <= SETTLED or last <= off <= NEAR:
+            break
+        last = off
+    else:
+        return None
     held = tuple((one.region.x - one.region.half_x, one.region.x + one.region.half_x) for one in supplies)  # type: ignore[union-attr]
     return Fed(lines, tuple(spans), line, held, P_film), p, r, P, more
 
@@ -230,7 +251,7 @@ def _balanced(
     supplies: Sequence[Supply], spans: Sequence[Span], begin: Array, law: Law, flow_of: Callable[[Span, Array], Flow]
 ) -> Array | None:
     """Pressures of the supplies at which each source gives what its films take, by Newton's method; None if it ends nowhere."""
-    P, free = begin, np.array([one.open for one in supplies], dtype=bool)
+    P, free, last = begin, np.array([one.open for one in supplies], dtype=bool), np.inf
     for _ in range(MOST if free.any() else 0):
         flows = [flow_of(span, P) for span in spans]
         Q = 0.5 * _given(spans, np.array([flow.Q for flow in flows]), P.size)
@@ -245,8 +266,10 @@ def _balanced(
         except np.linalg.LinAlgError:
             return None
         P = np.maximum(P + step, 0.0)
-        if np.max(np.abs(step)) <= DIGITS * np.max(P):
+        size = float(np.max(np.abs(step)) / (np.max(P) or 1.0))
+        if size <= DIGITS or last <= size <= NEAR:
             return P
+        last = size
     return P if not free.any() else None
 
 

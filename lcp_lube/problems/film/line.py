@@ -42,9 +42,10 @@ class Line:
 
     Attributes
     ----------
-    integrals : between points, all places where U h = Q and all fronts among them. q : there, Pa above p_c: the pressure, of
-        Barus' fluid the unknown in its place (`fluid`). full : of each piece between two of them, whether it is full. Q : the
-        equation's flow, m2/s, twice what flows. enters : whether void does at x = 0. law : of the viscosity by the pressure.
+    integrals : between points, the ends of its panels: all places where U h = Q and all fronts among them. q : there, Pa
+        above p_c: the pressure, of Barus' fluid the unknown in its place (`fluid`). full : of each piece between two of them,
+        whether it is full. Q : the equation's flow, m2/s, twice what flows. enters : whether void does at x = 0. law : of the
+        fluid by the pressure.
     """
 
     integrals: LineIntegrals
@@ -62,21 +63,22 @@ class Line:
         return self.law.pressure(self.q)
 
     @cached_property
+    def q_within(self) -> Array:
+        """q at the panels' Gauss points."""
+        line = self.integrals
+        rise = 6.0 * self.mu * line.within((self.U - self.Q * line.swollen / line.h) / line.h**2)
+        return np.where(self.full[:, None], self.q[:-1, None] + rise, 0.0)
+
+    @cached_property
     def _thicker(self) -> Array | float:
         """mu(p)/mu at the panels' Gauss points."""
-        if not self.law.barus:
-            return 1.0
-        line = self.integrals
-        _, F, J = 6.0 * self.mu * (line.upto(line.at_gauss.ravel()) - line.upto(line.points[:-1])[:, line.interval.repeat(8)])
-        rise = (self.U * F - self.Q * J).reshape(line.at_gauss.shape)
-        full, before = self.full[line.interval, None], self.q[line.interval, None]
-        return 1.0 / np.where(full, 1.0 - self.law.barus * (before + rise), 1.0)
+        return 1.0 / (1.0 - self.law.barus * self.q_within) if self.law.barus else 1.0
 
     @cached_property
     def slope(self) -> Array:
         """p' at the panels' Gauss points, Pa/m; 0 in cavities."""
-        h = self.integrals.h
-        rise = self._thicker * (6.0 * self.mu * (self.U - self.Q / h) / h**2)
+        h, swollen = self.integrals.h, self.integrals.swollen
+        rise = self._thicker * (6.0 * self.mu * (self.U - self.Q * swollen / h) / h**2)
         return np.where(self.full[self.integrals.interval, None], rise, 0.0)
 
     def integral(self, antiderivative: Callable[[Array], Array], above: float = 0.0) -> float:
@@ -90,10 +92,10 @@ class Line:
 
     @property
     def friction(self) -> float:
-        """Integral of mu U (1 - r)/h + (h/2) p', N/m: of 4 mu U/h - 3 mu Q/h^2 where full, mu Q/h^2 in cavities."""
-        if self.law.barus:
+        """Integral of mu U (1 - r)/h + (h/2) p', N/m: of 4 mu U/h - 3 mu Q/(rho h^2) where full, mu Q/h^2 in cavities."""
+        if self.law.barus or self.integrals.swell is not None:
             h, full = self.integrals.h, self.full[self.integrals.interval, None]
-            shear = np.where(full, self._thicker * (4.0 * self.U - 3.0 * self.Q / h), self.Q / h) / h
+            shear = np.where(full, self._thicker * (4.0 * self.U - 3.0 * self.Q * self.integrals.swollen / h), self.Q / h) / h
             return float(self.mu * np.sum(self.integrals.weigh(shear)))
         one, two, _ = self.mu * self.integrals.parts
         return float(np.sum(np.where(self.full, 4.0 * self.U * one - 3.0 * self.Q * two, self.Q * two)))
@@ -135,7 +137,7 @@ def crossings(line: LineIntegrals, U: float, level: float) -> Array:
     over = level < U * h
     k, i = np.nonzero(over[:, 1:] != over[:, :-1])
     sign = np.where(over[k, i], 1.0, -1.0)
-    return bisect(lambda x: sign * (U * line.film_at(x) - level), places[k, i], places[k, i + 1])
+    return bisect(lambda x: sign * (U * line.carries(x) - level), places[k, i], places[k, i + 1])
 
 
 def line_flow(
@@ -200,7 +202,7 @@ def solve_line(
     Z = F - Q * J
     p = _followed(Z, p_b)
     rise = np.diff(Z)
-    empty = (p[:-1] == 0.0) & (U * line.film_at(0.5 * (x[1:] + x[:-1])) > Q + VOID * abs(Q))
+    empty = (p[:-1] == 0.0) & (U * line.carries(0.5 * (x[1:] + x[:-1])) > Q + VOID * abs(Q))
     refills = empty & (p[1:] > 0.0) & (rise > p[1:] * (1.0 + 1e-9))
     dry = empty & ((p[1:] == 0.0) | refills)
     k = np.flatnonzero(refills)
@@ -214,7 +216,7 @@ def solve_line(
     k, x_f = k[apart], x_f[apart]
     points = np.insert(x, k + 1, x_f)
     whole = np.insert(~dry, k + 1, True)
-    found = LineIntegrals(line.film, points, fine=True)
+    found = LineIntegrals(line.film, points, fine=True, swell=line.swell)
     found.ring = line.ring
     return Line(found, np.insert(p, k + 1, 0.0), whole, mu, U, Q, r_in > 0.0, law)
 
