@@ -212,7 +212,9 @@ def solve_line(
         return Z[k + 1] - (F_t - Q * J_t) - p[k + 1]
 
     x_f = bisect(below, x[k], x[k + 1])
-    apart = (x_f - x[k] > SAME * x[-1]) & (x[k + 1] - x_f > SAME * x[-1])
+    begins = x_f - x[k] <= SAME * x[-1]
+    dry[k[begins]] = False
+    apart = ~begins & (x[k + 1] - x_f > SAME * x[-1])
     k, x_f = k[apart], x_f[apart]
     points = np.insert(x, k + 1, x_f)
     whole = np.insert(~dry, k + 1, True)
