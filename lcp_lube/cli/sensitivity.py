@@ -30,7 +30,7 @@ HEAD = ("scene", "nx", "ny", "outcome", "converged", "message")
 def run(args: argparse.Namespace) -> int:
     """Exit status 0 if the film's solution converged, else 1. Collective."""
     scene = scene_of(args)
-    check(scene, film=bool(args.plot or args.output))
+    check(scene)
     names = [name.strip() for name in args.quantity.split(",")]
     keys = [word.strip() for word in args.by.split(",")] if args.by else None
     for key in keys or []:
@@ -61,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
             bars = error_bars(args, scene, solution, found, deviation, ask)
             for one, into in zip(found, [record, *record.get("others", [])], strict=True):
                 into |= {"error_bar": bars[one.quantity]} if bars else {}
-            pictures(args, scene, solution, found)
+            pictures(args, scene, solution, found, trace)
             if args.errors:
                 record["grid_error"] = grid_error(args, scene, solution, names[0], ask)
         if args.json:
@@ -119,12 +119,12 @@ def bar_line(name: str, bar: dict[str, Any], unit: str) -> str:
     return "\n".join(lines)
 
 
-def pictures(args: argparse.Namespace, scene: Scene, solution: Solution, found: list[Gradient]) -> None:
+def pictures(args: argparse.Namespace, scene: Scene, solution: Solution, found: list[Gradient], trace: Trace | None) -> None:
     """The film's derivative, drawn and written where that was asked for. Collective."""
     if not (args.plot or args.output):
         return
     names = [one.quantity for one in found]
-    fields = film_fields(scene, solution, names if args.output else names[:1])
+    fields = film_fields(scene, solution, names if args.output else names[:1], trace)
     if args.plot:
         sensitivity.plot(found[0], solution, fields[names[0]], args.plot)
     if args.output:

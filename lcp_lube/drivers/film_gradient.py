@@ -23,10 +23,8 @@ from ..problems.film.turned import TurnedProblem
 from ..problems.film.weighed import Weighed, can
 from ..problems.grid import Grid
 from ..registry import SMALL
-from .adjoint import Adjoint, Implicit
+from .adjoint import Implicit
 from .equations import DRAGS, FLIPPED
-from .frozen import Frozen
-from .turned import Mirrored
 
 STEP = 1e-30  # relative: complex steps have no differences whose digits could cancel
 
@@ -43,17 +41,18 @@ def areas(grid: Grid) -> Array:
 
 
 class FilmGradient:
-    """dQ/dh of an adjoint's quantities. Collective, as its method."""
+    """dQ/dh of the quantities of an `Adjoint`, or of what has its attributes. Collective, as its methods."""
 
-    def __init__(self, adjoint: Adjoint):
+    def __init__(self, adjoint: Any):
         self.adjoint, eq = adjoint, adjoint.equations
-        film: Any = Mirrored(adjoint.scene) if eq.turned else adjoint.scene
-        model = Frozen(film, eq.law).constant if eq.law else film.model
         self.problem = eq.problem(adjoint.p)
-        self.model = model
+        self.model = model = eq.model
         self.at_faces = model.scheme == "face", model.scheme != "upwind"  # whether void and Couette flow are those of faces
         self.mean_cubes = model.mean_cubes
-        self.implicit = Implicit.of(adjoint)
+
+    @cached_property
+    def implicit(self) -> Implicit:
+        return Implicit.of(self.adjoint)
 
     @cached_property
     def slopes(self) -> BoxScheme:
@@ -74,7 +73,7 @@ class FilmGradient:
         adjoint, eq = self.adjoint, self.adjoint.equations
         total: Any = 0.0
         for name, factor in self.implicit.weights(quantity).items():
-            total = total + factor * self._lagrangian(name)
+            total = total + factor * self.lagrangian(name)
         out = total.ravel() / areas(eq.grid)
         reported = adjoint.reported
         return reported.here({"h": out})["h"] if isinstance(reported, TurnedProblem) else out
@@ -82,8 +81,8 @@ class FilmGradient:
     def destroy(self) -> None:
         """Nothing of its own."""
 
-    def _lagrangian(self, name: str) -> Array:
-        """Of one L by the film at each point: by what the balance has, and by what the number itself has."""
+    def lagrangian(self, name: str) -> Array:
+        """Of one L by the film at each point, all that cells store held: by what the balance has, and the number itself."""
         adjoint = self.adjoint
         held = adjoint.equations.given
         rows = -adjoint.lambdas[name] if held is None else np.where(held, 0.0, -adjoint.lambdas[name])

@@ -28,6 +28,7 @@ from .coupled_gradient import CoupledGradient
 from .equations import check_film
 from .film_gradient import FilmGradient
 from .march_course import Trace, check_march
+from .march_film_gradient import MarchFilm
 from .march_gradient import MarchGradient
 from .transposed import CoupledFilm
 
@@ -122,29 +123,26 @@ def gradients(
     return out
 
 
-def check(scene: Scene, film: bool = False) -> None:
-    """Raise InputError for a scene without derivatives; film : that of the film itself is asked for too."""
-    if motion_of(scene) is not None:
-        check_march(scene)
-    else:
-        check_film(scene)
-    if film and motion_of(scene) is not None:
-        raise InputError(f"scene {scene.name}: dQ/dh at every point (--plot, --output) is not known in time")
+def check(scene: Scene) -> None:
+    """Raise InputError for a scene without derivatives."""
+    (check_film if motion_of(scene) is None else check_march)(scene)
 
 
-def film_fields(scene: Scene, solution: Solution, quantities: Sequence[str]) -> dict[str, Array]:
+def film_fields(scene: Scene, solution: Solution, quantities: Sequence[str], trace: Trace | None = None) -> dict[str, Array]:
     """dQ/dh by quantity at the owned points of the solution's grid, per area, in the fields' shape. Collective.
+
+    Of a march by a film that is so much thicker at all times. trace : as of `gradients`.
 
     Raises
     ------
-    InputError : a quantity without a derivative, a scene without a film or in time, a solution that is none.
+    InputError : a quantity without a derivative, a scene without a film, a solution that is none.
     """
-    check(scene, film=True)
+    check(scene)
     grid = solution.problem.grid
-    adjoint: Any = (CoupledGradient if _coupled(scene) else Adjoint)(scene, solution, quantities)
+    adjoint: Any = _adjoint(scene, solution, quantities, trace=trace)
     film: Any = None
     try:
-        film = CoupledFilm(adjoint) if _coupled(scene) else FilmGradient(adjoint)
+        film = (MarchFilm if motion_of(scene) is not None else CoupledFilm if _coupled(scene) else FilmGradient)(adjoint)
         return {name: film.field(name).reshape(grid.box if grid.dim == 2 else -1) for name in quantities}
     finally:
         if film is not None:
@@ -163,6 +161,14 @@ def _coupled(scene: Any) -> bool:
     return bool(getattr(getattr(scene, "model", None), "effects", ()))
 
 
+def _adjoint(
+    scene: Scene, solution: Solution, quantities: Sequence[str], flip: bool = False, trace: Trace | None = None
+) -> Any:
+    if motion_of(scene) is not None:
+        return MarchGradient(scene, solution, quantities, trace)
+    return (CoupledGradient if _coupled(scene) else Adjoint)(scene, solution, quantities, flip)
+
+
 def _gradients(
     scene: Scene,
     solution: Solution,
@@ -171,13 +177,7 @@ def _gradients(
     flip: bool = False,
     trace: Trace | None = None,
 ) -> list[Gradient]:
-    adjoint: Any
-    if motion_of(scene) is not None:
-        adjoint = MarchGradient(scene, solution, quantities, trace)
-    elif _coupled(scene):
-        adjoint = CoupledGradient(scene, solution, quantities, flip)
-    else:
-        adjoint = Adjoint(scene, solution, quantities, flip)
+    adjoint = _adjoint(scene, solution, quantities, flip, trace)
     try:
         values = values_of(adjoint.scene)
         balance = solution.settings.get("balance")

@@ -61,6 +61,7 @@ class MarchGradient:
             trace = Trace()
             solve(scene, Ask(method=solution.settings.get("method", "auto"), implied=True, comm=comm, watch=trace)).destroy()
         self.scene, self.trace, self.comm, self.names = scene, trace, comm, list(dict.fromkeys(quantities))
+        self.reported = solution.problem
         self.lambdas: dict[str, list[Any]] = {name: [None] * (len(trace.steps) + 1) for name in self.names}
         self.left: dict[str, list[Any]] = {name: [None] * (len(trace.steps) + 1) for name in self.names}  # lambda, of contents
         self.course = Course(scene, trace, comm)
@@ -83,7 +84,7 @@ class MarchGradient:
         parts = {name: (name.removeprefix(MEAN), share if name.startswith(MEAN) else float(last)) for name in self.names}
         return {name: part for name, part in parts.items() if part[1]}
 
-    def _later(self, n: int) -> list[tuple[int, float]]:
+    def later(self, n: int) -> list[tuple[int, float]]:
         """The steps that keep what step n left, and by what part."""
         N, found = len(self.trace.steps), []
         for m, name in ((n + 1, "last"), (n + 2, "before")):
@@ -110,7 +111,7 @@ class MarchGradient:
         }
         forces = [name for name, found in zip(self.course.forces, self.course.sought(n), strict=True) if found]
         slopes = {part: eq.slope(p, r, part) for part in dict.fromkeys([*(q for one in parts.values() for q in one), *forces])}
-        later = self._later(n)
+        later = self.later(n)
         of_full = 0.0 if eq.law is None else (1.0 - r) * eq.law.density_slope(p) * eq.constant.p_unit
         left = 2.0 * grid.spacing[0] * point_weights(grid) * mean_film(grid, self.course.film(n).film).ravel()
         left *= np.where(cavity, 1.0, of_full)  # of the content, by z
@@ -180,6 +181,21 @@ class MarchGradient:
             self.fed[name][n] = fed
             found[name] = found[name] + sum(part * answer for part, answer in zip(one, pushed, strict=True))
             found[name] = found[name] - sum(part * answer for part, answer in zip(fed, off_by, strict=True))
+
+    def parts(self, n: int, eq: Equations) -> dict[str, dict[str, float]]:
+        """By quantity the numbers of step n, and the shares of them, that it and what its supplies ask for are made of."""
+        kept = self.course.kept(n)
+        assert kept is not None  # as it has adjoints
+        numbers, asked = eq.numbers(kept.p, kept.r), self._asked(n)
+        off = [eq.partials(numbers, name) for name in eq.report(numbers) if name.startswith(MISFIT)]
+        out: dict[str, dict[str, float]] = {name: {} for name in self.names}
+        for name, of in out.items():
+            base, share = asked.get(name, ("", 0.0))
+            mine = [(share, eq.partials(numbers, base))] if base else []
+            for w, found in [*mine, *zip(-self.fed[name][n], off, strict=True)]:
+                for part, value in found.items():
+                    of[part] = of.get(part, 0.0) + w * value
+        return out
 
     def _scaled(self, n: int, eq: Equations) -> Array:
         """G of step n in the units of its adjoints."""

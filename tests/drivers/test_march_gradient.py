@@ -1,14 +1,18 @@
 """Derivatives of films that go on in time: the adjoint of the march against differences of marches."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from lcp_lube import solve
 from lcp_lube.drivers import rotor, supplies
-from lcp_lube.drivers.gradient import check, gradients
+from lcp_lube.drivers.film_gradient import areas
+from lcp_lube.drivers.gradient import check, film_fields, gradients
 from lcp_lube.drivers.march_course import Course, Trace
 from lcp_lube.drivers.march_gradient import MarchGradient, means
 from lcp_lube.errors import InputError
+from lcp_lube.problems.film.views import LiftedFilm
 from lcp_lube.scenes.scene import load_scene
 from lcp_lube.scenes.values import values_of, with_values
 
@@ -151,9 +155,31 @@ def test_what_has_no_derivative_in_time_is_said(changes):
             gradients(scene, solution, ["load"], ["fluid.mu"])
 
 
-def test_the_films_own_derivative_is_refused_before_the_solve():
-    with pytest.raises(InputError, match="not known in time"):
-        check(load_scene("moving_texture"), film=True)
+@pytest.mark.parametrize("case", ["to smaller x", "free"])
+def test_the_films_own_derivative(case, monkeypatch):
+    """In a drawn direction, by differences of marches whose film is another at all times; in sum that by its level."""
+    monkeypatch.setattr(rotor, "TOL", 1e-11)
+    monkeypatch.setattr(supplies, "TOLERANCE", 1e-13)
+    name, changes, _ = CASES[case]
+    scene = load_scene(name, **{**changes, "motion": {**changes["motion"], "start": "full"}})
+    names, trace, models = ["load", "mean_friction"], Trace(), type(scene).models
+    with solve(scene, watch=trace, stopping=TIGHT) as solution:
+        grid, fields = solution.problem.grid, film_fields(scene, solution, names, trace)
+        found = gradients(scene, solution, names, ["h_offset"], trace)
+        d = 1e-5 * solution.problem.scheme.h.min() * np.random.default_rng(1).uniform(-1.0, 1.0, grid.local_size)
+        ends = []
+        for way in (-1.0, 1.0):
+
+            def lifted(t, place, way=way):
+                model = models(scene)(t, place)
+                return replace(model, gap=LiftedFilm.of(model.gap, grid, way * d))
+
+            monkeypatch.setattr(type(scene), "models", lambda self: lifted)
+            ends.append(marched(scene, names))
+        for one, slope in zip(found, 0.5 * (ends[1] - ends[0]), strict=True):
+            parts = fields[one.quantity].ravel() * areas(grid)
+            assert parts.sum() == pytest.approx(one.gradient["h_offset"], rel=1e-8)
+            assert parts @ d == pytest.approx(slope, rel=1e-6)
 
 
 def test_by_the_speed_of_a_texture_the_mean_of_both_sides_is_the_limit_of_differences():
