@@ -42,7 +42,8 @@ class Entry:
 
     def load(self) -> Any:
         module, _, name = self.target.partition(":")
-        return getattr(import_module(module), name) if name else import_module(module)
+        found = sys.modules.get(module) or import_module(module)
+        return getattr(found, name) if name else found
 
 
 @dataclass(frozen=True)

@@ -38,6 +38,8 @@ def check_same(comm: MPI.Comm, what: str, value: object) -> None:
     ----------
     value : its `repr` is compared, addresses left out.
     """
+    if comm.size == 1:
+        return
     text = re.sub(r" at 0x[0-9a-f]+", "", repr(value))  # a function's address is each process's own
     digest = hashlib.sha256(text.encode(errors="replace")).digest()
     digests = comm.allgather(digest)

@@ -1,8 +1,7 @@
 """Named stages: seconds for the results, and the same names in PETSc's -log_view."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from time import perf_counter
+from typing import Any
 
 from petsc4py import PETSc
 
@@ -13,13 +12,20 @@ class Stages:
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
 
-    @contextmanager
-    def __call__(self, name: str) -> Iterator[None]:
-        stage = PETSc.Log.Stage(name)
-        start = perf_counter()
-        stage.push()
-        try:
-            yield
-        finally:
-            stage.pop()
-            self.seconds[name] = self.seconds.get(name, 0.0) + perf_counter() - start
+    def __call__(self, name: str) -> "_Stage":
+        return _Stage(self.seconds, name)
+
+
+class _Stage:
+    """One time that a stage is entered; no generator, as small solves enter dozens."""
+
+    def __init__(self, seconds: dict[str, float], name: str):
+        self._seconds, self._name, self._stage = seconds, name, PETSc.Log.Stage(name)
+
+    def __enter__(self) -> None:
+        self._start = perf_counter()
+        self._stage.push()
+
+    def __exit__(self, *failure: Any) -> None:
+        self._stage.pop()
+        self._seconds[self._name] = self._seconds.get(self._name, 0.0) + perf_counter() - self._start

@@ -12,6 +12,7 @@ from petsc4py import PETSc
 from ..base.options import wants_ksp
 from ..base.progress import Progress
 from ..errors import InputError, nearest
+from ..problems.certificate import Certificate
 from ..problems.solution import Fields, Problem, Solution
 from ..solvers.newton import Monitor, Stopping
 
@@ -75,6 +76,7 @@ class Ask:
     monitor : called after every step with its number and record.
     progress : told by the loops over grids, levels and time steps how far they have come.
     watch : called after every time step of a march with its `time.Moment`; collective.
+    judge : certifies the fields of the problem that is solved in that problem's place: a part's on the whole scene's data.
     times : when a march is to end a step, s, where an error estimate says how long these are.
     comm : communicator of petsc4py or mpi4py; default all ranks.
     """
@@ -102,6 +104,7 @@ class Ask:
     monitor: Monitor | None = None
     progress: Progress | None = None
     watch: Callable[[Any], None] | None = None
+    judge: Callable[[Problem, Fields, float], Certificate] | None = None
     times: tuple[float, ...] = ()
     comm: PETSc.Comm | None = None
 
@@ -119,6 +122,10 @@ class Ask:
             object.__setattr__(self, "options", {})
         if self.comm is not None:
             object.__setattr__(self, "comm", PETSc.Comm(self.comm))  # mpi4py's will do too
+
+    def certify_by(self, problem: Problem, fields: Fields, eps1: float) -> Certificate:
+        """What the problem's data say of the fields, or those of the whole whose part it is. Collective."""
+        return (self.judge or type(problem).certify)(problem, fields, eps1)
 
     def tell(self, loop: str, words: str, part: float) -> None:
         """How far a loop has come, for `progress`."""

@@ -70,7 +70,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner | None = None) -> Solution:
     run.take_over()
     problem = run.revise()
     outcome, message = run.outcome, run.message
-    certificate = run.certificate or problem.certify(run.fields, run.stopping.eps1)
+    certificate = run.certificate or ask.certify_by(problem, run.fields, run.stopping.eps1)
     enclosure = run.enclose(problem) if ask.certify and isinstance(problem, LubricationProblem) else None
     if outcome is not Outcome.CONVERGED and isinstance(problem, BoxProblem):
         outcome, message = problem.explain(outcome, message)
@@ -171,7 +171,7 @@ class Run:
         others = METHODS[self.chosen.method].of(self.problem.kind).fallback
         for k, name in enumerate((name for name in others if self.facts.size <= METHODS[name].at_most), start=1):
             if self.outcome is Outcome.CONVERGED:
-                self.certificate = self.certificate or self.problem.certify(self.fields, self.stopping.eps1)
+                self.certificate = self.certificate or self.ask.certify_by(self.problem, self.fields, self.stopping.eps1)
                 if not (failure := self.certificate.failure):
                     break
                 self.outcome, self.message = Outcome.WRONG_SOLUTION, f"{self.message}, but the certificate fails: {failure}"

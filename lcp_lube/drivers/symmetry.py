@@ -9,7 +9,8 @@ linear solve.)
 from dataclasses import replace
 from typing import Any
 
-from ..problems.solution import Outcome, Problem, Solution
+from ..problems.certificate import Certificate
+from ..problems.solution import Fields, Outcome, Problem, Solution
 from ..problems.transfer import Pick, numbers
 from ..scenes.scene import Solvable
 from . import film_part, rectangle_part
@@ -99,24 +100,40 @@ def solve_part(part: Part, problem: Problem, ask: Ask, inner: Inner) -> Solution
         take = Pick(problem.grid, small.grid, *numbers(small.grid))
         start = Start(small, {name: take(values) for name, values in near.items()}, ask.start.settings)
         take.destroy()
-    solution = inner(part, replace(ask, start=start))
+    whole = _Whole(part, problem)
+    solution = inner(part, replace(ask, start=start, judge=whole.certify))
     if start is not None:
         start.problem.destroy()
-    small_problem = solution.problem
-    spread = Pick(small_problem.grid, problem.grid, *part.places(problem.grid))
-    fields = {name: spread(values) for name, values in solution.fields.items()}
-    if (dry := getattr(small_problem, "dry", None)) is not None:
-        problem = problem.revised(spread(dry))  # type: ignore[attr-defined]
-    if (held := getattr(small_problem, "held", None)) is not None:  # pressures of supplies may have followed
-        of_whole: Any = problem
-        pairs = zip(of_whole.held.supplies, held.supplies, strict=True)
-        of_whole.hold_at([replace(one, p=found.p) for one, found in pairs])
-    spread.destroy()
-    small_problem.destroy()
+    certificate = whole.certify(solution.problem, solution.fields, solution.settings["eps1"])
+    solution.problem.destroy()
     settings = {
         **solution.settings,
         "why": [part.sentence, *solution.settings["why"]],
         "details": {**solution.settings["details"], **details},
     }
-    certificate = problem.certify(fields, solution.settings["eps1"])
-    return replace(solution, problem=problem, fields=fields, certificate=certificate, settings=settings).judged()
+    found = {"problem": whole.problem, "fields": whole.fields, "certificate": certificate, "settings": settings}
+    return replace(solution, **found).judged()
+
+
+class _Whole:
+    """The whole problem, and the fields that a part's answer spreads out to; for several answers, the last one's."""
+
+    def __init__(self, part: Part, problem: Any):
+        self.problem, self._first, self._part = problem, problem, part
+        self.fields: Fields = {}
+        self._seen: Fields = {}
+        self._found: Certificate
+
+    def certify(self, small: Any, fields: Fields, eps1: float) -> Certificate:
+        """Of the part's fields by the whole problem's data, once for the same ones. Collective."""
+        if self._seen is not fields:
+            spread = Pick(small.grid, self._first.grid, *self._part.places(self._first.grid))
+            self._seen, self.fields = fields, {name: spread(values) for name, values in fields.items()}
+            if (dry := getattr(small, "dry", None)) is not None:
+                self.problem = self._first.revised(spread(dry))
+            if (held := getattr(small, "held", None)) is not None:  # pressures of supplies may have followed
+                pairs = zip(self.problem.held.supplies, held.supplies, strict=True)
+                self.problem.hold_at([replace(one, p=found.p) for one, found in pairs])
+            spread.destroy()
+            self._found = self.problem.certify(self.fields, eps1)
+        return self._found

@@ -141,14 +141,15 @@ class FilmScene(Scene):
         ------
         InputError : sides that contradict one another, a profile that cannot be read.
         """
-        where = self._folder, self._t, self._travel, self._journal
-        if self._made is None or self._made[1] != where or self._made[0] != vars(self):  # a copy may have changed
+        private: dict[str, Any] = self.__pydantic_private__ or {}  # read at once: asked for a dozen times a solve
+        made, where = private["_made"], [private[name] for name in ("_folder", "_t", "_travel", "_journal")]
+        if made is None or made[1] != where or made[0] != vars(self):  # a copy may have changed
             try:
                 model, effects = self._model(), self.effects
             except InputError as error:
                 raise self._named(error) from None
-            self._made = dict(vars(self)), where, replace(model, effects=effects) if effects else model
-        return self._made[2]
+            made = self._made = dict(vars(self)), where, replace(model, effects=effects) if effects else model
+        return made[2]  # type: ignore[no-any-return]
 
     def __getstate__(self) -> dict[Any, Any]:
         state = super().__getstate__()

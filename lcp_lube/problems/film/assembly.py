@@ -32,7 +32,10 @@ def csr(grid: Grid, entries: Sequence[Entry], *more: Sequence[NDArray]) -> tuple
     places = [entries[k][:2] for k in ordered]
     columns = np.stack([number[1 + dj : 1 + dj + ny, 1 + di : 1 + di + nx] for dj, di in places], axis=-1)
     stencils = ([entry[2] for entry in entries], *more)
-    values = [np.stack([np.broadcast_to(one[k], grid.box) for k in ordered], axis=-1) for one in stencils]
+    values = [np.empty(columns.shape, dtype=np.result_type(*one)) for one in stencils]
+    for one, into in zip(stencils, values, strict=True):
+        for n, k in enumerate(ordered):
+            into[..., n] = one[k]
     if grid.comm.size > 1 or any(grid.periodic):
         order = np.argsort(columns, axis=-1)
         columns, *values = (np.take_along_axis(a, order, axis=-1) for a in (columns, *values))

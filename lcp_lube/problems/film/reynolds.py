@@ -289,6 +289,11 @@ def sides(grid: Grid, kinds: Sequence[str] = ("open",)) -> tuple[NDArray[np.bool
 
 def side_points(grid: Grid) -> tuple[tuple[slice | NDArray, slice | NDArray], ...]:
     """The owned points at the open ends of `sides` as indices into arrays of `grid.box`."""
-    west, east, south, north = (np.flatnonzero(mask) for mask in sides(grid))
-    every = slice(None)
+    every, nothing = slice(None), np.zeros(0, dtype=int)
+    found: list[NDArray] = []
+    parts = zip((grid.x_start, grid.y_start), grid.box[::-1], grid.shape, grid.ends, strict=False)
+    for start, owned, n, (first, last) in parts:
+        end = owned - int(last == "open" and start + owned == n)
+        found += [np.arange(int(first == "open" and start == 0)), np.arange(end, owned)]
+    west, east, south, north = found if grid.dim == 2 else [*found, nothing, nothing]
     return (every, west), (every, east), (south, every), (north, every)
