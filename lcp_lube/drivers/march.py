@@ -66,6 +66,7 @@ class March:
     rates: float = 0.0  # largest so far: what drives the film, 2 dx sums
     warming: float = 0.0  # likewise, of what is carried
     curved: bool = False  # whether `guess` knows three steps
+    lapse: float = 0.0  # of the last step: what its formula errs by, as `Stored` has it
 
     def begin(self, contents: Array, fields: Fields | None, carried: Array | None = None) -> None:
         """At t = 0."""
@@ -85,7 +86,7 @@ class March:
     def term(self, formula: Formula) -> Stored:
         """What the step adds to the film's balance."""
         carried = formula.old(self.carried) if self.carried else None
-        return Stored(formula.weight, formula.old(self.contents), self.grid, carried=carried)
+        return Stored(formula.weight, formula.old(self.contents), self.grid, carried=carried, lapse=self.lapse)
 
     def guess(self, dt: float) -> Fields | None:
         """Fields at the step's end, as they went on in the last steps: z = p or -r in a line, `curved` in a parabola, but where
@@ -120,6 +121,8 @@ class March:
         moving, own = (problem.moving, problem.there(fields)) if isinstance(problem, TurnedProblem) else (problem, fields)
         into += [flow / size for flow in supply_flows(moving, own["p"], own["r"])]
         contents, volume = self._rounded(formula, problem, contents, sum(into))
+        lapse, old = self._lapse(dt, contents, self.contents), self.grid.reduce.norm(formula.old(self.contents))
+        self.lapse = 0.0 if lapse is None else self.grid.reduce.norm(lapse) / (old or 1.0)
         rate = formula.weight * volume - formula.old(self.volumes)
         self.flowed += dt * sum(into)
         self.stored += dt * rate
@@ -178,8 +181,13 @@ class March:
 
     def _error(self, dt: float, new: Array, before: list[Array], size: float) -> float | None:
         """Of the rates of what cells store, over their size."""
+        lapse = self._lapse(dt, new, before) if size else None
+        return None if lapse is None else self._sum(np.abs(lapse)) / size
+
+    def _lapse(self, dt: float, new: Array, before: list[Array]) -> Array | None:
+        """What the formula errs by in the rates of cells that were full, or cavitated, all the while; in others 0."""
         order = 2 if self.second else 1
-        if len(self.dts) < order or not size:
+        if len(self.dts) < order:
             return None
         steps = [dt, *self.dts][: order + 1]
         times = -np.concatenate([[0.0], np.cumsum(steps)])  # of the values known, from the new one back
@@ -191,7 +199,8 @@ class March:
         high = sum(weight * values for weight, values in zip(weights, used, strict=True))
         factor = dt * (dt + self.dts[0]) if order == 2 else dt
         steady = np.logical_and.reduce([full == self.full[0] for full in self.full[: order + 1]])
-        return self._sum(np.where(steady, np.abs(factor * high), 0.0)) / size
+        found: Array = np.where(steady, factor * high, 0.0)
+        return found
 
     def next_step(self, dt: float, error: float | None, tol: float) -> float:
         """The length of the next step, or of the same once more."""

@@ -12,7 +12,7 @@ from . import checkpoint_file
 from .ask import Ask
 from .checkpoint import Checkpointer, load, scene_record
 
-NUMBERS = ("t", "dts", "volumes", "flowed", "stored", "moved", "rates", "warming")  # of a `March`
+NUMBERS = ("t", "dts", "volumes", "flowed", "stored", "moved", "rates", "warming", "lapse")  # of a `March`
 ARRAYS = ("contents", "carried", "full")
 RUN = ("history", "solves", "lengths", "step", "rescuer", "times_s", "settings")  # of what takes the steps
 

@@ -81,7 +81,7 @@ class Run:
         if chosen.method == "active-set":  # the steps before have the front to within a cell or two: see `_sweeps`
             self.may_sweep = "sweeps" not in ask.options
             ask = replace(ask, options={"sweeps": 0, **ask.options})
-        self.march.curved = coupled = bool(first.effects) or first.dense
+        self.march.curved = (coupled := bool(first.effects) or first.dense) or chosen.method == "fas"
         self.ask = replace(ask, method=chosen.method, implied=not named)
         if chosen.method == "fas" and self.rotor is None and ask.options.get("rest", REST):
             stopping = ask.stopping or {"eps1": EPS1}

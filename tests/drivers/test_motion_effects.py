@@ -235,4 +235,17 @@ def test_pressures_of_supplies_follow_in_cycles_of_multigrid(effect):
             found.append([row["load"] for row in solution.history])
             iterations = np.mean([row["iterations"] for row in solution.history[3:]])
     assert found[1] == pytest.approx(found[0], rel=1e-4)  # the formula's error is some 1e-2
-    assert iterations <= (4.5 if effect == "walls" else 2.5)
+    assert iterations <= (
+        2.5 if effect == "walls" else 1.6
+    )  # 2.0 to 2.5 where a part of the guess's residual alone ends a step
+
+
+def test_pressures_of_supplies_in_a_cavity_do_not_swing():
+    """A film that is cavitated beside a supply takes the less of its pressure the coarser the grid: that took 20 cycles."""
+    data: dict[str, Any] = {"family": "bearing", "dimension": 2, "L": 0.05, "width": 0.043, "U": 5.0, "nx": 160, "ny": 72}
+    film = {"shape": "formula", "h": "2.8e-5*(1+0.53*cos(125.66370614*x-2.434)*(1+0.16*sin(409*t)))"}
+    data |= {"film": film, "fluid": {"mu": 0.045, "p_supply": 1e5}, "sides": {"west": "periodic", "east": "periodic"}}
+    data |= {"supply": [{"flow": 9e-8, "x_mm": [14.1, 28.7], "y_mm": [17.5, 25.4]}], "motion": {"t_end": 1.5e-4, "steps": 2}}
+    with solve(data, method="fas", options={"rest": 0.0}) as solution:
+        assert solution.converged and solution.mass_defect_run < 1e-12
+        assert max(row["iterations"] for row in solution.history) <= 13

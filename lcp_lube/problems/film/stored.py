@@ -32,6 +32,7 @@ class Stored:
     first, step : the film that is solved is a part of that one: its column i is column first + step i there, counted round.
     exact : what hangs on the step's answer needs its last digit.
     carried : as `old`, of what the oil carries along, contents times temperature; None: nothing.
+    lapse : norm of what the formula errs by, as far as the last steps tell, in parts of that of `old`.
     """
 
     weight: float
@@ -41,6 +42,7 @@ class Stored:
     step: int = 1
     exact: bool = False
     carried: Array | None = None
+    lapse: float = 0.0
 
     def on(self, grid: Grid, values: Array | None = None) -> Array:
         """`old`, or other values there, at the owned points of the film's own grid, shape `grid.box`. Collective."""

@@ -42,7 +42,8 @@ SLOWER, LEAST_FALL = 2.5, 0.04  # times what the last F cycle left is what a V c
 class FasOptions(CycleOptions):
     """As `CycleOptions`, the sweeps at fronts doubled where these are rare; truncation: of corrections at fronts, none, clip
     or points; weights: of the interpolation, by the conductances of the faces (harmonic) or the same everywhere (linear);
-    rest: part of the residual of the guess that a time step may leave, where the certificate allows it."""
+    rest: part that a time step may leave, where the certificate allows it, of the residual of its guess, or if that is more, of
+    what the formula in time errs by."""
 
     truncation: str = one_of("clip", TRUNCATIONS)
     weights: str = one_of("harmonic", ("harmonic", "linear"))
@@ -86,7 +87,8 @@ class Fas(Cycles):
         self._following: Any = following.Following(problem, self._levels, self.fields) if follows else None
         self.norm = self._first = self._norm()
         if start is not None and problem.scheme.storage is not None and options.rest:
-            self._rest, self._share = max(self.eps1, min(options.rest * self.norm, self.eps1**0.5)), 0.5
+            lapse = problem.stored.lapse * problem.reduce.norm(problem.scheme.kept) / self._c_norm
+            self._rest, self._share = max(self.eps1, min(options.rest * max(self.norm, lapse), self.eps1**0.5)), 0.5
 
     @property
     def z(self) -> Array:
@@ -102,9 +104,8 @@ class Fas(Cycles):
             level.z[level.held] = level.given
 
     def _own(self) -> Array:
-        level = self._levels[0]
-        self._finest.take_back(level, self.problem, self._fields)
-        return self._finest.own(level, self.problem.grid, level.z)  # type: ignore[no-any-return]
+        self._finest.take_back(self._levels[0], self.problem, self._fields)
+        return self._finest.own(self._levels[0], self.problem.grid, self._levels[0].z)  # type: ignore[no-any-return]
 
     @property
     def fields(self) -> Fields:
@@ -153,9 +154,8 @@ class Fas(Cycles):
             if not self._retreat():
                 if not self.norm < 1.0:
                     self.z = np.zeros(self.problem.grid.local_size)  # nothing to start from (`run.Run.take_over`)
-                raise StalledError(
-                    f"||G|| is at {self.norm:.1e} of ||c|| after {self._taken} cycles and has stalled (fas.stall)"
-                )
+                told = f"||G|| is at {self.norm:.1e} of ||c|| after {self._taken} cycles and has stalled (fas.stall)"
+                raise StalledError(told)
             anew = not self.norm < self._first
         with self.stages("cycles"):
             if self._taken == 1 and self._levels[0].carry is not None:

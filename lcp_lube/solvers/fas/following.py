@@ -25,6 +25,7 @@ LEAST = 0.5  # of a pressure, in one step
 STEP = 1e-3  # of a pressure, by which the coarsest grid's answer to it is found
 SAME = 1e-3  # relative changes of pressures that end the coarsest grid's steps
 ROUNDS = 4  # of these, at most
+LEAST_PART = 0.5  # of a change of pressures by the coarse grids
 
 
 class Following:
@@ -44,6 +45,9 @@ class Following:
         self.units = [volume_unit(problem)]
         self.slopes: Array | None = None  # of the coarsest level's whole film
         self.before: dict[int, Array] = {}  # pressures with which each level was left on the way down
+        # What the coarse grids of the last cycle changed the finest level's by, and which part of that is taken: films that are
+        # cavitated beside a supply take the less of its pressure the coarser the grid is, and pressures would swing.
+        self.last, self.part = np.zeros(len(self.free)), np.ones(len(self.free))
         for fine in levels[:-1]:
             self.units.append(self.units[-1] * (2.0 if fine.by_y else 1.0))
         self.at = [[np.flatnonzero(v.owner == k + 1) for k in self.free] for v in levels]
@@ -94,8 +98,14 @@ class Following:
         self.P[k + 1] = self.before[k] = self.P[k]
 
     def ascend(self, k: int) -> None:
-        """What level k + 1's pressures have changed by."""
-        self.shift(k, np.maximum(self.P[k] + (self.P[k + 1] - self.before[k]), LEAST * self.P[k]))
+        """What level k + 1's pressures have changed by, or `part` of it on the finest level."""
+        step = self.P[k + 1] - self.before[k]
+        if k == 0:
+            with np.errstate(all="ignore"):
+                part = self.part / (1.0 - step / self.last)
+            self.part, self.last = np.clip(np.where(part > 0.0, part, 1.0), LEAST_PART, 1.0), step
+            step = self.part * step
+        self.shift(k, np.maximum(self.P[k] + step, LEAST * self.P[k]))
 
     def solve(self, k: int) -> None:
         """The coarsest level, whose cells alone are solved already."""
