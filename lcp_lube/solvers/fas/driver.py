@@ -87,7 +87,7 @@ class Fas(Cycles):
         self._following: Any = following.Following(problem, self._levels, self.fields) if follows else None
         self.norm = self._first = self._norm()
         if start is not None and problem.scheme.storage is not None and options.rest:
-            lapse = problem.stored.lapse * problem.reduce.norm(problem.scheme.kept) / self._c_norm
+            lapse = problem.stored.lapse * problem.reduce.norm(problem.scheme.kept) / (self._c_norm or 1.0)  # type: ignore[arg-type]
             self._rest, self._share = max(self.eps1, min(options.rest * max(self.norm, lapse), self.eps1**0.5)), 0.5
 
     @property
