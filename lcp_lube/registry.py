@@ -252,6 +252,7 @@ PADS, JOURNALS = ("lcp_lube.scenes.thrust", "lcp_lube.scenes.tilting"), ("lcp_lu
 DRIVERS: dict[str, Entry] = {
     "decision": Entry("lcp_lube.drivers.decision", "effects that do not count are left out"),
     "accuracy": Entry("lcp_lube.drivers.accuracy", "finer and finer grids until a quantity is as good as asked for"),
+    "anew": Entry("lcp_lube.drivers.warm:anew", "what is sought from a neighbour's answer, or anew where that leads nowhere"),
     "pads": Entry("lcp_lube.drivers.pads", "pads that tilt, and the place of what they carry, by Newton's method", PADS),
     "position": Entry("lcp_lube.drivers.position", "where a journal lies under a load, by Newton's method", JOURNALS),
     "balance": Entry("lcp_lube.drivers.balance", "the film that carries the load asked for"),

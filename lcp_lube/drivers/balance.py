@@ -9,7 +9,7 @@ solves, each started from the nearest answer. On large grids the search begins o
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from math import atan2, cos, exp, inf, log, prod, sin
+from math import atan2, copysign, cos, exp, inf, log, prod, sin
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,7 @@ MOST_SOLVES = 30  # on a grid
 RANGE = {"eccentricity": 1e4, "h_offset": 100.0}  # unless one is given: of e/(1 - e) about 1, of the film about the scene's
 COARSE_TOL = 1e-3  # a coarse grid's load is no better
 FEWEST, NARROWEST = 25, 3  # points of a coarse grid, and across
+MOST_FAILED, LIGHTER = 4, 3.0  # solves without an answer before there is one, and twice the step in t from each to less load
 ONE_GRID = 1_000  # points up to which a coarser grid saves no time
 
 
@@ -219,11 +220,12 @@ def _on_grid(
     for count in range(1, MOST_SOLVES + 1):
         solution, slope = solve_at(t, best or near)
         if not solution.converged:
-            if best is None:
+            if best is None and count > MOST_FAILED:
                 return solution, t, count, False
+            back = best_t if best is not None else t - copysign(LIGHTER, search.slope)
             solution.destroy()
-            search.leave(t)
-            t = 0.5 * (t + best_t)  # back towards what could be solved
+            search.leave(t, back)
+            t = 0.5 * (t + back)  # towards what could be solved, or has less pressure
             continue
         W = carried(solution.problem.quantities(solution.fields))
         g = log(W / load) if W / load > 0 else -inf

@@ -35,7 +35,7 @@ from .turned import Mirrored
 
 FLIPPED = {"flow_west": "flow_east", "flow_east": "flow_west"}
 # What is found around a film that derivatives know of; of what is coupled, a fluid's law alone.
-THROUGH = {"decision", "accuracy", "pads", "balance", "position", "attitude", "turned", "supplies", "warm", "coupling"}
+THROUGH = {"decision", "accuracy", "anew", "pads", "balance", "position", "attitude", "turned", "supplies", "warm", "coupling"}
 THROUGH |= {"grooves", "symmetry", "direct"}
 DRAGS = ("friction", "friction_torque")
 MISFIT = "supply_misfit_"  # by which a supply's source and film disagree, 0 at the solution

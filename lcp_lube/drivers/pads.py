@@ -9,15 +9,12 @@ tilting, and are not what a bearing runs at: their inlets are opened, step by st
 which the journal has moved so far that it finds no place with stiffness idles: its inlet is closed until it has no pressure.
 """
 
-from contextlib import suppress
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.parallel import Array
-from ..errors import InputError
 from ..problems.solution import Outcome, Solution
 from ..scenes.moving import motion_of
 from ..scenes.scene import Solvable
@@ -47,18 +44,8 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     assert bearing is not None  # as `applies` found
     q = bearing.start()
     known = ask.start.settings.get("relative_coordinates") if ask.start is not None else None
-    if known is None or len(known) != q.size or not bearing.free[0]:
-        return _from(bearing, q, scene, ask, inner)
-    with suppress(InputError):  # a neighbour's pads may leave no film here
-        solution = _from(bearing, np.where(bearing.free, bearing.sizes * known, q), scene, ask, inner)
-        if solution.converged:
-            return solution
-        solution.destroy()
-    return _from(bearing, q, scene, replace(ask, start=None), inner)
-
-
-def _from(bearing: Bearing, q: Array, scene: Solvable, ask: Ask, inner: Inner) -> Solution:
-    """From one place. Collective."""
+    if known is not None and len(known) == q.size and bearing.free[0]:
+        q = np.where(bearing.free, bearing.sizes * known, q)
     chain = Chain(ask, inner)
     found, again, stiff = False, False, False
     nudges, nudge, off = np.zeros(q.size, dtype=int), np.zeros(q.size), np.zeros(q.size)

@@ -71,7 +71,8 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         shapes = _coarse(scene, s)
     t = math.log(max(s, 1e-3) / max(1.0 - s, 1e-6))
     counts, best = np.zeros(len(shapes), dtype=int), _Best()
-    elsewhere = scene.attitude_deg is None and not known and scene.shape[0] >= _fewest(scene, s)
+    given = scene.attitude_deg is not None
+    elsewhere = not known and scene.shape[0] >= _fewest(scene, s)
 
     def through(q: Array) -> tuple[Solution, Array, bool]:
         """From a place on the coarsest grid through all, or to the first where none is found if others may be tried."""
@@ -98,9 +99,10 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
             nonlocal solution
             solution = chain.solve(_moved(free.with_shape(shapes[0]), max(t, -WIDEST), phi))
             fx, fy = solution.problem.quantities(solution.fields)["force"]
-            return complex(fx / table.load + 1.0, fy / table.load) if solution.converged else complex(math.nan, math.nan)
+            force = complex(-math.hypot(fx, fy), 0.0) if given else complex(fx, fy)
+            return 1.0 + force / table.load if solution.converged else complex(math.nan, math.nan)
 
-        likely, count = places(left_at, t)
+        likely, count = places(left_at, t, phi if given else None)
         counts[0] += count
         for q in likely:
             solution.destroy()

@@ -7,7 +7,7 @@ from math import inf, isfinite
 LONGEST_STEP = 2.5  # while there is no bracket
 FLATTEST = 0.05  # slope below which a step is taken as if it were this
 WIDEST_GAP, FINEST_GAP = 1.5, 0.3  # left between what is known, and beside the best point
-PATIENCE = 8  # points without a bracket, after which secant steps are left
+PATIENCE = 8  # evaluations without a bracket, after which secant steps are left
 
 
 @dataclass
@@ -29,6 +29,7 @@ class Search:
     explore: bool = True
     points: list[tuple[float, float]] = field(default_factory=list)  # t, g(t), in the order of their evaluation
     slopes: dict[float, float] = field(default_factory=dict)  # of g where they are known, by t
+    left: set[float] = field(default_factory=set)  # where g could not be evaluated: t
     widths: list[float] = field(default_factory=list)  # of the bracket, after each point since there is one
 
     def __post_init__(self) -> None:
@@ -45,12 +46,12 @@ class Search:
         if (bracket := self.bracket) is not None:
             self.widths.append(bracket[1] - bracket[0])
 
-    def leave(self, t: float) -> None:
-        """g could not be evaluated here: keep to this side of half the way from the nearest point."""
-        near = min((point[0] for point in self.points), key=lambda known: abs(known - t))
-        middle = 0.5 * (near + t)
-        self.low, self.high = (self.low, middle) if t > near else (middle, self.high)
-        self.ends = [min(max(end, self.low), self.high) for end in self.ends]
+    def leave(self, t: float, back: float) -> None:
+        """g could not be evaluated here: half the way to the nearest point, or if there is none to back, it may be."""
+        near = min((point[0] for point in self.points), key=lambda known: abs(known - t), default=back)
+        self.low, self.high = (self.low, t) if t > near else (t, self.high)
+        self.left.add(t)
+        self.ends = [0.5 * (near + t) if (end - t) * (t - near) >= 0 else end for end in self.ends]
 
     @property
     def bracket(self) -> tuple[float, float] | None:
@@ -65,7 +66,8 @@ class Search:
         step = self._newton(t, g, -g / (up * max(abs(self.slope), FLATTEST)))
         if (bracket := self.bracket) is None:
             target = min(max(t + min(max(step, -LONGEST_STEP), LONGEST_STEP), self.low), self.high)
-            return self._elsewhere() if self._known(target) or len(self.points) >= PATIENCE else target
+            target = 0.5 * (t + target) if target in self.left else target
+            return self._elsewhere() if self._known(target) or len(self.points) + len(self.left) >= PATIENCE else target
         a, b = bracket
         if b - a <= 1e-14 * max(abs(a), abs(b), 1.0):
             return None

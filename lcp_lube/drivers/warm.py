@@ -1,12 +1,18 @@
 """A scene solved from a neighbouring one's answer; from the beginning where that leads nowhere."""
 
+from contextlib import suppress
 from dataclasses import replace
+from types import SimpleNamespace
 
+from ..errors import InputError
 from ..problems.solution import Solution
+from ..registry import DRIVERS
 from ..scenes.scene import Solvable
 from .ask import Ask
 from .chain import added
 from .compose import Inner
+
+SEEKING = ("pads", "position", "balance", "attitude")  # drivers
 
 
 def applies(scene: Solvable, ask: Ask) -> bool:
@@ -18,13 +24,24 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     assert ask.start is not None
     times: dict[str, float] = {}
     if ask.start.problem.grid.dim == len(scene.shape):
-        solution = inner(scene, ask)
-        solution.settings["start"] = "warm"
-        if solution.converged:
-            return solution
-        times = solution.times
-        solution.destroy()
+        with suppress(InputError):  # a neighbour's pads may leave no film here
+            solution = inner(scene, ask)
+            solution.settings["start"] = "warm"
+            if solution.converged:
+                return solution
+            times = solution.times
+            solution.destroy()
     solution = inner(scene, replace(ask, start=None))
     solution.settings["start"] = "cold"
+    solution.because("solved from the beginning: the start was of no use")
     solution.times = added(times, solution.times)
     return solution
+
+
+def _seeks(scene: Solvable, ask: Ask) -> bool:
+    """Whether a place, a value or an attitude is sought, and there is a neighbour's."""
+    drivers = (DRIVERS[name] for name in SEEKING)
+    return applies(scene, ask) and any(not one.idle(scene) and one.load().applies(scene, ask) for one in drivers)
+
+
+anew = SimpleNamespace(applies=_seeks, solve=solve)  # a driver: as above, all solves of a search together

@@ -241,7 +241,7 @@ def test_what_cannot_be_evaluated_is_left():
     search, t, asked = Search(-5.0, 5.0, 1.0), 0.0, []
     while t is not None:
         asked.append(t)
-        search.leave(t) if t > 3.0 else search.add(t, t - 10.0)
+        search.leave(t, 0.0) if t > 3.0 else search.add(t, t - 10.0)
         t = search.next()
     assert max(a for a in asked if a <= 3.0) > 1.0 and len(asked) < 20
 
@@ -291,3 +291,15 @@ def test_a_hot_journal_is_found(load, eccentricity):
         found = s.settings["balance"]
         assert s.converged and found["solves"] <= 12
         assert found["value"] == pytest.approx(eccentricity, rel=0.05) and found["carried"] == pytest.approx(load, rel=2e-6)
+
+
+def test_a_first_film_without_an_answer():
+    """At the eccentricity of the file the viscosity grows without bound: the search goes on towards less load."""
+    film, fluid = {"shape": "journal", "c": 2.7e-5, "eccentricity": 0.6}, {"mu": 0.088, "barus": 1.4e-8}
+    data = {"family": "bearing", "L": 0.25, "U": 2.5, "n": 60, "fluid": fluid, "film": film}
+    load = direct(data, {"film.1.eccentricity": 0.3})
+    with pytest.raises(AssertionError):
+        direct(data, {})
+    found, outcome, message, _ = balance(data, {"balance.load": load, "balance.vary": "film.1.eccentricity"})
+    assert outcome is Outcome.CONVERGED, message
+    assert found["value"] == pytest.approx(0.3, rel=1e-5) and found["iterations"] <= 8
