@@ -9,10 +9,14 @@ Dissipation is what the wall drags, mu U^2/h times the liquid's share, and what 
 sum is the power that goes in, drag U plus the pumping at the sides, because liquid is conserved; the sum of the equations is
 the heat that goes out. Both are told, and their difference is in the certificate. In the cavity the liquid carries heat.
 
+Where a cavity ends, the wall drags liquid out of a cell that is partly full, and pressure drives some of it back through the
+same face: heat goes both ways there, not with the net flow alone, which may be nothing. Cells without oil have no temperature.
+
 In time cells hold heat, rho c_p d/dt [area h (1 - r) T] by the step's formula (`stored`) and the film's own contents, and what
 walls that approach do to the film goes in too. What is in minus what is out is stored.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,6 +37,7 @@ RTOL = 1e-13  # of the linear solves
 NOTHING = 1e-18  # of what pressures could turn into heat: the square of what a solve may leave of them
 LEVEL = 1e-15  # of the largest pressure: a drop by less is rounding where no wall moves
 STILL = 1e-11  # of the largest flow out of a cell: what is less is rounding
+EMPTY = 1e-9  # of a cell's liquid: less is rounding
 SAME = 1e-300  # what stands for 0 in a quotient
 
 
@@ -44,6 +49,8 @@ class Carried:
     dissipation : of each cell; sheared : the part of it that the wall drags.
     power : what drag and pumps put in, as the film's own numbers have it.
     area : of the cells, m2 (1D: m).
+    turns : through the west and east face both ways: what the wall drags out of a part of a cell that is full, and pressure
+        drives back into it, m3/s.
     held, kept : of a time step: liquid of a cell over the step's length, m3/s, and what it held before times T, K m3/s.
     """
 
@@ -53,8 +60,16 @@ class Carried:
     power: float
     area: Array
     sheared: Array
+    turns: tuple[Array, Array]
     held: Array
     kept: Array
+
+    @property
+    def both_ways(self) -> tuple[list[Array], list[Array]]:
+        """What leaves a cell through its west, east, south and north face, and what enters it, m3/s."""
+        turns = (*self.turns, 0.0, 0.0)
+        out, into = ([np.maximum(s * a, 0.0) + b for a, b in zip(self.q, turns, strict=True)] for s in (1.0, -1.0))
+        return out, into
 
 
 def holders(at: Answer) -> list[Any]:
@@ -82,6 +97,10 @@ def carried(at: Answer) -> Carried:
     q = (pushed[0] + dragged[0], pushed[1] + dragged[1], pushed[2], pushed[3])
 
     other_free = [a > 0.5 for a in _inside(at, free)]
+    front = free & ((r > 0.0) | (void_W > 0.0))
+    back = np.minimum(dragged[1], -pushed[1]) - np.maximum(pushed[0], 0.0)
+    turn = np.where(front, np.maximum(back, 0.0), 0.0)
+    turns = (grid.ghosted(turn.ravel(), outside=0.0)[1:-1, :-2], turn)
     heat = np.zeros(box)
     for flow, near, is_free in zip(pushed, beside, other_free, strict=True):
         heat += np.where(is_free, 0.5, 1.0) * flow * (p - near)
@@ -109,7 +128,7 @@ def carried(at: Answer) -> Carried:
         stays = np.where(free, unit * s.storage * (1.0 - r), 0.0)
         pumped -= float(problem.reduce.sum(np.where(free, p - least, 0.0) * (stays - unit * s.kept)))
         was = np.where(free, area * problem.stored.on(grid, problem.stored.carried), 0.0)
-    return Carried(q, free, np.where(free, heat + shear, 0.0), power_shear + push + pumped, area, sheared, stays, was)
+    return Carried(q, free, np.where(free, heat + shear, 0.0), power_shear + push + pumped, area, sheared, turns, stays, was)
 
 
 def _shear(at: Answer, dy: float, other_free: list[Any]) -> tuple[Array, Array]:
@@ -176,12 +195,14 @@ def heated(
         all of it at grooves, nothing at sides.
     falls, more : of a step of Newton's method: cells turn `more - falls (T - T_in)` into heat beside the dissipation, W.
     """
-    grid, reduce, free, q = at.grid, at.problem.reduce, flow.free, flow.q
-    leaves, enters = [np.maximum(a, 0.0) for a in q], [np.maximum(-a, 0.0) for a in q]
+    grid, reduce, free = at.grid, at.problem.reduce, flow.free
+    leaves, enters = flow.both_ways
     inside = _inside(at, free)
     H, falls = exchange * flow.area, np.where(free, falls, 0.0)
     diagonal = np.where(free, rho_c * (sum(leaves) + flow.held) + H, 0.0)  # type: ignore[operator]
-    still = diagonal <= STILL * reduce.max(diagonal)  # grooves, and cells whose liquid does not go on, an empty film's say
+    still = diagonal <= STILL * reduce.max(diagonal)  # grooves, and cells whose liquid does not go on
+    dry = free & (at.r > 1.0 - EMPTY).reshape(grid.box) & (H <= 0.0)  # behind a closed side, say: no oil, no temperature
+    still |= dry
     diagonal = np.where(still, 1.0, diagonal + falls)
     offsets = ((0, -1), (0, 1), (-1, 0), (1, 0))
     entries = [(0, 0, diagonal)]
@@ -189,7 +210,7 @@ def heated(
         entries.append((dj, di, np.where(still, 0.0, -rho_c * a * near)))
     solver = reduce.through(transport := _Transport(assemble(grid, entries)))
     heat = np.where(still, 0.0, flow.dissipation + np.where(free, more, 0.0) + H * wall + rho_c * flow.kept).ravel()
-    left = reduce.sum(np.where(free & still, np.maximum(flow.dissipation, 0.0), 0.0))
+    left = reduce.sum(np.where(free & still & ~dry, np.maximum(flow.dissipation, 0.0), 0.0))
     nowhere = left > STILL * reduce.sum(np.abs(flow.dissipation))  # heat that no liquid carries away
     try:
         theta, residual = solver(heat)
@@ -222,18 +243,15 @@ def heated(
 
 def _mixers(at: Answer, flow: Carried, carry_over: float | None) -> list[tuple[Array, Array, float]]:
     """For each place where oil is mixed: what flows to it and from it at the cells (m3/s), and T(from)/T(to). Collective."""
-    problem, grid, free, q = at.problem, at.grid, flow.free, flow.q
-    reduce, found = problem.reduce, []
+    grid, reduce, free, found = at.grid, at.problem.reduce, flow.free, []
     grooves = holders(at)
     if grooves:
         share = 1.0 if carry_over is None else carry_over
         for columns in grooves:
             near = around(framed_by(grid, columns.astype(float), (0.0,) * 4))
-            faces = [np.where(free & (a > 0.5), b, 0.0) for a, b in zip(near, q, strict=True)]
-            found.append((*_to_and_from(faces), share))
+            found.append((*_to_and_from(flow, [free & (a > 0.5) for a in near]), share))
     elif carry_over:
-        west, east, *_ = sides(grid)
-        found.append((*_to_and_from([np.where(west, q[0], 0.0), np.where(east, q[1], 0.0)]), carry_over))
+        found.append((*_to_and_from(flow, sides(grid)[:2]), carry_over))
     out = []
     for away, into, share in found:
         arriving, going = reduce.sum(away), reduce.sum(into)
@@ -256,12 +274,14 @@ def _inside(at: Answer, free: Any) -> list[Any]:
 
 def _over_edge(flow: Carried, inside: list[Any]) -> Array:
     """What leaves each cell over the edge of the film, m3/s."""
-    parts = [np.where(flow.free & (near < 0.5), np.maximum(a, 0.0), 0.0) for a, near in zip(flow.q, inside, strict=True)]
-    return np.sum(parts, axis=0)
+    return _to_and_from(flow, [flow.free & (near < 0.5) for near in inside])[0]
 
 
-def _to_and_from(faces: list[Array]) -> tuple[Array, Array]:
-    return sum(np.maximum(a, 0.0) for a in faces), sum(np.maximum(-a, 0.0) for a in faces)  # type: ignore[return-value]
+def _to_and_from(flow: Carried, faces: Sequence[Any]) -> tuple[Array, Array]:
+    """What leaves and enters each cell through some of its faces, which are told west, east, south, north, m3/s."""
+    sums = (sum(np.where(face, a, 0.0) for face, a in zip(faces, way, strict=False)) for way in flow.both_ways)
+    away, into = sums
+    return away, into  # type: ignore[return-value]
 
 
 class _Transport:

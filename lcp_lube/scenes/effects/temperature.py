@@ -198,10 +198,10 @@ class Heat(Effect):
         hottest, coldest = told["temperature_max"], at.problem.reduce.min(T)
         failure = ""
         if not (hottest <= oils.HIGHEST and coldest >= oils.LOWEST):
-            failure = (
-                f"no steady temperature: the oil would have {coldest:.4g} to {hottest:.4g} K, {oils.LOWEST:g} to "
-                f"{oils.HIGHEST:g} K are allowed; too little oil carries the heat away"
-            )
+            has = f"have {coldest:.4g} to {hottest:.4g} K, {oils.LOWEST:g} to {oils.HIGHEST:g} K are allowed"
+            stays = "get ever hotter, as some of it does not flow and no heat goes through the walls (temperature.exchange)"
+            would = has if np.isfinite(hottest) else stays
+            failure = f"no steady temperature: the oil would {would}; too little oil carries the heat away"
         mu = at.base.mu * at.cells["viscosity"] * at.law.viscosity(at.p)
         numbers = {key: value for key, value in told.items() if key != "heat_defect"}
         return Report(numbers, measures, {"T": (T, "K"), "mu": (mu, "Pa s")}, failure)
