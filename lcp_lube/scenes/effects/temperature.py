@@ -8,8 +8,9 @@ from pydantic import Field
 
 from ...base.parallel import Array
 from ...problems.film import oils
+from ...problems.film.carried import carried
 from ...problems.film.effects import Answer, Cells, Effect, Report
-from ...problems.film.energy import carried, fresh_flow, heated
+from ...problems.film.energy import fresh_flow, heated
 from ...problems.film.exact import bisect
 from ..scene import Finite, NotNegative, Positive
 from ..units import measured

@@ -1,0 +1,145 @@
+"""Flows and heat of a film's answer: what goes through each face, also where it turns round, and what warms each cell."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...base.parallel import Array
+from .cavity import cavity_sign
+from .contact import areas
+from .effects import Answer, around, framed_by
+from .flows import point_weights, sheared_faces, volume_unit
+from .forces import open_pressures
+from .reynolds import sides
+from .strip import line_weights
+
+NOTHING = 1e-18  # of what pressures could turn into heat: the square of what a solve may leave of them
+LEVEL = 1e-15  # of the largest pressure: a drop by less is rounding where no wall moves
+
+
+@dataclass(frozen=True)
+class Carried:
+    """Flows and heat of an answer; arrays of shape grid.box, W (1D: W/m) and m3/s (1D: m2/s).
+
+    q : out of a cell's west, east, south and north face. free : cells whose temperature is unknown (the others lie in grooves).
+    dissipation : of each cell; sheared : the part of it that the wall drags.
+    power : what drag and pumps put in, as the film's own numbers have it.
+    area : of the cells, m2 (1D: m).
+    turns : through the west and east face both ways: what the wall drags out of a part of a cell that is full, and pressure
+        drives back into it, m3/s.
+    held, kept : of a time step: liquid of a cell over the step's length, m3/s, and what it held before times T, K m3/s.
+    """
+
+    q: tuple[Array, Array, Array, Array]
+    free: Any
+    dissipation: Array
+    power: float
+    area: Array
+    sheared: Array
+    turns: tuple[Array, Array]
+    held: Array
+    kept: Array
+
+    @property
+    def both_ways(self) -> tuple[list[Array], list[Array]]:
+        """What leaves a cell through its west, east, south and north face, and what enters it, m3/s."""
+        turns = (*self.turns, 0.0, 0.0)
+        out, into = ([np.maximum(s * a, 0.0) + b for a, b in zip(self.q, turns, strict=True)] for s in (1.0, -1.0))
+        return out, into
+
+
+def holders(at: Answer) -> list[Any]:
+    """For each groove or supply inside the film, whether an owned point lies in it."""
+    held: Any = at.problem.held
+    count = len(held.supplies) if held is not None else 0
+    return [*getattr(at.problem, "columns", []), *((held.owner == k).ravel() for k in range(count))]
+
+
+def carried(at: Answer) -> Carried:
+    """Flows, dissipation and power of an answer. Collective."""
+    problem, grid = at.problem, at.grid
+    s: Any = problem.scheme
+    box, dy = grid.box, grid.spacing[1] if grid.dim == 2 else 1.0
+    unit = volume_unit(problem)
+    held = holders(at)
+    free = ~np.logical_or.reduce(held).reshape(box) if held else np.ones(box, dtype=bool)
+    p, r = at.p.reshape(box), at.r.reshape(box)
+    beside = around(framed_by(grid, at.p, problem.p_sides))
+    k = [unit * a / problem.p_unit for a in (s.k_W, s.k_E, s.k_S, s.k_N)]
+    flat = 0.0 if problem.U else LEVEL * problem.reduce.max(np.abs(p))
+    pushed = [np.where(np.abs(p - b) > flat, a * (p - b), 0.0) for a, b in zip(k, beside, strict=True)]  # out of the cell
+    void_W = grid.ghosted(at.r, outside=0.0)[1:-1, :-2]
+    dragged = [-unit * (s.couette_W - s.b_W * void_W), unit * (s.couette_E + s.b_E * r)]
+    q = (pushed[0] + dragged[0], pushed[1] + dragged[1], pushed[2], pushed[3])
+
+    other_free = [a > 0.5 for a in neighbours(at, free)]
+    front = free & ((r > 0.0) | (void_W > 0.0))
+    back = np.minimum(dragged[1], -pushed[1]) - np.maximum(pushed[0], 0.0)
+    turn = np.where(front, np.maximum(back, 0.0), 0.0)
+    turns = (grid.ghosted(turn.ravel(), outside=0.0)[1:-1, :-2], turn)
+    heat = np.zeros(box)
+    for flow, near, is_free in zip(pushed, beside, other_free, strict=True):
+        heat += np.where(is_free, 0.5, 1.0) * flow * (p - near)
+    # Where the end is closed or a mirror nothing beyond takes its half, and nothing flows.
+    shear, drag = _shear(at, dy, other_free)
+    sheared = np.where(free, shear, 0.0)
+    if problem.contact is not None:
+        carrying = problem.contact.p_a.reshape(box) * areas(problem) * grid.stretch(grid.y)
+        shear = shear + abs(problem.U) * problem.contact.friction * carrying
+    power_shear = float(problem.reduce.sum(np.where(free, shear, 0.0)))
+    pressures = problem.reduce.sum(np.sum(k, axis=0)) * problem.reduce.max(np.abs(at.p)) ** 2  # what they could turn into heat
+    if not problem.U and not problem.reduce.sum(np.abs(heat)) > NOTHING * pressures:
+        heat = np.zeros(box)  # rounding
+    push = float(problem.reduce.sum(np.where(free, drag * (beside[1] - p), 0.0)))
+    west, *_ = sides(grid)
+    first_west = (west | ~other_free[0]) & free
+    push += float(problem.reduce.sum(np.where(first_west, -dragged[0] * (p - beside[0]), 0.0)))
+    # No oil is lost: the pumps' work may be counted from any level of pressure, best from one that is among theirs.
+    pumped, least = 0.0, min((a for a in open_pressures(problem) if a is not None), default=0.0)
+    for flow, near, is_free in zip(q, beside, other_free, strict=True):
+        pumped -= float(problem.reduce.sum(np.where(free & ~is_free, flow * (near - least), 0.0)))
+    area = grid.cell * point_weights(grid).reshape(box)
+    stays = was = np.zeros(box)
+    if problem.stored is not None:
+        stays = np.where(free, unit * s.storage * (1.0 - r), 0.0)
+        pumped -= float(problem.reduce.sum(np.where(free, p - least, 0.0) * (stays - unit * s.kept)))
+        was = np.where(free, area * problem.stored.on(grid, problem.stored.carried), 0.0)
+    return Carried(q, free, np.where(free, heat + shear, 0.0), power_shear + push + pumped, area, sheared, turns, stays, was)
+
+
+def _shear(at: Answer, dy: float, other_free: list[Any]) -> tuple[Array, Array]:
+    """mu U^2/h over each cell by the midpoint rule at the x faces, W, and what is dragged through its east face, m3/s.
+
+    As `flows.friction` has it: the outer half meshes at open sides belong to the cells beside them, in the half cell at a
+    closed side h^2 dp/dx = 6 mu U where it is full.
+    """
+    problem, grid = at.problem, at.grid
+    s, box = problem.scheme, at.grid.box
+    _, _, south, north = sides(grid)
+    closed = sides(grid, ("closed",))[:2]
+    r = at.r.reshape(box)
+    full = (cavity_sign(problem.reduce, at.p, at.r) >= 0).reshape(box)
+    mu_east = np.broadcast_to(problem.mu, box)
+    mu_west = grid.ghosted(np.ascontiguousarray(mu_east).ravel())[1:-1, :-2]
+    mu_west = np.where(np.isnan(mu_west), at.mu.reshape(box), mu_west)
+    before, behind = grid.steps(0)[:-1], grid.steps(0)[1:]
+    faces = [sheared_faces(problem, grid.x + step)[1:] for step in (-before / 2, behind / 2)]
+    liquid = 1.0 + s.b_E * r / np.where(s.couette_E != 0.0, s.couette_E, np.inf)
+    liquid_west = grid.ghosted(np.ascontiguousarray(liquid).ravel(), outside=1.0)[1:-1, :-2]
+    rims = grid.rims(1) if grid.dim == 2 else (0.0, 0.0)
+    rows = problem.U**2 * dy * grid.stretch(grid.y) ** 3 * (line_weights(grid) + 0.5 * (rims[0] * south + rims[1] * north))
+    shear = np.zeros(box)
+    for mu, h, share, is_free, wall, dx in (
+        (mu_west, faces[0], liquid_west, other_free[0], closed[0], before),
+        (mu_east, faces[1], liquid, other_free[1], closed[1], behind),
+    ):
+        inner = np.where(is_free, 0.5, 1.0) * (h[0] + share / h[1])
+        at_wall = 0.5 * np.where(full, 4.0, 1.0 - r) / s.h
+        shear = shear + dx * mu * np.where(wall, at_wall, inner)
+    return rows * shear, volume_unit(problem) * (s.couette_E + s.b_E * r)
+
+
+def neighbours(at: Answer, free: Any) -> list[Any]:
+    """1 where the neighbour (west, east, south, north) is a cell whose temperature is unknown, else 0. Collective."""
+    return [np.where(a > 0.5, 1.0, 0.0) for a in around(framed_by(at.grid, free.astype(float), (0.0,) * 4))]
