@@ -8,9 +8,7 @@ from pydantic import Field
 
 from ...base.parallel import Array
 from ...problems.film import oils
-from ...problems.film.carried import carried
 from ...problems.film.effects import Answer, Cells, Effect, Report
-from ...problems.film.energy import fresh_flow, heated
 from ...problems.film.exact import bisect
 from ..scene import Finite, NotNegative, Positive
 from ..units import measured
@@ -116,6 +114,9 @@ class Heat(Effect):
         What the wall drags goes with the viscosity: heat by the old one would throw T far beyond or far below the answer, and
         back. Where the viscosity stays what it is both are the same. By Newton's method, from the old T.
         """
+        from ...problems.film.carried import carried  # here, and below: every film's scene has this table
+        from ...problems.film.energy import fresh_flow, heated
+
         table, reduce, law = self.table, at.problem.reduce, self.law
         flow, rho_c, box = carried(at), table.rho * table.specific_heat, at.grid.box
         coldest = table.T_in + min(self.wall, 0.0)  # heat arises only: an iterate that is colder is no film's
@@ -157,6 +158,9 @@ class Heat(Effect):
         return at.memory[id(self)]
 
     def _solve(self, at: Answer) -> tuple[Array, dict[str, float], float]:
+        from ...problems.film.carried import carried
+        from ...problems.film.energy import fresh_flow, heated
+
         table, reduce = self.table, at.problem.reduce
         flow, rho_c = carried(at), table.rho * table.specific_heat
         power = float(reduce.sum(flow.dissipation))
