@@ -141,7 +141,8 @@ class Equations:
         wanted = {FLIPPED.get(name, name) for name in wanted} if wanted is not None and self.turned else wanted
         problem = self.problem(p)
         found = slopes.numbers(problem, p / problem.p_unit, r, wanted)
-        if (fields := known_fields(problem)) is not None:  # a line's numbers are free of the grid's error (`film.known`)
+        fields = known_fields(problem) if wanted is None or wanted or problem.held else None
+        if fields is not None:  # a line's numbers are free of the grid's error (`film.known`)
             if wanted is not None and set(wanted) <= set(weights(problem)):  # integrals of the pressure: no flows, no fronts
                 told = totals(problem, fields["p"] * problem.p_unit, known_of(problem), wanted)
             else:
@@ -155,8 +156,7 @@ class Equations:
 
     def slope(self, p: Array, r: Array, name: str, last: bool = False) -> slopes.Slope:
         """dQ/dp (p in p_unit) and dQ/dr of one of `numbers` (`slopes.slope`). Collective."""
-        problem = self.problem(p)
-        name = FLIPPED.get(name, name) if self.turned else name
+        problem, name = self.problem(p), FLIPPED.get(name, name) if self.turned else name
         tangent = None if name in weights(problem) else self.tangent(p, r)
         found = slopes.slope(problem, tangent, p / problem.p_unit, r, name, last)
         return slopes.Slope(-found.p, -found.r) if self.turned and name in DRAGS else found

@@ -5,8 +5,9 @@ What it has of each is known once; another number costs the films of the steps, 
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +16,10 @@ from ..problems.film.edges import Around, face_film, jumps_of, pairs
 from ..problems.film.fluid import Law
 from ..problems.film.model import Model
 from ..problems.film.reynolds import sides
+from ..problems.film.shapes import Sum
 from ..problems.film.stored import mean_film
+from ..problems.film.views import MirroredFilm, Travelling
+from ..problems.strips import MANY
 from .march_course import Course
 from .near_films import FREE, _same
 
@@ -36,18 +40,19 @@ def films_of(course: Course) -> Films:
     """Those of a march."""
     grid = course.grid
     rows: list[tuple[Array, ...]] = []
-    kept: list[Array] = []
     nodes, faces = grid.nodes_and_faces(0)
     period, none = grid.lengths[0] if grid.periodic[0] else 0.0, np.zeros(1)
     places = np.concatenate([faces, nodes[:-1], grid.x[0]])[None, :]
-    for n in range(len(course.trace.steps) + 1):
-        model = course.models(course.trace.steps[n - 1].t if n else 0.0, course.place(n))
+    kept = [course.fill * mean_film(grid, course.models(0.0, course.place(0)).film)[0]]
+    h: Array = _at_once(course, places)
+    if h.size:
+        H, before, stored = np.split(h, [faces.size, 2 * faces.size], axis=1)
+        return Films(H**3, H, before, stored, np.concatenate([kept, stored]))
+    for n, step in enumerate(course.trace.steps, start=1):
+        model = course.models(step.t, course.place(n))
         film = Around(model.gap, grid)
         cut = jumps_of(film, "x")
-        if not n:
-            kept.append(course.fill * mean_film(grid, model.film)[0])
-            continue
-        h: Array = np.broadcast_to(film(places, none[:, None]), places.shape)[0].astype(float)
+        h = np.broadcast_to(film(places, none[:, None]), places.shape)[0].astype(float)
         H, before, stored = np.split(h, [faces.size, 2 * faces.size])
         C = H**3
         if cut:
@@ -57,6 +62,26 @@ def films_of(course: Course) -> Films:
         rows.append((C, H, before, stored))
     C, H, before, stored = (np.array(one) for one in zip(*rows, strict=True))
     return Films(C, H, before, stored, np.array(kept))
+
+
+def _at_once(course: Course, places: Array) -> Array:
+    """The films of all steps at places, a row each, where the wall's way is all that time changes; else none."""
+    steps, U = course.trace.steps, course.film(1).U * (-1.0 if course.turned else 1.0)
+    first, last = (course.models(steps[n].t, course.place(n + 1)).gap for n in (0, -1))
+    if course.place(1) is not None or jumps_of(first, "x") or not _same(_carried(first, U * steps[-1].t), last):
+        return np.zeros((0, 0))
+    blocks = np.array_split(U * np.array([step.t for step in steps])[:, None], 1 + len(steps) * places.size // MANY)
+    films = [(Around(_carried(first, way), course.grid), (way.size, places.size)) for way in blocks]
+    return np.concatenate([film(np.broadcast_to(places, shape), np.zeros((1, 1))) for film, shape in films])
+
+
+def _carried(film: Any, way: Any) -> Any:
+    """The film with what its wall carries along so far, m; of several ways the x that it is asked for has a row each."""
+    if isinstance(film, MirroredFilm):
+        return replace(film, film=_carried(film.film, way))
+    if isinstance(film, Sum):
+        return replace(film, parts=[replace(one, travel=way) if isinstance(one, Travelling) else one for one in film.parts])
+    return film
 
 
 class MarchFilms:

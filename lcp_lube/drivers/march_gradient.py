@@ -96,16 +96,15 @@ class MarchGradient:
         """The adjoints of step n, from those of later ones."""
         eq, kept = self.course.at(n), self.course.kept(n)
         assert kept is not None  # as `__init__` asks
-        p, r = kept.p, kept.r
-        numbers, grid = eq.numbers(p, r), eq.grid
+        p, r, asked = kept.p, kept.r, self._asked(n)
+        numbers, grid = eq.numbers(p, r, None if asked else self.course.forces), eq.grid
         told = eq.report(numbers)
-        for name, (base, share) in self._asked(n).items():
+        for name, (base, share) in asked.items():
             self.report[name] = self.report.get(name, 0.0) + share * told.get(base, np.nan)
         if n == len(self.trace.steps):
             self.report = told | self.report
         cavity, switching = cavity_of(eq, p, r)
         self.switching += int(grid.reduce.sum(switching.astype(float)))
-        asked = self._asked(n)
         parts = {
             name: {part: share * w for part, w in eq.partials(numbers, base).items()} for name, (base, share) in asked.items()
         }

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lcp_lube import solve
-from lcp_lube.drivers import rotor, supplies
+from lcp_lube.drivers import march_films, rotor, supplies
 from lcp_lube.drivers.film_gradient import areas
 from lcp_lube.drivers.gradient import check, film_fields, gradients
 from lcp_lube.drivers.march_course import Course, Trace
@@ -153,6 +153,18 @@ def test_what_has_no_derivative_in_time_is_said(changes):
         check(scene)
         with solve(scene) as solution:
             gradients(scene, solution, ["load"], ["fluid.mu"])
+
+
+@pytest.mark.parametrize("U", [2.0, -2.0])
+def test_films_of_all_steps_at_once_are_those_step_by_step(U, monkeypatch):
+    scene, trace = load_scene("moving_texture", n=30, U=U, motion={**TEXTURE, "fill": 0.9}), Trace()
+    with solve(scene, watch=trace) as solution:
+        course = Course(scene, trace, solution.problem.grid.petsc_comm)
+        found = march_films.films_of(course)
+        assert march_films._at_once(course, np.zeros((1, 2))).shape == (7, 2)
+        monkeypatch.setattr(march_films, "_at_once", lambda course, places: np.zeros((0, 0)))
+        others = march_films.films_of(course)
+    assert all(np.array_equal(getattr(found, name), value) for name, value in vars(others).items())
 
 
 @pytest.mark.parametrize("case", ["to smaller x", "free"])
