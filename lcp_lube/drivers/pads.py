@@ -29,8 +29,8 @@ THINNER, THICKER = 0.7, 3.0  # parts of a film anywhere by which a step may chan
 THINNEST = 1e-5  # film over the clearance, below which no load is looked for: a difference quotient's step is a tenth of it
 ROUNDING = 1e-15  # a step in parts of the coordinates' sizes, of which a film knows nothing
 NEAR = 0.05  # a step in parts of the coordinates' sizes
-NUDGES, NUDGE = 8, 0.5  # of a pad without stiffness: how often its inlet is opened, and by how much of its size of tilt
-SHRINK = 0.5  # of a nudge beside the one before: in a lightly loaded bearing a wide one upsets the other pads
+NUDGES, NUDGE = 4, 0.5  # of a pad without stiffness: how often its inlet is opened, and by how much of its size of tilt
+SHRINK = 0.25  # of a nudge beside the one before: in a lightly loaded bearing a wide one upsets the other pads
 
 
 def applies(scene: Solvable, ask: Ask) -> bool:
