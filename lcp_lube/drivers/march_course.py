@@ -58,7 +58,7 @@ class Trace:
 
         if not self.steps and moment.before is not None:
             p, r = of(moment.before)
-            self.begun = Kept(0.0, 0.0, p, r, None, moment.place, _pressures(problem, p))
+            self.begun = Kept(0.0, 0.0, p, r, moment.dry, moment.place, _pressures(problem, p))
         place = np.array([row[name] for name in PLACES if name in row])
         p, r = of(moment.fields)
         self.steps.append(Kept(moment.t, row["dt"], p, r, problem.dry, place, _pressures(problem, p)))

@@ -41,7 +41,7 @@ TOLD = ("load", "force", "moment", "p_max", "min_h", "cavitated_fraction", "fric
 
 @dataclass(frozen=True)
 class Moment:
-    """A step that was taken: what those hear who watch a march. before, place : fields and places before it."""
+    """A step that was taken: what those hear who watch a march. before, place : before it. dry : of the film at t = 0."""
 
     t: float
     t_end: float
@@ -51,6 +51,7 @@ class Moment:
     count: int
     before: dict[str, Any] | None
     place: Any = None
+    dry: Any = None
 
 
 class Run:
@@ -133,7 +134,7 @@ class Run:
             raise InputError(f"{self.scene.name}: no steady film at t = 0: {solution.message}; motion.start = full needs none")
         full = contents(self.march.grid, model, solution.fields, solution.problem)
         self.march.begin(full, solution.fields, carried(model, full, solution.problem))
-        self.begun = solution.settings
+        self.begun = {**solution.settings, "dry": getattr(getattr(solution.problem, "moving", solution.problem), "dry", None)}
         solution.destroy()
 
     @property
@@ -198,7 +199,7 @@ class Run:
         self._sweeps(self.history)
         self.lengths = [min(self.lengths[0], dt), max(self.lengths[1], dt)]
         if self.watch is not None:
-            was = march.fields[1] if len(march.fields) > 1 else None, self.rotor and self.rotor.places[1]
+            was = march.fields[1] if march.fields[1:] else None, self.rotor and self.rotor.places[1], self.begun.get("dry")
             self.watch(Moment(march.t, self.table.t_end, problem, solution.fields, row, len(self.history), *was))
         self.file.after(self)
 
@@ -213,8 +214,7 @@ class Run:
             self.model = replace(model, stored=term, places=march.grid.places)
             if model.sealed:
                 check_room(march.grid, self.model, t, self.scene.name)
-            found = near if not solves else solves[-1].fields
-            last = self.last
+            last, found = self.last, solves[-1].fields if solves else near
             problem, known = (last.problem, last.settings) if last is not None else (None, self.settings or self.begun)
             step = TimeStep(self.scene, self.model, march.grid)
             own = None if problem is not None or found is None else self._at(t, lambda: step.build(self.ask.comm))

@@ -88,6 +88,12 @@ CASES = {
         {"nx": 16, "ny": 4, "motion": {**FREE, "start": "full", "position": [0.5, 0.5]}, **DENSE},
         ["motion.mass", "film.journal.c"],
     ),
+    "round edges": (
+        "moving_texture",
+        {"dimension": 2, "width_mm": 10, "nx": 12, "ny": 8, "film.dimples.rows": 2, "film.dimples.columns": 3}
+        | {"film.dimples.size_mm": 3.0, "fluid.p_supply": 1e3, "motion": {"t_end": 0.003, "steps": 2}},
+        ["fluid.mu"],
+    ),
     "to smaller x": (
         "moving_texture",
         {
