@@ -7,6 +7,7 @@ from importlib.util import find_spec
 from typing import Any, TypeVar, cast
 
 Kernel = TypeVar("Kernel", bound=Callable)
+FAST: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "nsz"}, "nogil": True}
 
 
 @cache
@@ -31,7 +32,17 @@ def kernel(function: Kernel) -> Kernel:
     Division by zero gives inf or NaN, as in NumPy, and products may be added without rounding in between: loops like these
     are only then turned into vector instructions.
     """
-    return _machine_code(function, error_model="numpy", fastmath={"contract", "nsz"}, nogil=True)
+    return _machine_code(function, **FAST)
+
+
+def piece(function: Kernel) -> Kernel:
+    """A `kernel` that kernels call, which becomes a part of each.
+
+    Left on its own it would have a copy in every caller's machine code, compiled in other surroundings, where other products
+    are added without rounding; a process takes the copy that it loads first for all callers: last bits would depend on which
+    loops it used before, and on whether it compiled them or found them in the cache.
+    """
+    return _machine_code(function, forceinline=True, **FAST)
 
 
 def _machine_code(function: Kernel, **how: Any) -> Kernel:

@@ -39,7 +39,8 @@ MEASURED: dict[tuple[str, str, str], tuple[float, float]] = {
     ("lubrication 1D", "full", "klu"): (800, 0),
     ("lubrication 1D", "full", "mumps"): (1250, 0),
     ("lubrication 1D", "full", "light"): (750, 0),
-    ("lubrication 2D", "", ""): (100, 0),
+    ("lubrication 2D", "", ""): (70, 0),
+    ("lubrication 2D moving", "", ""): (100, 0),
     ("lubrication 2D", "cavity", "multigrid"): (780, 0),
     ("lubrication 2D", "reduced", "multigrid"): (1040, 0),
     ("lubrication 2D", "reduced", "umfpack"): (410, 82),
@@ -163,7 +164,7 @@ def bytes_needed(facts: Facts, plan: Plan) -> float | None:
 
     An inner solver that was not measured counts as the most expensive one of the same system.
     """
-    points, kind = facts.size, f"{facts.kind} {facts.dim}D"
+    points, kind = facts.size, f"{facts.kind} {facts.dim}D{' moving' if facts.moving and not plan.system else ''}"
     if facts.dense:
         return DENSE * points**2 * (facts.ranks if plan.recipe == "redundant_lu" else 1)
     options = PETSc.Options().getAll()
@@ -174,7 +175,7 @@ def bytes_needed(facts: Facts, plan: Plan) -> float | None:
     if not known:
         return None
     fits = [known[solver]] if solver in known else list(known.values())
-    each = max(max(a + b * log2(points), 100.0) for a, b in fits)
+    each = max(max(a + b * log2(points), 60.0) for a, b in fits)
     if solver == "light" and options.get("ksp_type", "gmres") == "gmres":
         unknowns = 2 if plan.system == "full" else 1
         each += 8 * unknowns * min(_restart(options), 200)

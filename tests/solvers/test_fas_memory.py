@@ -29,10 +29,12 @@ def test_bytes_a_point(name, changes, most):
         with solve(load_scene(name, {"nx": n, "ny": n, **changes}), method="fas", memory_check=False) as solution:
             held, peak = (count / n**2 for count in tracemalloc.get_traced_memory())
             assert solution.converged
+            foreseen = (solution.settings["memory_estimate_mb"] - solution.settings["memory_base_mb"]) * 2**20 / n**2
     finally:
         tracemalloc.stop()
     assert held < 60  # 40, p and r
     assert peak < most
+    assert 0.9 * peak < foreseen < 1.2 * peak
 
 
 def test_the_finest_grid_is_the_problems_own():

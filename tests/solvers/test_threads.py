@@ -1,11 +1,15 @@
 """Threads in the loops over large films: the bits are those of one thread, and small films start none."""
 
+from importlib import import_module
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from lcp_lube import solve
 from lcp_lube.base import crew
 from lcp_lube.errors import InputError
+from lcp_lube.solvers import fas
 
 FILMS = [
     ("problem4", {"nx": 350, "ny": 352}),
@@ -68,3 +72,18 @@ def test_settings_of_arithmetic_reach_every_thread():
     with np.errstate(divide="ignore"):
         found = crew.Crew(2).run(lambda k: np.geterr()["divide"], 4)
     assert found == ["ignore"] * 4
+
+
+MODULES = [f"lcp_lube.solvers.fas.{path.stem}" for path in Path(fas.__file__).parent.glob("*.py")]
+
+
+def test_what_loops_call_is_part_of_them():
+    """Machine code has no loop of ours that another one calls: which copy of it runs would depend on what was loaded before."""
+    Dispatcher = pytest.importorskip("numba.core.dispatcher").Dispatcher
+    found = {}
+    for name in [*MODULES, "lcp_lube.problems.film.cell_loops"]:
+        for loop in vars(import_module(name)).values():
+            if isinstance(loop, Dispatcher):
+                used = (loop.py_func.__globals__.get(word) for word in loop.py_func.__code__.co_names)
+                found |= {one: one.targetoptions.get("forceinline") for one in used if isinstance(one, Dispatcher)}
+    assert len(found) > 30 and all(found.values()), [one for one, part in found.items() if not part]

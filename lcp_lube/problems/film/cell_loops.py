@@ -5,22 +5,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.compiled import kernel
+from ...base.compiled import kernel, piece
 from ...base.parallel import Array
 from .certify import cell_misfit
 from .flows import face_drag
 
 
-@kernel
+@piece
 def choose(condition: Any, a: Any, b: Any) -> Any:
     """`numpy.where` of numbers."""
     return a if condition else b
 
 
-misfit, face = kernel(cell_misfit), kernel(face_drag)
+misfit, face = piece(cell_misfit), piece(face_drag)
 
 
-@kernel
+@piece
 def misfit_at(
     p: Array, r: Array, k_W: Array, k_E: Array, k_S: Array, k_N: Array, b_C: Array, b_W: Array, c: Array,
     p_max: float, above: float, j: int, i: int,

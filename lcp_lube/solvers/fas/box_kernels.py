@@ -6,7 +6,7 @@ Arrays as in `kernels`, all with a frame. f(v)_i = sum of k (v_i - v_neighbour) 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.compiled import kernel
+from ...base.compiled import kernel, piece
 from ...base.parallel import Array
 
 
@@ -25,7 +25,7 @@ def linearise(v: Array, kx: Array, ky: Array, c: Array, m: Array, g: Array, slop
             source[j, i] = c[j, i] + m[j, i] * g[j, i] + (diagonal - total) * v[j, i]
 
 
-@kernel
+@piece
 def relax(v: Array, kx: Array, ky: Array, bounds: Array, prepared: Array, j: int, start: int, end: int) -> None:
     """Projected Gauss-Seidel on points start to end - 1 of row j; bounds: lower, upper; prepared: source, over."""
     west = v[j, start - 1]

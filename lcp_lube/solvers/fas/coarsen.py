@@ -1,11 +1,11 @@
 """Conductances of the next coarser grid; arrays as in `kernels`."""
 
-from ...base.compiled import kernel
+from ...base.compiled import kernel, piece
 from ...base.parallel import Array
 from .transfer import share
 
 
-@kernel
+@piece
 def series(a: float, b: float) -> float:
     """Conductance of two faces one behind the other; one that lies in a supply, -1, resists nothing (`held.marked`)."""
     if a < 0.0 or b < 0.0:

@@ -7,7 +7,7 @@ region of one pressure, which they hardly move.
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.compiled import kernel
+from ...base.compiled import kernel, piece
 from ...base.parallel import Array
 from .fronts import relax_pairs
 from .held import free_spans
@@ -62,7 +62,7 @@ def solve(
     return False
 
 
-@kernel
+@piece
 def wrap(z: Array, ring_x: bool, ring_y: bool) -> None:
     """The frame beyond periodic sides."""
     if ring_x:
@@ -71,7 +71,7 @@ def wrap(z: Array, ring_x: bool, ring_y: bool) -> None:
         z[0], z[-1] = z[-2], z[1]
 
 
-@kernel
+@piece
 def residual_square(
     z: Array, kx: Array, ky: Array, c: Array, carry: Array | None = None, held: NDArray[np.bool_] | None = None
 ) -> float:
@@ -85,7 +85,7 @@ def residual_square(
     return total
 
 
-@kernel
+@piece
 def place(a: int, n: int, ring: bool) -> int:
     """Position of line a of n in the order of elimination: round a ring from both ends, so that neighbours stay near."""
     if not ring:
@@ -93,7 +93,7 @@ def place(a: int, n: int, ring: bool) -> int:
     return 2 * a if 2 * a < n else 2 * (n - 1 - a) + 1
 
 
-@kernel
+@piece
 def newton_step(
     z: Array,
     kx: Array,
@@ -156,7 +156,7 @@ def newton_step(
     return True
 
 
-@kernel
+@piece
 def eliminate(J: Array, d: Array, b: int) -> bool:
     """d = J^-1 d for a matrix of half bandwidth b without pivoting; J is overwritten. False at a pivot that is rounding."""
     n = d.size

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.compiled import kernel
+from ...base.compiled import kernel, piece
 from ...base.parallel import Array
 
 REACH = 8  # cells within which a cavity ends, if it does so at the front that is looked at
@@ -11,7 +11,7 @@ RARE, WIDER = 0.1, 5  # part of the points that a strip this many times as wide 
 OVER, LAST = 1.7, 2  # overrelaxation of the sweeps near fronts, but for so many that leave smooth what remains
 
 
-@kernel
+@piece
 def relax_pairs(
     z: Array,
     kx: Array,
@@ -97,7 +97,7 @@ def relax_front(
     return count * points
 
 
-@kernel
+@piece
 def without(spans: NDArray[np.int32], found: int, held: NDArray[np.bool_]) -> tuple[NDArray[np.int32], int]:
     """What is left of spans without the points that are held."""
     out, n = np.empty((2 * found + 64, 3), dtype=np.int32), 0
@@ -116,7 +116,7 @@ def without(spans: NDArray[np.int32], found: int, held: NDArray[np.bool_]) -> tu
     return out, n
 
 
-@kernel
+@piece
 def front_spans(z: Array, width: int, ring: bool = False) -> tuple[NDArray[np.int32], int]:
     """Row, first column and last column + 1 of the runs of points within `width` cells of a front, and their number.
 
@@ -171,14 +171,14 @@ def front_spans(z: Array, width: int, ring: bool = False) -> tuple[NDArray[np.in
     return spans, found
 
 
-@kernel
+@piece
 def positive(row: Array, out: NDArray[np.uint8]) -> None:
     """1 where the film is full."""
     for i in range(row.size):
         out[i] = 1 if row[i] > 0.0 else 0
 
 
-@kernel
+@piece
 def mark_changes(full: NDArray[np.uint8], north: NDArray[np.uint8], out: NDArray[np.uint8], nx: int, ring: bool) -> int:
     """Mark the points with a front to the east or north of them; returns their number."""
     total = 0
@@ -191,7 +191,7 @@ def mark_changes(full: NDArray[np.uint8], north: NDArray[np.uint8], out: NDArray
     return total + out[nx]
 
 
-@kernel
+@piece
 def extent(mask: NDArray[np.uint8], nx: int) -> tuple[int, int]:
     """First and last column that is marked, of at least one."""
     first, last = 1, nx
@@ -202,14 +202,14 @@ def extent(mask: NDArray[np.uint8], nx: int) -> tuple[int, int]:
     return first, last
 
 
-@kernel
+@piece
 def merge(mask: NDArray[np.uint8], into: NDArray[np.uint8]) -> None:
     """into |= mask."""
     for i in range(mask.size):
         into[i] |= mask[i]
 
 
-@kernel
+@piece
 def reforms(z: Array, m: int, i: int, ring: bool) -> bool:
     """Whether the film is full again soon to the east of point i of row m."""
     nx = z.shape[1] - 2

@@ -12,7 +12,7 @@ hands what is asked of it on to the east. carry + i turn is the part of a cell's
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.compiled import kernel
+from ...base.compiled import kernel, piece
 from ...base.parallel import Array
 
 Mask = NDArray[np.bool_]
@@ -147,7 +147,7 @@ def transposed_residual(
             transposed_row(l[n], full, free, kx, ky, c[n], carry, m, out[n, m])
 
 
-@kernel
+@piece
 def transposed_row(
     l: Array, full: Mask, free: Mask | None, kx: Array, ky: Array, c: Array, carry: Array | None, m: int, out: Array
 ) -> None:

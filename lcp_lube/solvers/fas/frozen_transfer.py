@@ -3,14 +3,14 @@ its corrections, and transposed. Arrays as in `kernels`, one right-hand side at 
 
 import numpy as np
 
-from ...base.compiled import kernel
+from ...base.compiled import kernel, piece
 from ...base.parallel import Array
 from .fronts import reforms
 from .frozen_kernels import Mask, transposed_row
 from .transfer import coarse_rows, interpolate_row, mix, share, west_shares
 
 
-@kernel
+@piece
 def sides_of(ky: Array, full: Mask, m: int, out: Array, ring: bool) -> None:
     """Weights of the coarse line south of row m at its points.
 
@@ -87,7 +87,7 @@ def restrict(
             deal_to_one(here, w, by_x, ring, 0.5 if by_y else 1.0, out[last])
 
 
-@kernel
+@piece
 def deal(r: Array, v: Array, w: Array, by_x: bool, ring: bool, south: Array, north: Array) -> None:
     """Half of what a line between two coarse ones, zero in the frame, gives to the points of these, v of it to the south."""
     half, one = r.dtype.type(0.5), r.dtype.type(1)
@@ -108,7 +108,7 @@ def deal(r: Array, v: Array, w: Array, by_x: bool, ring: bool, south: Array, nor
         north[-2] += (one - v[1]) * first
 
 
-@kernel
+@piece
 def deal_to_one(r: Array, w: Array, by_x: bool, ring: bool, part: float, out: Array) -> None:
     """That part of what a line on a coarse one gives to its points."""
     one, some = r.dtype.type(1), r.dtype.type(part)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.compiled import kernel
+from ...base.compiled import kernel, piece
 from ...base.parallel import Array
 from . import transfer
 from .fronts import without
@@ -78,7 +78,7 @@ def marked(level: Level) -> tuple[Array, Array]:
     return kx, ky
 
 
-@kernel
+@piece
 def free_spans(held: NDArray[np.bool_]) -> NDArray[np.int32]:
     """Row, first column and last column + 1 of the runs of points that are not held, upwards."""
     ny, nx = held.shape[0] - 2, held.shape[1] - 2

@@ -14,7 +14,7 @@ cavities' edges, `transfer` those between grids.
 
 import numpy as np
 
-from ...base.compiled import kernel
+from ...base.compiled import kernel, piece
 from ...base.parallel import Array
 from .waiting import await_part, fetch, write
 
@@ -73,7 +73,7 @@ def sweep(
                 write(done, part, taken)
 
 
-@kernel
+@piece
 def diagonals(kx: Array, ky: Array, m: int, at: int, end: int, over: Array, g: Array, slot: int, carry: Array | None) -> None:
     """Of row m, columns at to end - 1: one over the sum of each point's conductances, and what part of its west neighbour's t
     they make arrive.
@@ -88,7 +88,7 @@ def diagonals(kx: Array, ky: Array, m: int, at: int, end: int, over: Array, g: A
         g[slot, i] = kx[m, i] * over[slot, i - 1]
 
 
-@kernel
+@piece
 def arriving(
     z: Array, kx: Array, ky: Array, c: Array, m: int, at: int, end: int, t: Array, k: int, carry: Array | None
 ) -> None:
@@ -101,7 +101,7 @@ def arriving(
     t[k, at] += west * (kx[m, at] if west > 0.0 else 1.0 if carry is None else carry[0, m, at - 1])
 
 
-@kernel
+@piece
 def pass_on(
     t: Array, g: Array, g1: int, g2: int, g3: int,
     z: Array, kx: Array, ky: Array, c: Array, after: int, beyond: int, at: int, end: int,
@@ -128,14 +128,14 @@ def pass_on(
         t[0, i], t[1, i], t[2, i] = w1, w2, w3
 
 
-@kernel
+@piece
 def pass_on_part(t: Array, k: int, g: Array, slot: int, carry: Array, m: int, end: int) -> None:
     """The same for one row whose cells store void."""
     for i in range(np.uint32(2), np.uint32(end)):
         t[k, i] += t[k, i - 1] * (g[slot, i] if t[k, i - 1] > 0.0 else carry[0, m, i - 1])
 
 
-@kernel
+@piece
 def settle(t: Array, k: int, over: Array, slot: int, z: Array, m: int, start: int, end: int, ring: bool) -> None:
     """Each point's balance solved: a pressure where something arrives, else the flow of void."""
     for i in range(np.uint32(start), np.uint32(end)):
@@ -145,7 +145,7 @@ def settle(t: Array, k: int, over: Array, slot: int, z: Array, m: int, start: in
         z[m, 0], z[m, nx + 1] = z[m, nx], z[m, 1]
 
 
-@kernel
+@piece
 def relax(z: Array, kx: Array, ky: Array, c: Array, m: int, start: int, end: int, carry: Array | None = None) -> None:
     """The points of row m in columns start to end - 1, one after the other: each balance has one solution."""
     west = z[m, start - 1]
@@ -158,7 +158,7 @@ def relax(z: Array, kx: Array, ky: Array, c: Array, m: int, start: int, end: int
         z[m, i] = west
 
 
-@kernel
+@piece
 def balance_row(z: Array, kx: Array, ky: Array, m: int, out: Array, carry: Array | None = None) -> None:
     """G of the points of row m into out[1:-1]."""
     for i in range(1, z.shape[1] - 1):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...base.compiled import kernel
+from ...base.compiled import kernel, piece
 from ...base.parallel import Array
 from .transfer import coarse_rows, interpolate_row, mix, west_shares
 
@@ -69,7 +69,7 @@ def interpolate(
             z[m, i] = p if p * (kx[m, i] + kx[m, i + 1] + ky[m, i] + ky[m + 1, i]) > q else -q
 
 
-@kernel
+@piece
 def cubic(k: int, n: int) -> tuple[int, float, float, float, float]:
     """The first of four of n values, at least, and their weights in what the cubic polynomial through them has in the middle
     between values k and k + 1."""
@@ -80,7 +80,7 @@ def cubic(k: int, n: int) -> tuple[int, float, float, float, float]:
     return k - 1, -0.0625, 0.5625, 0.5625, -0.0625
 
 
-@kernel
+@piece
 def smooth_row(coarse: Array, kx: Array, m: int, west: bool, east: bool, out: Array) -> None:
     """The pressures of a line between two coarse points where the film is full and smooth. west, east : as `sides`."""
     n, last = coarse.size, kx.shape[1] - 2

@@ -2,19 +2,19 @@
 
 import numpy as np
 
-from ...base.compiled import kernel
+from ...base.compiled import kernel, piece
 from ...base.parallel import Array
 from .fronts import reforms
 from .kernels import balance_row
 
 
-@kernel
+@piece
 def share(a: float, b: float, harmonic: bool) -> float:
     """Weight of the neighbour behind conductance a, 1 minus that of the one behind b, in the interpolation between them."""
     return a / (a + b) if a + b > 0.0 and (harmonic or a == 0.0 or b == 0.0) else 0.5
 
 
-@kernel
+@piece
 def west_shares(kx: Array, m: int, harmonic: bool, out: Array) -> None:
     """Weights of the west neighbours of the points of row m between two coarse ones, and behind the last one."""
     n = min(out.size, (kx.shape[1] - 1) // 2)
@@ -86,7 +86,7 @@ def restrict(
                     out[row + 1, k] += 0.5 * coarse[k] - part
 
 
-@kernel
+@piece
 def restrict_row(r: Array, w: Array, by_x: bool, wrap: bool, out: Array) -> None:
     """What a line's values, zero in the frame, give to the coarse points of a line: `interpolate_row` transposed."""
     if not by_x:
@@ -183,13 +183,13 @@ def correct(
     return added.sum()
 
 
-@kernel
+@piece
 def alike(z: float, unit: float) -> float:
     """z, of which flows of void are told as pressures."""
     return z if z > 0.0 else unit * z
 
 
-@kernel
+@piece
 def coarse_rows(j: int, y0: int, m: int, by_y: bool) -> tuple[int, int]:
     """Rows of the coarse lines south and north of the fine line j, which is the rank's row m; one where it is among them."""
     if not by_y:
@@ -198,7 +198,7 @@ def coarse_rows(j: int, y0: int, m: int, by_y: bool) -> tuple[int, int]:
     return row, row + 1 - j % 2
 
 
-@kernel
+@piece
 def differ(z: Array, a: int, b: int) -> bool:
     """Whether two rows are full at different points."""
     count = 0
@@ -207,7 +207,7 @@ def differ(z: Array, a: int, b: int) -> bool:
     return count > 0
 
 
-@kernel
+@piece
 def interpolate_row(coarse: Array, w: Array, by_x: bool, out: Array) -> None:
     """A coarse line's values at all points of a line; w: `west_shares`."""
     if not by_x:
@@ -218,7 +218,7 @@ def interpolate_row(coarse: Array, w: Array, by_x: bool, out: Array) -> None:
         out[2 * k + 1] = w[k] * coarse[k] + (1.0 - w[k]) * coarse[k + 1]
 
 
-@kernel
+@piece
 def mix(south: Array, north: Array, ky: Array, m: int, harmonic: bool, out: Array) -> None:
     """Row m between two lines, by the conductances of the y faces to them."""
     for i in range(1, out.size - 1):

@@ -7,7 +7,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from ...base.compiled import kernel
+from ...base.compiled import piece
 from ...base.parallel import Array
 
 SLOTS, LINE = 4, 8  # lines that a part may be ahead of the next one, and numbers in a cache line
@@ -65,7 +65,7 @@ write: Any = _write
 fetch: Any = _fetch
 
 
-@kernel
+@piece
 def await_part(done: Array, part: int, lines: int) -> None:
     """Until a part has done so many lines; a part that does not exist has."""
     if part < 0 or part >= done.shape[0]:
