@@ -10,6 +10,7 @@ from lcp_lube import load_scene, solve
 from lcp_lube.drivers import film_part, supply_step
 from lcp_lube.drivers.loop import Loop
 from lcp_lube.problems.film.fluid import Law
+from lcp_lube.solvers.fas.driver import Fas
 
 WEDGE = marches.WEDGE | {"n": 24, "motion": {"t_end": 0.02, "steps": 12}}
 EFFECTS: dict[str, dict[str, Any]] = {
@@ -213,8 +214,10 @@ def test_half_of_a_symmetric_film_and_its_supplies_is_solved(ny, monkeypatch):
 
 
 @pytest.mark.parametrize("effect", ["none", "density", "walls"])
-def test_pressures_of_supplies_follow_in_cycles_of_multigrid(effect):
-    """One more unknown each on every grid: the answer of Newton's method, in as many cycles as with given pressures."""
+def test_pressures_of_supplies_follow_in_cycles_of_multigrid(effect, monkeypatch):
+    """One more unknown each on every grid: the answer of Newton's method, in one cycle or two, V where that will do."""
+    own, kinds = Fas._kind, [""]
+    monkeypatch.setattr(Fas, "_kind", lambda self: (kinds.append(own(self)), kinds[-1])[1])
     sources = [
         {"restrictor": "capillary", "K": 4e-12, "p_s": 3e6},
         {"restrictor": "orifice", "K": 4e-9, "p_s": 3e6},

@@ -35,7 +35,7 @@ SETTLED = 1e-8  # of the largest pressure: what they may then be in the mean
 CLOSE = 1e-6  # ||G|| below which a ring that is hardly fed is not what has stalled
 FED = 3e-5  # of the certificate's tolerance: the flow that a film with supplies may lose, 3e-12 in parts of what flows
 BORDER = 4  # lines on either side of the border between two ranks
-SLOWER, LEAST_FALL = 2.5, 0.04  # times what the last F cycle left is what a V cycle leaves in its place; at least that
+SLOWER, LEAST_FALL = 2.5, (0.04, 0.2)  # times what an F cycle leaves is what a V cycle does in its place; at least, in time too
 
 
 @dataclass(frozen=True)
@@ -187,8 +187,9 @@ class Fas(Cycles):
 
     def _kind(self) -> str:
         """Of the next cycle: a V cycle in place of an F cycle where that will do, as the last one."""
-        level, expected = self._levels[0], SLOWER * max(self.norm / (self._recent[-1] or inf), LEAST_FALL) * self.norm
-        last = expected <= self.eps1 and level.carry is None and level.held is None
+        level, least = self._levels[0], LEAST_FALL[self._levels[0].carry is not None]
+        expected = SLOWER * max(self.norm / (self._recent[-1] or inf), least) * self.norm
+        last = expected <= self._rest and (level.carry is not None or level.held is None)
         return "V" if last and self.options.cycle == "F" else self.options.cycle
 
     def destroy(self) -> None:
@@ -251,13 +252,12 @@ class Fas(Cycles):
 
     def _ascend(self, k: int) -> None:
         o, level, coarse = self.options, self._levels[k], self._levels[k + 1]
-        where = (level.first, level.by_x, level.by_y)
         new, old = (coarse.part(coarse.seen(z)) for z in (coarse.z, coarse.old))
         if self._following:
             self._following.ascend(k)
         at_supplies = None if level.held is None else level.z[level.held]
-        rules = (self._harmonic, self._truncation, level.periodic[0], self._unit)
-        self._correction = self._loops.correct(level.z, new, old, level.kx, level.ky, *where, *rules)
+        rules = (level.first, level.by_x, level.by_y, self._harmonic, self._truncation, level.periodic[0], self._unit)
+        self._correction = self._loops.correct(level.z, new, old, level.kx, level.ky, *rules)
         if level.held is not None:
             level.z[level.held] = at_supplies
         level.share(level.z)
