@@ -45,6 +45,8 @@ class CoupledResponse:
     gaps : the film for each motion, by its coordinate e. flip : points that are about to change count to the other side.
     """
 
+    rtol, most = RTOL, MOST  # of GMRES
+
     def __init__(self, scene: Any, solution: Solution, gaps: Sequence[Any], flip: bool = False):
         problem: Any = solution.problem
         grid, comm = problem.grid, problem.grid.petsc_comm
@@ -54,26 +56,14 @@ class CoupledResponse:
         if self.free:
             scene = Fed(scene, tuple(Supply(one.region, one.p) for one in self.supplies))
         self.loop = loop = Loop(scene, Ask(comm=comm), None)  # type: ignore[arg-type]
-        base, self.p, self.r = loop.base, solution.fields["p"], solution.fields["r"]
-        self.n, self.unit = grid.local_size, base.scheme.flow_unit
+        base, self.n, self.unit = loop.base, grid.local_size, loop.base.scheme.flow_unit
         columns = np.logical_or.reduce(base.columns) if isinstance(base, GroovedProblem) else np.zeros(self.n, dtype=bool)
         held = problem.held.mask.ravel() if problem.held is not None else False
         self.columns, self.given = columns, columns | held
-        self.cavity = (cavity_sign(problem.reduce, self.p, self.r) < 0) & ~self.given
-        self.x = loop.vector(problem.cells) if loop.names else np.zeros(0)
-        self.p_max = base.reduce.max(np.abs(self.p)) or 1.0
-        self.changing = about_to_change(base.reduce, self.p, self.r) & ~self.given
-        self.cavity ^= self.changing & flip
-        at = self._answer(np.zeros(self.n), self.x, base)
-        self._size = 2.0 * grid.spacing[0] / self.unit * point_weights(grid)
-        self._linear = Linear(at.problem, self.cavity, given=columns if columns.any() else None, factored=True)
-        self._areas = areas(base).ravel()
-        taken = supply_flows(at.problem, at.p / at.problem.p_unit, at.r)
-        self._sources = np.array([one.misfit(one.p, q)[1:] for one, q in zip(self.supplies, taken, strict=True)])
         self._owner = problem.held.owner.ravel() if self.free else np.zeros(0)
-        d = at.problem.scheme.diagonal.ravel() * (at.problem.scheme.flow_unit / self.unit / at.problem.p_unit)
-        self._pushes = [np.concatenate([np.where(self._owner == k, d, 0.0), 0.0 * self.x]) for k in self.free]
-        self._answers: dict[tuple[float, bool], list[Any]] = {}
+        self._size = 2.0 * grid.spacing[0] / self.unit * point_weights(grid)
+        self._areas = areas(base).ravel()
+        self.place(solution.fields["p"], solution.fields["r"], loop.vector(problem.cells) if loop.names else np.zeros(0), flip)
         weight = grid.cell * base.p_unit * point_weights(grid) * np.where(self.cavity, 0.0, 1.0)
         self._forward, self._sides, self._contacts = [], [], []
         model, h = loop.frozen.constant, base.scheme.h.ravel()
@@ -88,6 +78,21 @@ class CoupledResponse:
             self._contacts.append(base.p_unit * self._areas * change)
             for other in pair:
                 other.destroy()
+
+    def place(self, p: Array, r: Array, x: Array, flip: bool = False) -> None:
+        """Linearise at a state: p in p_unit. Collective."""
+        base, self.p, self.r, self.x = self.loop.base, p, r, x
+        self.cavity = (cavity_sign(base.reduce, p, r) < 0) & ~self.given
+        self.p_max = base.reduce.max(np.abs(p)) or 1.0
+        self.changing = about_to_change(base.reduce, p, r) & ~self.given
+        self.cavity ^= self.changing & flip
+        at = self._answer(np.zeros(self.n), x, base)
+        self._linear = Linear(at.problem, self.cavity, given=self.columns if self.columns.any() else None, factored=True)
+        taken = supply_flows(at.problem, at.p / at.problem.p_unit, at.r)
+        self._sources = np.array([one.misfit(one.p, q)[1:] for one, q in zip(self.supplies, taken, strict=True)])
+        d = at.problem.scheme.diagonal.ravel() * (at.problem.scheme.flow_unit / self.unit / at.problem.p_unit)
+        self._pushes = [np.concatenate([np.where(self._owner == k, d, 0.0), 0.0 * x]) for k in self.free]
+        self._answers: dict[tuple[float, bool], list[Any]] = {}
 
     def _change(self, gap: Any, e: float) -> Array:
         """dh/de at the points."""
@@ -172,8 +177,8 @@ class CoupledResponse:
                     y[n:] -= self._along(np.concatenate([z, 0.0 * y[n:]]))[0][n:]  # what the effects make of the film's answer
                 out.setArray(done.ravel())
 
-        found, reason = krylov(comm, np.concatenate(parts), Whole(), Film(), RTOL)
-        if reason < 0:
+        found, reason = krylov(comm, np.concatenate(parts), Whole(), Film(), self.rtol, self.most)
+        if reason < 0 and self.most == MOST:
             raise NotFound(f"coefficients: the linearised effects were not solved (GMRES ended with {reason})")
         return found if nu == 0.0 else found[:size] + 1j * found[size:]
 
@@ -224,7 +229,7 @@ class CoupledResponse:
         self.loop.base.destroy()
 
 
-def krylov(comm: PETSc.Comm, b: Array, whole: Any, nearly: Any, rtol: float) -> tuple[Array, int]:
+def krylov(comm: PETSc.Comm, b: Array, whole: Any, nearly: Any, rtol: float, most: int = MOST) -> tuple[Array, int]:
     """GMRES with a linear map and one that nearly inverts it (`mult`, `apply`): what it finds, and how it ends. Collective."""
     mat = PETSc.Mat().createPython(((b.size, None), (b.size, None)), whole, comm=comm)
     mat.setUp()
@@ -233,7 +238,7 @@ def krylov(comm: PETSc.Comm, b: Array, whole: Any, nearly: Any, rtol: float) -> 
     ksp.setOperators(mat)
     ksp.setType("gmres")
     ksp.setGMRESRestart(RESTART)
-    ksp.setTolerances(rtol=rtol, atol=0.0, max_it=MOST)
+    ksp.setTolerances(rtol=rtol, atol=0.0, max_it=most)
     pc = ksp.getPC()
     pc.setType("python")
     pc.setPythonContext(nearly)

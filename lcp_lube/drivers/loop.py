@@ -27,9 +27,7 @@ MEMORY = 30  # answers that Anderson's method combines; -coupling_snes_anderson_
 CYCLE = 25  # steps after which it begins anew: its least squares see no changes 1e-8 of the largest that they remember
 FEW, NEAR, AWAY = 1, 0.3, 30.0  # answers combined while a coefficient changes by more than NEAR; AWAY: times the least change
 WARMER = 1.0  # of log(viscosity): where a second start is
-VAIN = 100  # films of Newton's method in which the change has to halve
-NEWTON = {"snes_mf": "", "snes_linesearch_type": "bt", "mat_mffd_err": 1e-6, "snes_ksp_ew": "", "ksp_max_it": 60}
-NEWTON |= {"ksp_gmres_restart": 60, "snes_max_linear_solve_fail": LONG}  # what 60 products give of a step is taken
+FIRST = 8  # films from which on films between soft walls that are not NEAR yet are solved with their walls at once
 LONGEST = 1.0  # relative change of a coefficient in one step, before answers are combined
 LEAST_LIFT = -0.9  # of the rigid film, of an iterate
 STEEPEST = 0.9  # of q, over 1/b, where the pressure is without bound: of an iterate, whose viscosity is then 10 times mu
@@ -177,10 +175,10 @@ class Loop:
         Far from the answer old steps mislead: there it combines two answers alone, and many once coefficients change by less
         than `NEAR`. Where steps lead away from the best fields so far, or a cycle ends, it begins anew from these; where that
         leads no further, once from thinner oil: what hardly moves against a supply gets hot, and then flows back from it. Soft
-        walls, whose film drags what it has, go on by Newton's method from the best fields. What is left in the end are these.
+        walls, whose film drags what it has, go on by Newton's methods from the best fields. What is left in the end are these.
         watch : called after every film.
         """
-        from .nonlinear import steps  # here, and below: films without effects have no loop
+        from .nonlinear import by_films, steps  # here, and below: films without effects have no loop
 
         x = PETSc.Vec().createMPI((len(self.names) * self.h.size, None), comm=self.base.grid.petsc_comm)
         x.setArray(begin)
@@ -188,7 +186,9 @@ class Loop:
         best, last, near, idle = (np.inf, begin), (begin + 1.0, begin), False, 0  # idle: cycles without better fields
         least = best  # of both starts
         mark = (np.inf, 0)  # a least change, and the films after which it was found
-        warm = None if "warmth" not in self.names or self.model.stored is not None else self._warmer(begin)
+        steady = self.model.stored is None
+        wait = FIRST if steady and "lift" in self.names else np.inf
+        warm = self._warmer(begin) if steady and "warmth" in self.names else None
 
         def ends() -> bool:
             return self.solves >= (LONG if self.solves - mark[1] < PATIENCE else MOST_SOLVES)
@@ -212,15 +212,29 @@ class Loop:
         def ended(snes: PETSc.SNES, it: int, norms: tuple[float, float, float]) -> int:
             if not np.isfinite(self.change):
                 return int(PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN)
-            if self.change > AWAY * best[0] or ends():
+            if self.change > AWAY * best[0] or ends() or (self.solves >= wait and self.change > NEAR):
                 return int(PETSc.SNES.ConvergedReason.DIVERGED_DTOL)
             done = self.found if near or idle else self.change <= NEAR
             return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS) if done else 0
+
+        def at_once(*places: Array) -> tuple[float, Array]:
+            self.told.append(f"from film {self.solves + 1} on by Newton's method for film and effects as one")
+            from .coupled_newton import newton
+
+            found = least
+            for one in places:
+                found = found if self.found else min(found, newton(self, one, watch), key=lambda one: one[0])
+            return found
 
         while not (ends() or self.found or np.isnan(self.change)):  # NaN: no film
             before = best[0]
             steps(x, "anderson", residual, ended, CYCLE, {"snes_anderson_m": MEMORY if near else FEW})
             near, idle = not near, idle + 1 if best[0] >= before else 0
+            if self.solves >= wait and NEAR < self.change < np.inf:
+                wait = 2 * self.solves
+                best = least = at_once(*((best[1], last[0]) if best[0] < self.change else (best[1],)))
+                if self.found:
+                    break
             if best[0] < self.change < np.inf:
                 x.setArray(best[1])
             if idle == 2:  # both kinds of cycle would take the same steps again
@@ -229,44 +243,23 @@ class Loop:
                 x.setArray(warm)
                 self.told.append(f"from film {self.solves + 1} on from oil of 1/e of the viscosity")
                 best, warm, near, idle, mark = (np.inf, warm), None, False, 0, (np.inf, self.solves)
-        if "lift" in self.names and self.model.stored is None and not self.found and np.isfinite(self.change):
+        if steady and not self.found and "warmth" in self.names and np.isfinite(least[0]):
+            least = at_once(least[1])
+        if steady and not self.found and "lift" in self.names and np.isfinite(self.change):
             x.setArray(least[1])
             self.told.append(f"from film {self.solves + 1} on by Newton's method with films for its products")
-            least = self._newton(x, least, watch)
+            least = by_films(self, x, least, watch)
             self.change = np.nan_to_num(self.change, nan=np.inf)
         if not self.found and least[0] < self.change:
-            self.change = self._off(least[1], watch)[0]
+            self.change = self.off(least[1], watch)[0]
         x.destroy()
 
-    def _off(self, x: Array, watch: Callable[[], None]) -> tuple[float, Array]:
+    def off(self, x: Array, watch: Callable[[], None]) -> tuple[float, Array]:
         """By how much the effects change these fields at most, and the change."""
         self.last, found = x, self._found(x, watch)
         with np.errstate(all="ignore"):
             off = x - found
         return self.base.reduce.max(np.abs(off)), off
-
-    def _newton(self, x: PETSc.Vec, least: tuple[float, Array], watch: Callable[[], None]) -> tuple[float, Array]:
-        """Newton's method from x on, whose products with the Jacobian are differences of films: the best fields. Collective."""
-        from .nonlinear import steps
-
-        marks = [(least[0], self.solves)]
-
-        def residual(snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
-            nonlocal least
-            before = x.array_r.copy()
-            self.change, off = self._off(before, watch)
-            least = min(least, (self.change, before), key=lambda one: one[0])
-            f.setArray(off)
-
-        def ended(snes: PETSc.SNES, it: int, norms: tuple[float, float, float]) -> int:
-            if least[0] <= 0.5 * marks[-1][0]:
-                marks.append((least[0], self.solves))
-            vain = self.solves - marks[-1][1] > VAIN or not np.isfinite(norms[2])
-            done, failed = PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS, PETSc.SNES.ConvergedReason.DIVERGED_DTOL
-            return int(done if self.found else failed if vain else 0)
-
-        steps(x, "newtonls", residual, ended, LONG, NEWTON)
-        return least
 
     def _warmer(self, x: Array) -> Array:
         """These fields, with warmer oil."""

@@ -3,7 +3,15 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import numpy as np
 from petsc4py import PETSc
+
+from ..base.parallel import Array
+from .loop import LONG
+
+VAIN = 100  # films of Newton's method in which the change has to halve
+NEWTON = {"snes_mf": "", "snes_linesearch_type": "bt", "mat_mffd_err": 1e-6, "snes_ksp_ew": "", "ksp_max_it": 60}
+NEWTON |= {"ksp_gmres_restart": 60, "snes_max_linear_solve_fail": LONG}  # what 60 products give of a step is taken
 
 
 def steps(
@@ -37,3 +45,25 @@ def steps(
             given.delValue(name)
         for obj in (snes, f):
             obj.destroy()
+
+
+def by_films(loop: Any, x: PETSc.Vec, least: tuple[float, Array], watch: Callable[[], None]) -> tuple[float, Array]:
+    """Newton's method from x on, whose products with the Jacobian are differences of films: the best fields. Collective."""
+    marks = [(least[0], loop.solves)]
+
+    def residual(snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
+        nonlocal least
+        before = x.array_r.copy()
+        loop.change, off = loop.off(before, watch)
+        least = min(least, (loop.change, before), key=lambda one: one[0])
+        f.setArray(off)
+
+    def ended(snes: PETSc.SNES, it: int, norms: tuple[float, float, float]) -> int:
+        if least[0] <= 0.5 * marks[-1][0]:
+            marks.append((least[0], loop.solves))
+        vain = loop.solves - marks[-1][1] > VAIN or not np.isfinite(norms[2])
+        done, failed = PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS, PETSc.SNES.ConvergedReason.DIVERGED_DTOL
+        return int(done if loop.found else failed if vain else 0)
+
+    steps(x, "newtonls", residual, ended, LONG, NEWTON)
+    return least

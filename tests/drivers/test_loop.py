@@ -4,19 +4,24 @@ import numpy as np
 import pytest
 
 from lcp_lube import solve
-from lcp_lube.drivers import loop
+from lcp_lube.drivers import loop, nonlinear
 
 FILM = [{"shape": "linear", "h_start": 4e-5, "h_end": 2e-5}]
 SOFT = {"family": "bearing", "L": 0.1, "U": 5.0, "n": 24, "fluid": {"mu": 0.02, "p_supply": 1e5}, "film": FILM}
 SOFT["elastic"] = {"compliance": 3e-10}  # it drags more than pressure drives through a mesh
 
 
-def test_newton_goes_on_between_soft_walls(monkeypatch):
+@pytest.mark.parametrize("how", ["for film and effects as one", "with films"])
+def test_newton_goes_on_between_soft_walls(how, monkeypatch):
+    """With the walls in the same steps no film is needed for them; by films alone it takes many."""
     monkeypatch.setattr(loop, "MOST_SOLVES", 30)
     monkeypatch.setattr(loop, "PATIENCE", 0)
+    if how == "with films":
+        monkeypatch.setattr(loop, "FIRST", np.inf)
     with solve(SOFT, model="full") as s:
         assert s.converged and s.certificate.holds and s.certificate.measures["coupling"] < 1e-8
-        assert any("Newton's method with films" in one for one in s.settings["why"])
+        assert any(f"Newton's method {how}" in one for one in s.settings["why"])
+        assert (s.settings["details"]["fluid_solves"] < 20) == (how != "with films")
         h, p = s.problem.scheme.h.ravel(), s.fields["p"] * s.problem.p_unit
         rigid = 2e-5 + 2e-5 * (1.0 - s.problem.grid.x / 0.1)
         assert h == pytest.approx(rigid.ravel() + 3e-10 * p, rel=1e-7)
@@ -33,7 +38,8 @@ def test_what_does_not_settle_ends_at_its_best(monkeypatch):
 
     monkeypatch.setattr(loop, "MOST_SOLVES", 30)
     monkeypatch.setattr(loop, "PATIENCE", 0)
-    monkeypatch.setattr(loop, "VAIN", -1)
+    monkeypatch.setattr(loop, "FIRST", np.inf)
+    monkeypatch.setattr(nonlinear, "VAIN", -1)
     monkeypatch.setattr(loop.Loop, "_found", recorded)
     with solve(SOFT, model="full") as s:
         assert s.outcome == "max_iterations" and f"{min(changes):.1e}" in s.message

@@ -1,0 +1,92 @@
+"""Newton's method for a film and its effects as one system: what the loop of effects goes on by where films alone mislead.
+
+Between soft walls that drag more than pressure drives through a mesh a film's answer to a wavy wall is far from any that the
+wall would have with it, and steps from film to film go astray. Here pressure and wall change together: a step is one linear
+solve with the whole system (`coupled_response`), and no film.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..base.parallel import Array
+from .coupled_response import CoupledResponse
+
+STEPS = 40  # from one film's answer
+LONGEST, SHORTEST, DESCENT = (
+    3.0,
+    1e-3,
+    1e-4,
+)  # change of a field by a step; part of a step; of the square that it has to take off
+DONE = 1e-9  # of fields: what is left then is for films to tell
+
+
+class CoupledNewton(CoupledResponse):
+    """A loop's last answer and fields, and steps from there on. Collective, as its methods."""
+
+    rtol, most = 1e-3, 100
+
+    def found(self) -> Array:
+        """The effects' fields after steps of Newton's method.
+
+        A step is halved until what the film's Jacobian makes of what is left, which has the size of the fields, gets less.
+        """
+        R = self._left(self.p, self.r, self.x)
+        for _ in range(STEPS):
+            y, size = self._settled(-R, 0.0, 0.0), self._size_of(R)
+            if not size > DONE**2:
+                break
+            t = min(1.0, LONGEST / self.loop.base.reduce.max(np.abs(y[self.n :])))
+            z, least = np.where(self.cavity, -self.r, self.p), SHORTEST * t
+            while t > least:
+                new, x = z + t * y[: self.n], self.x + t * y[self.n :]
+                p = np.where(self.given, self.p, np.maximum(new, 0.0))
+                r = np.where(self.given, self.r, np.clip(-new, 0.0, 1.0))
+                with np.errstate(all="ignore"):
+                    R = self._left(p, r, x)
+                    if self._size_of(R) < (1.0 - DESCENT * t) * size:
+                        break
+                t *= 0.5
+            else:
+                break
+            self._linear.destroy()
+            self.place(p, r, x)
+        return self.x
+
+    def _left(self, p: Array, r: Array, x: Array) -> Array:
+        """What the equations leave at another state."""
+        here, self.p, self.r = (self.p, self.r), p, r
+        R = self._system(np.zeros(self.n), x, self.loop.base)[0]
+        self.p, self.r = here
+        return R
+
+    def _size_of(self, R: Array) -> float:
+        """The square of the size of the fields' changes that R stands for."""
+        z = self._linear.solve([R[: self.n]])[0] * np.where(self.cavity, 1.0, 1.0 / self.p_max)
+        size = float(self.loop.base.reduce.dot(z, z) + self.loop.base.reduce.dot(R[self.n :], R[self.n :]))
+        return size if np.isfinite(size) else np.inf
+
+
+def newton(loop: Any, x: Array, watch: Callable[[], None]) -> tuple[float, Array]:
+    """The change of the best fields, and these, from the film's answer at x on. Collective.
+
+    The film's answer at the fields found tells by how much they are off, and is gone on from while that falls to a half.
+    """
+    loop.change, _ = loop.off(x, watch)
+    best, before = (loop.change, x), np.inf
+    while not loop.found and loop.change <= 0.5 * before:
+        if len(loop.log) <= len(loop.given):  # its answer was given, not its film
+            loop.again(False)
+        before, at = loop.change, loop.answer
+        at.problem.cells = at.cells
+        fields = {"p": at.p / at.problem.p_unit, "r": at.r}
+        system = CoupledNewton(loop.scene, replace(loop.solution, problem=at.problem, fields=fields), [])
+        try:
+            x = system.found()
+        finally:
+            system.destroy()
+        loop.change, _ = loop.off(x, watch)
+        best = min(best, (loop.change, x), key=lambda one: one[0])
+    return best
