@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from ..base.parallel import Array
-from .coupled_response import CoupledResponse
+from .coupled_response import Changes, CoupledResponse
 
-STEPS = 40  # from one film's answer
+PRODUCTS = 1000  # with the system's derivative, from one film's answer on
 LONGEST, SHORTEST, DESCENT = (
     3.0,
     1e-3,
@@ -26,7 +26,11 @@ DONE = 1e-9  # of fields: what is left then is for films to tell
 class CoupledNewton(CoupledResponse):
     """A loop's last answer and fields, and steps from there on. Collective, as its methods."""
 
-    rtol, most = 1e-3, 100
+    rtol, most, products = 1e-3, 60, 0
+
+    def _along(self, y: Array) -> Changes:
+        self.products += 1
+        return super()._along(y)
 
     def found(self) -> Array:
         """The effects' fields after steps of Newton's method.
@@ -34,7 +38,7 @@ class CoupledNewton(CoupledResponse):
         A step is halved until what the film's Jacobian makes of what is left, which has the size of the fields, gets less.
         """
         R = self._left(self.p, self.r, self.x)
-        for _ in range(STEPS):
+        while self.products < PRODUCTS:
             y, size = self._settled(-R, 0.0, 0.0), self._size_of(R)
             if not size > DONE**2:
                 break
@@ -73,20 +77,28 @@ def newton(loop: Any, x: Array, watch: Callable[[], None]) -> tuple[float, Array
     """The change of the best fields, and these, from the film's answer at x on. Collective.
 
     The film's answer at the fields found tells by how much they are off, and is gone on from while that falls to a half.
+    No film is started from another, and what is found is logged as films' answers are: a resumed run takes the same steps.
     """
-    loop.change, _ = loop.off(x, watch)
-    best, before = (loop.change, x), np.inf
-    while not loop.found and loop.change <= 0.5 * before:
-        if len(loop.log) <= len(loop.given):  # its answer was given, not its film
-            loop.again(False)
-        before, at = loop.change, loop.answer
-        at.problem.cells = at.cells
-        fields = {"p": at.p / at.problem.p_unit, "r": at.r}
-        system = CoupledNewton(loop.scene, replace(loop.solution, problem=at.problem, fields=fields), [])
-        try:
-            x = system.found()
-        finally:
-            system.destroy()
+    best, before = (np.inf, x), np.inf
+    while True:
+        loop.start = None
         loop.change, _ = loop.off(x, watch)
         best = min(best, (loop.change, x), key=lambda one: one[0])
-    return best
+        if loop.found or not loop.change <= 0.5 * before or not np.isfinite(loop.change):
+            return best
+        before = loop.change
+        if len(loop.log) < len(loop.given):
+            x = loop.given[len(loop.log)]
+        else:
+            if len(loop.log) == len(loop.given):  # its answer was given, not its film
+                loop.start = None
+                loop.again(False)
+            at = loop.answer
+            at.problem.cells = at.cells
+            fields = {"p": at.p / at.problem.p_unit, "r": at.r}
+            system = CoupledNewton(loop.scene, replace(loop.solution, problem=at.problem, fields=fields), [])
+            try:
+                x = system.found()
+            finally:
+                system.destroy()
+        loop.log.append(x)

@@ -82,7 +82,8 @@ class CouplingFile:
             setattr(loop, name, record["coupling"][name])
         loop.solves = 0  # counted again, as the answers are taken from the file
         loop.steps = [Step(*step) for step in record["steps"]]
-        loop.given = [vector(f"made.{k}") for k in range(record["coupling"]["solves"])]
+        made = sum(name.startswith("made.") and name.endswith(f".{loop.names[0]}") for name in arrays)
+        loop.given = [vector(f"made.{k}") for k in range(made)]
         near = replace(loop.frozen, by=loop.by(loop.cells(vector("last")))).build(grid.petsc_comm)
         loop.start = Start(near, {name: arrays[f"fields.{name}"] for name in "pr"})
         return vector("first")
