@@ -157,7 +157,7 @@ class Equations:
     def slope(self, p: Array, r: Array, name: str, last: bool = False) -> slopes.Slope:
         """dQ/dp (p in p_unit) and dQ/dr of one of `numbers` (`slopes.slope`). Collective."""
         problem, name = self.problem(p), FLIPPED.get(name, name) if self.turned else name
-        tangent = None if name in weights(problem) else self.tangent(p, r)
+        tangent = self.tangent(p, r) if "flow_" in name or (self.law and name in DRAGS) else None
         found = slopes.slope(problem, tangent, p / problem.p_unit, r, name, last)
         return slopes.Slope(-found.p, -found.r) if self.turned and name in DRAGS else found
 

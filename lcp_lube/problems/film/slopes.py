@@ -77,8 +77,8 @@ def slope(problem: LubricationProblem, tangent: Tangent | None, p: Array, r: Arr
 
     Parameters
     ----------
-    tangent : the film's equations linearised in p, which know how a fluid's coefficients change with it; integrals of the
-        pressure (`forces.weights`) need none.
+    tangent : the film's equations linearised in p, which know how a fluid's coefficients change with it; flows need it, and
+        drags of a fluid with a law.
     last : of points that tie for the largest pressure the last one has it, not the first.
     """
     if (weight := weights(problem).get(name)) is not None:
@@ -89,16 +89,16 @@ def slope(problem: LubricationProblem, tangent: Tangent | None, p: Array, r: Arr
         return _largest(problem, p, last)
     if name == "min_h":
         return Slope(np.zeros(p.size), np.zeros(p.size))
-    assert tangent is not None  # as these need it
     if name in ("friction", "friction_torque"):
         lever = problem.grid.polar[0] + problem.grid.y if name == "friction_torque" and problem.grid.polar else 1.0
         return _friction(problem, tangent, p, r, lever)
+    assert tangent is not None  # as flows need it
     if name.startswith("flow_"):
         return _flow(problem, tangent, name.removeprefix("flow_"))
     return _given(problem, tangent, giving(problem, name))
 
 
-def _friction(problem: LubricationProblem, tangent: Tangent, p: Array, r: Array, lever: Any) -> Slope:
+def _friction(problem: LubricationProblem, tangent: Tangent | None, p: Array, r: Array, lever: Any) -> Slope:
     """Of `flows.drag`, term by term."""
     grid, s = problem.grid, problem.scheme
     before, behind = grid.steps(0)[:-1], grid.steps(0)[1:]
@@ -106,32 +106,34 @@ def _friction(problem: LubricationProblem, tangent: Tangent, p: Array, r: Array,
     weight, rims = line_weights(grid), grid.rims(1) if grid.dim == 2 else (0.0, 0.0)
     first, last, south, north = sides(grid)
     walls = sides(grid, ("closed",))[:2]
-    h_west, *west = sheared_faces(problem, grid.x - before / 2)
     h_east, resting, h_moving = sheared_faces(problem, grid.x + behind / 2)
-    full = (cavity_sign(problem.reduce, p, r) >= 0).reshape(grid.box)
-    void = r.reshape(grid.box)
-    passes = ~np.broadcast_to(walls[1], grid.box)
-    share = s.b_E / np.where(passes & (s.couette_E != 0.0), s.couette_E, np.inf)  # the liquid's share of a face is 1 + share r
-    sheared = np.where(passes, share / h_moving, 0.0)
+    full = (cavity_sign(problem.reduce, p, r) >= 0).reshape(grid.box) if "closed" in grid.ends[0] else np.ones(1, dtype=bool)
+    void, passes = r.reshape(grid.box), ~walls[1]
+    share = np.zeros(grid.box)  # the liquid's share of a face is 1 + share r
+    np.divide(s.b_E, s.couette_E, out=share, where=passes & (s.couette_E != 0.0))
+    sheared = share / np.where(passes, h_moving, 1.0)
     parts: list[tuple[NDArray[np.bool_], Any]] = list(zip(walls, (0.5 * before / behind, 0.5), strict=True))
+    parts = [(wall, part) for wall, part in parts if wall.any()]
     for wall, part in parts:
-        sheared = sheared - np.where(wall & ~full, part / s.h, 0.0)
+        sheared -= np.where(wall & ~full, part / s.h, 0.0)
     arcs = grid.stretch(grid.y) ** 2 * lever
-    per_row = behind * problem.U * arcs * (weight + 0.5 * (rims[0] * south + rims[1] * north)) * dy
-    weight = weight * lever * dy
-    towards = np.where(passes, 0.5 * h_east, 0.0) * weight * unit  # of p_east - p
-    from_west = np.nan_to_num(grid.ghosted(np.where(last, 0.0, towards).ravel())[1:-1, :-2])
-    dp = from_west - towards + np.where(first, 0.5 * h_west, 0.0) * weight * unit
-    if tangent.viscosity is not None:  # that of a face follows the mean of its two points' pressures
+    lines = problem.U * arcs * (weight + 0.5 * (rims[0] * south + rims[1] * north)) * dy
+    pull = 0.5 * weight * lever * dy * unit  # of p_east - p, times the film
+    towards = np.where(passes, h_east, 0.0) * pull
+    dp = grid.ghosted(np.where(last, 0.0, towards).ravel(), outside=0.0)[1:-1, :-2] - towards
+    if first.any():
+        h_west, *west = sheared_faces(problem, grid.x[:, :1] - before[:1] / 2)
+        dp[:, :1] += h_west * pull
+    if tangent is not None and tangent.viscosity is not None:  # that of a face follows the mean of its two points' pressures
         own, other = tangent.viscosity  # d log(mu)/dp at the west and the east point of the east face
-        shear = np.where(passes, resting + (1.0 + share * void) / h_moving, 0.0) + np.where(
-            first, before / behind * (west[0] + 1.0 / west[1]), 0.0
-        )
+        shear = np.where(passes, resting + (1.0 + share * void) / h_moving, 0.0)
+        if first.any():
+            shear[:, :1] += before[0] / behind[0] * (west[0] + 1.0 / west[1])
         for wall, part in parts:
             shear = shear + np.where(wall, part * np.where(full, 4.0, 1.0 - void) / s.h, 0.0)
-        drag = problem.mu * per_row * shear
-        dp = dp + drag * own + np.nan_to_num(grid.ghosted((drag * other).ravel())[1:-1, :-2])
-    return Slope(dp.ravel(), (problem.mu * per_row * sheared).ravel())
+        drag = problem.mu * behind * lines * shear
+        dp = dp + drag * own + grid.ghosted((drag * other).ravel(), outside=0.0)[1:-1, :-2]
+    return Slope(dp.ravel(), (problem.mu * behind * lines * sheared).ravel())
 
 
 def _largest(problem: LubricationProblem, p: Array, last: bool) -> Slope:
