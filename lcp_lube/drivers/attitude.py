@@ -17,7 +17,7 @@ from .chain import Chain
 from .compose import Inner
 from .root import Search
 
-MOST_SOLVES, MOST_BETWEEN = 12, 20
+MOST_SOLVES, MOST_BETWEEN = 12, 20  # ends of searches that go round; by secants, then within a bracket
 AROUND = 12  # attitudes, all round
 TOLERANCE, PART = 1e-9, 0.1  # rad: the force across the load is then 1e-9 of it; of an eps1 that was given
 STEEPEST, FLATTEST = 2.0, 0.3  # slope of the force's angle over the attitude; without grooves it is 1

@@ -28,7 +28,7 @@ SHARE = 0.10  # of the fine solve's work that coarse ones may take, by points: f
 SHARE_TIME = 0.13  # the same of a march in time, by its steps
 LEAST = {1: 15, 2: 6}  # points a side of a coarse grid, at least
 FREE = {"barus"}  # a change of the unknown: it costs nothing, and is always kept
-COARSE_EPS1 = 1e-7
+COARSE_EPS1 = 1e-7  # far below a coarse grid's own error, so that differences of two such films tell the effect alone
 PLACE = 1e-2  # by which the load of a film that is looked at may be off
 FEWEST = 5  # steps of a march that is looked at, at least
 

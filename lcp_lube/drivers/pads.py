@@ -24,7 +24,7 @@ from .compose import Inner
 from .impedance import stiffness
 from .pad_coordinates import Bearing, Films, PadFilm, bearing_of
 
-MOST_SOLVES = 80
+MOST_SOLVES = 80  # the end of a search that goes round: pads without preload, which idle, took up to 65
 THINNER, THICKER = 0.7, 3.0  # parts of a film anywhere by which a step may change it
 THINNEST = 1e-5  # film over the clearance, below which no load is looked for: a difference quotient's step is a tenth of it
 ROUNDING = 1e-15  # a step in parts of the coordinates' sizes, of which a film knows nothing

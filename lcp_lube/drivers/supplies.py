@@ -31,7 +31,7 @@ from .chain import Chain
 from .compose import Inner
 from .linearised import Feed, Linear
 
-MOST_SOLVES = 40
+MOST_SOLVES = 40  # the end of a search that goes round: of drawn films with dense fluids those that were found took up to 11
 TOLERANCE = 1e-10  # of the largest flow: by how much what a source gives may differ from what the film takes
 DIGITS, ENOUGH = 1e-7, 1e-4  # steps of such parts of the largest pressure may be rounding; the misfit that may be left then
 PATIENCE, GIVE_UP = 2, 8  # such steps that do not halve the misfit, before one that is left is enough; or given up

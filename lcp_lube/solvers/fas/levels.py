@@ -17,7 +17,7 @@ MOST_ENTRIES = 9_000_000  # of a banded matrix that is eliminated
 # Times the mean conductance of the other direction: then points are left out in the strong one alone. 8 costs 6 % less work on
 # six stretched films and 6 cycles more, on a rough one above all; 64 doubles both (benchmarks/constants.py).
 STRONG = 4.0
-LEAST = 1e-300
+LEAST = 1e-300  # beside flows of a cell that has none: 0 / 0 is 0 then
 
 
 @dataclass
