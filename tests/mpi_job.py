@@ -14,9 +14,9 @@ from mpi4py import MPI
 
 # name: (scene, changes, method, recipe); sizes that no number of ranks divides.
 DIRECT: dict[str, tuple[str, dict[str, Any], str, str]] = {
-    "line": ("problem1", {"n": 101}, "din", "mumps"),
-    "line_superlu_dist": ("problem3", {"n": 53}, "din", "superlu_dist"),
-    "plane": ("problem4", {"nx": 53, "ny": 41}, "din", "mumps"),
+    "line": ("problem1", {"n": 53}, "din", "mumps"),
+    "line_superlu_dist": ("problem3", {"n": 31}, "din", "superlu_dist"),
+    "plane": ("problem4", {"nx": 19, "ny": 17}, "din", "mumps"),
     "small": ("problem4", {"nx": 7, "ny": 5}, "din", "superlu_dist"),
     "flat": ("problem4", {"nx": 31, "ny": 1, "scheme": "face"}, "din", "mumps"),
 }
