@@ -109,6 +109,20 @@ def test_corners_of_unequal_pressure():
     assert even["flow_growth"] is None and "no limit" not in summary(even)
 
 
+def test_a_supply_that_reaches_a_side():
+    """What it gives to a side at its own end doubles with every halving of the spacings, and the run says so."""
+    groove = {"shape": "axial_groove", "x": [0.04, 0.06], "p": 5e5}
+    pad = {"family": "bearing", "dimension": 2, "L": 0.1, "width": 0.08, "U": 1.0, "fluid": {"mu": MU}, "nx": 19}
+    film = [{"shape": "constant", "h": 2e-5}]
+    runs = [found(load_scene({**pad, "film": film, "supply": [groove], "ny": n})) for n in (79, 159)]
+    growth = runs[0]["flow_growth"]
+    assert growth["south"] == pytest.approx(growth["north"], rel=1e-9) and growth["west"] == growth["east"] == 0.0
+    assert runs[1]["flow"]["south"] - runs[0]["flow"]["south"] == pytest.approx(growth["south"], rel=0.02)
+    assert "these flows have no limit" in summary(runs[0])
+    landed = found(load_scene({**pad, "film": film, "supply": [{**groove, "length": 0.06}], "ny": 39}))
+    assert landed["flow_growth"] is None
+
+
 def test_fluids_that_depend_on_pressure_keep_the_force():
     data = bearing(n=(40, 9)).model_dump(exclude_unset=True)
     plain, barus = (found(load_scene({**data, "fluid": {"mu": MU, "barus": b}})) for b in (0.0, 1e-10))

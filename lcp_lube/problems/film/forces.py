@@ -10,6 +10,7 @@ import numpy as np
 
 from ...base.parallel import Array
 from ..strips import each_strip, places_of
+from .flows import volume_unit
 from .reynolds import sides
 from .strip import line_weights, stream_weights
 
@@ -223,11 +224,12 @@ def _in_rims(problem: LubricationProblem, above: float, weight: Weight) -> float
     return total
 
 
-def corner_flows(problem: LubricationProblem) -> dict[str, float] | None:
+def flow_growth(problem: LubricationProblem) -> dict[str, float] | None:
     """By how much the flow out of each side grows when the spacings are halved, m3/s; None if it does not. Collective.
 
     At a corner of two sides whose pressures differ by dp, the flow from the one to the other is without bound: a distance r
-    from the corner h^3/(12 mu) 2 dp/(pi r) passes, so that every halving adds h^3/(12 mu) (2 dp/pi) log 2.
+    from the corner h^3/(12 mu) 2 dp/(pi r) passes, so that every halving adds h^3/(12 mu) (2 dp/pi) log 2. A supply that
+    reaches a side of another pressure gives to it twice as much with every halving.
     """
     grid, s, pressures = problem.grid, problem.scheme, open_pressures(problem)
     if grid.dim == 1:
@@ -245,4 +247,20 @@ def corner_flows(problem: LubricationProblem) -> dict[str, float] | None:
             passing = problem.reduce.sum(np.where(at[i] & at[j], k, 0.0)) * 2.0 * np.log(2.0) / np.pi * (p_i - p_j)
             growth[names[j]] += passing
             growth[names[i]] -= passing
+    for side, name in enumerate(names) if problem.held is not None else ():
+        growth[name] += volume_unit(problem) * _reaching(problem, side)
     return growth if any(growth.values()) else None
+
+
+def _reaching(problem: LubricationProblem, side: int) -> float:
+    """What supplies that reach a side give to it, in the scheme's units of flow. Collective."""
+    grid, s, held, p_side = problem.grid, problem.scheme, problem.held, open_pressures(problem)[side]
+    assert held is not None
+    passing, axis = np.zeros(grid.box), side // 2
+    place = [grid.x, grid.y]
+    place[axis] = np.full_like(place[axis], grid.origin[axis] + side % 2 * grid.lengths[axis])
+    for number, supply in enumerate(held.supplies) if p_side is not None else ():
+        there = sides(grid)[side] & (held.owner == number) & supply.region.inside(*place)
+        conductance = (s.k_W, s.k_E, s.k_S, s.k_N)[side]
+        passing += np.where(there, conductance * ((supply.p - p_side) / problem.p_unit), 0.0)  # type: ignore[operator]
+    return problem.reduce.sum(passing)

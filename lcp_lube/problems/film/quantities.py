@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...base.parallel import Array
 from .cavity import cavitated
 from .flows import friction, side_flows
-from .forces import ambient, corner_flows, forces, open_pressures
+from .forces import ambient, flow_growth, forces, open_pressures
 from .fronts import cavitated_area, first_cavity, fronts, line_fronts
 from .peak import Window
 from .supplies import supply_flows
@@ -100,7 +100,7 @@ def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any
         "flow": flow,
     }
     if grid.dim == 2:
-        out |= {"side_leakage": flow["south"] + flow["north"], "flow_growth": corner_flows(problem)}
+        out |= {"side_leakage": flow["south"] + flow["north"], "flow_growth": flow_growth(problem)}
     if grid.polar is not None:
         out["friction_torque"] = friction(problem, p_pa, r, grid.polar[0] + grid.y)
     if problem.held is not None:
