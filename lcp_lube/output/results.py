@@ -153,7 +153,8 @@ def _bearing_lines(data: dict[str, Any], one_d: bool) -> list[str]:
         lines.append(f"temperature {hot} K; heat in {into}, out {out}{stored}")
     if data.get("flow_growth"):
         growth = ", ".join(f"{side} {value:+.2g}" for side, value in data["flow_growth"].items() if value)
-        lines.append(f"these flows have no limit: sides, or a supply and a side, of unequal pressure meet; halving the spacings adds {growth}")
+        meet = "sides, or a supply and a side, of unequal pressure meet"
+        lines.append(f"these flows have no limit: {meet}; each halving of the spacings adds {growth}")
     return lines
 
 
