@@ -19,6 +19,7 @@ SCENE_DIR = PACKAGE / "scenes"
 # A wheel carries the recipes inside the package; in a checkout they stand at top level.
 RECIPE_DIR = next((d for d in (PACKAGE / "options", PACKAGE.parent / "options") if d.is_dir()), PACKAGE / "options")
 SMALL = 20_000  # points up to which one grid and a direct solver cost less than setting up anything better
+ELIMINATED = 230  # points of multigrid's coarsest grid: elimination takes less time than the calls of coarser ones
 SMALL_BOX = 5_000  # the same where a contact area has to move by a cell a step
 
 

@@ -16,7 +16,7 @@ from ..errors import InputError, nearest
 from ..problems.film.model import Model
 from ..problems.grid import OFFSET
 from ..problems.solution import Outcome, Solution
-from ..registry import METHODS
+from ..registry import ELIMINATED, METHODS
 from ..scenes.scene import Solvable
 from ..solvers.newton import Stopping
 from .ask import Ask
@@ -29,7 +29,6 @@ from .rungs import ASYMPTOTIC, finer, first_shape, round_ring, rungs_up
 from .values import Values, carried, sought
 
 FEW_KNOWN = 128  # points of the first grid of a line whose number is known: no coarser grid is cheaper
-FEW_LINE = 230  # of a line that multigrid's loops solve by elimination alone (`fas.driver.DIRECT`)
 FEW_PAIRS = 200  # of a film whose load is estimated from each two grids: these are solved by elimination
 ALGEBRAIC = 1e-3  # ||F|| relative to the tolerance: with many small cavities it leaves up to 60 times itself in a load
 ALLOWED = (1e-10, 0.5)  # tolerances
@@ -113,7 +112,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         stopping = _stopping(ask, tol, before) if before is not None or (pairs and not ring) else ask.stopping
         halved = ask.reduction and (len(shape) == 1 or prod(shape) > WHOLE[loops if before is None else before.asked == "fas"])
         this = replace(ask, accuracy=None, stopping=stopping, start=near, nested=False, reduction=halved)
-        by_loops = loops and (plane or (line and shape[0] <= FEW_LINE))
+        by_loops = loops and (plane or (line and shape[0] <= ELIMINATED))
         solution = inner(scene.with_shape(shape), replace(this, direct_below=0) if by_loops else this)
         problem = solution.problem
         sure = quantity or (DEFAULT_QUANTITY[0] if pairs or line else "")

@@ -19,6 +19,7 @@ from ...base.parallel import Array
 from ...problems.film.certify import filled
 from ...problems.film.lubrication import LubricationProblem
 from ...problems.solution import Fields, Step
+from ...registry import ELIMINATED
 from ..job import Job
 from ..method_options import one_of, option
 from ..newton import StalledError
@@ -28,7 +29,6 @@ from .cycles import COARSEST_SWEEPS, WINDOW, CycleOptions, Cycles
 EPS = float(np.finfo(float).eps)
 TRUNCATIONS = {"none": 0, "clip": 1, "points": 2}  # see `transfer.correct`
 EXACT = (1200, 5000, 10_000)  # points of the coarsest grid once the cycles have stalled, and stalled again
-DIRECT = 230  # points of the coarsest grid: elimination takes less time than the calls of coarser ones
 OWN = 17_000  # points of a problem that is then solved so itself
 EXTREME = 1000.0  # film ratio above which a small ||G|| says little of p, and the corrections have to be small too
 SETTLED = 1e-8  # of the largest pressure: what they may then be in the mean
@@ -70,7 +70,7 @@ class Fas(Cycles):
         self._harmonic, self._truncation = options.weights == "harmonic", TRUNCATIONS[options.truncation]
         follows = start is not None and following.foreseen(problem, start["p"])
         with self.stages("assembly"):
-            self._levels = levels.hierarchy(finest.finest(problem), self._harmonic, DIRECT)
+            self._levels = levels.hierarchy(finest.finest(problem), self._harmonic, ELIMINATED)
         # A corrected pressure counts beside a corrected flow of void as the flow that it drives: units of pressure are any.
         first = self._levels[0]
         driven = 2.0 * problem.reduce.max(np.array([float(k[1:-1, 1:-1].mean()) for k in (first.kx, first.ky)]))
