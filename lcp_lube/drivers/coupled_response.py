@@ -107,7 +107,8 @@ class CoupledResponse:
         cells = loop.cells(x) if loop.names else {}
         at_sides = [float(loop.law.density(np.array(p))) for p in loop.p_sides] if loop.law.dowson_higginson else None
         by = factors(base, cells, at_sides)
-        return answer(base, loop.law, cells, by, p, self.r - np.where(self.cavity, z, 0.0), loop.p_sides)
+        r = self.r - np.where(self.cavity, z, 0.0)
+        return answer(base, loop.law, cells, by, p, r, loop.p_sides, loop.effects)
 
     def _system(self, z: Array, x: Array, base: Any) -> tuple[Array, Array, Array]:
         """H and x - X, one behind the other, and Q of a state; what flows out of supplies that follow, and what they hold."""

@@ -72,8 +72,8 @@ def _settled_on(scene: Solvable, ask: Ask, inner: Inner, file: CouplingFile) -> 
     loop, coarse = Loop(scene, _reduced(inside, scene.model.law), inner), None  # type: ignore[attr-defined]
     if file.holds(loop):
         begin = file.restore(loop)
-    elif (made := getattr(loop.ask.start, "made", None)) is not None:
-        begin, loop.given = loop.vector(neutral(loop.effects, loop.h.size)), [loop.vector(made)]
+    elif isinstance(loop.ask.start, Start) and (made := loop.ask.start.made) is not None:
+        begin, loop.given = loop.vector(neutral(loop.effects, loop.h.size)), [loop.vector(dict(made))]
     else:
         known = _known(loop)
         if known is None:
@@ -95,7 +95,8 @@ def _reduced(ask: Ask, law: Law | None) -> Ask:
     near, found = ask.start.problem, ask.start.fields
     unit = near.p_unit  # type: ignore[attr-defined]
     in_q = {**found, "p": law.reduced(found["p"] * unit) / unit}
-    return replace(ask, start=Start(near, in_q, ask.start.settings, getattr(ask.start, "made", None)))
+    made = ask.start.made if isinstance(ask.start, Start) else None  # a solution would look for it among its numbers
+    return replace(ask, start=Start(near, in_q, ask.start.settings, made))
 
 
 def _known(loop: Loop) -> Cells | None:
@@ -176,6 +177,7 @@ def _told(ask: Ask, loop: Loop) -> Solution:
             message = f"film {loop.solves} of the coupling: {message}"
     fields = {"p": at.p / problem.p_unit, "r": at.r}
     problem.cells = at.cells | {"stored": at.stored}
+    problem.oil = problem.oil if loop.found else None  # numbers of what has not settled are those of the fields
     problem.rigid = None if loop.effects or problem.size > NESTED_ABOVE else loop.base
     certificate = problem.certify(fields, eps1)
     enclosure = _band(loop, solution.enclosure, fields) if ask.certify else None

@@ -140,7 +140,7 @@ class Loop:
             by = closed(by, new.problem, new.fields, self.base)
             self.left = {"residual": new.certificate.measures["residual"]}
         with np.errstate(all="ignore"):
-            self.answer = answer(self.base, self.law, cells, by, p, new.fields["r"], self.p_sides)
+            self.answer = answer(self.base, self.law, cells, by, p, new.fields["r"], self.p_sides, self.effects)
         return bool(np.isfinite(self.base.reduce.max(p)))
 
     def foreseen(self, known: Cells | None, near: Any) -> Cells:

@@ -34,7 +34,7 @@ def applies(scene: Solvable, ask: Ask) -> bool:
 def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     """The mirror image's solution, turned back. Collective."""
     if ask.start is not None and isinstance(near := ask.start.problem, TurnedProblem):
-        made = getattr(ask.start, "made", None)  # in the mirror image's frame
+        made = ask.start.made if isinstance(ask.start, Start) else None  # in the mirror image's frame
         ask = replace(ask, start=Start(near.moving, near.there(ask.start.fields), ask.start.settings, made))
     solution = inner(Mirrored(scene), ask)
     assert isinstance(solution.problem, LubricationProblem)  # as `applies` found

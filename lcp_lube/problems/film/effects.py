@@ -18,6 +18,7 @@ from ..grid import Grid
 from ..transfer import Pick
 from .fluid import Law
 from .lubrication import LubricationProblem
+from .oil_along import oil_of
 from .reynolds import sides
 from .supplies import Held, pressed
 
@@ -60,13 +61,14 @@ NOTHING = Report({}, {}, {})
 class Effect:
     """A rung: what one effect makes of an answer; these are most: even, the same in the mirror image, nothing to tell.
 
-    channels : what it may change. even : whether what it makes of an answer that is symmetric in y is so too. carried : of a
-    field that the oil carries along in time, by its equation: its name among those that are told, and the level from which it
-    is counted; None: its law is local in time.
+    channels : what it may change. even : whether what it makes of an answer that is symmetric in y is so too. local : whether
+    what it makes at a place is made of what the answer has there. carried : of a field that the oil carries along in time, by
+    its equation: its name among those that are told, and the level from which it is counted; None: its law is local in time.
     """
 
     channels: ClassVar[tuple[str, ...]] = ("viscosity",)
     even = True
+    local: ClassVar[bool] = False
 
     @property
     def carried(self) -> tuple[str, float] | None:
@@ -246,9 +248,20 @@ def scaled(
 
 
 def answer(
-    base: LubricationProblem, law: Law, cells: Cells, by: FaceFactors, p: Array, r: Array, p_sides: tuple[float, ...]
+    base: LubricationProblem,
+    law: Law,
+    cells: Cells,
+    by: FaceFactors,
+    p: Array,
+    r: Array,
+    p_sides: tuple[float, ...],
+    effects: Sequence[Effect] = (),
 ) -> Answer:
-    """An answer of `base` with these coefficients: p in Pa above p_c and r, whatever unknown it was solved in. Collective."""
+    """An answer of `base` with these coefficients: p in Pa above p_c and r, whatever unknown it was solved in. Collective.
+
+    effects : those that have made the cells of an answer.
+    """
+    given = by
     framed = framed_by(base.grid, p, p_sides)
     here = framed[1:-1, 1:-1]
     mobility = [law.mobility(here, np.nan_to_num(other)) for other in around(framed)] if law.barus else None
@@ -260,8 +273,7 @@ def answer(
         supplies = tuple(replace(one, p=float(law.pressure(np.array(one.p)))) for one in held.supplies)
         held = replace(held, supplies=supplies, law=None)
     film = scaled(base, by, mobility, p_sides, held)  # type: ignore[arg-type]
-    alone = (law.barus or cells) and {*cells} == ({"density"} if law.dowson_higginson else set())
-    film.thick = (base.mu, law) if alone else None
+    film.oil = None if base.integrals is None else oil_of(base, law, cells, given.values, effects)
     if "lift" in cells:
         film = film.with_lift(cells["lift"])
     return Answer(film, p, r, cells, law, base, by.values)

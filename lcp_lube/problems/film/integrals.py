@@ -43,12 +43,12 @@ class LineIntegrals:
     ----------
     film : h(x, y) in m for arrays that broadcast. points : x of two points and more, ascending, m. edges : x of the film's
         jumps and kinks, m; those outside are not heeded. fine : the points are ends of panels that need no halving.
-    swell : rho_0/rho at places, by which h^-3 is multiplied wherever it is integrated; None: 1.
+    oil : mu/mu_0 and rho_0/rho at places (`oil_along`), by which h^-2 and h^-3 are multiplied where they are integrated.
 
     Attributes
     ----------
     parts : the three integrals between neighbouring points, shape (3, points - 1), in 1, 1/m, 1/m2.
-    swollen : rho_0/rho at the panels' Gauss points.
+    thicker, swollen : mu/mu_0 and rho_0/rho at the panels' Gauss points.
 
     Raises
     ------
@@ -61,9 +61,9 @@ class LineIntegrals:
         points: Array,
         edges: Iterable[float] = (),
         fine: bool = False,
-        swell: Callable[[Array], Array] | None = None,
+        oil: Callable[[Array], Array] | None = None,
     ):
-        self.film, self.points, self.swell = film, points, swell
+        self.film, self.points, self.oil = film, points, oil
         self.known: dict[tuple[float, ...], Any] = {}  # `known.known_of` by what else it needs
         self.spans: tuple[Any, ...] | None = None  # between supplies (`known.Span`)
         self.ring: tuple[float, float] | None = None  # where a turn begins, and its length, m
@@ -71,22 +71,22 @@ class LineIntegrals:
         self.ends = points if fine else self._panels(self.edges)
         self.at_gauss = _gauss_points(self.ends[:-1], self.ends[1:])  # shape (panels, 8)
         self.h = self.film_at(self.at_gauss)
-        self.swollen = self.swell_at(self.at_gauss)
+        self.thicker, self.swollen = self.oil_at(self.at_gauss)
         self.first = np.searchsorted(self.ends, points)  # the panel behind each point
-        self._of_panels = self._integrals(self.ends[:-1], self.ends[1:], self.h, self.swollen)
+        self._of_panels = self._integrals(self.ends[:-1], self.ends[1:], self.h, self.thicker, self.swollen)
         self.parts = np.add.reduceat(self._of_panels, self.first[:-1], axis=1)
 
     def film_at(self, x: Array) -> Array:
         """h at places of the line, m."""
         return np.broadcast_to(self.film(x, np.zeros(1)), x.shape)
 
-    def swell_at(self, x: Array) -> Any:
-        """rho_0/rho at places of the line."""
-        return 1.0 if self.swell is None else self.swell(x)
+    def oil_at(self, x: Array) -> Any:
+        """mu/mu_0 and rho_0/rho at places of the line."""
+        return (1.0, 1.0) if self.oil is None else self.oil(x)
 
     def carries(self, x: Array) -> Array:
         """What a wall drags through places where the film is full, over its speed: h rho/rho_0, m."""
-        return self.film_at(x) / self.swell_at(x)  # type: ignore[no-any-return]
+        return self.film_at(x) / self.oil_at(x)[1]  # type: ignore[no-any-return]
 
     def _panels(self, edges: Array) -> Array:
         """Ends of the panels; each point among them, to the bit."""
@@ -122,9 +122,10 @@ class LineIntegrals:
         return 0.5 * (b - a) * (h**-3.0 @ _WEIGHT)
 
     @staticmethod
-    def _integrals(a: Array, b: Array, h: Array, swollen: Any = 1.0) -> Array:
+    def _integrals(a: Array, b: Array, h: Array, thicker: Any = 1.0, swollen: Any = 1.0) -> Array:
         inverse = 1.0 / h
-        return 0.5 * (b - a) * np.stack([inverse @ _WEIGHT, inverse**2 @ _WEIGHT, (inverse**3 * swollen) @ _WEIGHT])
+        two, three = thicker * inverse**2, thicker * swollen * inverse**3
+        return 0.5 * (b - a) * np.stack([inverse @ _WEIGHT, two @ _WEIGHT, three @ _WEIGHT])
 
     def lifted(self, by: complex) -> LineIntegrals:
         """Those of the film with a number added."""
@@ -170,7 +171,7 @@ class LineIntegrals:
         inside = x > a  # at an end nothing is added: the film beyond is not asked for
         a, x = a[inside], x[inside]
         within = _gauss_points(a, x)
-        at[:, inside] += self._integrals(a, x, self.film_at(within), self.swell_at(within))
+        at[:, inside] += self._integrals(a, x, self.film_at(within), *self.oil_at(within))
         return at
 
     @property

@@ -13,56 +13,23 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...base.parallel import Array
 from ..solution import Fields
 from .fluid import Law
 from .integrals import LineIntegrals
 from .line import ISOVISCOUS, Flow, Line, line_flow, solve_line, solve_points
+from .oil_along import Oil, with_densities, with_oil
+from .spans import SIDE, Span, whole
 from .supplies import Supply
-from .swollen import swollen, swollen_parts
 
 if TYPE_CHECKING:
     from .lubrication import LubricationProblem
 
 KINDS = {"open", "closed"}  # ends of a line that is known, if it does not go round
-SIDE = -1  # in the place of a supply's number
 MOST, DIGITS = 60, 1e-14  # steps for the pressures of supplies, and their last relative change
-SETTLED = 1e-12  # of densities, which then are off by a part of it
+SETTLED = 1e-12  # of densities and viscosities, which then are off by a part of it
 NEAR = 1e-9  # relative: of such changes those that grow are rounding
-
-
-@dataclass(frozen=True)
-class Span:
-    """A film between two ends: from a side, or the edge of a supply, to the next.
-
-    Attributes
-    ----------
-    line : with the two ends and the points between them. west, east : numbers of the supplies there, or SIDE. faces : of the
-        line of all points, those between these. parts : what `line.parts` is to the scheme: an end next to a point is at least
-        a part NEAREST of a spacing from it.
-    """
-
-    line: LineIntegrals
-    west: int
-    east: int
-    faces: NDArray[np.int64]
-    parts: Array
-
-    @property
-    def owned(self) -> NDArray[np.int64]:
-        """Numbers of its points, behind all of its faces but the last."""
-        return self.faces[:-1]
-
-    def lifted(self, by: complex) -> Span:
-        line = self.line.lifted(by)
-        return replace(self, line=line, parts=line.parts * (self.parts / self.line.parts))
-
-
-def whole(line: LineIntegrals) -> tuple[Span, ...]:
-    """The only one of a line without supplies."""
-    return (Span(line, SIDE, SIDE, np.arange(line.points.size - 1), line.parts),)
 
 
 @dataclass(frozen=True)
@@ -157,8 +124,8 @@ class Known:
 
 def known_of(problem: LubricationProblem) -> Known | None:
     """None for 2D, a film without `integrals`, other ends, supplies that are no lines' (`spans.supplied`), other equations."""
-    grid, line, law = problem.grid, problem.integrals, problem.thick
-    if line is None or not (problem.plain or law) or problem.U < 0:
+    grid, line, oil = problem.grid, problem.integrals, problem.oil
+    if line is None or not (problem.plain or oil) or problem.U < 0:
         return None
     supplies = problem.held.supplies if problem.held is not None else ()
     spans = line.spans if supplies else whole(line)
@@ -166,75 +133,105 @@ def known_of(problem: LubricationProblem) -> Known | None:
         return None
     if any(one.open for one in supplies) and len(spans) < len(supplies) + (not grid.periodic[0]):
         return None  # what flows from a supply to the side that it reaches is the grid's alone
-    mu = problem.mu if law is None else law[0]
-    data: Any = (mu, problem.U, problem.p_sides[:2], problem.r_in, supplies, law)
-    if data not in line.known:
-        with np.errstate(all="ignore"):
-            line.known[data] = _solved(problem, line, spans, supplies, mu, ISOVISCOUS if law is None else law[1])
-    found = line.known[data]
-    if found is None:
+    oil = oil or Oil(problem.mu, ISOVISCOUS)
+    if oil.effects and "closed" in grid.ends[0]:
         return None
-    fed, p, r, P, more = found
+    data: Any = (oil.mu, problem.U, problem.p_sides[:2], problem.r_in, supplies, oil.law, tuple(map(id, oil.effects)))
+    with np.errstate(all="ignore"):
+        if data not in line.known:
+            line.known[data] = _film(problem, line, spans, supplies, oil), oil.effects  # which keep their ids
+        fed = line.known[data][0]
+        found = None if fed is None else _points(problem, spans, supplies, oil)
+    if fed is None or found is None:
+        return None
+    p, r, P, flows = found
+    more_Q = np.array([one.Q for one in fed.lines]) - flows
     p, r = (field[grid.x_start : grid.x_end] for field in (p, r))
     if problem.held is not None:
         p = np.where(problem.held.mask.ravel(), np.append(P, 0.0)[problem.held.owner].ravel(), p)
-    return Known(fed, p, r, P, more)
+    return Known(fed, p, r, P, more_Q)
 
 
-def _solved(
-    problem: LubricationProblem, line: LineIntegrals, spans: Sequence[Span], supplies: Sequence[Supply], mu: float, law: Law
-) -> tuple[Fed, Array, Array, Array, Array] | None:
-    """What `known_of` remembers of a line: the film, p and r at all points, the supplies' pressures there, `Known.more_Q`."""
-    at_sides, walls = problem.p_sides[:2], [kind == "closed" for kind in problem.grid.ends[0]]
+def _ends(problem: LubricationProblem, oil: Oil, span: Span, P: Array) -> tuple[float, float, float, bool]:
+    """q at both ends, the void that enters, whether nothing flows; P : pressures of the supplies."""
+    ends, kinds = (span.west, span.east), problem.grid.ends[0]
+    given = [problem.p_sides[k] if end == SIDE else P[end] for k, end in enumerate(ends)]
+    p = [float(oil.law.reduced(np.asarray(one))) for one in given]
+    shut = [kind == "closed" and end == SIDE for kind, end in zip(kinds, ends, strict=True)]
+    if shut[1]:  # what the wall brings is pressed back: full, with the slope 6 mu U/h^2 all the way
+        p[1] = p[0] + 6.0 * oil.mu * problem.U * float(np.sum(span.line.parts[1]))
+    return p[0], p[1], problem.r_in if span.west == SIDE else 0.0, any(shut)
+
+
+def _film(
+    problem: LubricationProblem, line: LineIntegrals, spans: Sequence[Span], supplies: Sequence[Supply], oil: Oil
+) -> Fed | None:
+    """The line as its film has it; None where it has no answer, or its oil does not settle."""
 
     def ends(span: Span, P: Array) -> tuple[float, float, float, bool]:
-        """q at both ends, the void that enters, whether nothing flows."""
-        p = [
-            float(law.reduced(np.asarray(at_sides[k] if end == SIDE else P[end])))
-            for k, end in enumerate((span.west, span.east))
-        ]
-        shut = [wall and end == SIDE for wall, end in zip(walls, (span.west, span.east), strict=True)]
-        if shut[1]:  # what the wall brings is pressed back: full, with the slope 6 mu U/h^2 all the way
-            p[1] = p[0] + 6.0 * mu * problem.U * float(np.sum(span.line.parts[1]))
-        return p[0], p[1], problem.r_in if span.west == SIDE else 0.0, any(shut)
+        return _ends(problem, oil, span, P)
 
-    def of_film(span: Span, P: Array) -> Flow:
-        return line_flow(span.line, mu, problem.U, *ends(span, P))
-
-    def of_points(span: Span, P: Array) -> Flow:
-        return solve_points(span.parts, mu, problem.U, *ends(span, P))[2]
-
-    begin = np.array([one.p for one in supplies])
-    (p, r), more = np.zeros((2, problem.grid.shape[0])), np.zeros(len(spans))
-    films, points, last = list(spans), list(spans), np.inf  # with the densities that they have
+    begin, films, last = np.array([one.p for one in supplies]), list(spans), np.inf
+    fronts = np.zeros(0)
     for _ in range(MOST):
-        P_film, P = _balanced(supplies, films, begin, law, of_film), _balanced(supplies, points, begin, law, of_points)
-        if P_film is None or P is None:
+        P = _balanced(supplies, films, begin, oil.law, lambda span, P: line_flow(span.line, oil.mu, problem.U, *ends(span, P)))
+        if P is None:
             return None
-        lines = tuple(solve_line(span.line, mu, problem.U, *ends(span, P_film), law) for span in films)
+        lines = tuple(solve_line(span.line, oil.mu, problem.U, *ends(span, P), oil.law) for span in films)
+        if not all(np.isfinite(one.Q) and np.isfinite(one.p).all() for one in lines):
+            return None
         off = 0.0
-        for k, (span, one) in enumerate(zip(spans, lines, strict=True)):
-            q, r[span.owned], flow = solve_points(points[k].parts, mu, problem.U, *ends(span, P))
-            p[span.owned], more[k] = law.pressure(q), one.Q - flow.Q
-            if not (np.isfinite(one.Q) and np.isfinite(one.p).all() and np.isfinite(p).all()):
-                return None
-            if law.dowson_higginson:
-                at_ends = law.pressure(np.array(ends(span, P)[:2]))
-                film = swollen(span.line, one, law)
-                parts = swollen_parts(span.parts, np.array([at_ends[0], *p[span.owned], at_ends[1]]), law)
-                off = max(
-                    off,
-                    np.abs(film.swollen - films[k].line.swell_at(film.at_gauss)).max(),
-                    np.abs(parts[2] / points[k].parts[2] - 1.0).max(),
-                )
-                films[k], points[k] = replace(span, line=film), replace(span, parts=parts)
+        if oil.law.dowson_higginson or oil.effects:
+            before, fronts = fronts, np.concatenate([place for one in lines for place in one.fronts])
+            off = np.max(np.abs(fronts - before), initial=0.0) / line.points[-1] if fronts.size == before.size else np.inf
+            found = [with_oil(span.line, one, oil, problem.reduce) for span, one in zip(spans, lines, strict=True)]
+            for new, old in zip(found, films, strict=True):
+                pairs = zip((new.thicker, new.swollen), old.line.oil_at(new.at_gauss), strict=True)
+                changes = [np.abs(a / b - 1.0).max() for a, b in pairs]
+                off = max(off, *changes)
+            films = [replace(span, line=new) for span, new in zip(spans, found, strict=True)]
         if off <= SETTLED or last <= off <= NEAR:
-            break
+            held = tuple((one.region.x - one.region.half_x, one.region.x + one.region.half_x) for one in supplies)  # type: ignore[union-attr]
+            return Fed(lines, tuple(spans), line, held, P)
         last = off
-    else:
-        return None
-    held = tuple((one.region.x - one.region.half_x, one.region.x + one.region.half_x) for one in supplies)  # type: ignore[union-attr]
-    return Fed(lines, tuple(spans), line, held, P_film), p, r, P, more
+    return None
+
+
+def _points(
+    problem: LubricationProblem, spans: Sequence[Span], supplies: Sequence[Supply], oil: Oil
+) -> tuple[Array, Array, Array, Array] | None:
+    """The discrete solution: p and r at all points, pressures of the supplies, flows of the spans; None as of `_film`."""
+
+    def solved(span: Span, P: Array) -> tuple[Array, Array, Flow]:
+        return solve_points(span.parts, oil.mu, problem.U, *_ends(problem, oil, span, P))
+
+    begin, last, law = np.array([one.p for one in supplies]), np.inf, oil.law
+    (p, r), flows = np.zeros((2, problem.grid.shape[0])), np.zeros(len(spans))
+    if oil.effects:  # with what they have made of the faces; of a line alone, without supplies
+        every = [np.concatenate(problem.grid.comm.allgather(a)) for a in oil.faces]
+        pushed, dragged = (np.append(west[:1], east) for west, east in zip(every[:2], every[2:], strict=True))
+        parts = spans[0].parts * np.stack([np.ones(pushed.size), dragged / pushed, 1.0 / pushed])
+        spans = [replace(spans[0], parts=parts)]
+    points = list(spans)
+    for _ in range(MOST):
+        P = _balanced(supplies, points, begin, law, lambda span, P: solved(span, P)[2])
+        if P is None:
+            return None
+        off = 0.0
+        for k, span in enumerate(spans):
+            q, r[span.owned], flow = solved(points[k], P)
+            p[span.owned], flows[k] = law.pressure(q), flow.Q
+            if law.dowson_higginson and not oil.effects:
+                at_ends = law.pressure(np.array(_ends(problem, oil, span, P)[:2]))
+                parts = with_densities(span.parts, np.array([at_ends[0], *p[span.owned], at_ends[1]]), law)
+                off = max(off, np.abs(parts[2] / points[k].parts[2] - 1.0).max())
+                points[k] = replace(span, parts=parts)
+        if not np.isfinite(p).all():
+            return None
+        if off <= SETTLED or last <= off <= NEAR:
+            return p, r, P, flows
+        last = off
+    return None
 
 
 def _given(spans: Sequence[Span], flows: Array, count: int) -> Array:

@@ -66,13 +66,14 @@ class Line:
     def q_within(self) -> Array:
         """q at the panels' Gauss points."""
         line = self.integrals
-        rise = 6.0 * self.mu * line.within((self.U - self.Q * line.swollen / line.h) / line.h**2)
+        rise = 6.0 * self.mu * line.within(line.thicker * (self.U - self.Q * line.swollen / line.h) / line.h**2)
         return np.where(self.full[:, None], self.q[:-1, None] + rise, 0.0)
 
     @cached_property
     def _thicker(self) -> Array | float:
-        """mu(p)/mu at the panels' Gauss points."""
-        return 1.0 / (1.0 - self.law.barus * self.q_within) if self.law.barus else 1.0
+        """mu/mu_0 at the panels' Gauss points."""
+        by_p = 1.0 - self.law.barus * self.q_within if self.law.barus else 1.0
+        return self.integrals.thicker / by_p  # type: ignore[no-any-return]
 
     @cached_property
     def slope(self) -> Array:
@@ -93,9 +94,9 @@ class Line:
     @property
     def friction(self) -> float:
         """Integral of mu U (1 - r)/h + (h/2) p', N/m: of 4 mu U/h - 3 mu Q/(rho h^2) where full, mu Q/h^2 in cavities."""
-        if self.law.barus or self.integrals.swell is not None:
+        if self.law.barus or self.integrals.oil is not None:
             h, full = self.integrals.h, self.full[self.integrals.interval, None]
-            shear = np.where(full, self._thicker * (4.0 * self.U - 3.0 * self.Q * self.integrals.swollen / h), self.Q / h) / h
+            shear = np.where(full, 4.0 * self.U - 3.0 * self.Q * self.integrals.swollen / h, self.Q / h) * self._thicker / h
             return float(self.mu * np.sum(self.integrals.weigh(shear)))
         one, two, _ = self.mu * self.integrals.parts
         return float(np.sum(np.where(self.full, 4.0 * self.U * one - 3.0 * self.Q * two, self.Q * two)))
@@ -218,7 +219,7 @@ def solve_line(
     k, x_f = k[apart], x_f[apart]
     points = np.insert(x, k + 1, x_f)
     whole = np.insert(~dry, k + 1, True)
-    found = LineIntegrals(line.film, points, fine=True, swell=line.swell)
+    found = LineIntegrals(line.film, points, fine=True, oil=line.oil)
     found.ring = line.ring
     return Line(found, np.insert(p, k + 1, 0.0), whole, mu, U, Q, r_in > 0.0, law)
 

@@ -52,7 +52,7 @@ class LubricationProblem:
     tops = False  # whether the largest pressure is looked for between the points (`peak`)
     factors: Any = None  # of its faces, that follow from `cells`
     tangent: Any = None  # dG/dp, where that is not A
-    thick: Any = None  # mu and a fluid's law, where nothing else acts; rigid: its film in q, of a small one
+    oil: Any = None  # `oil_along.Oil`, where nothing else acts but what it knows; rigid: its film in q, of a small one
     rigid: Any = None
     contact: Any = None  # of asperities
     levers: Any = ()  # `Model.levers`

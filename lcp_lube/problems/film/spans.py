@@ -3,15 +3,50 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...base.parallel import Array
 from ..grid import Grid
 from .integrals import SAME, LineIntegrals
-from .known import SIDE, Span
 from .supplies import NEAREST, Patch, Supply
+
+SIDE = -1  # in the place of a supply's number
+
+
+@dataclass(frozen=True)
+class Span:
+    """A film between two ends: from a side, or the edge of a supply, to the next.
+
+    Attributes
+    ----------
+    line : with the two ends and the points between them. west, east : numbers of the supplies there, or SIDE. faces : of the
+        line of all points, those between these. parts : what `line.parts` is to the scheme: an end next to a point is at least
+        a part NEAREST of a spacing from it.
+    """
+
+    line: LineIntegrals
+    west: int
+    east: int
+    faces: NDArray[np.int64]
+    parts: Array
+
+    @property
+    def owned(self) -> NDArray[np.int64]:
+        """Numbers of its points, behind all of its faces but the last."""
+        return self.faces[:-1]
+
+    def lifted(self, by: complex) -> Span:
+        line = self.line.lifted(by)
+        return replace(self, line=line, parts=line.parts * (self.parts / self.line.parts))
+
+
+def whole(line: LineIntegrals) -> tuple[Span, ...]:
+    """The only one of a line without supplies."""
+    return (Span(line, SIDE, SIDE, np.arange(line.points.size - 1), line.parts),)
 
 
 def supplied(line: LineIntegrals, grid: Grid, supplies: Sequence[Supply], owner: NDArray[np.int64]) -> tuple[Span, ...] | None:

@@ -8,7 +8,7 @@ in both. z, some 0.6 for mineral oils, or from the slope alpha = dlog(mu)/dp at 
 
 from dataclasses import dataclass
 from math import exp, log
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -48,6 +48,7 @@ class Roelands(Effect):
     """z : the exponent."""
 
     z: float
+    local: ClassVar[bool] = True
 
     def apply(self, at: Answer, out: Cells) -> None:
         at_p_c = np.log(at.base.mu * out["viscosity"]) + ROELANDS_MU

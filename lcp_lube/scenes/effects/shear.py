@@ -8,7 +8,7 @@ mu_N is the viscosity at that place's pressure and temperature. Reynolds' equati
 usual; profiles across the film are not resolved.
 """
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -22,6 +22,7 @@ from .table import EffectTable
 class Shear(EffectTable):
     """Shear thinning, by Eyring's or Carreau's law."""
 
+    local: ClassVar[bool] = True
     law: Literal["eyring", "carreau"] = Field(..., description="which law")
     tau_0: Positive | None = measured("Pa", None, "Eyring stress")
     time: Positive | None = measured("s", None, "Carreau's time lambda")
