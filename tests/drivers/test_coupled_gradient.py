@@ -77,8 +77,7 @@ def test_by_the_level_of_a_film_that_is_nearly_all_cavitated():
     ends = {"film.linear.h_start_um": 17.4, "film.linear.h_end_um": 58.2, "U": 7.3, "L_mm": 51.5, "p_in": 3e5, "p_out": 0.0}
     scene = without(load_scene("lined_pad", {"n": 48, "fluid.barus": 0.0, **ends}), ["temperature", "elastic"])
     with answer(scene) as solution:
-        field = float(film_fields(scene, solution, ["load"])["load"] @ areas(solution.problem.grid))
-        assert gradients(scene, solution, ["load"], ["h_offset"])[0].gradient["h_offset"] == pytest.approx(field, rel=1e-6)
+        assert not off(scene, solution, ["load"], ["h_offset"], step=1e-5)
 
 
 def test_through_a_journals_place():
