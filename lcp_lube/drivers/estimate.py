@@ -185,9 +185,11 @@ def given_film(scene: Solvable) -> Model | None:
 
 
 def is_known(scene: Solvable) -> bool:
-    """Whether a film in 1D can be solved by quadrature: its ends open or closed, no supplies, not in time, no effects."""
+    """Whether a film in 1D can be solved by quadrature: its ends open or closed, steady, no supplies, effects local."""
     model = given_film(scene)
-    if model is None or len(scene.shape) != 1 or model.law or model.effects or model.supplies or model.grooves:
+    if model is None or len(scene.shape) != 1 or model.supplies or model.grooves:
+        return False
+    if (model.law or model.effects) and not (model.scheme == "face" and all(effect.local for effect in model.effects)):
         return False
     from ..problems.film.known import KINDS  # here: of lines alone
 

@@ -251,10 +251,11 @@ def known_numbers(problem):
 
 
 def test_what_a_line_is_known_by():
-    """Quadrature knows a steady line; not one in time, nor one that effects act on."""
+    """Quadrature knows a steady line; not one in time, nor one that heat acts on."""
     for n in (7, 100):
         pad = load_scene("pocketed_pad", {"n": n})
         assert is_known(pad) and known_numbers(pad.build())["load"] == pytest.approx(34165.70098, rel=1e-9)
+    assert is_known(load_scene("pocketed_pad", {"scheme": "face", "fluid.barus": 1e-8}))
     assert not is_known(load_scene("moving_texture")) and not is_known(load_scene("lined_pad"))
     for scene in ("problem1", "problem3"):  # whatever the scheme that it is solved with, and whichever way it moves
         nodal, turned = load_scene(scene), load_scene(scene, {"U": -4.0})

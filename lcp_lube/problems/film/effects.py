@@ -18,7 +18,6 @@ from ..grid import Grid
 from ..transfer import Pick
 from .fluid import Law
 from .lubrication import LubricationProblem
-from .oil_along import oil_of
 from .reynolds import sides
 from .supplies import Held, pressed
 
@@ -273,7 +272,10 @@ def answer(
         supplies = tuple(replace(one, p=float(law.pressure(np.array(one.p)))) for one in held.supplies)
         held = replace(held, supplies=supplies, law=None)
     film = scaled(base, by, mobility, p_sides, held)  # type: ignore[arg-type]
-    film.oil = None if base.integrals is None else oil_of(base, law, cells, given.values, effects)
+    if base.integrals is not None:
+        from .oil_along import oil_of  # here: of lines alone
+
+        film.oil = oil_of(base, law, cells, given.values, effects)
     if "lift" in cells:
         film = film.with_lift(cells["lift"])
     return Answer(film, p, r, cells, law, base, by.values)

@@ -19,7 +19,7 @@ from ..solution import Fields
 from .fluid import Law
 from .integrals import LineIntegrals
 from .line import ISOVISCOUS, Flow, Line, line_flow, solve_line, solve_points
-from .oil_along import Oil, with_densities, with_oil
+from .oil_along import Oil, Settling, with_densities
 from .spans import SIDE, Span, whole
 from .supplies import Supply
 
@@ -172,7 +172,7 @@ def _film(
         return _ends(problem, oil, span, P)
 
     begin, films, last = np.array([one.p for one in supplies]), list(spans), np.inf
-    fronts = np.zeros(0)
+    settling = [Settling(span.line) for span in spans]
     for _ in range(MOST):
         P = _balanced(supplies, films, begin, oil.law, lambda span, P: line_flow(span.line, oil.mu, problem.U, *ends(span, P)))
         if P is None:
@@ -182,14 +182,10 @@ def _film(
             return None
         off = 0.0
         if oil.law.dowson_higginson or oil.effects:
-            before, fronts = fronts, np.concatenate([place for one in lines for place in one.fronts])
-            off = np.max(np.abs(fronts - before), initial=0.0) / line.points[-1] if fronts.size == before.size else np.inf
-            found = [with_oil(span.line, one, oil, problem.reduce) for span, one in zip(spans, lines, strict=True)]
-            for new, old in zip(found, films, strict=True):
-                pairs = zip((new.thicker, new.swollen), old.line.oil_at(new.at_gauss), strict=True)
-                changes = [np.abs(a / b - 1.0).max() for a, b in pairs]
-                off = max(off, *changes)
-            films = [replace(span, line=new) for span, new in zip(spans, found, strict=True)]
+            for one, found in zip(settling, lines, strict=True):
+                one.take(found, oil, problem.reduce)
+            off = max(one.off for one in settling)
+            films = [replace(span, line=one.line) for span, one in zip(spans, settling, strict=True)]
         if off <= SETTLED or last <= off <= NEAR:
             held = tuple((one.region.x - one.region.half_x, one.region.x + one.region.half_x) for one in supplies)  # type: ignore[union-attr]
             return Fed(lines, tuple(spans), line, held, P)

@@ -55,6 +55,9 @@ def oil_of(
     return Oil(base.mu, law, acting, [faces[name].ravel() for name in ("k_W", "u_W", "k_E", "u_E")])  # type: ignore[arg-type]
 
 
+MEMORY = 2  # films beside the last two
+
+
 class Along:
     """mu and 1/rho along a line, polynomials in every panel.
 
@@ -75,24 +78,50 @@ class Along:
         return out
 
 
-def with_oil(line: LineIntegrals, found: Line, oil: Oil, reduce: Any) -> LineIntegrals:
-    """A line with the oil that a film on it has."""
+def made_along(found: Line, oil: Oil, reduce: Any) -> Array:
+    """mu and 1/rho that a film's pressures and slopes make, at its panels' Gauss points, shape (2, panels, 8)."""
     at, law = found.integrals, oil.law
     x, p, slope = (np.ascontiguousarray(a).ravel() for a in (at.at_gauss, law.pressure(found.q_within), found.slope))
     ones = np.ones(x.size)
     here: Any = SimpleNamespace(p=p, law=law, h=np.array(at.h).ravel(), speed=found.U * ones, gradient=(slope, 0.0 * ones))
     here.base, here.problem = SimpleNamespace(mu=oil.mu), SimpleNamespace(reduce=reduce)
-    back = at.turned_back(x)
-    here.grid = SimpleNamespace(x=(x - back)[None, :], y=np.zeros((1, 1)), box=(1, x.size))
+    here.grid = SimpleNamespace(x=(x - at.turned_back(x))[None, :], y=np.zeros((1, 1)), box=(1, x.size))
     here.mu = oil.mu * (at.thicker * np.ones_like(at.h)).ravel() * law.viscosity(p)
     out = {"viscosity": ones.copy()}
     for effect in oil.effects:
         effect.apply(here, out)
-    values = np.array([out["viscosity"], 1.0 / law.density(p)]).reshape(2, *at.h.shape)
-    ends = np.union1d(line.ends, np.concatenate(found.fronts))
-    new = LineIntegrals(line.film, ends, fine=True, oil=Along(at.ends, values))
-    new.ring = line.ring
-    return new
+    return np.array([out["viscosity"], 1.0 / law.density(p)]).reshape(2, *at.h.shape)
+
+
+class Settling:
+    """A line's oil from film to film: of the last ones what makes the least of what they are off by (Anderson's method).
+
+    Attributes
+    ----------
+    line : with the oil as it is taken next. off : by how much the last film's was off, and its fronts have moved, relative.
+    """
+
+    def __init__(self, line: LineIntegrals):
+        self.line, self._bare, self.off = line, line, np.inf
+        self._before: list[tuple[Array, Array]] = []
+        self._fronts = np.zeros(0)
+
+    def take(self, found: Line, oil: Oil, reduce: Any) -> None:
+        """The next oil, after a film with this one."""
+        at, fronts, made = found.integrals, np.concatenate(found.fronts), made_along(found, oil, reduce)
+        off = made - np.stack([at.thicker * np.ones_like(at.h), at.swollen * np.ones_like(at.h)])
+        moved = np.max(np.abs(fronts - self._fronts), initial=0.0) if fronts.size == self._fronts.size else np.inf
+        self.off = max(float(np.max(np.abs(off / made))), float(moved) / at.points[-1])
+        before = [one for one in self._before if one[0].shape == made.shape]
+        mixed = made
+        if before:
+            steps = np.array([(off - one).ravel() for _, one in before])
+            shares = np.linalg.lstsq(steps @ steps.T, steps @ off.ravel(), rcond=1e-14)[0]
+            mixed = made - sum(share * (made - one) for share, (one, _) in zip(shares, before, strict=True))
+        self._before, self._fronts = [*before[-MEMORY:], (made, off)], fronts
+        ends = np.union1d(self._bare.ends, fronts)
+        self.line = LineIntegrals(self._bare.film, ends, fine=True, oil=Along(at.ends, mixed))
+        self.line.ring = self._bare.ring
 
 
 def with_densities(parts: Array, p: Array, law: Law) -> Array:
