@@ -314,5 +314,7 @@ def test_effects_of_the_place_alone(more):
     scene = {**base, **more, "fluid": {"mu": 0.02, "p_c": 0.0, **more.get("fluid", {})}}
     few, many = (answer(load_scene({**scene, "n": n}), model="full")[0] for n in (9, 70))
     assert few["cavitated_area"] > 1e-3
-    for name in ("load", "friction", "p_max", "cavitated_area", "rupture", "reformation"):
+    for name in ("load", "friction", "p_max"):
         assert few[name] == pytest.approx(many[name], rel=1e-8), name
+    for name in ("cavitated_area", "rupture", "reformation"):
+        assert few[name] == pytest.approx(many[name], abs=1e-8 * base["L"]), name

@@ -114,7 +114,7 @@ class Settling:
         self.off = max(float(np.max(np.abs(off / made))), float(moved) / at.points[-1])
         before = [one for one in self._before if one[0].shape == made.shape]
         mixed = made
-        if before:
+        if before and not (fronts.size and oil.effects):  # which make mu jump at fronts, that move
             steps = np.array([(off - one).ravel() for _, one in before])
             shares = np.linalg.lstsq(steps @ steps.T, steps @ off.ravel(), rcond=1e-14)[0]
             mixed = made - sum(share * (made - one) for share, (one, _) in zip(shares, before, strict=True))
