@@ -155,7 +155,7 @@ class Look:
             value = 1.0 / (1.0 + (1.0 / value - 1.0) * exp(-min(max(grows / (1.0 - value), -WIDEST), WIDEST)))
         else:
             value *= exp(grows)
-        return {**settings, "balance": {**balance, "value": value}}
+        return {**settings, "balance": {**balance, "value": value, "foretold": True}}
 
     def _small(self, film: FirstOrder, name: str) -> bool:
         """Whether an effect by itself does not count: to second order, where its square could."""

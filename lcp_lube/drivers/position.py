@@ -67,7 +67,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     s = guess if value is None else value / touching(scene, phi)
     free = scene.model_copy(update={"balance": None})
     shapes = [scene.shape]
-    if ask.nested is not False and not known:
+    if ask.nested is not False and (not known or "foretold" in known.get("balance", {})):
         shapes = _coarse(scene, s)
     t = math.log(max(s, 1e-3) / max(1.0 - s, 1e-6))
     counts, best = np.zeros(len(shapes), dtype=int), _Best()
