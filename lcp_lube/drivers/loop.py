@@ -224,6 +224,7 @@ class Loop:
             found = least
             for one in places:
                 found = found if self.found else min(found, newton(self, one, watch), key=lambda one: one[0])
+            self.change = np.nan_to_num(self.change, nan=np.inf)
             return found
 
         while not (ends() or self.found or np.isnan(self.change)):  # NaN: no film
@@ -235,6 +236,7 @@ class Loop:
                 best = least = at_once(*((best[1], last[0]) if best[0] < self.change else (best[1],)))
                 if self.found:
                     break
+                x.setArray(best[1])
             if best[0] < self.change < np.inf:
                 x.setArray(best[1])
             if idle == 2:  # both kinds of cycle would take the same steps again
