@@ -197,7 +197,8 @@ def _end(estimates: Sequence[float], values: Sequence[float], tol: float, points
 
 def _rounding(problem: Any) -> float:
     """What rounding of the flows may make of an integral of the pressure, N: all that some films carry. Collective."""
-    wall = 6.0 * problem.mu * abs(problem.U) * problem.grid.lengths[0] / problem.reduce.min(problem.scheme.h.ravel()) ** 2
+    mu, least = float(np.max(problem.mu)), problem.reduce.min(problem.scheme.h.ravel())
+    wall = 6.0 * mu * abs(problem.U) * problem.grid.lengths[0] / least**2
     return 10.0 * np.finfo(float).eps * max(wall, *problem.p_sides) * prod(problem.grid.lengths)
 
 

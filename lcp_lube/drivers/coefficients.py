@@ -1,6 +1,7 @@
 """Stiffness and damping of a film: of a journal in its bush, with tilt too, and of a flat film along its normal.
 
-`response` has the derivation. K + i nu C = -d(force)/de, exact at the discrete solution, at any frequency nu.
+`response` has the derivation. K + i nu C = -d(force)/de, exact at the discrete solution, at any frequency nu;
+in 1D, where numbers are the film's own, K is theirs.
 """
 
 import math
@@ -15,6 +16,7 @@ from ..base.parallel import Array
 from ..errors import InputError
 from ..problems.film.forces import totals
 from ..problems.film.grooves import GroovedProblem
+from ..problems.film.known import known_of
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.turned import TurnedProblem
@@ -104,7 +106,7 @@ def coefficients(
     assert isinstance(ring, LubricationProblem)  # as a scene with a `model` has
     along = 0.0
     if turning is not None:
-        force = totals(ring, solution.fields["p"] * ring.p_unit, wanted=("force_x", "force_y"))
+        force = totals(ring, solution.fields["p"] * ring.p_unit, known_of(ring), wanted=("force_x", "force_y"))
         along = math.atan2(-force["force_y"], -force["force_x"])
     motions = motions_of(turning, tilt, 0.5 * model.lengths[-1], along)
     names = FLAT if turning is None else TILTED if tilt else JOURNAL

@@ -25,14 +25,17 @@ from ..problems.film.contact import areas
 from ..problems.film.effects import Answer, answer, factors
 from ..problems.film.flows import point_weights
 from ..problems.film.grooves import GroovedProblem
+from ..problems.film.known import known_of
 from ..problems.film.supplies import Supply, supply_flows
 from ..problems.solution import Solution
 from .ask import Ask
+from .line_forces import line_forces, stiffness_of
 from .linearised import Linear, following
 from .loop import Loop
 from .supplies import Fed
 
 STEP = 1e-4  # of differences: their error is its square
+OF_LINE = 0.1  # of it, where a line's numbers are taken: they have all digits, and thick oils bend them
 RTOL, RESTART, MOST = 1e-8, 150, 1500  # of GMRES; MOST: ten restarts
 Changes = tuple[Array, Array, Array]  # of a state's H and x - X, of Q, and of what supplies give and hold
 
@@ -65,19 +68,26 @@ class CoupledResponse:
         self._areas = areas(base).ravel()
         self.place(solution.fields["p"], solution.fields["r"], loop.vector(problem.cells) if loop.names else np.zeros(0), flip)
         weight = grid.cell * base.p_unit * point_weights(grid) * np.where(self.cavity, 0.0, 1.0)
-        self._forward, self._sides, self._contacts = [], [], []
-        model, h = loop.frozen.constant, base.scheme.h.ravel()
-        for gap in gaps:
-            e = STEP * base.reduce.min(h)
-            change = self._change(gap, e)
-            e /= base.reduce.max(np.abs(change)) or 1.0
-            change = self._change(gap, e)
-            pair = [replace(model, gap=gap(k * e)).build(grid.shape, comm, grid) for k in (1.0, -1.0)]
+        model, least = loop.frozen.constant, STEP * base.reduce.min(base.scheme.h.ravel())
+        steps = [least / (base.reduce.max(np.abs(self._change(gap, least))) or 1.0) for gap in gaps]
+        changes = [self._change(gap, e) for gap, e in zip(gaps, steps, strict=True)]
+        self._sides = [weight * change for change in changes]
+        self._contacts = [base.p_unit * self._areas * change for change in changes]
+        self._forward, forces = [], []
+        told = grid.dim == 1 and known_of(problem) is not None
+        for k, (gap, e) in enumerate(zip(gaps, steps, strict=True)):
+            pair = [replace(model, gap=gap(side * e)).build(grid.shape, comm, grid) for side in (1.0, -1.0)]
             self._forward.append(_slopes([self._system(np.zeros(self.n), self.x, other) for other in pair], 2.0 * e))
-            self._sides.append(weight * change)
-            self._contacts.append(base.p_unit * self._areas * change)
             for other in pair:
                 other.destroy()
+            e *= OF_LINE
+            beside = [replace(model, gap=gap(side * e)).build(grid.shape, comm, grid) for side in (1.0, -1.0)] if told else []
+            for other in beside:
+                other.oil, other.p_sides, other.held = problem.oil, problem.p_sides, problem.held  # pressures, not their q
+                forces.append(line_forces(other, changes))
+                other.destroy()
+            steps[k] = e
+        self._line = stiffness_of(forces, steps)
 
     def place(self, p: Array, r: Array, x: Array, flip: bool = False) -> None:
         """Linearise at a state: p in p_unit. Collective."""
@@ -190,7 +200,7 @@ class CoupledResponse:
 
     def stiffness(self) -> Array:
         """-dF/de with nothing but e changed, shape (motions, motions)."""
-        return self._forces(self._slow).real
+        return self._forces(self._slow).real if self._line is None else self._line  # type: ignore[no-any-return]
 
     def damping(self) -> Array:
         """-dF/d(de/dt) in the limit of slow motion."""
@@ -208,7 +218,7 @@ class CoupledResponse:
             rhs = -H_e.astype(complex)
             rhs[: self.n] -= 1j * nu * Q_e
             found.append(self._settled(rhs, fed[0] + 1j * nu * fed[1], nu, stored))
-        return self._forces(found)
+        return self._forces(found) + (0.0 if self._line is None else self._line - self._forces(self._slow).real)
 
     def _forces(self, found: Sequence[Any]) -> Any:
         """-F of each motion's answer, shape (motions, motions); asperities push too."""

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 from ..base.parallel import Array
 from ..problems.film.cavity import cavity_sign
 from ..problems.film.flows import point_weights
+from ..problems.film.known import known_of
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.stored import Stored
@@ -31,6 +32,7 @@ from ..problems.solution import Fields
 from ..registry import SMALL
 from ..scenes.scene import Solvable
 from .halved import Halved
+from .line_forces import line_forces, stiffness_of
 from .linearised import Feed, Linear
 
 STEP = 1e-5  # of the thinnest film
@@ -104,7 +106,10 @@ class Response:
         self._answers: dict[float, list[Any]] = {}
         swept = (lambda S: S) if held is None else (lambda S: np.where(held.mask.ravel(), 0.0, S))  # type: ignore[union-attr]
         self._swept = [swept(S) for S in self._S]
-        self._dG, self._raw = zip(*(self._derivative(moved) for moved in self._moved), strict=True)
+        self._told = grid.dim == 1 and known_of(problem) is not None  # numbers are the film's own, not those of the fields
+        self._forces_of_line: list[Array | None] = []
+        self._dG, self._raw, steps = zip(*(self._derivative(moved) for moved in self._moved), strict=True)
+        self._line = stiffness_of(self._forces_of_line, steps)
 
     def _solved(self, rows: Sequence[Any], raws: Sequence[Any], nu: float = 0.0, stored: bool = True) -> list[Any]:
         """The film's answers, with the change of the supplies' pressures that follow."""
@@ -125,7 +130,12 @@ class Response:
 
     def stiffness(self) -> Array:
         """-dF/de with nothing but e changed, shape (motions, motions)."""
-        return self._forces(self._slow).real
+        return self._forces(self._slow).real if self._line is None else self._line  # type: ignore[no-any-return]
+
+    @cached_property
+    def _misplaced(self) -> Any:
+        """What the grid gets wrong of a line's stiffness."""
+        return 0.0 if self._line is None else self._line - self._forces(self._slow).real
 
     def damping(self) -> Array:
         """-dF/d(de/dt) in the limit of slow motion."""
@@ -136,20 +146,20 @@ class Response:
         """K + i nu C at this frequency, rad/s > 0; stored = False: as if the cavity's void were not stored (M = 0)."""
         rows = [-dG - 1j * nu * swept for dG, swept in zip(self._dG, self._swept, strict=True)]
         raws = [raw + 1j * nu * S for raw, S in zip(self._raw, self._S, strict=True)]
-        return self._forces(self._solved(rows, raws, nu, stored))
+        return self._forces(self._solved(rows, raws, nu, stored)) + self._misplaced
 
     def _forces(self, found: Any) -> Any:
         """-F of each motion's answer, shape (motions, motions)."""
         dot = self.problem.reduce.dot
         return np.array([[-complex(dot(row, z.real), dot(row, z.imag)) for z in found] for row in self._sides])
 
-    def _derivative(self, moved: Moved) -> tuple[Array, Array]:
+    def _derivative(self, moved: Moved) -> tuple[Array, Array, float]:
         """dG/de at fixed fields, and that of the cells' own balances, were none held: G is a cubic in e (conductances in h^3,
-        Couette and stored terms in h), whose third derivative the step makes small."""
+        Couette and stored terms in h), whose third derivative the step makes small; and the step."""
         size = self.problem.reduce.max(np.abs(moved.change(self.problem.grid.x, self.problem.grid.y)))
         step = STEP * self.problem.reduce.min(self.problem.scheme.h) / (size or 1.0)
         values, grid = [], self.problem.grid
-        for part in (-1.0, 1.0):
+        for part in (1.0, -1.0):
             other = replace(self.model, gap=replace(moved, e=part * step)).build(grid.shape, grid.petsc_comm, grid)
             if self.problem.factors is not None:
                 other = self.problem.factors.film(other)
@@ -158,9 +168,11 @@ class Response:
             balance = other.balance(self.p, self.r)
             raw = balance if other.held is None else other.face_flows(self.p, self.r)
             values.append(np.stack([balance, raw]) * (other.scheme.flow_unit / self.problem.scheme.flow_unit))
+            if self._told:
+                self._forces_of_line.append(line_forces(other, self.changes))
             other.destroy()
-        dG, raw = (values[1] - values[0]) / (2.0 * step)
-        return dG, raw
+        dG, raw = (values[0] - values[1]) / (2.0 * step)
+        return dG, raw, step
 
     def destroy(self) -> None:
         """Free the PETSc objects. Collective."""

@@ -390,6 +390,14 @@ def test_a_load_on_a_ring_with_grooves_to_a_per_cent():
         assert abs(found.load / 1554.3 - 1) < 1e-2  # limit of 720 and 1440 points around
 
 
+def test_viscosity_by_shear_in_films_between_grooves():
+    """The unit of their pressures is one number, whatever the viscosity from point to point."""
+    shear = {"law": "eyring", "tau_0": 1.4e4}
+    scene = load_scene("dam_journal", {"nx": 84, "ny": 12, "attitude_deg": 76.5, "eccentricity": 0.35, "shear": shear})
+    with solve(scene, accuracy=0.03, model="full") as found:
+        assert found.converged
+
+
 def test_a_film_that_carries_nothing_ends_early_and_says_so():
     """A dimple in a flat film, no pressure around: its load is rounding, which no grid brings to a per cent."""
     film = [{"shape": "constant", "h": 5e-6}, {"shape": "dimples", "depth": 3e-6, "columns": 1, "rows": 1, "size": 3e-3}]

@@ -154,6 +154,25 @@ def test_the_threshold_of_stability():
     assert stability(np.eye(2), np.eye(2)) == (None, None)
 
 
+@pytest.mark.parametrize("effect", [{}, {"shear": {"law": "eyring", "tau_0": 2e5}}], ids=["", "eyring"])
+def test_stiffness_of_a_line_is_that_of_the_numbers_told(effect):
+    """On few points too: of a pad's level, and of a journal along its eccentricity."""
+    pad = {"family": "bearing", "L": 0.1, "U": 4.0, "n": 23, "fluid": {"mu": 0.05, "barus": 2e-8}} | effect
+    pad["film"] = [{"shape": "linear", "h_start": 60e-6, "h_end": 30e-6}]
+    above, below = (solve(load_scene(pad, {"h_offset": e}), model="full").load for e in (1e-9, -1e-9))
+    with solve(load_scene(pad), model="full") as s:
+        assert s.coefficients(0.0).K[0, 0] == pytest.approx((below - above) / 2e-9, rel=1e-6)
+
+
+def test_stiffness_of_a_long_journal_along_its_eccentricity():
+    e, c = 1e-6, 5e-5
+    above, below = (np.array(solve(load_scene("long_journal", {"n": 37, "eccentricity": 0.5 + k * e})).force) for k in (1, -1))
+    with solve(load_scene("long_journal", {"n": 37})) as s:
+        phi, K = np.radians(s.attitude_deg), s.coefficients(0.0).K
+    moved = K @ np.array([np.cos(phi), np.sin(phi)])
+    assert np.hypot(*moved) == pytest.approx(np.hypot(*(above - below)) / (2.0 * e * c), rel=1e-6)
+
+
 @pytest.mark.parametrize("ranks", [2, 3])
 def test_ranks(cli, ranks):
     words = ("coefficients", "two_groove_journal", "--set", "nx=72", "--set", "ny=7", "--frequency", "0,100", "--json")

@@ -1,0 +1,40 @@
+"""The forces on a line as its film has them (`known`), for its stiffness: no grid's error is in them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..base.parallel import Array
+from ..problems.film.forces import antiderivative, weights
+from ..problems.film.known import known_of
+from ..problems.film.lubrication import LubricationProblem
+
+TOLD = ("load", "force_x", "force_y")
+NEAR = 1e-9  # relative: by which motions may differ from sums of those that these numbers are of
+
+
+def line_forces(problem: LubricationProblem, changes: Sequence[Array]) -> Array | None:
+    """Int (p - p_ambient) dh/de for each motion, N/m; None of what is no line, or of other motions. Collective.
+
+    changes : dh/de at the owned points.
+    """
+    grid, of = problem.grid, weights(problem)
+    names = [name for name in TOLD if name in of]
+    if grid.dim > 1 or (known := known_of(problem)) is None:
+        return None
+    modes = [np.broadcast_to(of[name](grid.x, np.zeros(1)), grid.box).ravel() for name in names]
+    at, motions = (np.concatenate(grid.comm.allgather(np.stack(some, axis=1))) for some in (modes, changes))
+    parts = np.linalg.lstsq(at, motions, rcond=None)[0]
+    if np.abs(at @ parts - motions).max() > NEAR * np.abs(motions).max():
+        return None
+    above = known.ambient(problem)
+    found: Array = parts.T @ np.array([known.line.integral(antiderivative(problem, name), above) for name in names])
+    return found
+
+
+def stiffness_of(forces: Sequence[Array | None], steps: Sequence[float]) -> Array | None:
+    """-dF/de, shape (motions, motions), from the forces with a step of each motion, and one back; None where any is None."""
+    found = [one for one in forces if one is not None]
+    if not found or len(found) < len(forces):
+        return None
+    return np.stack([(back - on) / (2.0 * e) for on, back, e in zip(found[::2], found[1::2], steps, strict=True)], axis=1)
