@@ -15,11 +15,8 @@ from ..base.parallel import Array
 from .coupled_response import Changes, CoupledResponse
 
 PRODUCTS = 1000  # with the system's derivative, from one film's answer on
-LONGEST, SHORTEST, DESCENT = (
-    3.0,
-    1e-3,
-    1e-4,
-)  # change of a field by a step; part of a step; of the square that it has to take off
+LONGEST, SHORTEST = 3.0, 1e-3  # change of a field by a step; part of a step
+DESCENT = 1e-4  # of the square of what is left, that a whole step has to take off
 DONE = 1e-9  # of fields: what is left then is for films to tell
 
 

@@ -29,7 +29,7 @@ from ..problems.film.known import known_of
 from ..problems.film.supplies import Supply, supply_flows
 from ..problems.solution import Solution
 from .ask import Ask
-from .line_forces import line_forces, stiffness_of
+from .line_forces import OfLine, line_forces, stiffness_of
 from .linearised import Linear, following
 from .loop import Loop
 from .supplies import Fed
@@ -40,7 +40,7 @@ RTOL, RESTART, MOST = 1e-8, 150, 1500  # of GMRES; MOST: ten restarts
 Changes = tuple[Array, Array, Array]  # of a state's H and x - X, of Q, and of what supplies give and hold
 
 
-class CoupledResponse:
+class CoupledResponse(OfLine):
     """A scene with effects at its solution, linearised; as `response.Response` is of a film without. Collective.
 
     Parameters
@@ -74,7 +74,7 @@ class CoupledResponse:
         self._sides = [weight * change for change in changes]
         self._contacts = [base.p_unit * self._areas * change for change in changes]
         self._forward, forces = [], []
-        told = grid.dim == 1 and known_of(problem) is not None
+        told = bool(gaps) and known_of(problem) is not None
         for k, (gap, e) in enumerate(zip(gaps, steps, strict=True)):
             pair = [replace(model, gap=gap(side * e)).build(grid.shape, comm, grid) for side in (1.0, -1.0)]
             self._forward.append(_slopes([self._system(np.zeros(self.n), self.x, other) for other in pair], 2.0 * e))
@@ -198,10 +198,6 @@ class CoupledResponse:
         """What stiffness and damping are both made of."""
         return [self._settled(-H_e, fed[0], 0.0) for H_e, _, fed in self._forward]
 
-    def stiffness(self) -> Array:
-        """-dF/de with nothing but e changed, shape (motions, motions)."""
-        return self._forces(self._slow).real if self._line is None else self._line  # type: ignore[no-any-return]
-
     def damping(self) -> Array:
         """-dF/d(de/dt) in the limit of slow motion."""
         found = []
@@ -218,7 +214,7 @@ class CoupledResponse:
             rhs = -H_e.astype(complex)
             rhs[: self.n] -= 1j * nu * Q_e
             found.append(self._settled(rhs, fed[0] + 1j * nu * fed[1], nu, stored))
-        return self._forces(found) + (0.0 if self._line is None else self._line - self._forces(self._slow).real)
+        return self._forces(found) + self._misplaced
 
     def _forces(self, found: Sequence[Any]) -> Any:
         """-F of each motion's answer, shape (motions, motions); asperities push too."""

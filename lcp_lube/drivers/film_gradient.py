@@ -40,6 +40,12 @@ def areas(grid: Grid) -> Array:
     return np.asarray(sizes[0][None, :] * of_lines).ravel()
 
 
+def per_area(total: Array, grid: Grid, reported: Any) -> Array:
+    """dQ/dh of changes at the owned points, over their areas, where the problem that is told has them."""
+    found: Array = total / areas(grid)
+    return reported.here({"h": found})["h"] if isinstance(reported, TurnedProblem) else found
+
+
 class FilmGradient:
     """dQ/dh of the quantities of an `Adjoint`, or of what has its attributes. Collective, as its methods."""
 
@@ -70,13 +76,10 @@ class FilmGradient:
 
         A change of the film by dh(x, y) changes Q by the sum over the points of dQ/dh dh times their `areas`.
         """
-        adjoint, eq = self.adjoint, self.adjoint.equations
         total: Any = 0.0
         for name, factor in self.implicit.weights(quantity).items():
             total = total + factor * self.lagrangian(name)
-        out = total.ravel() / areas(eq.grid)
-        reported = adjoint.reported
-        return reported.here({"h": out})["h"] if isinstance(reported, TurnedProblem) else out
+        return per_area(total.ravel(), self.adjoint.equations.grid, self.adjoint.reported)
 
     def destroy(self) -> None:
         """Nothing of its own."""

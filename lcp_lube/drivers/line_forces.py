@@ -1,6 +1,8 @@
 """The forces on a line as its film has them (`known`), for its stiffness: no grid's error is in them."""
 
 from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +22,7 @@ def line_forces(problem: LubricationProblem, changes: Sequence[Array]) -> Array 
     """
     grid, of = problem.grid, weights(problem)
     names = [name for name in TOLD if name in of]
-    if grid.dim > 1 or (known := known_of(problem)) is None:
+    if (known := known_of(problem)) is None:
         return None
     modes = [np.broadcast_to(of[name](grid.x, np.zeros(1)), grid.box).ravel() for name in names]
     at, motions = (np.concatenate(grid.comm.allgather(np.stack(some, axis=1))) for some in (modes, changes))
@@ -38,3 +40,28 @@ def stiffness_of(forces: Sequence[Array | None], steps: Sequence[float]) -> Arra
     if not found or len(found) < len(forces):
         return None
     return np.stack([(back - on) / (2.0 * e) for on, back, e in zip(found[::2], found[1::2], steps, strict=True)], axis=1)
+
+
+class OfLine:
+    """What all linearised films share: their stiffness, which of a line is that of its own numbers."""
+
+    _line: Array | None  # -dF/de of a line, as `stiffness_of` tells; None: of no line
+    _slow: Any  # the answers to motions without an end
+
+    def _forces(self, found: Any) -> Any:
+        """-F of each motion's answer, shape (motions, motions)."""
+        raise NotImplementedError
+
+    @cached_property
+    def _of_grid(self) -> Array:
+        """-dF/de of the discrete equations."""
+        return self._forces(self._slow).real  # type: ignore[no-any-return]
+
+    def stiffness(self) -> Array:
+        """-dF/de with nothing but e changed, shape (motions, motions)."""
+        return self._of_grid if self._line is None else self._line
+
+    @property
+    def _misplaced(self) -> Any:
+        """What the grid gets wrong of a line's stiffness, at any frequency."""
+        return 0.0 if self._line is None else self._line - self._of_grid

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..base.parallel import Array
 from ..errors import InputError
+from ..problems.film.flows import point_weights
 from ..problems.film.forces import PIVOT
 from ..problems.film.stored import Stored, mean_film
 from ..problems.film.turned import TurnedProblem
@@ -176,6 +177,12 @@ class Course:
             film = contents(self.grid, self.film(n), None if kept is None else {"r": kept.r})
             self.known[n] = film * self.density(n) * (1.0 if n else self.fill)
         return self.known[n]
+
+    def by_film(self, n: int) -> Array:
+        """2 dx (1 - r), times the density, at the end of step n: what each cell stores, as G has it, for each m of its film."""
+        kept = self.kept(n)
+        liquid: Any = self.fill if kept is None else 1.0 - kept.r
+        return 2.0 * self.grid.spacing[0] * point_weights(self.grid) * liquid * self.density(n)  # type: ignore[no-any-return]
 
     def density(self, n: int) -> Any:
         """At the end of step n, over that at p_c."""

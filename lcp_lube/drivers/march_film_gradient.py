@@ -7,15 +7,12 @@ its contents u = h (1 - r), which later steps have too, with f = s (1 - r):
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from ..base.parallel import Array
-from ..problems.film.flows import point_weights
-from ..problems.film.turned import TurnedProblem
 from .equations import Equations
-from .film_gradient import FilmGradient, areas
+from .film_gradient import FilmGradient, per_area
 from .march_gradient import MarchGradient
 
 
@@ -38,11 +35,9 @@ class MarchFilm:
         self.grid, self.reported = course.grid, gradient.reported
         self.total = {name: np.zeros(self.grid.local_size) for name in names}
         for n in range(len(course.trace.steps) + 1):
-            kept, later = course.kept(n), gradient.later(n)
-            size = 2.0 * self.grid.spacing[0] * point_weights(self.grid) * course.density(n)
-            size = size * (course.fill if kept is None else 1.0 - kept.r)
+            kept, size = course.kept(n), course.by_film(n)
             for name in names:
-                self.total[name] += size * sum(part * gradient.left[name][m] / gradient.units[m] for m, part in later)
+                self.total[name] += size * gradient.kept_on(name, n)
             if kept is None:
                 continue
             eq, weight = course.at(n), course.formula(n).weight if n else 0.0
@@ -54,8 +49,7 @@ class MarchFilm:
 
     def field(self, quantity: str) -> Array:
         """dQ/dh at the owned points of the solution's grid, unit of Q per m and m2 (1D: per m and m)."""
-        found: Any = self.total[quantity] / areas(self.grid)
-        return found if not isinstance(self.reported, TurnedProblem) else self.reported.here({"h": found})["h"]
+        return per_area(self.total[quantity], self.grid, self.reported)
 
     def destroy(self) -> None:
         """Nothing of its own."""

@@ -92,6 +92,11 @@ class MarchGradient:
                 found.append((m, part))
         return found
 
+    def kept_on(self, name: str, n: int) -> Array:
+        """What later steps make of a content that step n left, by their adjoints."""
+        kept = (part * self.left[name][m] / self.units[m] for m, part in self.later(n))
+        return sum(kept, np.zeros(self.course.grid.local_size))
+
     def _back(self, n: int) -> None:
         """The adjoints of step n, from those of later ones."""
         eq, kept = self.course.at(n), self.course.kept(n)
@@ -114,11 +119,7 @@ class MarchGradient:
         of_full = 0.0 if eq.law is None else (1.0 - r) * eq.law.density_slope(p) * eq.constant.p_unit
         left = 2.0 * grid.spacing[0] * point_weights(grid) * mean_film(grid, self.course.film(n).film).ravel()
         left *= np.where(cavity, 1.0, of_full)  # of the content, by z
-        rows = {
-            name: right_side(slopes, parts.get(name, {}), cavity)
-            + left * sum(part * self.left[name][m] / self.units[m] for m, part in later)
-            for name in self.names
-        }
+        rows = {name: right_side(slopes, parts.get(name, {}), cavity) + left * self.kept_on(name, n) for name in self.names}
         problem = eq.problem(p)
         entries = None if eq.law is None else eq.tangent(p, r).entries(problem.scheme)
         linear = Linear(problem, cavity, entries, eq.held)
@@ -158,7 +159,7 @@ class MarchGradient:
         assert kept is not None  # as `_back` asks
         weight, at, count = course.formula(n).weight if n else 0.0, np.flatnonzero(course.sought(n)), course.free.size
         inertia = course.inertia[at]
-        size = 2.0 * course.grid.spacing[0] * point_weights(course.grid) * (1.0 - kept.r) * course.density(n)
+        size = course.by_film(n)
         by = course.by_followed(n, at, self.units[n])
         C = np.zeros((len(by), len(by)))  # of what follows, by the conditions
         for row, (G, _, told) in zip(C, by, strict=True):
@@ -170,7 +171,7 @@ class MarchGradient:
             raise InputError(f"{self.scene.name}: t = {kept.t:.6g} s: the film bears nothing: no derivatives of what it bears")
         for name in self.names:
             mu, nu = (sum((part * self.journal[name][m, k + at] for m, part in later), np.zeros(at.size)) for k in (0, count))
-            kept_on = sum((part * self.left[name][m] / self.units[m] for m, part in later), np.zeros(size.size))
+            kept_on = self.kept_on(name, n)
             base, share = self._asked(n).get(name, ("", 0.0))
             own = [share * told.get(base, 0.0) - dot(found[name], G) + dot(kept_on, size * h) for G, h, told in by]
             own[: at.size] += weight * inertia * mu - nu

@@ -32,7 +32,7 @@ from ..problems.solution import Fields
 from ..registry import SMALL
 from ..scenes.scene import Solvable
 from .halved import Halved
-from .line_forces import line_forces, stiffness_of
+from .line_forces import OfLine, line_forces, stiffness_of
 from .linearised import Feed, Linear
 
 STEP = 1e-5  # of the thinnest film
@@ -56,7 +56,7 @@ class Moved(View):
         return self.film(x, y) + self.e * self.change(x, y)
 
 
-class Response:
+class Response(OfLine):
     """The film of one problem at its solution, linearised. Collective, until `destroy`.
 
     Parameters
@@ -106,7 +106,7 @@ class Response:
         self._answers: dict[float, list[Any]] = {}
         swept = (lambda S: S) if held is None else (lambda S: np.where(held.mask.ravel(), 0.0, S))  # type: ignore[union-attr]
         self._swept = [swept(S) for S in self._S]
-        self._told = grid.dim == 1 and known_of(problem) is not None  # numbers are the film's own, not those of the fields
+        self._told = known_of(problem) is not None  # numbers are the film's own, not those of the fields
         self._forces_of_line: list[Array | None] = []
         self._dG, self._raw, steps = zip(*(self._derivative(moved) for moved in self._moved), strict=True)
         self._line = stiffness_of(self._forces_of_line, steps)
@@ -127,15 +127,6 @@ class Response:
     def _slow(self) -> list[Any]:
         """What stiffness and damping are both made of."""
         return self._solved([-dG for dG in self._dG], self._raw)
-
-    def stiffness(self) -> Array:
-        """-dF/de with nothing but e changed, shape (motions, motions)."""
-        return self._forces(self._slow).real if self._line is None else self._line  # type: ignore[no-any-return]
-
-    @cached_property
-    def _misplaced(self) -> Any:
-        """What the grid gets wrong of a line's stiffness."""
-        return 0.0 if self._line is None else self._line - self._forces(self._slow).real
 
     def damping(self) -> Array:
         """-dF/d(de/dt) in the limit of slow motion."""

@@ -26,7 +26,7 @@ from ..problems.grid import Grid
 from .adjoint import Implicit
 from .coupled_gradient import CoupledGradient
 from .coupled_response import krylov
-from .film_gradient import areas
+from .film_gradient import per_area
 from .tape import Tape
 
 STEP = 1e-6  # of a field: neighbours' differences see it some hundred times as large
@@ -271,8 +271,7 @@ class CoupledFilm:
     def field(self, quantity: str) -> Array:
         """dQ/dh at the owned points of the solution's grid, as `film_gradient.FilmGradient.field` tells."""
         total = sum(w * self._lagrangian(name) for name, w in self.implicit.weights(quantity).items())
-        found, turned = np.asarray(total / areas(self.grid)), self.gradient.turned
-        return found if turned is None else turned.here({"h": found})["h"]
+        return per_area(np.asarray(total), self.grid, self.gradient.turned)
 
     def _lagrangian(self, name: str) -> Array:
         """Of a number by the film at each point, what was found held; pressures of supplies follow."""

@@ -1,6 +1,7 @@
 """Flows and heat of a film's answer: what goes through each face, also where it turns round, and what warms each cell."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -41,7 +42,7 @@ class Carried:
     held: Array
     kept: Array
 
-    @property
+    @cached_property
     def both_ways(self) -> tuple[list[Array], list[Array]]:
         """What leaves a cell through its west, east, south and north face, and what enters it, m3/s."""
         turns = (*self.turns, 0.0, 0.0)

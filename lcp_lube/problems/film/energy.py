@@ -146,8 +146,7 @@ def _over_edge(flow: Carried, inside: list[Any]) -> Array:
 
 def _to_and_from(flow: Carried, faces: Sequence[Any]) -> tuple[Array, Array]:
     """What leaves and enters each cell through some of its faces, which are told west, east, south, north, m3/s."""
-    sums = (sum(np.where(face, a, 0.0) for face, a in zip(faces, way, strict=False)) for way in flow.both_ways)
-    away, into = sums
+    away, into = (sum(np.where(face, a, 0.0) for face, a in zip(faces, way, strict=False)) for way in flow.both_ways)
     return away, into  # type: ignore[return-value]
 
 

@@ -247,20 +247,18 @@ def flow_growth(problem: LubricationProblem) -> dict[str, float] | None:
             passing = problem.reduce.sum(np.where(at[i] & at[j], k, 0.0)) * 2.0 * np.log(2.0) / np.pi * (p_i - p_j)
             growth[names[j]] += passing
             growth[names[i]] -= passing
-    for side, name in enumerate(names) if problem.held is not None else ():
-        growth[name] += volume_unit(problem) * _reaching(problem, side)
+    for side, (name, p_side) in enumerate(zip(names, pressures, strict=True)):
+        if problem.held is not None and p_side is not None:
+            growth[name] += volume_unit(problem) * _reaching(problem, side, p_side)
     return growth if any(growth.values()) else None
 
 
-def _reaching(problem: LubricationProblem, side: int) -> float:
-    """What supplies that reach a side give to it, in the scheme's units of flow. Collective."""
-    grid, s, held, p_side = problem.grid, problem.scheme, problem.held, open_pressures(problem)[side]
-    assert held is not None
-    passing, axis = np.zeros(grid.box), side // 2
-    place = [grid.x, grid.y]
+def _reaching(problem: LubricationProblem, side: int, p_side: float) -> float:
+    """What supplies that reach an open side, at p_side, give to it, in the scheme's units of flow. Collective."""
+    grid, s, held = problem.grid, problem.scheme, problem.held
+    assert held is not None  # as its caller asks for no others
+    axis, place, conductance = side // 2, [grid.x, grid.y], (s.k_W, s.k_E, s.k_S, s.k_N)[side]
     place[axis] = np.full_like(place[axis], grid.origin[axis] + side % 2 * grid.lengths[axis])
-    for number, supply in enumerate(held.supplies) if p_side is not None else ():
-        there = sides(grid)[side] & (held.owner == number) & supply.region.inside(*place)
-        conductance = (s.k_W, s.k_E, s.k_S, s.k_N)[side]
-        passing += np.where(there, conductance * ((supply.p - p_side) / problem.p_unit), 0.0)  # type: ignore[operator]
-    return problem.reduce.sum(passing)
+    inside = [(held.owner == number) & supply.region.inside(*place) for number, supply in enumerate(held.supplies)]
+    driven = sum(np.where(there, supply.p - p_side, 0.0) for there, supply in zip(inside, held.supplies, strict=True))
+    return problem.reduce.sum(np.where(sides(grid)[side], conductance * driven / problem.p_unit, 0.0))

@@ -186,7 +186,7 @@ def _film(
                 one.take(found, oil, problem.reduce)
             off = max(one.off for one in settling)
             films = [replace(span, line=one.line) for span, one in zip(spans, settling, strict=True)]
-        if off <= SETTLED or last <= off <= NEAR:
+        if _ends_at(off, last, SETTLED):
             held = tuple((one.region.x - one.region.half_x, one.region.x + one.region.half_x) for one in supplies)  # type: ignore[union-attr]
             return Fed(lines, tuple(spans), line, held, P)
         last = off
@@ -224,10 +224,15 @@ def _points(
                 points[k] = replace(span, parts=parts)
         if not np.isfinite(p).all():
             return None
-        if off <= SETTLED or last <= off <= NEAR:
+        if _ends_at(off, last, SETTLED):
             return p, r, P, flows
         last = off
     return None
+
+
+def _ends_at(change: float, last: float, least: float) -> bool:
+    """Whether steps have come to their end: by so small a relative change, or by one that grows as rounding does."""
+    return change <= least or last <= change <= NEAR
 
 
 def _given(spans: Sequence[Span], flows: Array, count: int) -> Array:
@@ -260,7 +265,7 @@ def _balanced(
             return None
         P = np.maximum(P + step, 0.0)
         size = float(np.max(np.abs(step)) / (np.max(P) or 1.0))
-        if size <= DIGITS or last <= size <= NEAR:
+        if _ends_at(size, last, DIGITS):
             return P
         last = size
     return P if not free.any() else None
