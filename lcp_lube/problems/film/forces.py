@@ -15,11 +15,13 @@ from .reynolds import sides
 from .strip import line_weights, stream_weights
 
 if TYPE_CHECKING:
+    from ..grid import Grid
     from .known import Known
     from .lubrication import LubricationProblem
 
 Weight = Callable[[Array, Array], Array]
 PIVOT = "pivot_moment_"
+LOOKS = 16  # places of a cell at a side, for the part of it that a supply fills
 
 
 def open_pressures(problem: LubricationProblem) -> list[float | None]:
@@ -211,7 +213,8 @@ def _in_rims(problem: LubricationProblem, above: float, weight: Weight) -> float
         at = grid.origin[axis] + (k % 2) * grid.lengths[axis]
         strip = 0.5 * grid.rims(axis)[k % 2]
         if grid.dim == 1:
-            total += strip * (p_side - above) * weight(np.array([at]), np.zeros(1))[0]
+            end = np.array([at]), np.zeros(1)
+            total += strip * (_at_side(problem, p_side, *end)[0] - above) * weight(*end)[0]
             continue
         along = coordinates[across]
         share = strip * grid.widths(across, everywhere=True)
@@ -220,8 +223,36 @@ def _in_rims(problem: LubricationProblem, above: float, weight: Weight) -> float
         corner_shares = [0.5 * strip * 0.5 * grid.rims(across)[j] for j in corners]
         places, shares = np.concatenate([along, ends]), np.concatenate([share, corner_shares])
         x, y = (np.full_like(places, at), places) if axis == 0 else (places, np.full_like(places, at))
-        total += (p_side - above) * float(np.sum(shares * grid.stretch(y) * weight(x, y)))
+        p_at: float | Array = p_side
+        if problem.held is not None or hasattr(problem, "grooves"):
+            looks = _looks(grid, across, corners)
+            at_side = np.full_like(looks, at)
+            p_at = np.mean(_at_side(problem, p_side, *((at_side, looks) if axis == 0 else (looks, at_side))), axis=1)
+        total += np.sum((p_at - above) * shares * grid.stretch(y) * weight(x, y))
     return total
+
+
+def _at_side(problem: LubricationProblem, p_side: float, x: Array, y: Array) -> Array:
+    """Pressure at places of an open side, Pa above p_c: its own, or that of a supply which comes up to it."""
+    p, L = np.full(x.shape, p_side), problem.grid.lengths[0]
+    for groove in getattr(problem, "grooves", ()):
+        p = np.where(np.remainder(x - groove.start, L) <= (groove.end - groove.start) % L, groove.p, p)
+    for supply in reversed(problem.held.supplies if problem.held is not None else ()):  # where two lie, the first one counts
+        p = np.where(supply.region.inside(x, y), supply.p, p)
+    return p
+
+
+def _looks(grid: Grid, side: int, corners: Sequence[int]) -> Array:
+    """LOOKS places side by side in each cell along a side, and between the outermost ones and these corners, m."""
+    low, high = grid.origin[side], grid.origin[side] + grid.lengths[side]
+    around = grid.with_neighbours(side)
+    faces = 0.5 * (around[1:] + around[:-1])
+    if not grid.periodic[side]:
+        faces = np.clip(faces, low, high)  # cells end at a wall
+    ends = [(low, faces[0]) if j == 0 else (faces[-1], high) for j in corners]
+    start, end = np.concatenate([np.column_stack([faces[:-1], faces[1:]]), np.reshape(ends, (-1, 2))]).T
+    places = start[:, None] + (np.arange(LOOKS) + 0.5) / LOOKS * (end - start)[:, None]
+    return low + np.remainder(places - low, high - low) if grid.periodic[side] else places
 
 
 def flow_growth(problem: LubricationProblem) -> dict[str, float] | None:
