@@ -60,12 +60,11 @@ class FirstOrder:
 
     def __init__(self, scene: Any, solution: Solution, kept: Sequence[str], quantity: str, found: Implicit | None = None):
         grid = solution.problem.grid
-        self.scene, self.kept = scene.with_shape(grid.shape), list(kept)
+        self.scene, self.kept = scene if scene.shape == grid.shape else scene.with_shape(grid.shape), list(kept)
         self._fields: dict[tuple[str, ...], Cells] = {}
-        bare = without(self.scene, named(scene))
         if found is None:
             found = Implicit([], [], np.zeros((0, 0)), {})
-            if conditions_of(bare, solution)[0] or solution.settings.get("supply_pressures"):
+            if conditions_of(self.scene, solution)[0] or solution.settings.get("supply_pressures"):
                 law = without(self.scene, [name for name in named(scene) if name != "barus" or name not in kept])
                 adjoint = Adjoint(law, solution, [quantity])
                 found = Implicit.of(adjoint)
@@ -89,7 +88,8 @@ class FirstOrder:
         if "barus" in named(scene):
             self.cells.setdefault("viscosity", np.ones(self.h.size))
         self.law = self._physics(self.kept)[0]
-        self._film(self.cells)
+        self.solved = {name: self.cells[name] for name in solved.cells if name in self.cells}
+        self._film(self.solved)
         self.at = Answer(eq.constant, self.p, self.r, self.cells, self.law, self.base)
         names = [name for name in dict.fromkeys([quantity, *found.conditions]) if name not in found.found]
         self.numbers = numbers = eq.numbers(self.p, self.r, None if self.quantity != "load" else ("load", "force_x", "force_y"))
@@ -138,9 +138,10 @@ class FirstOrder:
         """What an effect changes, d, and its sign: -1 for one that was solved for, Barus' law."""
         if name in self.kept:
             return {"viscosity": -np.log(self.law.viscosity(self.p))}, -1.0
-        after = self._made([*self.kept, name])
+        both = [*self.kept, name]
+        after, channels = self._made(both), {"viscosity", *neutral(self._physics(both)[1], 0)}
         with np.errstate(all="ignore"):
-            return {key: self._over(key, after[key], self.cells[key]) for key in after}, 1.0
+            return {key: self._over(key, after[key], self.cells[key]) for key in after if key in channels}, 1.0
 
     def made(self, names: Sequence[str]) -> Cells:
         """The fields that effects make of this answer: what the loop that solves for them has of its first film."""
@@ -194,8 +195,9 @@ class FirstOrder:
         cells = self._moved(d, STEP)
         if not self._only_pressures(cells):
             return (self._lagrangians(cells, STEP) - self._start) / STEP
-        by, dot = self._factors(cells, STEP).values, self.base.reduce.dot
-        G = sum(flow * ((by[name] - before) / before) for name, (flow, before) in self._flows.items()).ravel()  # type: ignore[union-attr]
+        before = self._factors({key: self.cells[key] for key in d if key in self.solved}, 0.0).values
+        by, dot = self._factors({key: cells[key] for key in d}, STEP).values, self.base.reduce.dot
+        G = sum(flow * ((by[name] - before[name]) / before[name]) for name, flow in self._flows.items()).ravel()  # type: ignore[union-attr]
         return np.array([-dot(one, G) / STEP for one in self.lambdas.values()])
 
     def _only_pressures(self, cells: Cells) -> bool:
@@ -208,8 +210,8 @@ class FirstOrder:
         return self._lagrangians(self.cells)
 
     @cached_property
-    def _flows(self) -> dict[str, tuple[Array, Array]]:
-        """What leaves each cell at the answer by the factors of its faces, and these; nothing where the pressure is given."""
+    def _flows(self) -> dict[str, Array]:
+        """What leaves each cell at the answer by the factors of its faces; nothing where the pressure is given."""
         film, grid = self.at.problem, self.base.grid
         s, p, r = film.scheme, self.p.reshape(grid.box) / film.p_unit, self.r.reshape(grid.box)
         beside = around(framed_by(grid, self.p / film.p_unit, [side / film.p_unit for side in film.p_sides]))
@@ -219,8 +221,7 @@ class FirstOrder:
         flows["u_E"] = s.couette_E + s.b_E * r
         given = self.equations.given
         free = 1.0 if given is None else ~given.reshape(grid.box)
-        before = self._factors(self.cells, 0.0).values
-        return {name: (free * flow, before[name]) for name, flow in flows.items()}
+        return {name: free * flow for name, flow in flows.items()}
 
     def _factors(self, cells: Cells, t: float) -> FaceFactors:
         dense, own = self._physics(named(self.scene))[0], self._physics(self.kept)[0]

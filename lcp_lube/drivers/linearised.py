@@ -72,19 +72,16 @@ class Linear:
 
     @cached_property
     def J(self) -> PETSc.Mat:
-        problem = self.problem
-        full, void = problem.A.createVecs()
-        full.setArray(np.where(self.cavity, 0.0, 1.0))
-        void.setArray(np.where(self.cavity, -1.0, 0.0))
-        J = problem.A.copy() if self.entries is None else assemble(problem.grid, self.entries).copy()
-        J.diagonalScale(None, full)
-        B = problem.B.copy()
-        B.diagonalScale(None, void)
-        J.axpy(1.0, B, structure=PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+        grid, s = self.problem.grid, self.problem.scheme
+        (ny, nx), found = grid.box, dict[tuple[int, int], Any]()
+        for entries, column in ((self.entries or s.pressure_entries(), ~self.cavity), (s.void_entries(), -1.0 * self.cavity)):
+            at = grid.ghosted(column.astype(float), 0.0)
+            for dj, di, value in entries:
+                part = value * at[1 + dj : 1 + dj + ny, 1 + di : 1 + di + nx]
+                found[dj, di] = found[dj, di] + part if (dj, di) in found else part
+        J = assemble(grid, [(*place, value) for place, value in found.items()])
         if self.given is not None:
-            J.zeroRows((problem.grid.first + np.flatnonzero(self.given)).astype(PETSc.IntType), 1.0)
-        for obj in (B, full, void):
-            obj.destroy()
+            J.zeroRows((grid.first + np.flatnonzero(self.given)).astype(PETSc.IntType), 1.0)
         return J
 
     @cached_property

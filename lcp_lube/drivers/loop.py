@@ -1,6 +1,7 @@
 """The loop of `coupling`: a film with its coefficients held, and Anderson's method for the fields that these come from."""
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import replace
 from typing import Any
 
@@ -11,6 +12,7 @@ from ..base.parallel import Array
 from ..errors import InputError
 from ..problems.film.effects import Answer, Cells, Compressible, Effect, FaceFactors, answer, factors, neutral
 from ..problems.film.fluid import Law
+from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.tangent import WIDEST, Giving, closed, filled, lift_of, logarithm
 from ..problems.solution import Solution
@@ -47,7 +49,7 @@ class Loop:
             what = "fluid.density = dowson-higginson" if moving == {"density"} else f"an effect on {', '.join(sorted(moving))}"
             raise InputError(f"{scene.name}: scheme = {self.model.scheme}: {what} needs scheme = face")
         self.frozen = Frozen(scene, self.law, None, all(effect.even for effect in self.effects))
-        self.base = self.frozen.build(ask.comm)
+        self.base = self._lent() or self.frozen.build(ask.comm)
         self.frozen = replace(self.frozen, base=self.base)
         self.p_sides = self.model.p_sides
         self.h = self.base.scheme.h.ravel()
@@ -71,6 +73,19 @@ class Loop:
         self.told: list[str] = []  # how it went on where Anderson's method did not settle
         self.log: list[Array] = []  # what the effects have made of each film's answer
         self.given: list[Array] = []  # those that were found before, by an earlier run say: they are taken instead of films
+
+    def _lent(self) -> LubricationProblem | None:
+        """The rigid film of a start whose effects were looked at, from which its grid is taken over."""
+        near: Any = self.ask.start
+        if not isinstance(near, Start) or near.made is None or near.problem.grid.shape != self.scene.shape:
+            return None
+        found: Any = near.problem
+        rigid = found if found.plain else found.rigid
+        if type(rigid) is not LubricationProblem or rigid.coefficients_for is not None:
+            return None
+        base = copy(rigid)
+        base.exact, base.rigid, found.shares_grid = None, None, True
+        return base
 
     def vector(self, cells: Cells) -> Array:
         """Fields as one vector, in which equal steps are equal relative changes of coefficients."""

@@ -53,7 +53,7 @@ def numbers(problem: LubricationProblem, p: Array, r: Array, wanted: Collection[
         lever = problem.grid.polar[0] + problem.grid.y
         out["friction_torque"] = friction(problem, p_pa, r, lever) if asked("friction_torque") else np.nan
     out["p_max"] = largest_pressure(problem, p_pa)[0] + problem.p_c if asked("p_max") else np.nan
-    out["min_h"] = thinnest(problem)[0]
+    out["min_h"] = thinnest(problem)[0] if asked("min_h") else np.nan
     kinds = [kind for pair in problem.grid.ends for kind in pair]
     flows = side_flows(problem, p, r) if asked("flow_") else dict.fromkeys(SIDES, np.nan)
     out |= {f"flow_{name}": flows[name] for name, kind in zip(SIDES, kinds, strict=False) if kind == "open"}
