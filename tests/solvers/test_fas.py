@@ -289,7 +289,7 @@ def test_json_and_a_start():
 
 @pytest.mark.parametrize("ring", [False, True])
 def test_front_spans_are_all_points_near_a_front(ring):
-    from lcp_lube.solvers.fas.fronts import front_spans
+    from lcp_lube.solvers.fas.front_points import front_spans
 
     random = np.random.default_rng(1)
     for _ in range(60):

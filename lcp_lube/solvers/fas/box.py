@@ -55,9 +55,9 @@ class BoxFas(Cycles):
     def __init__(self, job: Job):
         super().__init__(job)
         problem, start = self.problem, job.start
-        from . import box_kernels, finest, fronts, levels, transfer
+        from . import box_kernels, finest, front_points, levels, transfer
 
-        self._kernels, self._fronts, self._transfer, self._tools = box_kernels, fronts, transfer, levels
+        self._kernels, self._fronts, self._transfer, self._tools = box_kernels, front_points, transfer, levels
         self._finest = finest
         if not isinstance(problem, ObstacleProblem):
             raise InputError("--method fas: for obstacle problems on a rectangle; use active-set")

@@ -64,9 +64,9 @@ class Fas(Cycles):
         super().__init__(job)
         problem, options, start = self.problem, self.options, job.start
         # numba starts with this import, 0.4 s: only where the method is used.
-        from . import finest, following, fronts, kernels, levels, loops
+        from . import finest, following, kernels, levels, loops
 
-        self._kernels, self._fronts, self._loops, self._tools, self._finest = kernels, fronts, loops, levels, finest
+        self._kernels, self._loops, self._tools, self._finest = kernels, loops, levels, finest
         self._harmonic, self._truncation = options.weights == "harmonic", TRUNCATIONS[options.truncation]
         follows = start is not None and following.foreseen(problem, start["p"])
         with self.stages("assembly"):
@@ -271,8 +271,8 @@ class Fas(Cycles):
         # What lies beyond a periodic side, or is another rank's, must be new every sweep or two: else fronts across it wander.
         ring, parts = level.periodic[0], front if level.periodic[1] else (front + 1) // 2 if level.split else 1
         for n, count in enumerate(front // parts + (n < front % parts) for n in range(parts)):
-            arrays, rest = (level.z, level.kx, level.ky, level.c), {"ring": ring, "more": n + 1 < parts}
-            level.work += self._fronts.relax_front(*arrays, count, width, level.carry, level.held, level.slips, **rest)
+            arrays, kinds = (level.z, level.kx, level.ky, level.c), (level.carry, level.held, level.slips)
+            level.work += self._loops.relax_front(*arrays, count, width, *kinds, ring, n + 1 < parts)
             level.share(level.z)
 
     def _relax(self, level: Any, sweeps: int, down: bool) -> None:

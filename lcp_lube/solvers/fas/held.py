@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ...base.compiled import kernel, piece
 from ...base.parallel import Array
 from . import transfer
-from .fronts import without
+from .front_points import without
 from .kernels import balance_row, relax
 
 if TYPE_CHECKING:
@@ -85,8 +85,8 @@ def free_spans(held: NDArray[np.bool_]) -> NDArray[np.int32]:
     rows = np.empty((ny, 3), dtype=np.int32)
     for k in range(ny):
         rows[k, 0], rows[k, 1], rows[k, 2] = k + 1, 1, nx + 1
-    spans, found = without(rows, ny, held)
-    return spans[:found]
+    spans, at = without(rows, np.array([0, ny]), held)
+    return spans[: at[1]]
 
 
 @kernel

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from ...base.crew import FEWEST, crew
+from ...base.crew import FEWEST, PARTS, crew
 from ...base.parallel import Array
 from ...problems.film.reynolds import BoxScheme
 from ...problems.grid import Grid
 from ...problems.solution import Fields
 from ...problems.strips import each_strip
-from . import kernels, starts, transfer
+from . import fronts, kernels, starts, transfer
 from .waiting import LINE, SLOTS
 
 COLUMNS = 128  # of a part of a line, at least
@@ -31,6 +31,16 @@ def sweep(z: Array, *others: Any) -> None:
         return
     done, west = np.zeros((parts, LINE), dtype=np.int64), np.zeros((parts, SLOTS, LINE))
     crew().run(lambda part: kernels.sweep(*(z, *others, part, done, west)), parts)
+
+
+def relax_front(z: Array, *others: Any) -> int:
+    """`fronts.relax_front`, of a large grid in blocks, whose number does not depend on the threads."""
+    if z.size < FEWEST:
+        return int(fronts.relax_front(*(z, *others, 0, 1, None, None)))
+    blocks = min(PARTS, z.shape[0] - 2)
+    threads = min(crew().threads, (blocks + 1) // 2)
+    done, near = np.zeros((blocks, LINE), dtype=np.int64), np.zeros((2, blocks), dtype=np.int64)
+    return int(crew().run(lambda k: fronts.relax_front(*(z, *others, k, threads, done, near)), threads)[0])
 
 
 def norms(z: Array, *others: Any) -> Array:
