@@ -200,7 +200,7 @@ class Adjoint:
     def scale(self, key: str) -> float:
         """A change of a number that is not small."""
         problem = self.equations.constant
-        return scale_of(self.scene, key, problem, self.p / problem.p_unit, key in self.found)
+        return scale_of(self.scene, key, problem, self.p, key in self.found)
 
     @property
     def report(self) -> dict[str, float]:
@@ -212,7 +212,7 @@ class Adjoint:
 
 
 def scale_of(scene: Scene, key: str, problem: LubricationProblem, p: Array, found: bool = False) -> float:
-    """The size of a number, of one that is zero what its change is small against; p : the film's, p_unit. Collective.
+    """The size of a number, of one that is zero what its change is small against; p : the film's, Pa above p_c. Collective.
 
     found : it was found, and may be zero but for rounding.
     """
@@ -221,7 +221,7 @@ def scale_of(scene: Scene, key: str, problem: LubricationProblem, p: Array, foun
         return value
     units = scene.data_units()
     unit = units.get(key, units.get(key.rpartition(".")[0], ""))
-    p_max = max(problem.reduce.max(p) * problem.p_unit, *map(abs, problem.p_sides)) or problem.p_unit
+    p_max = max(problem.reduce.max(p), *map(abs, problem.p_sides)) or problem.p_unit
     thinnest = problem.reduce.min(problem.scheme.h)
     small = {"Pa": p_max, "1/Pa": 1.0 / p_max, "m": thinnest, "rad": thinnest / max(problem.grid.lengths)}.get(unit, GUESS)
     return value if value > ROUNDED * small else small

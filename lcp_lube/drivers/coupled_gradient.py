@@ -231,7 +231,7 @@ class CoupledGradient(CoupledResponse):
 
         No other is made larger: where nearly all of a film is cavitated its level hardly changes the equations, and they bend.
         """
-        scale = scale_of(self.scene, key, self.loop.base, self.p, key in self.found)
+        scale = scale_of(self.scene, key, self.loop.base, self.p * self.loop.base.p_unit, key in self.found)
         d = STEP * scale
         if a or scale != GUESS:
             return d

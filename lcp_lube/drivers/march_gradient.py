@@ -279,7 +279,7 @@ class MarchGradient:
         scale = abs(value)
         if not scale:
             eq = self.course.at(len(self.trace.steps))
-            scale = scale_of(self.scene, key, eq.constant, last.p / eq.constant.p_unit)
+            scale = scale_of(self.scene, key, eq.constant, last.p)
             eq.destroy()
         found = differences(
             at, value, scale, np.array([self.sizes[name] for name in self.names]), oblique(self.course.first.gap)

@@ -399,3 +399,24 @@ def test_large_films_have_the_same_adjoint(monkeypatch, name, halved, limit):
     for part, exact in found[0].items():
         assert found[1][part] == pytest.approx(exact, abs=5e-7 * np.abs(exact).max()), part
     solution.destroy()
+
+
+@pytest.mark.parametrize(("name", "n"), [("problem4", 191), ("dimpled_pad", 255), ("journal", 360)])
+def test_frictions_adjoint_begins_near(monkeypatch, name, n):
+    """Cavities ask something of lambda too, which the coarser grids are told: they start it within some per cent."""
+    pytest.importorskip("numba")
+    from lcp_lube.solvers.fas import frozen
+
+    answers, solved = [], frozen.Frozen._improved
+
+    def heard(self, start, *given):
+        answers.append((start, solved(self, start, *given)))
+        return answers[-1][1]
+
+    monkeypatch.setattr(frozen.Frozen, "_improved", heard)
+    scene = load_scene(name)
+    scene = scene.with_shape((n, n * scene.shape[1] // scene.shape[0]))
+    with solve(scene, method="fas") as solution:
+        Adjoint(scene, solution, ["friction"]).destroy()
+    start, (lam, settled) = answers[0][0], answers[-1][1]
+    assert settled and np.linalg.norm(start - lam) < 0.06 * np.linalg.norm(lam)

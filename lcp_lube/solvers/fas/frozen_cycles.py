@@ -203,6 +203,7 @@ class Cycles:
         for k in range(last):
             self.z[k][:] = 0.0
             self._descend(k)
+            self._hand_on(k)
         self.z[last][:] = 0.0
         self._run(last, "V")
         for k in reversed(range(last)):
@@ -212,6 +213,14 @@ class Cycles:
                 self._run(k, "V")
         self._sweep(0, True)
         return self._own(self.z[0])
+
+    def _hand_on(self, k: int) -> None:
+        """What level k's cavities ask for is asked of the coarser one's."""
+        level, coarse = self.levels[k], self.levels[k + 1]
+        for asked, into in zip(self.c[k], self.c[k + 1], strict=True):
+            data = level.share(asked), self.full[k], self.passed[k][0], coarse.part(into)
+            frozen_transfer.hand_on(*data, level.first, level.by_x, level.by_y)
+            coarse.gather(into)
 
     def _sweep(self, k: int, down: bool) -> None:
         level, z = self.levels[k], self.z[k]

@@ -87,6 +87,25 @@ def restrict(
             deal_to_one(here, w, by_x, ring, 0.5 if by_y else 1.0, out[last])
 
 
+@kernel
+def hand_on(c: Array, full: Mask, carry: Array | None, out: Array, y0: int, by_x: bool, by_y: bool) -> None:
+    """Of J' l = c, what coarse points in a cavity ask for: what the next point asks of them too, as l_i - carry l_east = c_i.
+
+    At its end they go on for as long, that what the full film is given there, k (l_i - l_east), be that of the fine grid.
+    """
+    sx, sy = 2 if by_x else 1, 2 if by_y else 1
+    shift = (1 - y0 % 2 if by_y else 0) + 1  # as in `transfer.inject`
+    for J in range(out.shape[0] - 2):
+        m = shift + sy * J
+        for k in range(1, out.shape[1] - 1):
+            i = sx * k
+            if not full[m, i]:
+                after = c[m, i] if full[m, i + 1] else c[m, i + 1]
+                if carry is not None:
+                    after *= carry[m, i]
+                out[J + 1, k] = c[m, i] + (after if by_x else c.dtype.type(0))
+
+
 @piece
 def deal(r: Array, v: Array, w: Array, by_x: bool, ring: bool, south: Array, north: Array) -> None:
     """Half of what a line between two coarse ones, zero in the frame, gives to the points of these, v of it to the south."""
