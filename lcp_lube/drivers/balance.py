@@ -6,7 +6,7 @@ stiffness, for other values a secant iteration, kept inside the bracket once the
 solves, each started from the nearest answer. On large grids the search begins on coarse ones.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import atan2, copysign, cos, exp, inf, log, prod, sin
@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, NotFound
+from ..problems.film.integrals import thinnest
 from ..problems.film.model import Model
 from ..problems.film.turned import TurnedProblem
 from ..problems.solution import Outcome, Solution
@@ -55,12 +56,13 @@ class Variable:
     slope: float
 
 
-def variable(scene: Scene, table: BalanceTable, begin: float | None) -> Variable:
+def variable(scene: Scene, table: BalanceTable, begin: float | None, shapes: Sequence[tuple[int, ...]]) -> Variable:
     """What is to be found. Collective.
 
     Parameters
     ----------
     begin : value where the search begins; default the scene's, or the middle of the range.
+    shapes : grids on which the film is to be positive.
 
     Raises
     ------
@@ -82,9 +84,10 @@ def variable(scene: Scene, table: BalanceTable, begin: float | None) -> Variable
             value = half_film_eccentricity(turning, scene.mu_0, table.load, len(scene.shape) == 1)  # type: ignore[attr-defined]
         value = 0.5 if value is None else min(max(value, 1e-3), 0.999)
     elif key == "h_offset":
-        problem: Any = scene.build()
-        shift = problem.reduce.min(problem.scheme.h) - getattr(scene, key)  # the film is shift + h_offset thick
-        problem.destroy()
+        problems: list[Any] = [scene.with_shape(shape).build() for shape in shapes]
+        shift = min(thinnest(one.grid, one.film)[0] for one in problems) - getattr(scene, key)  # the film less h_offset
+        for one in problems:
+            one.destroy()
         value = value if value + shift > 0 else getattr(scene, key)  # a neighbour's, whose film was thicker
         to_t, to_value, slope = (lambda v: log(v + shift)), (lambda t: exp(t) - shift), -2.0
     elif table.range is None:
@@ -131,18 +134,19 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     table: BalanceTable = scene.balance  # type: ignore[attr-defined]
     nested, near = ask.nested, ask.start
     shapes = [scene.shape]
-    if prod(scene.shape) > ONE_GRID and nested is not False:
+    if nested is not False:
         shapes = [shape for shape in level_shapes(scene.shape) if shape == scene.shape or prod(shape) > ONE_GRID]
-    elif near is None and nested is not False and getattr(scene, "turning", None) is None:  # a level, from a cold start
+    # A small grid's, from a cold start, unless the closed forms of a groove at the widest gap know the place.
+    if shapes == [scene.shape] and near is None and nested is not False and getattr(scene, "round", None) != "groove":
         half = tuple((n - 1) // 2 for n in scene.shape)
         shapes = [half, scene.shape] if min(half) >= NARROWEST and prod(half) >= FEWEST else shapes
     known = near.settings.get("balance", {}).get("value") if near is not None else None
-    unknown = variable(scene.with_shape(shapes[0]), table, known)
+    unknown = variable(scene, table, known, shapes)
     t, slope, solves, work, found = unknown.start, unknown.slope, 0, 0.0, False
     start: Any = near
     times: dict[str, float] = {}
     for shape in shapes:
-        search = Search(unknown.low, unknown.high, slope, explore=not found)
+        search = Search(unknown.low, unknown.high, slope)
         tol = table.tol if shape == shapes[-1] else max(table.tol, COARSE_TOL)
 
         def solve_at(t: float, near: Any, shape: tuple[int, ...] = shape) -> tuple[Solution, Callable[[float], float | None]]:

@@ -32,7 +32,7 @@ from .winding import places
 
 MOST_SOLVES = 25  # on a grid
 COARSEST, COARSE_TOL = (36, 7), 1e-2  # fewest points around and across, and how well a coarse grid's place is worth knowing
-COARSER = 0.6  # points of a grid over those of the next finer one, at most
+COARSER = 0.7  # points of a grid over those of the next finer one, at most
 SEEN = 0.5  # a mesh in parts of the stretch sqrt(2 (1 - s)) on which the film is thin, at most
 MOST_COARSE = 8  # solves on a grid that is not the last
 LONGEST = (2.0, 0.4)  # of a step in t and in the attitude (rad)
@@ -90,7 +90,8 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
                 break
         return solution, q, found
 
-    solution, q, found = through(np.array([t, phi]))
+    begin = np.array([t, phi])
+    solution, q, found = through(begin)
     if not found and elsewhere:
         solution.destroy()
         chain = Chain(replace(ask, start=None), inner)
@@ -112,7 +113,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         elsewhere = False
         if not found and best.q is None:  # the last grid was not met
             solution.destroy()
-            solution, q, found = through(likely[0] if likely else q)
+            solution, q, found = through(likely[0] if likely else begin)
     if not found and best.q is not None:
         q = best.q
         solution.destroy()

@@ -266,6 +266,20 @@ def test_a_load_that_cavitation_limits():
         solution.destroy()
 
 
+def test_a_film_thinnest_at_a_side_stays_positive_on_every_grid():
+    """A wedge whose thin end no coarse point sees, under pressures that carry nearly all: the search goes to thin films."""
+    data = {
+        "dimension": 2, "L": 0.041, "width": 0.014, "U": -1.9, "nx": 32, "ny": 47, "fluid": {"mu": 0.0056},
+        "film": [{"shape": "linear", "h_start": 9e-6, "h_end": 13e-6}],
+        "sides": {"west": 1.5e6, "east": 2.7e5, "south": 1e5, "north": 5.4e5},
+    }  # fmt: skip
+    with solve(BearingScene(**data, h_offset=5e-5)) as there:
+        load = carried(there.problem.quantities(there.fields))
+    with solve(BearingScene(**data, balance={"load": load})) as solution:
+        assert solution.converged, solution.message
+        assert solution.settings["balance"]["carried"] == pytest.approx(load, rel=2e-6)
+
+
 def test_the_range_may_have_a_unit():
     """That of the key that varies."""
     from lcp_lube import InputError, load_scene

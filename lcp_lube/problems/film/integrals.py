@@ -212,6 +212,15 @@ def line_integrals(grid: Grid, film: Any) -> LineIntegrals:
 
 def check_film(grid: Grid, film: Callable[[Array, Array], Array]) -> None:
     """Raise InputError with the place where the film is thinnest, unless it is positive on all nodes and faces. Collective."""
+    h_min, at_x, at_y = thinnest(grid, film)
+    if not h_min > 0:
+        where = f"x = {at_x:g}" + (f", y = {at_y:g}" if grid.dim == 2 else "")
+        found = f"{h_min:g} m" if np.isfinite(h_min) else "no number"
+        raise InputError(f"film {found} at {where} m: it must be positive everywhere")
+
+
+def thinnest(grid: Grid, film: Callable[[Array, Array], Array]) -> tuple[float, float, float]:
+    """The thinnest film on all nodes and faces, and its x and y, m. Collective."""
     x_nodes, x_faces = grid.nodes_and_faces(0)
     y_nodes, y_faces = grid.nodes_and_faces(1) if grid.dim == 2 else (np.zeros(1), np.zeros(1))
     lowest = (np.inf, 0.0, 0.0)
@@ -220,11 +229,7 @@ def check_film(grid: Grid, film: Callable[[Array, Array], Array]) -> None:
         h = np.nan_to_num(np.broadcast_to(film(x, y), (y.size, x.size)), nan=-np.inf, posinf=np.inf, neginf=-np.inf)
         j, i = np.unravel_index(np.argmin(h), h.shape)
         lowest = min(lowest, (float(h[j, i]), float(x[0, i]), float(y[j, 0])))
-    h_min, at_x, at_y = grid.comm.allreduce(lowest, MPI.MIN)
-    if not h_min > 0:
-        where = f"x = {at_x:g}" + (f", y = {at_y:g}" if grid.dim == 2 else "")
-        found = f"{h_min:g} m" if np.isfinite(h_min) else "no number"
-        raise InputError(f"film {found} at {where} m: it must be positive everywhere")
+    return grid.comm.allreduce(lowest, MPI.MIN)  # type: ignore[no-any-return]
 
 
 def _gauss_points(a: Array, b: Array) -> Array:
