@@ -1,5 +1,7 @@
 """Round edges: faces that they cut, for full and for cavitated dimples."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -96,3 +98,11 @@ def test_methods_and_halves_agree():
     assert turned.numbers["load"] == pytest.approx(first.numbers["load"], rel=1e-8)
     turned.destroy()
     first.destroy()
+
+
+def test_faces_seen_before_are_those_of_another_look():
+    """Only faces beside a cavity are looked at once more: to the last bit what all of them, looked at anew, are."""
+    with solve(pad(37)) as solution:
+        again = solution.problem
+        anew = partial(again.coefficients_for, seen=None)(cavity=again.dry)
+        assert again.dry.any() and all(np.array_equal(getattr(again.scheme, name), getattr(anew, name)) for name in anew.arrays)

@@ -20,6 +20,7 @@ from ..grid import Grid
 
 Flags = NDArray[np.bool_]
 Shape = Callable[[Array, Array], Array]
+Faces = tuple[Flags, Array, Array]
 SIDE_BY_SIDE, IN_SERIES = 16, 32  # looks across a face and between its two points
 TOGETHER = 200  # faces that are looked at together, in cache
 THIN = 1 / 3  # of the way from the thinnest to the thickest film of a face: what is below is the film outside a recess
@@ -34,7 +35,8 @@ def cut_faces(
     cavity: Flags,
     along_flow: bool,
     period: float = 0.0,
-) -> tuple[Flags, Array, Array]:
+    full: Faces | None = None,
+) -> Faces:
     """Which faces along t a rim cuts, shape (lines, faces), and C and H of those (`edges.face_film`).
 
     Parameters
@@ -43,20 +45,25 @@ def cut_faces(
     lines, steps : s of the lines of points, and the distances before, between and behind them.
     cavity : whether the points are cavitated, shape (lines, nodes). along_flow : whether the flow goes to larger t.
     period : round a ring, whose last point lies before the first.
+    full : what this returned for them without cavities, if that is known: only those beside a cavity are looked at then.
     """
     a, d = nodes[:-1], np.diff(nodes)
     d = np.where(d < 0.0, d + period, d)
     low, width = lines - 0.5 * steps[:-1], 0.5 * (steps[:-1] + steps[1:])
-    middle, across = (a + 0.5 * d)[None, :], (low + 0.5 * width)[:, None]
-    reach = 0.5 * np.hypot(d[None, :], width[:, None])
-    cut = np.zeros(reach.shape, dtype=bool)
-    for rim in rims:
-        cut |= np.abs(rim(middle, across)) <= reach
-    cut &= d[None, :] > 0.0
+    if full is None:
+        middle, across = (a + 0.5 * d)[None, :], (low + 0.5 * width)[:, None]
+        reach = 0.5 * np.hypot(d[None, :], width[:, None])
+        cut = np.zeros(reach.shape, dtype=bool)
+        for rim in rims:
+            cut |= np.abs(rim(middle, across)) <= reach
+        cut &= d[None, :] > 0.0
+        kind = np.asarray(film(nodes[:1], lines[:1])).dtype  # complex, where a derivative is asked for
+        cubes, films = np.zeros((2, np.count_nonzero(cut)), dtype=kind)
+    else:
+        cut, cubes, films = full[0], full[1].copy(), full[2].copy()
     j, i = np.nonzero(cut)
-    cubes = np.zeros(j.size, dtype=np.asarray(film(nodes[:1], lines[:1])).dtype)  # complex, where a derivative is asked for
-    films = np.zeros_like(cubes)
-    for some in (slice(k, k + TOGETHER) for k in range(0, j.size, TOGETHER)):
+    anew = np.arange(j.size) if full is None else np.flatnonzero(cavity[j, i] | cavity[j, i + 1])
+    for some in (anew[k : k + TOGETHER] for k in range(0, anew.size, TOGETHER)):
         at = j[some], i[some]
         dry = cavity[at], cavity[at[0], at[1] + 1]
         t = a[at[1], None] + d[at[1], None] * ((np.arange(IN_SERIES) + 0.5) / IN_SERIES)
@@ -100,25 +107,55 @@ def _in_series(h: Array, resists: Flags | None = None) -> tuple[Array, Array]:
 
 
 def rims_across_x(
-    grid: Grid, film: Shape, rims: Sequence[Shape], cavity: Array | None, cubes: Array, films: Array, period: float
+    grid: Grid,
+    film: Shape,
+    rims: Sequence[Shape],
+    cavity: Array | None,
+    cubes: Array,
+    films: Array,
+    period: float,
+    seen: dict[int, Faces] | None,
 ) -> tuple[Array, Array]:
-    """C and H of the x faces, those that rims cut made anew; cavity: 1 at the owned points that are cavitated. Collective."""
+    """C and H of the x faces, those that rims cut made anew; cavity: 1 at the owned points that are cavitated. Collective.
+
+    seen : keeps what `cut_faces` says of the grid's faces without cavities.
+    """
     nodes, _ = grid.nodes_and_faces(0)
-    cut, cut_cubes, cut_films = cut_faces(
-        film, rims, nodes, grid.y[:, 0], grid.steps(1), _dry(grid, cavity)[1:-1], True, period
+    cut, cut_cubes, cut_films = found = cut_faces(
+        film, rims, nodes, grid.y[:, 0], grid.steps(1), _dry(grid, cavity)[1:-1], True, period, (seen or {}).get(0)
     )
+    if cavity is None and seen is not None:
+        seen[0] = found
     cubes, films = np.array(cubes), np.array(films)
     cubes[cut], films[cut] = cut_cubes, cut_films
     return cubes, films
 
 
-def rims_across_y(grid: Grid, film: Shape, rims: Sequence[Shape], cavity: Array | None, cubes: Array, period: float) -> Array:
+def rims_across_y(
+    grid: Grid,
+    film: Shape,
+    rims: Sequence[Shape],
+    cavity: Array | None,
+    cubes: Array,
+    period: float,
+    seen: dict[int, Faces] | None,
+) -> Array:
     """The same for C of the y faces. Collective."""
     nodes, _ = grid.nodes_and_faces(1)
     turned = [partial(_swapped, rim) for rim in (film, *rims)]
-    cut, cut_cubes, _ = cut_faces(
-        turned[0], turned[1:], nodes, grid.x[0], grid.steps(0), _dry(grid, cavity)[:, 1:-1].T, False, period
+    cut, cut_cubes, _ = found = cut_faces(
+        turned[0],
+        turned[1:],
+        nodes,
+        grid.x[0],
+        grid.steps(0),
+        _dry(grid, cavity)[:, 1:-1].T,
+        False,
+        period,
+        (seen or {}).get(1),
     )
+    if cavity is None and seen is not None:
+        seen[1] = found
     cubes = np.array(cubes)
     cubes.T[cut] = cut_cubes
     return cubes
