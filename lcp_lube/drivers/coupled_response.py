@@ -55,7 +55,7 @@ class CoupledResponse(OfLine):
         grid, comm = problem.grid, problem.grid.petsc_comm
         self.supplies = problem.held.supplies if problem.held is not None else ()
         self.free = [k for k, one in enumerate(self.supplies) if one.open]
-        scene = scene.with_shape(grid.shape)
+        scene = scene if scene.shape == grid.shape else scene.with_shape(grid.shape)  # a time step has its march's grid alone
         if self.free:
             scene = Fed(scene, tuple(Supply(one.region, one.p) for one in self.supplies))
         self.loop = loop = Loop(scene, Ask(comm=comm), None)  # type: ignore[arg-type]

@@ -49,7 +49,10 @@ class Loop:
             what = "fluid.density = dowson-higginson" if moving == {"density"} else f"an effect on {', '.join(sorted(moving))}"
             raise InputError(f"{scene.name}: scheme = {self.model.scheme}: {what} needs scheme = face")
         self.frozen = Frozen(scene, self.law, None, all(effect.even for effect in self.effects))
-        self.base = self._lent() or self.frozen.build(ask.comm)
+        try:
+            self.base = self._lent() or self.frozen.build(ask.comm)
+        except InputError as error:
+            raise InputError(f"{scene.name}: {error}") from None
         self.frozen = replace(self.frozen, base=self.base)
         self.p_sides = self.model.p_sides
         self.h = self.base.scheme.h.ravel()

@@ -406,3 +406,12 @@ def test_a_film_that_carries_nothing_ends_early_and_says_so():
         assert abs(found.load) < 1e-9
         assert found.problem.grid.size < 300**2
         assert found.converged or (found.outcome == "accuracy_not_reached" and "rounding" in found.message)
+
+
+@pytest.mark.parametrize("scheme", ["face", "upwind"])
+def test_a_line_in_which_nothing_happens_ends_early_and_says_so(scheme):
+    data = {"family": "bearing", "dimension": 1, "L": 0.004, "U": 18.0, "n": 2, "scheme": scheme, "fluid": {"mu": 0.03}}
+    with solve({**data, "film": [{"shape": "constant", "h": 2e-5}]}, accuracy=1e-2) as found:
+        assert abs(found.load) < 1e-9
+        assert len(found.levels) == 2
+        assert found.outcome == "accuracy_not_reached"

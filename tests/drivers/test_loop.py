@@ -27,6 +27,15 @@ def test_newton_goes_on_between_soft_walls(how, monkeypatch):
         assert h == pytest.approx(rigid.ravel() + 3e-10 * p, rel=1e-7)
 
 
+def test_newton_goes_on_in_a_time_step(monkeypatch):
+    march = {**SOFT, "motion": {"t_end": 0.02, "steps": 2, "start": "full"}}
+    with solve(march, model="full") as s:
+        load = s.load
+    monkeypatch.setattr(loop, "PATIENCE", 0)
+    with solve(march, model="full") as s:
+        assert s.converged and s.load == pytest.approx(load, rel=1e-7)
+
+
 def test_what_does_not_settle_ends_at_its_best(monkeypatch):
     """Not at the last film, and says where it began anew."""
     changes, found = [], loop.Loop._found

@@ -256,6 +256,15 @@ def test_bad_input(supply, words):
     assert words in str(error.value) and "\n" not in str(error.value)
 
 
+def test_overlapping_supplies_of_a_line_are_refused_beside_effects_too():
+    film = [{"shape": "sinusoid", "h_min": 4e-6, "h_max": 9e-6}]
+    line = {"family": "bearing", "L": 0.06, "U": 1.0, "n": 17, "fluid": {"mu": 0.01, "p_supply": 1e5}, "film": film}
+    supply = [{"x": [0.028, 0.040], "flow": 7e-6}, {"x": [0.026, 0.029], "flow": 1e-6}]
+    for more in ({}, {"temperature": {"beta": 0.03}}):
+        with pytest.raises(InputError, match=r"^bearing: supply 1 and supply 2 overlap"):
+            solve({**line, "supply": supply, **more})
+
+
 @pytest.mark.parametrize("start_mm", [0.0, 0.3, 24.0])
 def test_a_supply_beside_a_periodic_side_is_one_anywhere(start_mm):
     """A film that does not depend on y and closes in it: where the supply lies, by whole cells, does not matter."""

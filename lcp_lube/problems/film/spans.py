@@ -52,11 +52,11 @@ def whole(line: LineIntegrals) -> tuple[Span, ...]:
 def supplied(line: LineIntegrals, grid: Grid, supplies: Sequence[Supply], owner: NDArray[np.int64]) -> tuple[Span, ...] | None:
     """Those of a line with supplies, on every rank; owner : the number of the supply at each of all points, or -1.
 
-    None where a supply is no `Patch`, or reaches right round or as far as another one.
+    None where a supply is no `Patch`, or reaches right round or as far as another one, whose all its points may be then.
     """
     start, L, ring = grid.origin[0], grid.lengths[0], bool(grid.periodic[0])
     regions = [one.region for one in supplies if isinstance(one.region, Patch)]
-    if len(regions) < len(supplies) or not all(one.half_x < 0.5 * L for one in regions):
+    if len(regions) < len(supplies) or not all(one.half_x < 0.5 * L and (owner == k).any() for k, one in enumerate(regions)):
         return None
     ends = sorted((x - one.half_x, x + one.half_x, k) for k, one in enumerate(regions) for x in [one.x % L if ring else one.x])
     around = (ends[0][0] + L, ends[0][1] + L, ends[0][2])

@@ -221,19 +221,27 @@ def owners(grid: Grid, supplies: Sequence[Supply]) -> NDArray[np.int64]:
 
     Raises
     ------
-    InputError : two supplies that are not held at one pressure have a point in common.
+    InputError : two supplies that are not held at one pressure have a point or an area in common.
     """
     owner = np.full(grid.box, -1, dtype=np.int64)
     for number, supply in enumerate(supplies):
         mine = np.broadcast_to(supply.region.inside(grid.x, grid.y), grid.box)
         if not grid.reduce.sum(mine.astype(float)):
             mine = _nearest(grid, supply.region.middle)
-        taken = owner[mine & (owner >= 0)]
-        other = grid.comm.allreduce(int(taken[0]) if taken.size else -1, MPI.MAX)
-        if other >= 0 and (supply.open or supplies[other].open or supply.p != supplies[other].p):
-            raise InputError(f"supply {other + 1} and supply {number + 1} overlap: allowed where both hold the same p")
+        meet = {k for k in range(number) if _meet(supply.region, supplies[k].region)}
+        for other in (meet | {grid.comm.allreduce(int(owner[mine].max(initial=-1)), MPI.MAX)}) - {-1}:
+            if supply.open or supplies[other].open or supply.p != supplies[other].p:
+                raise InputError(f"supply {other + 1} and supply {number + 1} overlap: allowed where both hold the same p")
         owner = np.where(mine & (owner < 0), number, owner)
     return owner
+
+
+def _meet(a: Region, b: Region) -> bool:
+    """Whether two rectangles have an area in common."""
+    if not (isinstance(a, Patch) and isinstance(b, Patch)) or a.round or b.round:
+        return False
+    dx, dy = abs(math.remainder(a.x - b.x, a.period or math.inf)), abs(a.y - b.y)
+    return max(dx - (1.0 - MARGIN) * (a.half_x + b.half_x), dy - (1.0 - MARGIN) * (a.half_y + b.half_y)) < 0.0
 
 
 def pressed(scheme: BoxScheme, held: Held, p_unit: float) -> BoxScheme:
