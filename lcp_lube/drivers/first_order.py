@@ -90,7 +90,7 @@ class FirstOrder:
         self.law = self._physics(self.kept)[0]
         self.solved = {name: self.cells[name] for name in solved.cells if name in self.cells}
         self._film(self.solved)
-        self.at = Answer(eq.constant, self.p, self.r, self.cells, self.law, self.base)
+        self.at = Answer(eq.constant, self.p, self.r, self.cells, self.law, self.base, rough=True)
         names = [name for name in dict.fromkeys([quantity, *found.conditions]) if name not in found.found]
         self.numbers = numbers = eq.numbers(self.p, self.r, None if self.quantity != "load" else ("load", "force_x", "force_y"))
         self.parts = {name: eq.partials(numbers, name) for name in names}

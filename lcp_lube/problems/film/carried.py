@@ -23,7 +23,8 @@ LEVEL = 1e-15  # of the largest pressure: a drop by less is rounding where no wa
 class Carried:
     """Flows and heat of an answer; arrays of shape grid.box, W (1D: W/m) and m3/s (1D: m2/s).
 
-    q : out of a cell's west, east, south and north face. free : cells whose temperature is unknown (the others lie in grooves).
+    q : out of a cell's west, east, south and north face. free : cells whose temperature is unknown (the others lie in
+        grooves). inside : whether a cell's west, east, south and north neighbour is such a one.
     dissipation : of each cell; sheared : the part of it that the wall drags.
     power : what drag and pumps put in, as the film's own numbers have it.
     area : of the cells, m2 (1D: m).
@@ -34,6 +35,7 @@ class Carried:
 
     q: tuple[Array, Array, Array, Array]
     free: Any
+    inside: list[Any]
     dissipation: Array
     power: float
     area: Array
@@ -74,7 +76,8 @@ def carried(at: Answer) -> Carried:
     dragged = [-unit * (s.couette_W - s.b_W * void_W), unit * (s.couette_E + s.b_E * r)]
     q = (pushed[0] + dragged[0], pushed[1] + dragged[1], pushed[2], pushed[3])
 
-    other_free = [a > 0.5 for a in neighbours(at, free)]
+    # Whether the neighbour (west, east, south, north) is a cell whose temperature is unknown.
+    other_free = [a > 0.5 for a in around(framed_by(grid, free.astype(float), (0.0,) * 4))]
     front = free & ((r > 0.0) | (void_W > 0.0))
     back = np.minimum(dragged[1], -pushed[1]) - np.maximum(pushed[0], 0.0)
     turn = np.where(front, np.maximum(back, 0.0), 0.0)
@@ -106,7 +109,8 @@ def carried(at: Answer) -> Carried:
         stays = np.where(free, unit * s.storage * (1.0 - r), 0.0)
         pumped -= float(problem.reduce.sum(np.where(free, p - least, 0.0) * (stays - unit * s.kept)))
         was = np.where(free, area * problem.stored.on(grid, problem.stored.carried), 0.0)
-    return Carried(q, free, np.where(free, heat + shear, 0.0), power_shear + push + pumped, area, sheared, turns, stays, was)
+    heat, power = np.where(free, heat + shear, 0.0), power_shear + push + pumped
+    return Carried(q, free, other_free, heat, power, area, sheared, turns, stays, was)
 
 
 def _shear(at: Answer, dy: float, other_free: list[Any]) -> tuple[Array, Array]:
@@ -139,8 +143,3 @@ def _shear(at: Answer, dy: float, other_free: list[Any]) -> tuple[Array, Array]:
         at_wall = 0.5 * np.where(full, 4.0, 1.0 - r) / s.h
         shear = shear + dx * mu * np.where(wall, at_wall, inner)
     return rows * shear, volume_unit(problem) * (s.couette_E + s.b_E * r)
-
-
-def neighbours(at: Answer, free: Any) -> list[Any]:
-    """1 where the neighbour (west, east, south, north) is a cell whose temperature is unknown, else 0. Collective."""
-    return [np.where(a > 0.5, 1.0, 0.0) for a in around(framed_by(at.grid, free.astype(float), (0.0,) * 4))]

@@ -107,6 +107,7 @@ class Answer:
     base: LubricationProblem
     factors: dict[str, Array] = field(default_factory=dict)
     memory: dict[Any, Any] = field(default_factory=dict)  # what an effect found, by its id
+    rough: bool = False  # whether three digits of what effects make of it will do
 
     @property
     def grid(self) -> Grid:

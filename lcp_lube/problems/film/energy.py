@@ -25,7 +25,7 @@ from petsc4py import PETSc
 
 from ...base.parallel import Array
 from .assembly import assemble
-from .carried import Carried, holders, neighbours
+from .carried import Carried, holders
 from .effects import Answer, around, framed_by
 from .reynolds import sides
 
@@ -69,7 +69,6 @@ def heated(
     """
     grid, reduce, free = at.grid, at.problem.reduce, flow.free
     leaves, enters = flow.both_ways
-    inside = neighbours(at, free)
     H, falls = exchange * flow.area, np.where(free, falls, 0.0)
     diagonal = np.where(free, rho_c * (sum(leaves) + flow.held) + H, 0.0)  # type: ignore[operator]
     still = diagonal <= STILL * reduce.max(diagonal)  # grooves, and cells whose liquid does not go on
@@ -78,7 +77,7 @@ def heated(
     diagonal = np.where(still, 1.0, diagonal + falls)
     offsets = ((0, -1), (0, 1), (-1, 0), (1, 0))
     entries = [(0, 0, diagonal)]
-    for (dj, di), a, near in list(zip(offsets, enters, inside, strict=True))[: 2 * grid.dim]:
+    for (dj, di), a, near in list(zip(offsets, enters, flow.inside, strict=True))[: 2 * grid.dim]:
         entries.append((dj, di, np.where(still, 0.0, -rho_c * a * near)))
     solver = reduce.through(transport := _Transport(assemble(grid, entries)))
     heat = np.where(still, 0.0, flow.dissipation + np.where(free, more, 0.0) + H * wall + rho_c * flow.kept).ravel()
@@ -105,7 +104,7 @@ def heated(
     finally:
         transport.destroy()
     T = theta.reshape(grid.box)
-    edge = _over_edge(flow, inside)
+    edge = _over_edge(flow)
     on = [float(back) * reduce.sum(into) for (_, into, _), back in zip(mixers, mixed, strict=True)]  # goes on with the oil
     out = rho_c * (reduce.sum(edge * T) - sum(on)) + reduce.sum(np.where(free, H * (T - wall), 0.0))
     for columns, back in zip(holders(at), mixed, strict=False):
@@ -135,13 +134,13 @@ def fresh_flow(at: Answer, flow: Carried, carry_over: float | None) -> float:
     """Oil that enters at T_in and leaves again, m3/s (1D: m2/s). Collective."""
     reduce = at.problem.reduce
     mixers = _mixers(at, flow, carry_over)
-    away = reduce.sum(_over_edge(flow, neighbours(at, flow.free)))
+    away = reduce.sum(_over_edge(flow))
     return float(away - sum(share * reduce.sum(into) for _, into, share in mixers))
 
 
-def _over_edge(flow: Carried, inside: list[Any]) -> Array:
+def _over_edge(flow: Carried) -> Array:
     """What leaves each cell over the edge of the film, m3/s."""
-    return _to_and_from(flow, [flow.free & (near < 0.5) for near in inside])[0]
+    return _to_and_from(flow, [flow.free & ~near for near in flow.inside])[0]
 
 
 def _to_and_from(flow: Carried, faces: Sequence[Any]) -> tuple[Array, Array]:

@@ -16,6 +16,7 @@ from .table import EffectTable
 
 Kelvin = Annotated[Finite, Field(ge=oils.LOWEST, le=oils.HIGHEST)]
 NEWTON, FOUND, NEAR = 30, 1e-9, 1e-2  # steps, and K: of T ahead; for derivatives by T
+ALIKE = 0.03  # of log(viscosity): a change after which one more step would move T by less than a part in 1000
 LITTLE = 1e-6  # of the heat that walls could take, and that films hold over a step's length: the balance of less is not told
 POINTS = {"exponential": 2, "walther": 2, "roelands": 2, "vogel": 3}
 
@@ -141,6 +142,8 @@ class Heat(Effect):
             new = table.T_in + heated(at, flow, rho_c, table.exchange, self.wall, table.carry_over, *steps).theta
             new = np.clip(np.nan_to_num(new, nan=oils.HIGHEST), coldest, oils.HIGHEST)
             T, moved = new, reduce.max(np.abs(new - T))
+            if at.rough and reduce.max(np.abs(np.log(law(T) / old))) < ALIKE:
+                break
             if not moved * (moved / before) ** 2 > FOUND:  # what the next step is expected to move
                 break
             before = moved
