@@ -30,6 +30,7 @@ from .turned import Mirrored
 
 MOST_SOLVES = 30  # on a grid
 RANGE = {"eccentricity": 1e4, "h_offset": 100.0}  # unless one is given: of e/(1 - e) about 1, of the film about the scene's
+STEP = 1e-4  # in t, of a difference
 COARSE_TOL = 1e-3  # a coarse grid's load is no better
 FEWEST, NARROWEST = 25, 3  # points of a coarse grid, and across
 MOST_FAILED, LIGHTER = 4, 3.0  # solves without an answer before there is one, and twice the step in t from each to less load
@@ -144,6 +145,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     unknown = variable(scene, table, known, shapes)
     t, slope, solves, work, found = unknown.start, unknown.slope, 0, 0.0, False
     start: Any = near
+    steep: float | None = None  # slope of log W at what was found
     times: dict[str, float] = {}
     for shape in shapes:
         search = Search(unknown.low, unknown.high, slope)
@@ -160,13 +162,16 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         if start is not None and start is not near:
             start.destroy()
         start, slope, solves = solution, search.slope, solves + count
+        steep = (search.slope_at(t) if found else None) or steep
     value, load = unknown.to_value(t), carried(solution.problem.quantities(solution.fields))
     answer = f"{unknown.key} = {value:.8g} carries {load:.8g}"
     if solution.converged and not found:
         solution.outcome = Outcome.LOAD_NOT_CARRIED
         solution.message = f"{table.load:g} asked for; the nearest of {count} tried: {answer}"
     solution.times = times
+    by_t = (unknown.to_value(t + STEP) - unknown.to_value(t - STEP)) / (2.0 * STEP)
     solution.settings |= {
+        "load_slope": None if steep is None else steep * load / by_t,  # dW/dvalue, a few digits of it
         "balance": {
             "vary": unknown.key,
             "value": value,

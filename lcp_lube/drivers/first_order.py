@@ -42,6 +42,7 @@ from .turned import Mirrored
 STEP = 1e-4  # of an effect: its derivative is a difference of two values of L
 THINNEST = -0.9  # of the rigid film, of a lift
 SOME = 1e-300  # Pa
+FORCES = {"load", "force_x", "force_y"}  # numbers that are made of no others
 MOST = 30.0  # of log(Q), up or down, by an effect: more tells nothing, and less than exp(-36) is no digit of 1 + dQ/Q
 
 
@@ -64,7 +65,10 @@ class FirstOrder:
         self._fields: dict[tuple[str, ...], Cells] = {}
         if found is None:
             found = Implicit([], [], np.zeros((0, 0)), {})
-            if conditions_of(self.scene, solution)[0] or solution.settings.get("supply_pressures"):
+            (keys, conditions), supplied = conditions_of(self.scene, solution), solution.settings.get("supply_pressures")
+            if keys == [quantity] and not supplied and (slope := solution.settings.get("load_slope")):  # a search knows it
+                found = Implicit(keys, list(conditions), np.array([[1.0 / slope]]), {})
+            elif keys or supplied:
                 law = without(self.scene, [name for name in named(scene) if name != "barus" or name not in kept])
                 adjoint = Adjoint(law, solution, [quantity])
                 found = Implicit.of(adjoint)
@@ -92,7 +96,7 @@ class FirstOrder:
         self._film(self.solved)
         self.at = Answer(eq.constant, self.p, self.r, self.cells, self.law, self.base, rough=True)
         names = [name for name in dict.fromkeys([quantity, *found.conditions]) if name not in found.found]
-        self.numbers = numbers = eq.numbers(self.p, self.r, None if self.quantity != "load" else ("load", "force_x", "force_y"))
+        self.numbers = numbers = eq.numbers(self.p, self.r, FORCES if FORCES.issuperset(names) else None)
         self.parts = {name: eq.partials(numbers, name) for name in names}
         self.value = eq.report(numbers).get(quantity)
         if quantity in found.found:

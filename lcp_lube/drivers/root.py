@@ -53,6 +53,14 @@ class Search:
         self.left.add(t)
         self.ends = [0.5 * (near + t) if (end - t) * (t - near) >= 0 else end for end in self.ends]
 
+    def slope_at(self, t: float) -> float | None:
+        """That of g at one of the points, by its own or by another one's and the secant between; None where none is known."""
+        g = dict(self.points)[t]
+        near = min(self.slopes, key=lambda known: abs(known - t), default=t)
+        if near == t:
+            return self.slopes.get(t)
+        return 2.0 * (g - dict(self.points)[near]) / (t - near) - self.slopes[near]
+
     @property
     def bracket(self) -> tuple[float, float] | None:
         """The narrowest interval between two points with g of different sign; None without one."""

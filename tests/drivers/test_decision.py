@@ -127,6 +127,18 @@ def test_a_value_that_is_next_to_nothing():
         assert s.converged and not s.settings["model"]["left_out"] and abs(s.settings["balance"]["value"]) < 1e-7
 
 
+def test_the_slope_of_a_load_that_was_found():
+    """By what the search has seen, for the decision: as two films near it have it."""
+    pad = {**PAD, "n": 99, "fluid": {"mu": 0.02, "p_supply": 1e5}, "balance": {"load": 3e5}}
+    with solve(pad) as s:
+        at, told = s.settings["balance"]["value"], s.settings["load_slope"]
+    loads = []
+    for level in (at - 1e-8, at + 1e-8):
+        with solve({**pad, "balance": None, "h_offset": level}) as s:
+            loads.append(s.load)
+    assert told == pytest.approx((loads[1] - loads[0]) / 2e-8, rel=0.02) and told < 0.0
+
+
 def test_least_and_named():
     plain = load_scene({**SCENES["cavity"], "fluid": {"mu": 0.02, "p_supply": 1e5}, "temperature": None})
     with solve(plain) as reference, solve(SCENES["cavity"], model="least") as least:
