@@ -1,5 +1,7 @@
 """Films whose coefficients depend on their answer: one loop for all effects, pressure, temperature, shear, deformation.
 
+In a time step by multigrid density alone is no loop: its film takes those of its pressures after every cycle (`tangent.renew`).
+
 The fields x that effects make of an answer (`film.effects`) go into the film's coefficients, the film is solved as any other,
 and the effects make new fields G(x) of its answer. x = G(x) is solved by PETSc's Anderson acceleration (SNES type
 anderson, `loop`), which has no factor to tune: each step costs one solve of a film, started from the one before.

@@ -14,7 +14,7 @@ from ..problems.film.effects import Answer, Cells, Compressible, Effect, FaceFac
 from ..problems.film.fluid import Law
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
-from ..problems.film.tangent import WIDEST, Giving, closed, filled, lift_of, logarithm
+from ..problems.film.tangent import WIDEST, Giving, closed, filled, lift_of, logarithm, renewed
 from ..problems.solution import Solution
 from ..scenes.scene import Solvable
 from .ask import Ask, Start
@@ -56,7 +56,7 @@ class Loop:
         self.frozen = replace(self.frozen, base=self.base)
         self.p_sides = self.model.p_sides
         self.h = self.base.scheme.h.ravel()
-        self.giving = Giving.of(self.law, self.model.effects, self.base)
+        self.giving = Giving.of(self.law, self.model.effects, self.base, not (self.model.effects or self.model.grooves))
         if self.giving is not None:
             self.effects += (self.giving,)
         self.names = list(neutral(self.effects, 0))
@@ -69,6 +69,7 @@ class Loop:
         # How far a time step is expected to change the fields, as a vector; and how far they are then from having no effect.
         self.moved, self.reach = 0.0, np.inf
         self.answer: Answer | None = None
+        self.own: Array | None = None  # the vector that the last film has taken in place of that it was given
         self.left: dict[str, float] = {}  # of a film's balances, where that went into what its cells store
         self.beyond = False  # whether no pressure carries the last film's flow
         self.start: Solution | Start | None = ask.start
@@ -130,19 +131,15 @@ class Loop:
         """Solve the film with these coefficients; whether it has an answer, which is then `answer`."""
         plain = self.by(cells)
         by = plain if self.giving is None else self.giving.linearised(plain, cells, self.h)
-        ask = replace(self.ask, start=self.start)
-        if self.solves:
-            ask = replace(ask, nested=None)
+        ask = replace(self.ask, start=self.start, nested=None if self.solves else self.ask.nested)
         new = self.inner(replace(self.frozen, by=by if cells else None), ask)
         if self.solution is not None:
             self.solution.destroy()
-        self.solution = self.start = new
-        self.first = self.first or new
+        self.solution, self.start, self.first = new, new, self.first or new
         self.steps += new.steps
         self.rescued = new if new.took_over else self.rescued
         self.times = added(self.times, new.times)
-        self.solves += 1
-        self.work += new.problem.unknowns
+        self.solves, self.work = self.solves + 1, self.work + new.problem.unknowns
         if not new.converged:
             return False
         if any(one.open for one in self.model.supplies):
@@ -152,10 +149,14 @@ class Loop:
         self.beyond = bool(b) and not self.base.reduce.max(b * q) < 1.0
         if self.beyond and {"viscosity", "lift"} & set(self.names):  # of an iterate: hotter oil, softer walls may carry it
             q = np.minimum(q, STEEPEST / b)
-        p = self.law.pressure(q)
-        by = filled(plain, by, q)
-        if self.model.stored is not None and self.ask.options.get("rest"):
-            by = closed(by, new.problem, new.fields, self.base)
+        p, problem, fields = self.law.pressure(q), new.problem, new.fields
+        by, own = filled(plain, by, q), renewed(problem, self.law, None if new.took_over else p)
+        self.own = None if own is None else self.vector(own)
+        if own is not None:
+            cells, by, fields = own, self.by(own), {"p": p / unit, "r": fields["r"]}
+            problem = answer(self.base, self.law, cells, by, p, fields["r"], self.p_sides).problem
+        if self.model.stored is not None and (own or self.ask.options.get("rest")):
+            by = closed(by, problem, fields, self.base)
             self.left = {"residual": new.certificate.measures["residual"]}
         with np.errstate(all="ignore"):
             self.answer = answer(self.base, self.law, cells, by, p, new.fields["r"], self.p_sides, self.effects)
@@ -218,7 +219,7 @@ class Loop:
                 self.last = before
                 found = self._found(before, watch)
                 with np.errstate(all="ignore"):
-                    after = before - found
+                    after = (before if self.own is None else self.own) - found
                 last, self.change = (before, after), self.base.reduce.max(np.abs(after))
                 if self.change < best[0]:
                     best = self.change, before

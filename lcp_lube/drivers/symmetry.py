@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import Any
 
 from ..problems.certificate import Certificate
+from ..problems.film.tangent import renew
 from ..problems.solution import Fields, Outcome, Problem, Solution
 from ..problems.transfer import Pick, numbers
 from ..scenes.scene import Solvable
@@ -134,6 +135,8 @@ class _Whole:
             if (held := getattr(small, "held", None)) is not None:  # pressures of supplies may have followed
                 pairs = zip(self.problem.held.supplies, held.supplies, strict=True)
                 self.problem.hold_at([replace(one, p=found.p) for one, found in pairs])
+            if (by := getattr(small, "factors", None)) is not None and by.at is not None:
+                renew(self.problem, spread(by.at))
             spread.destroy()
             self._found = self.problem.certify(self.fields, eps1)
         return self._found

@@ -164,6 +164,22 @@ def test_large_symmetric_films_begin_by_the_method_that_half_of_them_takes():
             assert solution.converged and solution.method == "fas" and solution.mass_defect_run < 1e-10, solution.message
 
 
+def test_cavitated_films_with_density_take_one_film_a_step(monkeypatch):
+    """Multigrid's film takes the densities of its pressures between cycles: no second one, whatever a front passes."""
+    film, films = Loop.film, list[Any]()
+    monkeypatch.setattr(Loop, "film", lambda loop, cells: films.append(loop.model.stored) or film(loop, cells))
+    shape = {"shape": "formula", "h": "1e-5*(1.5+0.4*sin(600*t)+0.6*cos(418*x-300*t))"}
+    data: dict[str, Any] = {"family": "bearing", "dimension": 2, "L": 0.03, "width": 0.02, "U": 5.0, "nx": 64, "ny": 40}
+    data |= {"film": shape, "fluid": {"mu": 0.03, "p_supply": 1e5, "density": "dowson-higginson"}}
+    loads = []
+    for method in ("fas", "active-set"):
+        with solve(data | {"motion": {"t_end": 1e-3, "steps": 10}}, method=method) as solution:
+            assert solution.converged and solution.mass_defect_run < 1e-10, solution.message
+            assert method != "fas" or sum(stored is not None for stored in films) == 10
+            loads.append([row["load"] for row in solution.history])
+    assert loads[0] == pytest.approx(loads[1], rel=1e-3)  # the formula's error is far more
+
+
 @pytest.mark.parametrize("effect", ["none", "density", "walls"])
 def test_pressures_of_supplies_follow(effect, monkeypatch):
     """Unknowns of each step beside the film's: one or two steps of Newton's method, two or three films between soft walls."""

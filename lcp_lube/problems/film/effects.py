@@ -153,22 +153,26 @@ class FaceFactors:
 
     k_W, k_E, k_S, k_N : of the conductances. u_W, u_E : of the wall's flows. mu : viscosity at the east face, over mu.
     stored : of what a full cell holds, in a time step; gives : by how much more for 1 Pa more, if it is not held, 1/Pa.
+    again : those of a rigid film at another pressure (p_unit, `tangent.renew`); None: they are held. rigid, at : these two.
     """
 
     grid: Grid
     values: dict[str, Array]
+    again: Any = None
+    rigid: Any = None
+    at: Any = None
 
     def on(self, grid: Grid, j: NDArray[np.int64], i: NDArray[np.int64]) -> "FaceFactors":
         """Those of a part of the film, whose points are the lines j and columns i of this one's grid. Collective."""
         take = Pick(self.grid, grid, j, i)
         found = {name: take(values.ravel()).reshape(grid.box) for name, values in self.values.items()}
         take.destroy()
-        return FaceFactors(grid, found)
+        return FaceFactors(grid, found, self.again)
 
     def film(self, problem: LubricationProblem) -> LubricationProblem:
         """The film with these factors."""
         film = scaled(problem, self)
-        film.factors = self
+        film.factors = replace(self, rigid=problem)
         return film
 
 
@@ -187,8 +191,7 @@ def framed_by(grid: Grid, values: Array, at_sides: Sequence[float] | None = None
 
 def face_means(framed: Array) -> list[Array]:
     """Means over the west, east, south and north face."""
-    here = framed[1:-1, 1:-1]
-    return [0.5 * (here + other) for other in around(framed)]
+    return [0.5 * (framed[1:-1, 1:-1] + other) for other in around(framed)]
 
 
 def around(framed: Array) -> tuple[Array, Array, Array, Array]:
@@ -198,8 +201,7 @@ def around(framed: Array) -> tuple[Array, Array, Array, Array]:
 
 def factors(problem: LubricationProblem, cells: Cells, density_at_sides: Sequence[float] | None = None) -> FaceFactors:
     """What the fields make of the scheme of a rigid, isoviscous film. Collective."""
-    grid = problem.grid
-    ones = np.ones(grid.box)
+    grid, ones = problem.grid, np.ones(problem.grid.box)
     k, u, mu, stored = [ones] * 4, [ones] * 4, ones, ones
     if "viscosity" in cells:
         at_faces = face_means(framed_by(grid, cells["viscosity"]))
@@ -236,13 +238,11 @@ def scaled(
         stored["storage"] = s.storage * f["stored"]
         stored["gives"] = s.storage * f["gives"] * problem.p_unit if "gives" in f else None
         c, carried = c + s.storage - stored["storage"], carried - stored["storage"]
-    p_sides = p_sides or problem.p_sides
-    for conductance, at_side, p_side in zip(k.values(), sides(grid), p_sides, strict=True):
+    for conductance, at_side, p_side in zip(k.values(), sides(grid), p_sides or problem.p_sides, strict=True):
         c = c + np.where(at_side, conductance * (p_side / problem.p_unit), 0.0)
     u: dict[str, Any] = {"b_C": carried, "b_W": s.b_W * f["u_W"], "couette_W": couette_W, "couette_E": couette_E}
     scheme = replace(s, **k, **u, **stored, c=c)
-    held = held or problem.held
-    if held is not None:
+    if (held := held or problem.held) is not None:
         scheme = pressed(scheme, held, problem.p_unit)
     return problem.with_scheme(scheme, problem.mu * f["mu"], p_sides, held)
 

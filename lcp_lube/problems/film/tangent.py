@@ -19,7 +19,7 @@ import numpy as np
 
 from ...base.parallel import Array
 from ..solution import Fields
-from .effects import Answer, Cells, Effect, FaceFactors, answer, around, face_means, factors, framed_by
+from .effects import Answer, Cells, Effect, FaceFactors, answer, around, face_means, factors, framed_by, scaled
 from .fluid import Law
 from .lubrication import LubricationProblem
 from .reynolds import BoxScheme, sides
@@ -103,17 +103,19 @@ def tangent(problem: LubricationProblem, law: Law | None, constant: LubricationP
 
 @dataclass(frozen=True)
 class Giving(Effect):
-    """slopes : by how much more of the rigid film a full cell stores for 1 Pa more, at p = 0, 1/Pa. walls : by these alone."""
+    """slopes : by how much more of the rigid film a full cell stores for 1 Pa more, at p = 0, 1/Pa. walls : by these alone.
+    alone : whether density is all that follows the pressure, of which a film may take its own while it is solved."""
 
     law: Law
     walls: Array
+    alone: bool
     channels: ClassVar[tuple[str, ...]] = ("pressure",)
 
     @classmethod
-    def of(cls, law: Law, effects: Sequence[Effect], film: LubricationProblem) -> "Giving | None":
+    def of(cls, law: Law, effects: Sequence[Effect], film: LubricationProblem, alone: bool) -> "Giving | None":
         """film : the rigid one; None where nothing gives way, or nothing is stored. Collective."""
         h = film.scheme.h.ravel()
-        found = cls(law, sum((effect.yields(film.grid) for effect in effects), np.zeros(h.size)) / h)
+        found = cls(law, sum((effect.yields(film.grid) for effect in effects), np.zeros(h.size)) / h, alone)
         return found if film.scheme.storage is not None and film.reduce.max(found.slopes) > LEAST else None
 
     @cached_property
@@ -131,7 +133,31 @@ class Giving(Effect):
         gives, left = slope * self.law.viscosity(p), stored - LEAST_KEPT * np.minimum(stored, 1.0)  # dp/dq = mu(p)/mu
         gives = np.minimum(gives, np.divide(left, q, out=np.full_like(q, np.inf), where=q > 0.0))
         found = {"stored": stored - gives * q, "gives": gives}
-        return replace(by, values=by.values | {name: a.reshape(by.grid.box) for name, a in found.items()})
+        values = by.values | {name: a.reshape(by.grid.box) for name, a in found.items()}
+        return replace(by, values=values, again=self.at if self.alone else None)
+
+    def at(self, film: LubricationProblem, q: Array) -> FaceFactors:
+        """Those of a rigid film's cells and faces at q (p_unit), where density alone gives way. Collective."""
+        p = self.law.pressure(q * film.p_unit)
+        sides = [float(self.law.density(self.law.pressure(np.array(side)))) for side in film.p_sides]
+        cells = {"density": self.law.density(p), "pressure": p}
+        return replace(self, walls=np.zeros(1)).linearised(factors(film, cells, sides), cells, film.scheme.h.ravel())
+
+
+def renew(problem: LubricationProblem, p: Array) -> None:
+    """Give a problem the coefficients that follow from another pressure (p_unit). Collective."""
+    rigid = problem.factors.rigid
+    by = problem.factors.again(rigid, p)
+    problem.scheme, problem.factors = scaled(rigid, by, held=problem.held).scheme, replace(by, rigid=rigid, at=p)
+
+
+def renewed(problem: Any, law: Law, p: Array | None) -> Cells | None:
+    """The fields at p (Pa; None: those taken last) of a film that took its own while it was solved; None if it did not."""
+    by = getattr(problem, "factors", None)
+    if by is None or by.at is None:
+        return None
+    p = law.pressure(by.at * problem.p_unit) if p is None else p
+    return {"density": law.density(p), "pressure": p}
 
 
 def filled(plain: FaceFactors, by: FaceFactors, q: Array) -> FaceFactors:

@@ -120,15 +120,13 @@ class Fas(Cycles):
         sums = np.array(self._loops.norms(level.z, level.kx, level.ky, level.c, level.carry))
         if level.comm is not None:
             level.comm.Allreduce(sums.copy(), sums)
-        residual, terms = np.sqrt(sums)
-        return float(residual), float(terms)
+        return float(np.sqrt(sums[0])), float(np.sqrt(sums[1]))
 
     def _norm(self) -> float:
         """||G|| / ||c||; where rounding in G's sums alone exceeds eps1, on very fine grids, relative to that. Collective.
 
         Many small residuals of one sign are a flow that is lost. Where little flows through the sides of a film, or pressures
-        drive next to nothing beside the wall, the certificate sees more of it than ||G|| does: then eps1 times the ratio of
-        its mass defect or residual to a tenth of what may be.
+        drive next to nothing beside the wall, the certificate sees more of it: eps1 times that over a tenth of what may be.
         """
         residual, terms = self._norms() if self._taken or self.problem.held else (self._c_norm, self._c_norm)  # z = 0
         norm = float(residual / (max(self._c_norm, 16 * EPS * terms / self.eps1) or 1.0))
@@ -149,7 +147,7 @@ class Fas(Cycles):
         StalledError : ||G|| has stalled.
         """
         self._own()
-        anew, self._fields = self._taken == 0, None
+        anew, self._fields, level = self._taken == 0, None, self._levels[0]
         if self._stalled and self.norm > self.eps1:
             if not self._retreat():
                 if not self.norm < 1.0:
@@ -158,8 +156,8 @@ class Fas(Cycles):
                 raise StalledError(told)
             anew = not self.norm < self._first
         with self.stages("cycles"):
-            if self._taken == 1 and self._levels[0].carry is not None:
-                self._relax_fronts(self._levels[0])
+            if self._taken == 1 and level.carry is not None:
+                self._relax_fronts(level)
             if anew:
                 self._tools.right_sides(self._levels[: self._depth], self._harmonic)
                 self._full_multigrid()
@@ -167,7 +165,8 @@ class Fas(Cycles):
                 self._cycle(0, self._kind())
         self._count()
         with self.stages("norm"):
-            if self._levels[0].carry is not None:
+            if level.carry is not None:
+                self._finest.renewed(level, self.problem, self._following)
                 part, pressures = closing(self.problem, self.fields, self._following)
                 self.z = self.z + part * np.abs(self.z)
                 if pressures is not None:
@@ -176,8 +175,7 @@ class Fas(Cycles):
         if not np.isfinite(self.norm):
             self.z = np.zeros(self.problem.grid.local_size)  # as above
         self._first = self.norm if self._taken == 1 else self._first
-        step = self.problem.reduce.comm.allreduce(self._correction) if self._levels[0].comm is not None else self._correction
-        size = float(np.sqrt(step))
+        size = float(np.sqrt(self._correction if level.comm is None else level.comm.allreduce(self._correction)))
         if self.norm <= self.eps1:
             whole = self.problem.reduce.max(self.fields["p"]) * np.sqrt(self.problem.size)
             # Where pressures drive less through a cell than the wall does, ||c|| is no scale for them.
@@ -261,6 +259,8 @@ class Fas(Cycles):
         if level.held is not None:
             level.z[level.held] = at_supplies
         level.share(level.z)
+        if k == 0:
+            self._finest.renewed(level, self.problem, self._following)
         if o.front:
             self._relax_fronts(level)
         self._relax(level, o.post, True)

@@ -7,10 +7,11 @@ import numpy as np
 
 from ...base.parallel import Array
 from ...problems.film.lubrication import LubricationProblem
+from ...problems.film.tangent import renew
 from ...problems.grid import Grid
 from ...problems.solution import Fields
 from ...problems.strips import in_strips
-from . import held
+from . import held, loops
 from .kernels import pressure_and_void
 from .levels import FEWEST_LINES, Level, carried
 
@@ -33,6 +34,22 @@ def finest(problem: LubricationProblem) -> Level:
         put(level, grid, pressures, problem.held.pressures(problem.p_unit))
         held.hold(level, pressures, owner)
     return level
+
+
+def renewed(level: Level, problem: LubricationProblem, follow: Any) -> None:
+    """Go on with coefficients that follow the pressure, if any do; coarse grids, which make corrections alone, keep the old.
+
+    follow : supplies whose pressures do likewise (`following.Following`), if any. Collective.
+    """
+    if problem.factors is None or problem.factors.again is None:
+        return
+    fields = loops.pressure_and_void(own(level, problem.grid, level.z), problem.scheme, problem.grid)
+    renew(problem, fields["p"])
+    new = finest(problem)
+    level.kx, level.ky, level.c, level.void, level.carry = new.kx, new.ky, new.c, new.void, new.carry
+    put(level, problem.grid, level.z, fields["p"] + problem.scheme.b_C.ravel() * fields["r"])
+    if follow is not None:
+        follow.begin(fields)
 
 
 def level_of(grid: Grid, k_W: Array, k_E: Array, k_S: Array, k_N: Array, c: Array) -> Level:

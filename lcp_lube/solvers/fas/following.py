@@ -54,7 +54,12 @@ class Following:
         self.inner = [self._sum(v, inner(v.kx, v.ky, v.owner, v.carry, len(held.supplies))) for v in levels]
         self.P, self.c, self.flows = ([np.zeros(len(self.free))] * n for _ in range(3))
         self.P[0] = np.array([held.supplies[k].p / problem.p_unit for k in self.free])
-        own = np.array(supply_flows(problem, fields["p"], fields["r"]))[self.free]
+        self.begin(fields)
+
+    def begin(self, fields: Fields) -> None:
+        """With the problem's coefficients, at fields."""
+        own = np.array(supply_flows(self.problem, fields["p"], fields["r"]))[self.free]
+        self.c[0] = np.zeros(len(self.free))
         self.c[0] = (self.taken(0) - own) / self.units[0]
 
     def _sum(self, level: tools.Level, of_all: Array) -> Array:
