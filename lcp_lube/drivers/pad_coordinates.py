@@ -21,6 +21,7 @@ from .grooves import SideBySide, SolvedFilm, films_of
 from .impedance import Mode, displacements, held
 from .response import Response
 
+FEWEST = 10  # points of a coarse grid along a pad
 MOMENTS = 1e-8  # of the load times the lever, about a pivot
 
 
@@ -68,6 +69,11 @@ class JournalPads:
     def pitches(self) -> Sequence[int]:
         """The tilts that open an inlet."""
         return range(2, self.sizes.size)
+
+    @property
+    def fewest(self) -> int:
+        """Points around of a coarse grid."""
+        return math.ceil(FEWEST * 360.0 / self.scene.pad_deg)
 
     def start(self) -> Array:
         scene = self.scene
@@ -153,6 +159,10 @@ class ThrustPads:
     @property
     def pitches(self) -> Sequence[int]:
         return (1,)
+
+    @property
+    def fewest(self) -> int:
+        return FEWEST
 
     def start(self) -> Array:
         scene = self.scene

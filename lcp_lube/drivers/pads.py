@@ -9,6 +9,8 @@ tilting, and are not what a bearing runs at: their inlets are opened, step by st
 which the journal has moved so far that it finds no place with stiffness idles: its inlet is closed until it has no pressure.
 """
 
+import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,14 +19,15 @@ from numpy.typing import NDArray
 from ..base.parallel import Array
 from ..problems.solution import Outcome, Solution
 from ..scenes.moving import motion_of
-from ..scenes.scene import Solvable
+from ..scenes.scene import Scene, Solvable
 from .ask import Ask
 from .chain import Chain
 from .compose import Inner
 from .impedance import stiffness
 from .pad_coordinates import Bearing, Films, PadFilm, bearing_of
 
-MOST_SOLVES = 80  # the end of a search that goes round: pads without preload, which idle, took up to 65
+MOST_SOLVES = 80  # on a grid: the end of a search that goes round: pads without preload, which idle, took up to 65
+COARSER, FINE = 0.7, 9  # points of a coarse grid over those of the scene's, at most; points across that are halved
 THINNER, THICKER = 0.7, 3.0  # parts of a film anywhere by which a step may change it
 THINNEST = 1e-5  # film over the clearance, below which no load is looked for: a difference quotient's step is a tenth of it
 ROUNDING = 1e-15  # a step in parts of the coordinates' sizes, of which a film knows nothing
@@ -39,16 +42,48 @@ def applies(scene: Solvable, ask: Ask) -> bool:
 
 
 def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
-    """The solution where everything balances; its outcome is LOAD_NOT_CARRIED where no such place was found. Collective."""
+    """The solution where everything balances; its outcome is LOAD_NOT_CARRIED where no such place was found. Collective.
+
+    From a cold start a coarse grid comes first, which tells too what pads idle; `nested` = False: none does.
+    """
     bearing = bearing_of(scene)
-    assert bearing is not None  # as `applies` found
-    q = bearing.start()
-    known = ask.start.settings.get("relative_coordinates") if ask.start is not None else None
-    if known is not None and len(known) == q.size and bearing.free[0]:
-        q = np.where(bearing.free, bearing.sizes * known, q)
+    assert isinstance(scene, Scene) and bearing is not None  # as `applies` found
+    known, q = ask.start.settings.get("relative_coordinates") if ask.start is not None else None, bearing.start()
+    warm = known is not None and len(known) == q.size and bool(bearing.free[0])
+    if warm:
+        q = np.where(bearing.free, bearing.sizes * np.asarray(known), q)
+    idles, solves, work, first = np.zeros(q.size, dtype=bool), 0, 0.0, None
+    if not warm and ask.nested is not False and (coarse := _coarse(scene.shape, bearing.fewest)) is not None:
+        first, at, solves, found, there, _ = _on_grid(scene.with_shape(coarse), ask, inner, q, idles)
+        work = solves * math.prod(coarse) / math.prod(scene.shape)
+        if found:
+            q, idles, ask = at, there, replace(ask, start=first)
+    solution, q, count, found, _, why = _on_grid(scene, ask, inner, q, idles)
+    if first is not None:
+        first.destroy()
+    _tell(scene, bearing, solution, q, found, {"iterations": count, "solves": solves + count, "work": work + count}, why)
+    return solution
+
+
+def _coarse(shape: tuple[int, ...], fewest: int) -> tuple[int, int] | None:
+    """Half of the points each way, at least so few along; None where that saves too little."""
+    nx, ny = shape
+    coarse = max(nx // 2, fewest), ny // 2 | 1 if ny >= FINE else ny
+    return coarse if math.prod(coarse) <= COARSER * nx * ny else None
+
+
+def _on_grid(
+    scene: Scene, ask: Ask, inner: Inner, q: Array, idles: NDArray[np.bool_]
+) -> tuple[Solution, Array, int, bool, NDArray[np.bool_], str]:
+    """Newton's method on one grid: solution, place, solves, whether it was found, what idles there, and why none was found.
+
+    idles : tilts of pads that idle on a coarser grid. Collective.
+    """
+    bearing = bearing_of(scene)
+    assert bearing is not None  # as in `solve`
     chain = Chain(ask, inner)
-    found, again, stiff = False, False, False
-    nudges, nudge, off = np.zeros(q.size, dtype=int), np.zeros(q.size), np.zeros(q.size)
+    found, again, stiff = False, bool(idles.any()), False
+    nudges, nudge, off = NUDGES * idles.astype(int), np.zeros(q.size), np.zeros(q.size)
     counts, idle = off, list[bool]()
     for count in range(1, MOST_SOLVES + 1):
         at = bearing.at(q)
@@ -90,8 +125,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
             K[k, k] > 0 for k in bearing.pitches if bearing.free[k]
         )
         q = q + step
-    _tell(scene, bearing, solution, q, found, count, why + _left(bearing, off, counts, idle))
-    return solution
+    return solution, q, count, found, nudges >= NUDGES, why + _left(bearing, off, counts, idle)
 
 
 def _left(bearing: Bearing, off: Array, counts: Array, idle: list[bool]) -> str:
@@ -125,7 +159,7 @@ def _step(bearing: Bearing, films: Films, K: Array, off: Array, counts: Array, n
     return films.min(share) * step
 
 
-def _tell(scene: Any, bearing: Bearing, solution: Solution, q: Array, found: bool, count: int, why: str) -> None:
+def _tell(scene: Any, bearing: Bearing, solution: Solution, q: Array, found: bool, counts: dict[str, float], why: str) -> None:
     """Outcome, record and the pads' numbers on the solution. why : where none was found. Collective."""
     values, told = solution.problem.quantities(solution.fields), bearing.told(solution, q)
     place = f"{told['vary']} = {told['value']:.8g}, tilts {', '.join(f'{tilt:.4g}' for tilt in told['tilts'])} rad"
@@ -136,9 +170,10 @@ def _tell(scene: Any, bearing: Bearing, solution: Solution, q: Array, found: boo
     tilts = [float(tilt) for tilt in told["tilts"]]
     solution.problem.more |= {"pad_tilts": tilts}  # type: ignore[attr-defined]
     solution.settings |= {"coordinates": [float(one) for one in q], "relative_coordinates": q / bearing.sizes}
-    solution.because(f"pads: {place}, found in {count} solves", after=True)
+    found_in = f"found in {counts['iterations']} solves on this grid, {counts['solves']} in all"
+    solution.because(f"pads: {place}, {found_in}", after=True)
     if "attitude_deg" in told:
         solution.settings["attitude_deg"] = told["attitude_deg"]
     if scene.balance is not None:
-        record = {"load": scene.balance.load, "carried": values["load"], "iterations": count, "solves": count}
-        solution.settings["balance"] = {"vary": told["vary"], "value": told["value"], **record}
+        record = {"load": scene.balance.load, "carried": values["load"]}
+        solution.settings["balance"] = {"vary": told["vary"], "value": told["value"], **record, **counts}

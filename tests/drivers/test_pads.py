@@ -73,6 +73,8 @@ def test_a_pad_without_preload_idles():
         assert solution.converged, solution.message
         values = solution.problem.quantities(solution.fields)
         assert values["force"] == pytest.approx([-5e3, 0.0], abs=1e-2)
+        found = solution.settings["balance"]  # which pads idle is known from half the points
+        assert found["iterations"] <= 5 < found["solves"] and found["work"] < found["solves"]
 
 
 @pytest.mark.parametrize(
