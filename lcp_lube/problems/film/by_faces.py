@@ -10,6 +10,7 @@ is such a sum too, of h and 1/h at the faces.
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,25 @@ from .strip import line_weights, stream_weights
 EQUAL = 1e-15  # relative: ratios that differ by rounding alone
 NEAR = 1e-6  # of a cell: an edge so near it counts as inside
 Rows = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Laid:
+    """Places of a grid's lines and of the faces between them, and the sums' parts of those that are alike."""
+
+    grid: Grid
+    x_places: tuple[Array, Array]
+    y_places: tuple[Array, Array]
+    steps: Array
+    widths: Array
+    y: Array
+    across: Array
+    lines: Rows
+    faces: Rows
+    ends: Array
+    of_lines: list[Any]
+    of_faces: Any
+    of_drags: list[Any]
 
 
 class ByFaces:
@@ -72,53 +92,62 @@ class ByFaces:
             self._void = -np.insert(r.reshape(grid.box), 0, 0.0, axis=1)[None]
             self._outer = [np.full((1, ny, 1), side) for side in (-west, east)]
         self._known: dict[tuple[int, bytes], tuple[Array, Array]] = {}
+        self._own: dict[tuple[bool, tuple[float, ...]], Laid] = {}
 
     def sums(self, gap: Any, grid: Grid) -> Array | None:
         """What the pressures (m2/s Pa s) and the wall (m) make of each, and by what it grows with each side's pressure: shape
         (weights, 6); None for a film that is not positive. Of drags what the pressures (N) and mu U (m) make.
         grid : the problem's, or the same points elsewhere."""
-        film, (y_nodes, y_faces) = Around(gap, grid), grid.nodes_and_faces(1)
+        film = Around(gap, grid)
         cut = [jumps_of(film, axis) for axis in "xy"]
-        y, across = grid.y[:, 0], pairs(grid.steps(1))
-        lines, faces = np.arange(y.size), np.arange(y_faces.size)
-        if level(film):
-            lines = _alike(cut[1], y - 0.5 * across[0], y + 0.5 * across[1])
-            faces = _alike(cut[1], *pairs(y_nodes))
         out, positive = np.zeros((self.count + len(self.drags), 6)), True
-        balances = out[: self.count]
-        of_lines, of_faces = self._parts(grid, lines, faces)
-        of_drags = self._drag_parts(grid, lines) if self.drags else []
-        for some, rows in _strips(lines, grid.box[1]):
-            C, H, before = _along(film, grid, y[rows], across[:, rows], cut)
+        balances, at = out[: self.count], self._laid(grid, level(film), tuple(cut[1]))
+        for some, rows in _strips(at.lines, grid.box[1]):
+            C, H, before = _along(film, at, at.y[rows], at.across[:, rows], cut)
             positive = positive and all(bool((a > 0.0).all()) for a in (C, H, before))
             if self.drags and positive:
-                films = self._sheared(film, grid, y[rows], across[:, rows], before / H)
-                for k, parts in enumerate(of_drags, start=self.count):
+                films = self._sheared(film, at, at.y[rows], at.across[:, rows], before / H)
+                for k, parts in enumerate(at.of_drags, start=self.count):
                     for column, part, of in zip((0, 1, 1, 2, 3), parts, films, strict=True):
                         out[k, column] += _total(part, some, of)[0]
-            C = C / grid.steps(0)
-            for k, part, values in zip((0, 1, 1, 2, 3), of_lines, (C, H, before, C[:, :1], C[:, -1:]), strict=True):
+            C = C / at.steps
+            for k, part, values in zip((0, 1, 1, 2, 3), at.of_lines, (C, H, before, C[:, :1], C[:, -1:]), strict=True):
                 if part is not None:
                     balances[:, k] += _total(part, some, values)
-        for some, rows in _strips(faces, grid.box[1]):
-            C = _across(film, grid, pairs(y_nodes)[:, rows], y_faces[rows], cut) * grid.widths(0)
+        for some, rows in _strips(at.faces, grid.box[1]):
+            C = _across(film, at, pairs(at.y_places[0])[:, rows], at.y_places[1][rows], cut) * at.widths
             positive = positive and bool((C > 0.0).all())
-            balances[:, 0] += _total(of_faces, some, C)
-            for k, end, here in ((4, 0, some.start == 0), (5, -1, some.stop == faces.size)):
-                balances[:, k] += here * _weights(grid)[1][end] * (self._ends[end] @ C[end])
+            balances[:, 0] += _total(at.of_faces, some, C)
+            for k, end, here in ((4, 0, some.start == 0), (5, -1, some.stop == at.faces.size)):
+                balances[:, k] += here * at.ends[end] * (self._ends[end] @ C[end])
         total = grid.comm.allreduce(np.append(out, float(not positive)))
         return None if total[-1] else total[:-1].reshape(out.shape)
 
-    def _parts(self, grid: Grid, lines: Rows, faces: Rows) -> list[Any]:
-        """The sums' parts of rows that are alike, with the weights that are left."""
-        pressed, across = _weights(grid)
-        dragged = stream_weights(grid)[:, 0]
+    def _laid(self, grid: Grid, level: bool, cut: tuple[float, ...]) -> "Laid":
+        """Its lines, those of the problem's own grid made once for films that jump along the same ones."""
+        key = level, cut
+        if grid is self.grid and key in self._own:
+            return self._own[key]
+        y_nodes, y_faces = grid.nodes_and_faces(1)
+        y, across = grid.y[:, 0], pairs(grid.steps(1))
+        lines, faces = np.arange(y.size), np.arange(y_faces.size)
+        if level:
+            lines = _alike(cut, y - 0.5 * across[0], y + 0.5 * across[1])
+            faces = _alike(cut, *pairs(y_nodes))
+        # What conductances have of the lines, and of the faces between them; and what the wall drags.
+        ends = grid.spacing[0] * grid.stretch(y_faces) / (6.0 * grid.steps(1) * grid.spacing[1])
+        pressed, dragged = (line_weights(grid) / grid.stretch(grid.y) / 6.0)[:, 0], stream_weights(grid)[:, 0]
         of_lines = [(self._along, pressed), (self._at_face, dragged), (self._before, dragged)]
         of_lines += [(one, pressed) for one in self._beside]
-        return [
+        found = Laid(
+            grid, grid.nodes_and_faces(0), (y_nodes, y_faces), grid.steps(0), grid.widths(0), y, across, lines, faces, ends,
             [None if a is None else self._added(a, b, lines) for a, b in of_lines],
-            self._added(self._across, across, faces),
-        ]
+            self._added(self._across, ends, faces),
+            self._drag_parts(grid, lines) if self.drags else [],
+        )  # fmt: skip
+        if grid is self.grid:
+            self._own[key] = found
+        return found
 
     def _drag_parts(self, grid: Grid, lines: Rows) -> list[Any]:
         """The same of the drags'."""
@@ -127,10 +156,10 @@ class ByFaces:
         of = [(self._pull, pulls), (self._whole, shears), (self._void, shears), *((one, pulls) for one in self._outer)]
         return [[self._added(a, b * lever, lines) for a, b in of] for lever in levers]
 
-    def _sheared(self, film: Around, grid: Grid, y: Array, across: Array, void: Array) -> list[Array]:
+    def _sheared(self, film: Around, at: "Laid", y: Array, across: Array, void: Array) -> list[Array]:
         """By what `_drag_parts` count on the x faces of some lines. void : the film of the void, in parts of the wall's."""
-        at, steps = grid.x[0], grid.steps(0)
-        x = np.append(at[0] - steps[0] / 2, at + steps[1:] / 2)[None]
+        places, steps = at.grid.x[0], at.steps
+        x = np.append(places[0] - steps[0] / 2, places + steps[1:] / 2)[None]
         h, resting, moving = sheared_lines(film, x, y[:, None], across)
         pull, full = 0.5 * h, steps / moving
         return [pull, steps * resting + full, full * void if self._nodal else full, pull[:, :1], pull[:, -1:]]
@@ -147,13 +176,6 @@ class ByFaces:
             added = np.array([[np.einsum("j,ji->i", weights[run], one[run]) for run in runs] for one in a])
             self._known[id(a), first.tobytes()] = added, weights
         return added, np.full(first.size, ratio[0])
-
-
-def _weights(grid: Grid) -> tuple[Array, Array]:
-    """What conductances have of the lines, and of the faces between them."""
-    y_faces = grid.nodes_and_faces(1)[1]
-    across = grid.spacing[0] * grid.stretch(y_faces) / (6.0 * grid.steps(1) * grid.spacing[1])
-    return (line_weights(grid) / grid.stretch(grid.y) / 6.0)[:, 0], across
 
 
 def _alike(jumps: Sequence[float], low: Array, high: Array) -> Rows:
@@ -176,9 +198,9 @@ def _total(part: tuple[Array, Array], some: slice, films: Array) -> Array:
     return np.array([weights[some] @ np.einsum("ji,ji->j", one[some], films) for one in a])
 
 
-def _along(film: Around, grid: Grid, y: Array, across: Array, cut: Sequence[Any]) -> tuple[Array, Array, Array]:
+def _along(film: Around, at: Laid, y: Array, across: Array, cut: Sequence[Any]) -> tuple[Array, Array, Array]:
     """C and H of the x faces of some lines, and the film at the points before them (`strip.coefficients_of`)."""
-    nodes, faces = grid.nodes_and_faces(0)
+    (nodes, faces), grid = at.x_places, at.grid
     shape = y.size, faces.size
     before = np.broadcast_to(film(nodes[None, :-1], y[:, None]), shape)
     if cut[0] or cut[1]:
@@ -188,12 +210,12 @@ def _along(film: Around, grid: Grid, y: Array, across: Array, cut: Sequence[Any]
     return h * h * h, h, before
 
 
-def _across(film: Around, grid: Grid, nodes: Array, faces: Array, cut: Sequence[Any]) -> Array:
+def _across(film: Around, at: Laid, nodes: Array, faces: Array, cut: Sequence[Any]) -> Array:
     """C of some lines of y faces."""
-    x = grid.x[0]
+    x, grid = at.x_places[0][1:-1], at.grid
     if cut[0] or cut[1]:
         period = grid.lengths[1] if grid.periodic[1] else 0.0
-        turned = face_film(lambda t, s: film(s, t), nodes, faces, x, cut[1], cut[0], pairs(grid.steps(0)), period)
+        turned = face_film(lambda t, s: film(s, t), nodes, faces, x, cut[1], cut[0], pairs(at.steps), period)
         return turned[0].T
     h = np.broadcast_to(film(x[None, :], faces[:, None]), (faces.size, x.size))
     return np.asarray(h * h * h)
