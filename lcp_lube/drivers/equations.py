@@ -128,7 +128,7 @@ class Equations:
         return G if self.held is None else np.where(self.held, G * unit / self.constant.p_unit, G)
 
     def terms(self, p: Array, weights: Sequence[Array]) -> Array:
-        """Sums of weights' sizes times those of the terms that G is the sum of, in its unit of flow: a measure of rounding. Collective."""
+        """Sums of weights' sizes times those of G's terms, in its unit of flow: a measure of rounding. Collective."""
         grid, scheme = self.grid, self.problem(p).scheme
         p, w, out = (p / self.constant.p_unit).reshape(grid.box), [a.reshape(grid.box) for a in weights], np.zeros(len(weights))
         some = (every := list(scheme.in_strips(grid)))[:: max(1, len(every) // 6)]  # they stand for a large film's others
