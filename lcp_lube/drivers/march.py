@@ -66,7 +66,8 @@ class March:
     rates: float = 0.0  # largest so far: what drives the film, 2 dx sums
     warming: float = 0.0  # likewise, of what is carried
     curved: bool = False  # whether `guess` knows three steps
-    lapse: float = 0.0  # of the last step: what its formula errs by, as `Stored` has it
+    ends: bool = False  # whether steps end by `lapse`: of the last step, what its formula errs by, as `Stored` has it
+    lapse: float = 0.0
 
     def begin(self, contents: Array, fields: Fields | None, carried: Array | None = None) -> None:
         """At t = 0."""
@@ -121,8 +122,8 @@ class March:
         moving, own = (problem.moving, problem.there(fields)) if isinstance(problem, TurnedProblem) else (problem, fields)
         into += [flow / size for flow in supply_flows(moving, own["p"], own["r"])]
         contents, volume = self._rounded(formula, problem, contents, sum(into))
-        lapse, old = self._lapse(dt, contents, self.contents), self.grid.reduce.norm(formula.old(self.contents))
-        self.lapse = 0.0 if lapse is None else self.grid.reduce.norm(lapse) / (old or 1.0)
+        if self.ends and (lapse := self._lapse(dt, contents, self.contents)) is not None:
+            self.lapse = self.grid.reduce.norm(lapse) / (self.grid.reduce.norm(formula.old(self.contents)) or 1.0)
         rate = formula.weight * volume - formula.old(self.volumes)
         self.flowed += dt * sum(into)
         self.stored += dt * rate

@@ -85,7 +85,7 @@ class Run:
         self.march.curved = (coupled := bool(first.effects) or first.dense) or chosen.method == "fas"
         self.ask = replace(ask, method=chosen.method, implied=not named)
         if chosen.method == "fas" and self.rotor is None and ask.options.get("rest", REST):
-            stopping = ask.stopping or {"eps1": EPS1}
+            stopping, self.march.ends = ask.stopping or {"eps1": EPS1}, True
             self.ask = replace(self.ask, options={"rest": REST, **ask.options}, stopping=stopping)
             ask = ask if coupled else replace(ask, stopping=stopping)
         self.steps, self.certificates = list[Step](), list[Certificate]()
