@@ -1,6 +1,7 @@
 """What the caller of `solve` wants, beyond the scene: one value that every driver reads and hands down."""
 
 from collections.abc import Callable, Mapping
+from copy import copy
 from dataclasses import dataclass, field, fields
 from numbers import Integral, Real
 from pathlib import Path
@@ -13,6 +14,7 @@ from ..base.options import wants_ksp
 from ..base.progress import Progress
 from ..errors import InputError, nearest
 from ..problems.certificate import Certificate
+from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Fields, Problem, Solution
 from ..solvers.newton import Monitor, Stopping
 
@@ -29,6 +31,16 @@ class Start:
     fields: Fields
     settings: Mapping[str, Any] = field(default_factory=dict)
     made: Mapping[str, Any] | None = None
+
+
+def light(problem: Any) -> Any:
+    """A plain film's problem as a start from it needs it: without coefficients, which are most of its memory."""
+    if type(problem) is not LubricationProblem or not problem.plain:
+        return problem
+    problem.free_matrices()
+    other = copy(problem)
+    other.scheme = None  # type: ignore[assignment]
+    return other
 
 
 # What attributes may be, and in words: for those who call from Python.

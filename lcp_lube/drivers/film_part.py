@@ -10,6 +10,7 @@ mirror : the film is symmetric about the middle of the width, and the sides sout
 """
 
 from dataclasses import dataclass, replace
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -92,7 +93,7 @@ class Part(Derived):
 
     def facts(self, comm: PETSc.Comm | None = None) -> Facts:
         model, shape = self._model()
-        return model.facts(shape, comm)
+        return replace(model.facts(shape, comm), spread=prod(self.whole.shape))
 
     def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
         """The discrete problem of the part. Collective."""

@@ -16,7 +16,7 @@ from ..problems.grid import EVEN
 from ..problems.solution import Outcome, Solution, Step
 from ..scenes.motion import MotionTable
 from ..scenes.moving import motion_of
-from .ask import Ask, Start
+from .ask import Ask, Start, light
 from .coefficients import supplied
 from .compose import Inner
 from .march import March
@@ -89,8 +89,7 @@ class Run:
             self.ask = replace(self.ask, options={"rest": REST, **ask.options}, stopping=stopping)
             ask = ask if coupled else replace(ask, stopping=stopping)
         self.steps, self.certificates = list[Step](), list[Certificate]()
-        self.times_s, self.history = dict[str, float](), list[dict[str, Any]]()
-        self.lengths = [np.inf, 0.0]
+        self.times_s, self.history, self.lengths = dict[str, float](), list[dict[str, Any]](), [np.inf, 0.0]
         self.rescuer: str | None = None
         self.last: Solution | None = None
         self.settings, self.begun = dict[str, Any](), dict[str, Any]()  # of the steps, and of the steady film
@@ -206,6 +205,7 @@ class Run:
     def _step(self, t: float, dt: float) -> tuple[Solution, Any, str, list[list[Step]]]:
         """The film at the step's end, where the journal is, why it has no place, and each solve's steps. Collective."""
         march, formula = self.march, self.march.formula(dt)
+        self.last = self.last and replace(self.last, problem=light(self.last.problem))
         term, near = replace(march.term(formula), exact=self.rotor is not None), march.guess(dt)
         solves: list[Solution] = []
 
@@ -246,9 +246,9 @@ class Run:
         self.steps += [step for steps in solves for step in steps]
         self.solves += len(solves)
         self.times_s = {name: self.times_s.get(name, 0.0) + seconds for name, seconds in solution.times.items()}
-        if self.last is not None:
-            self.last.destroy()
-        self.last = solution
+        last, self.last = self.last, solution
+        if last is not None:
+            last.destroy()
 
     def _sweeps(self, history: list[dict[str, Any]]) -> None:
         """Fronts that run by several cells a step are put right by sweeps, which a few steps alone would not pay for."""

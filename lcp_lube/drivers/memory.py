@@ -40,7 +40,7 @@ MEASURED: dict[tuple[str, str, str], tuple[float, float]] = {
     ("lubrication 1D", "full", "mumps"): (1250, 0),
     ("lubrication 1D", "full", "light"): (750, 0),
     ("lubrication 2D", "", ""): (70, 0),
-    ("lubrication 2D moving", "", ""): (100, 0),
+    ("lubrication 2D moving", "", ""): (200, 0),
     ("lubrication 2D", "cavity", "multigrid"): (780, 0),
     ("lubrication 2D", "reduced", "multigrid"): (1040, 0),
     ("lubrication 2D", "reduced", "umfpack"): (410, 82),
@@ -57,6 +57,7 @@ MEASURED: dict[tuple[str, str, str], tuple[float, float]] = {
     ("equations 2D", "jacobian", "multigrid"): (550, 0),
     ("equations 2D", "jacobian", "umfpack"): (1310, 0),
 }
+SPREAD = 16, 56  # bytes for each point of the film that a part is of: its fields; of a march those that are kept too
 LITTLE = 32 * MB  # a run that needs no more starts without a look at what is free
 LARGE = 1_000_000  # points from which building the problem is itself worth a look ahead
 MULTIGRID = ("hypre", "ml", "gamg", "mg")
@@ -179,7 +180,7 @@ def bytes_needed(facts: Facts, plan: Plan) -> float | None:
     if solver == "light" and options.get("ksp_type", "gmres") == "gmres":
         unknowns = 2 if plan.system == "full" else 1
         each += 8 * unknowns * min(_restart(options), 200)
-    return each * points
+    return each * points + SPREAD[facts.moving] * facts.spread
 
 
 def _libraries(facts: Facts, plan: Plan) -> int:

@@ -15,7 +15,7 @@ from ..problems.solution import Fields, Outcome, Problem, Solution
 from ..problems.transfer import Pick, numbers
 from ..scenes.scene import Solvable
 from . import film_part, rectangle_part
-from .ask import Ask, Start
+from .ask import Ask, Start, light
 from .compose import Inner
 from .memory import look_ahead
 from .plan import plan
@@ -95,7 +95,7 @@ def solve_part(part: Part, problem: Problem, ask: Ask, inner: Inner) -> Solution
         return Solution(problem, known, Outcome.CONVERGED, "nothing to solve", certificate, [], settings).judged()
     start = None
     if ask.start is not None:
-        small = part.build(problem.grid.petsc_comm)
+        small = light(part.build(problem.grid.petsc_comm))
         same = ask.start.problem.grid is problem.grid
         near = ask.start.fields if same else problem.prolong(ask.start.problem, ask.start.fields, False)  # type: ignore[arg-type]
         take = Pick(problem.grid, small.grid, *numbers(small.grid))

@@ -17,6 +17,7 @@ class Facts:
     dense : whether the Jacobian is a dense matrix.
     held : whether supplies hold cells inside at their pressures.
     moving : whether the film's cells store liquid: a time step.
+    spread : points of the whole film whose fields a part's answer becomes; 0: it is the whole one.
     """
 
     kind: str
@@ -26,6 +27,7 @@ class Facts:
     dense: bool = False
     held: bool = False
     moving: bool = False
+    spread: int = 0
 
     @property
     def dim(self) -> int:

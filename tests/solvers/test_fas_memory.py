@@ -37,6 +37,19 @@ def test_bytes_a_point(name, changes, most):
     assert 0.9 * peak < foreseen < 1.2 * peak
 
 
+def test_bytes_a_point_in_time():
+    """Of a march: what is kept of earlier steps, a step's coefficients once and not those of the step before, multigrid's."""
+    scene, ask = load_scene("piston_skirt", {"motion.t_end": 4e-3, "motion.steps": 5}), {"method": "fas", "memory_check": False}
+    solve(scene.with_shape((140, 140)), **ask).destroy()  # as above
+    tracemalloc.start()
+    try:
+        with solve(scene.with_shape((260, 261)), **ask) as solution:
+            assert solution.converged and len(solution.history) == 5
+            assert tracemalloc.get_traced_memory()[1] < 300 * 260 * 261  # 276
+    finally:
+        tracemalloc.stop()
+
+
 def test_the_finest_grid_is_the_problems_own():
     """Its conductances and right-hand side are not stored twice; a scheme that was changed is not mistaken for them."""
     from dataclasses import replace

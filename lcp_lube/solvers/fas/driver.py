@@ -70,7 +70,7 @@ class Fas(Cycles):
         self._harmonic, self._truncation = options.weights == "harmonic", TRUNCATIONS[options.truncation]
         follows = start is not None and following.foreseen(problem, start["p"])
         with self.stages("assembly"):
-            self._levels = levels.hierarchy(finest.finest(problem), self._harmonic, ELIMINATED)
+            self._levels = levels.settled(levels.hierarchy(finest.finest(problem), self._harmonic, ELIMINATED))
         # A corrected pressure counts beside a corrected flow of void as the flow that it drives: units of pressure are any.
         first = self._levels[0]
         driven = 2.0 * problem.reduce.max(np.array([float(k[1:-1, 1:-1].mean()) for k in (first.kx, first.ky)]))

@@ -181,6 +181,14 @@ def hierarchy(level: Level, harmonic: bool, enough: int = 0) -> list[Level]:
     return levels
 
 
+def settled(levels: list[Level]) -> list[Level]:
+    """The same without what `carry` was made of, once all are made."""
+    for level in levels:
+        if level.void is not None:
+            level.void = np.zeros((3, 0, 0))
+    return levels
+
+
 def _coarser(fine: Level, harmonic: bool) -> Level | None:
     """The grid of every second point, in the directions whose coupling is not much the weaker one. Collective."""
     # Without a point in between, the two ends of a period would be neighbours on the coarse grid and not on the fine one.
