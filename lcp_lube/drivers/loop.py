@@ -197,7 +197,7 @@ class Loop:
         walls, whose film drags what it has, go on by Newton's methods from the best fields. What is left in the end are these.
         watch : called after every film.
         """
-        from .nonlinear import by_films, steps  # here, and below: films without effects have no loop
+        from .nonlinear import by_films, by_half_steps, steps  # here, and below: films without effects have no loop
 
         x = PETSc.Vec().createMPI((len(self.names) * self.h.size, None), comm=self.base.grid.petsc_comm)
         x.setArray(begin)
@@ -266,6 +266,7 @@ class Loop:
                 best, warm, near, idle, mark = (np.inf, warm), None, False, 0, (np.inf, self.solves)
         if steady and not self.found and "warmth" in self.names and np.isfinite(least[0]):
             least = at_once(least[1])
+            least = least if self.found or "lift" in self.names else by_half_steps(self, least, watch)
         if steady and not self.found and "lift" in self.names and np.isfinite(self.change):
             x.setArray(least[1])
             self.told.append(f"from film {self.solves + 1} on by Newton's method with films for its products")

@@ -53,3 +53,30 @@ def test_what_does_not_settle_ends_at_its_best(monkeypatch):
     with solve(SOFT, model="full") as s:
         assert s.outcome == "max_iterations" and f"{min(changes):.1e}" in s.message
         assert s.certificate.measures["coupling"] == pytest.approx(min(changes), rel=1e-6)
+
+
+class Swinging:
+    """What a loop leaves behind whose fields its effects throw to the other side, by `pull` times as much."""
+
+    def __init__(self, pull):
+        self.pull, self.change, self.told, self.solves = pull, np.inf, [], 0
+
+    @property
+    def found(self):
+        return self.change <= 1e-9
+
+    def off(self, x, watch):
+        self.solves += 1
+        change = (1.0 + self.pull) * np.sin(x)  # G(x) = x - change
+        return np.max(np.abs(change)), change
+
+
+def test_half_steps_settle_where_whole_ones_swing():
+    """And end where the least change no longer halves."""
+    swings, far = Swinging(1.5), np.array([0.9, -0.4])
+    least = nonlinear.by_half_steps(swings, (np.inf, far), lambda: None)
+    assert swings.found and least[0] == swings.change and np.max(np.abs(least[1])) < 1e-9 and swings.solves < 50
+    swings = Swinging(3.5)
+    least = nonlinear.by_half_steps(swings, (np.inf, far), lambda: None)
+    most = 3 * nonlinear.PATIENT
+    assert not swings.found and nonlinear.PATIENT <= swings.solves < most and least[0] < np.inf
