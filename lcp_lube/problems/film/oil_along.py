@@ -72,9 +72,10 @@ class Along:
     def __call__(self, x: Array) -> Array:
         k = np.clip(np.searchsorted(self._ends, x, side="right") - 1, 0, self._ends.size - 2)
         a, b = self._ends[k], self._ends[k + 1]
-        at, out = np.clip((2.0 * x - a - b) / (b - a), -1.0, 1.0), self._parts[-1][:, k]
-        for part in self._parts[-2::-1]:
-            out = out * at + part[:, k]
+        at, out = np.clip((2.0 * x - a - b) / (b - a), -1.0, 1.0), self._parts[-1].take(k, axis=1)
+        for part in self._parts[-2::-1]:  # a third of the time of new arrays and of indices in brackets
+            out *= at
+            out += part.take(k, axis=1)
         return out
 
 
