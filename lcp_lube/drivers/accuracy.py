@@ -143,11 +143,8 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         end = _end(estimates, values, tol, problem.grid.size)
         rounding = _rounding(problem) if pairs or (line and quantity in INTEGRALS) else 0.0
         if not end and len(values) > 1 and max(map(abs, values)) <= rounding:
-            end = (
-                f"it is below {rounding:.0e} N, which is rounding beside what wall and sides could carry"
-                if rounding
-                else "it is 0"
-            )
+            noise = f"below {rounding:.0e} N, which is rounding beside what wall and sides could carry"
+            end = f"it is {noise if rounding else 0}"
         most = 0 if end else rungs_up(estimates, tol, told.line is not None, len(first), pairs)
         for up in range(most, 0, -1):
             shape = finer(first, meshes, rung + up, unit)
