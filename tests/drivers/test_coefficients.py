@@ -146,6 +146,44 @@ def test_moments_are_odd_in_the_tilt():
     assert forth["moment"][0] < 0 < back["moment"][0]
 
 
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"grooves_deg": [80.0, 200.0, 320.0], "p_groove": 2e5, "p_end": 3e4},
+        {"grooves_deg": [], "p_end": 1e5},  # film forms again inside
+        {"grooves_deg": [80.0, 260.0], "shear": {"law": "eyring", "tau_0": 1e4}},
+    ],
+    ids=["grooves", "ring", "eyring"],
+)
+def test_forces_and_moments_with_tilt_are_slopes_of_solves(changes):
+    """All sixteen of K, against central differences of the numbers told of a tilted journal, slopes by half the width."""
+    place, tilts = 0.4 * np.exp(0.7j), 1e-3 * (0.8 - 0.5j)
+    base, stop = {"nx": 48, "ny": 7, **changes}, {"eps1": 1e-11}
+    half = 0.5 * load_scene("misaligned_journal", base).side_lengths[1]
+
+    def told(place, tilts):
+        e, at, tilt = abs(place), math.degrees(np.angle(place)), {"tilt": tilts.real, "tilt_across": tilts.imag}
+        scene = load_scene("misaligned_journal", {**base, "eccentricity": e, "attitude_deg": at, **tilt})
+        solution = solve(scene, stopping=stop)
+        values = solution.problem.quantities(solution.fields)
+        return scene, solution, np.array([*values["force"], *np.divide(values["moment"], half)])
+
+    scene, solution, F = told(place, tilts)
+    with solution:
+        (found,) = coefficients(scene, solution, tilt=True)
+    along = math.atan2(-F[1], -F[0])
+    turn = np.kron(np.eye(2), [[math.cos(along), -math.sin(along)], [math.sin(along), math.cos(along)]])
+    size, step = np.array([1.0, 1.0, half, half]), 1e-5 * scene.clearance
+    slopes = np.zeros((4, 4))
+    for k, (e, slope) in enumerate([(1, 0), (1j, 0), (0, 1), (0, 1j)]):
+        for sign in (1.0, -1.0):
+            moved = told(place + sign * step * e / scene.clearance, tilts + sign * step * slope / half)
+            moved[1].destroy()
+            slopes[:, k] -= sign * moved[2] / (2.0 * step)
+    K = turn @ (found.K / np.outer(size, size)) @ turn.T
+    assert np.abs(K - slopes).max() < 1e-6 * np.abs(K).max() and np.abs(K[2:, 2:]).min() > 1e-3 * np.abs(K).max()
+
+
 def test_the_threshold_of_stability():
     """Lund and Thomsen's rows give 2.35 for L/D = 0.5, S = 1.656."""
     K, C = np.array([[1.69, 5.06], [-2.20, 1.95]]), np.array([[9.93, 2.15], [2.15, 4.80]])
