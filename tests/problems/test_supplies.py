@@ -127,6 +127,16 @@ def test_pressure_at_a_side_that_a_supply_reaches(data):
     assert errors[1] < 3e-3 and np.polyfit(np.log([48, 96, 192]), np.log(errors), 1)[0] < -1.7
 
 
+@pytest.mark.parametrize("corner", [0.0, 3e-4])
+def test_faces_around_the_corners_of_a_recess(corner):
+    """Load and flow to 1e-3 at 31 points a side: 6e-3 and 1.2e-2 with differences, which follow r^(2/3) by order 4/3."""
+    recess = {"shape": "rectangle", "x_mm": [31.7, 58.2], "y_mm": [17.3, 36.1 + 1e3 * corner], "p": 1e6}
+    data = {**PAD, "U": 0.0, "film": [{"shape": "constant", "h": 3e-5}], "fluid": {"mu": MU}, "supply": [recess]}
+    coarse, fine = (answer({**data, "nx": n, "ny": n}, certify=False)[1] for n in (31, 255))
+    assert coarse["load"] == pytest.approx(fine["load"], rel=1e-3)
+    assert coarse["supply_flow"] == pytest.approx(fine["supply_flow"], rel=1e-3)
+
+
 def test_groove_as_supply_is_the_groove():
     """An axial groove as a table on the ring and as a groove between two films: the same answer."""
     data = {**RING, "grooves_deg": [90.0, 270.0], "attitude_deg": 50.0, "p_groove": 1e5}

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ...base.parallel import Array
 from ...errors import InputError
 from ..grid import Grid
+from .corners import around_corners
 from .flows import volume_unit
 from .fluid import Law
 from .reynolds import BoxScheme
@@ -262,7 +263,7 @@ def _nearest(grid: Grid, place: tuple[float, float]) -> NDArray[np.bool_]:
 
 
 def _shares(grid: Grid, held: Held) -> Array:
-    """Parts of the ways to the four neighbours over which faces resist: to the edge between a held and a free point."""
+    """Parts of the ways to the four neighbours over which faces resist: to the edge of a supply, and as at its `corners`."""
     (ny, nx), outside = grid.box, -2
     framed = grid.ghosted(held.owner.astype(float).ravel(), outside=outside).astype(np.int64)
     beside = np.stack([framed[1 + dj : 1 + dj + ny, 1 + di : 1 + di + nx] for dj, di in WAYS])
@@ -288,13 +289,12 @@ def _shares(grid: Grid, held: Held) -> Array:
             low, high = np.where(there, low, middle), np.where(there, middle, high)
         found[at] = np.maximum(high, NEAREST)
     shares[way, j, i] = np.where((other == outside) & (found == NEAREST), 1.0, found)  # 1: a supply that reaches the side
-    return shares
+    return shares / around_corners(grid, [supply.region for supply in held.supplies])
 
 
 def supply_flows(problem: LubricationProblem, p: Array, r: Array) -> list[float]:
     """Volume flow that each supply gives to the film, m3/s (1D: m2/s). Collective."""
     if (held := problem.held) is None:
         return []
-    given = problem.face_flows(p, r).reshape(problem.grid.box)
-    unit = volume_unit(problem)
+    given, unit = problem.face_flows(p, r).reshape(problem.grid.box), volume_unit(problem)
     return [unit * problem.reduce.sum(np.where(held.owner == k, given, 0.0)) for k in range(len(held.supplies))]
