@@ -167,7 +167,8 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     answer = f"{unknown.key} = {value:.8g} carries {load:.8g}"
     if solution.converged and not found:
         solution.outcome = Outcome.LOAD_NOT_CARRIED
-        solution.message = f"{table.load:g} asked for; the nearest of {count} tried: {answer}"
+        looked = " to ".join(f"{end:.8g}" for end in sorted(map(unknown.to_value, (unknown.low, unknown.high))))
+        solution.message = f"{table.load:g} asked for; the nearest of {count} tried: {answer}; balance.range was {looked}"
     solution.times = times
     by_t = (unknown.to_value(t + STEP) - unknown.to_value(t - STEP)) / (2.0 * STEP)
     solution.settings |= {
