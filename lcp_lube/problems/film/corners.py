@@ -48,10 +48,10 @@ def around_corners(grid: Grid, regions: Sequence[Region]) -> Array:
             if not around[side]:
                 room = min(room, at[side] - grid.origin[side], grid.origin[side] + grid.lengths[side] - at[side])
         off = [np.min(np.abs(a - t)) / h for a, t, h in zip(nodes, at, grid.spacing, strict=True)]
-        if room <= 0.0 or max(off) > ON:
-            continue
         reach = [min(room, CELLS * h) for h in grid.spacing]
         near = [np.flatnonzero(np.abs(a[1:-1] - t) < r) for a, t, r in zip(nodes, at, reach, strict=True)]
+        if max(off) > ON or not all(k.size for k in near):  # none too where a corner is as near a side as rounding
+            continue
         # In lengths, from the corner outwards: these points and those before and behind them, and the faces between.
         scale = outward[0] * float(grid.stretch(np.array(at[1]))), outward[1]
         points = [(a[k[0] : k[-1] + 3] - t) * m for a, k, t, m in zip(nodes, near, at, scale, strict=True)]
