@@ -21,7 +21,7 @@ from .grooves import SideBySide, SolvedFilm, films_of
 from .impedance import Mode, displacements, held
 from .response import Response
 
-FEWEST = 10  # points of a coarse grid along a pad
+FEWEST = 8  # points of a coarse grid along a pad
 MOMENTS = 1e-8  # of the load times the lever, about a pivot
 
 

@@ -27,7 +27,7 @@ from .impedance import stiffness
 from .pad_coordinates import Bearing, Films, PadFilm, bearing_of
 
 MOST_SOLVES = 80  # on a grid: the end of a search that goes round: pads without preload, which idle, took up to 65
-COARSER, FINE = 0.7, 9  # points of a coarse grid over those of the scene's, at most; points across that are halved
+COARSER, FINE = 0.7, 7  # points of a coarse grid over those of the scene's, at most; points across that are halved
 THINNER, THICKER = 0.7, 3.0  # parts of a film anywhere by which a step may change it
 THINNEST = 1e-5  # film over the clearance, below which no load is looked for: a difference quotient's step is a tenth of it
 ROUNDING = 1e-15  # a step in parts of the coordinates' sizes, of which a film knows nothing
