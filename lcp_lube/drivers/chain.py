@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 from ..problems.solution import Fields, Solution, Step
 from ..scenes.scene import Solvable
@@ -28,11 +29,11 @@ class Chain:
         self.steps: list[Step] = []
         self._times: dict[str, float] = {}
 
-    def solve(self, scene: Solvable, near: Fields | None = None) -> Solution:
-        """near : fields nearer than the last one's."""
+    def solve(self, scene: Solvable, near: Fields | None = None, **changes: Any) -> Solution:
+        """near : fields nearer than the last one's. changes : of the ask."""
         last = self._last
         start = last if last is None or near is None else Start(last.problem, near, last.settings)
-        new = self._inner(scene, replace(self._ask, start=start or self._ask.start))
+        new = self._inner(scene, replace(self._ask, start=start or self._ask.start, **changes))
         if self._last is not None:
             self._last.destroy()
         self._last, self.steps = new, [*self.steps, *new.steps]

@@ -6,8 +6,7 @@ gives R_s(P_s), which never grows. Newton's method on Q - R, with the exact deri
 after a handful of solves, each started from the last. That leaves A, B, c and every method as they are; sharing one unknown
 among a supply's cells would put a dense row into each of their matrices, grids and kernels.
 
-Large films, whose factors would cost more than their multigrid, begin with the pressures and derivatives that half their points
-have each way; Broyden's update keeps the derivatives near.
+Where multigrid solves, one such step brings the pressures near: from there they are unknowns of its own cycles.
 """
 
 from dataclasses import dataclass, replace
@@ -25,7 +24,7 @@ from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.supplies import Supply, supply_flows
 from ..problems.solution import Enclosure, Fields, Outcome, Solution
-from ..scenes.scene import Derived, Scene, Solvable
+from ..scenes.scene import Derived, Solvable
 from .ask import Ask
 from .chain import Chain
 from .compose import Inner
@@ -37,7 +36,6 @@ DIGITS, ENOUGH = 1e-7, 1e-4  # steps of such parts of the largest pressure may b
 PATIENCE, GIVE_UP = 2, 8  # such steps that do not halve the misfit, before one that is left is enough; or given up
 DEAF = 1e-9  # of the slope that would end the misfit within P: a flow that follows P less does so by rounding
 FIRST = 0.5  # part of p_s behind a restrictor, to begin with
-LARGE = 60_000  # points of a film in the plane that is not factored
 
 
 @dataclass(frozen=True)
@@ -88,24 +86,28 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         raise InputError(f"{scene.name}: supply.1.flow: no side has a pressure, and no supply one or a restrictor: no way out")
     known = ask.start.settings.get("supply_pressures") if ask.start is not None else None
     free = np.array([one.open for one in supplies])
-    P, film = _coarse(scene, ask, inner, free)
+    P = np.array(_first(model))
     if known is not None and len(known) == len(supplies):
         near: Any = ask.start
         P = np.array(known)
         if model.stored is not None:
             P = supply_step.Sources(supplies).foreseen(near.problem, near.fields["p"])
-    elif P is None:
-        P = np.array(_first(model))
     known_before = shut and len(supplies) == 1  # nothing flows, through its restrictor neither, whatever rounding says
     P = np.array([supplies[0].p_s]) if known_before else P
     other = np.full(2, np.nan)  # of one supply: the last pressure that was too low, and too high
-    last: tuple[Array, Array] | None = None  # pressures and flows
-    ahead: Fields | None = None  # in a time step, of the film with the next pressures
+    ahead: Fields | None = None  # of the film with the next pressures
+    follow = model.stored is None and not (model.effects or model.law or model.grooves or known_before)
     chain = Chain(replace(ask, certify=False, reduction=ask.reduction and not ask.certify), inner)  # one band, at the end
     resting, least, enough = 0, np.inf, ENOUGH if known_before else TOLERANCE
+    together = False  # film and pressures
     for count in range(1, MOST_SOLVES + 1):
         held = tuple(Supply(one.region, float(p)) for one, p in zip(supplies, P, strict=True))
-        solution = chain.solve(Fed(scene, held), ahead)
+        if together:
+            solution = chain.solve(scene, ahead, rescue=False)
+        if together and solution.converged:
+            P = np.array([one.p for one in solution.problem.held.supplies])  # type: ignore[attr-defined]
+        else:
+            solution = chain.solve(Fed(scene, held), ahead)
         problem: Any = solution.problem
         if not solution.converged:
             break
@@ -117,12 +119,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         starved = (off > TOLERANCE) & (misfit[:, 0] > 0.0) & (P <= 0.0)
         if np.max(off) <= TOLERANCE or starved.any() or count == MOST_SOLVES or known_before:
             break
-        if film is None:
-            slopes, answers = _slopes(problem, solution.fields, free)
-        else:
-            if last is not None and (moved := P[free] - last[0]).any():
-                film += np.outer(flows[free] - last[1] - film @ moved, moved) / (moved @ moved)
-            last, slopes = (P[free], flows[free]), film
+        slopes, answers = _slopes(problem, solution.fields, free)
         matrix = misfit[free, 2:] * slopes + np.diag(misfit[free, 1])
         steep = np.abs(misfit[free, 0]) / np.maximum(P[free], model.p_unit * 1e-3)
         flat = np.diag(matrix) <= DEAF * steep  # a film that is nowhere full hears nothing of P: ten times as much
@@ -132,16 +129,17 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
             other[int(misfit[free, 0][0] > 0.0)] = P[free][0]
             if not np.isnan(other).any() and not other[0] < new_P[0] < other[1]:
                 new_P[:] = np.mean(other)
-        rests = film is None and np.all(np.abs(new_P - P[free]) <= DIGITS * np.max(P)) and np.max(off) > 0.5 * least
+        rests = np.all(np.abs(new_P - P[free]) <= DIGITS * np.max(P)) and np.max(off) > 0.5 * least
         resting, least = resting + 1 if rests else 0, min(least, np.max(off))
         if resting >= GIVE_UP or (resting >= PATIENCE and np.max(off) <= ENOUGH):
             enough = ENOUGH
             break
-        if film is None and model.stored is not None:
-            z = solution.fields["p"] - solution.fields["r"] + (new_P - P[free]) @ np.array(answers)
+        together = follow and count == 1 and solution.settings["method"] == "fas"
+        by, P[free] = new_P - P[free], new_P
+        if model.stored is not None or follow:
+            z = solution.fields["p"] - solution.fields["r"] + by @ np.array(answers)
+            z = np.where(problem.held.mask.ravel(), np.append(P / problem.p_unit, 0.0)[problem.held.owner.ravel()], z)
             ahead = {"p": np.maximum(z, 0.0), "r": np.maximum(-z, 0.0)}
-        P = P.copy()
-        P[free] = new_P
     if solution.converged and np.max(off) > enough:
         worst = int(np.argmax(np.where(starved, off, 0.0) if starved.any() else off))
         if starved.any():
@@ -165,22 +163,6 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     solution.settings["supply_pressures"] = [float(p) for p in P]
     solution.because(f"supplies: pressures {found} Pa, found in {count} solves")
     return solution.judged()
-
-
-def _coarse(scene: Solvable, ask: Ask, inner: Inner, free: Array) -> tuple[Array | None, Array | None]:
-    """Pressures of a large film with half the points each way, and dQ_s/dP_t of those that are free there. Collective."""
-    facts = scene.facts(ask.comm)
-    if not isinstance(scene, Scene) or facts.dim == 1 or facts.size <= LARGE:
-        return None, None
-    coarse = scene.with_shape(tuple(n // 2 for n in scene.shape))
-    solution = solve(coarse, replace(ask, start=None), inner)
-    try:
-        if not solution.converged:
-            return None, None
-        problem: Any = solution.problem
-        return np.array(solution.settings["supply_pressures"]), _slopes(problem, solution.fields, free)[0]
-    finally:
-        solution.destroy()
 
 
 def _first(model: Model) -> list[float]:

@@ -22,6 +22,8 @@ def closing(problem: LubricationProblem, fields: Fields, follow: Any = None) -> 
     the pressures of supplies that follow, if any (`following.Following`), at which their sources give what the cells beside
     them take. Collective.
     """
+    if problem.scheme.storage is None:  # no cell stores what is left
+        return 0.0, None if follow is None else follow.P[0]
     volume, held = volume_unit(problem) / problem.scheme.flow_unit, problem.held
     moves = 1.0 if held is None else np.append([float(one.open) for one in held.supplies], 1.0)[held.owner.ravel()]
     lost, taken = [], []

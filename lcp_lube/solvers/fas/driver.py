@@ -85,7 +85,7 @@ class Fas(Cycles):
         if start is not None:
             self.z = start["p"] + problem.scheme.b_C.ravel() * start["r"]
         self._following: Any = following.Following(problem, self._levels, self.fields) if follows else None
-        self.norm = self._first = self._norm()
+        self.norm = self._first = 1.0 if follows and problem.scheme.storage is None else self._norm()  # it knows no sources
         if start is not None and problem.scheme.storage is not None and options.rest:
             lapse = problem.stored.lapse * problem.reduce.norm(problem.scheme.kept) / (self._c_norm or 1.0)  # type: ignore[arg-type]
             self._rest, self._share = max(self.eps1, min(options.rest * max(self.norm, lapse), self.eps1**0.5)), 0.5
@@ -165,7 +165,7 @@ class Fas(Cycles):
                 self._cycle(0, self._kind())
         self._count()
         with self.stages("norm"):
-            if level.carry is not None:
+            if level.carry is not None or self._following:
                 self._finest.renewed(level, self.problem, self._following)
                 part, pressures = closing(self.problem, self.fields, self._following)
                 self.z = self.z + part * np.abs(self.z)
