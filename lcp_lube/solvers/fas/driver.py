@@ -158,10 +158,10 @@ class Fas(Cycles):
         with self.stages("cycles"):
             if self._taken == 1 and level.carry is not None:
                 self._relax_fronts(level)
-            if anew:
+            if anew and not (self._taken == 0 and self._finest.unpressed(level)):
                 self._tools.right_sides(self._levels[: self._depth], self._harmonic)
                 self._full_multigrid()
-            else:
+            elif not anew:
                 self._cycle(0, self._kind())
         self._count()
         with self.stages("norm"):

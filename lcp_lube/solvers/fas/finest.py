@@ -4,6 +4,7 @@ import ctypes
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 
 from ...base.parallel import Array
 from ...problems.film.lubrication import LubricationProblem
@@ -15,6 +16,7 @@ from . import held, loops
 from .kernels import pressure_and_void
 from .levels import FEWEST_LINES, Level, carried
 
+SHARP = 1e-12  # of the largest flow of void: less is rounding
 LARGE = 1_000_000  # points of a grid whose coarser ones are worth being given back to the system
 
 
@@ -34,6 +36,24 @@ def finest(problem: LubricationProblem) -> Level:
         put(level, grid, pressures, problem.held.pressures(problem.p_unit))
         held.hold(level, pressures, owner)
     return level
+
+
+def unpressed(level: Level) -> bool:
+    """Put in the answer of a film that needs no pressure, if it is one; whether it is. Collective.
+
+    Such a film is nowhere narrower than where its oil comes in. Its void is what flow is missing, and each of its cavities ends
+    just where it is full again, at places that coarse grids have elsewhere: cycles do not settle there.
+    """
+    found = level.held is None and level.carry is None and not level.periodic[0]
+    for step in (max(1, level.c.shape[0] // 4), 1):  # some lines tell most other films
+        missing = np.cumsum(level.c[1:-1:step, 1:-1], axis=1) if found else np.zeros((1, 1))
+        found = found and bool(missing.max(initial=0.0) <= SHARP * -missing.min(initial=0.0))
+    if level.comm is not None:
+        found = level.comm.allreduce(found, MPI.LAND)
+    if found:
+        np.minimum(missing, 0.0, out=level.z[1:-1, 1:-1])
+        level.share(level.z)
+    return found
 
 
 def renewed(level: Level, problem: LubricationProblem, follow: Any) -> None:
