@@ -244,7 +244,8 @@ def test_pressures_of_supplies_follow_in_cycles_of_multigrid(effect, monkeypatch
     film = {"shape": "formula", "h": "4e-5*(1+20*x)*(1+0.3*sin(314*t))"}
     data: dict[str, Any] = {"family": "bearing", "dimension": 2, "L": 0.05, "width": 0.02, "U": 2.0, "nx": 64, "ny": 40}
     fluid = {"density": {"density": "dowson-higginson"}, "walls": {"barus": 2e-8}}.get(effect, {})
-    data |= {"film": film, "fluid": {"mu": 0.03, "p_supply": 1e5, **fluid}, "motion": {"t_end": 0.0012, "steps": 8}}
+    # Of so long a step that one cycle is just enough, or just not, the count would say nothing.
+    data |= {"film": film, "fluid": {"mu": 0.03, "p_supply": 1e5, **fluid}, "motion": {"t_end": 0.0012, "steps": 10}}
     data |= {"supply": [{**x, **q} for x, q in zip(places, sources, strict=True)]}
     data |= {"elastic": {"compliance": 1e-13}} if effect == "walls" else {}
     found = []
@@ -254,9 +255,7 @@ def test_pressures_of_supplies_follow_in_cycles_of_multigrid(effect, monkeypatch
             found.append([row["load"] for row in solution.history])
             iterations = np.mean([row["iterations"] for row in solution.history[3:]])
     assert found[1] == pytest.approx(found[0], rel=1e-4)  # the formula's error is some 1e-2
-    assert iterations <= (
-        2.5 if effect == "walls" else 1.6
-    )  # 2.0 to 2.5 where a part of the guess's residual alone ends a step
+    assert iterations <= (2.0 if effect == "walls" else 1.6)
 
 
 def test_pressures_of_supplies_in_a_cavity_do_not_swing():
