@@ -20,7 +20,7 @@ from ...base.parallel import Array
 from ..grid import Grid
 from ..strips import STRIP, ghosted, in_strips
 from .edges import Around, face_film, jumps_of, level, pairs
-from .flows import line_shares, sheared_lines
+from .flows import line_shares, linear, sheared_lines
 from .lubrication import LubricationProblem
 from .reynolds import sides
 from .strip import line_weights, stream_weights
@@ -106,7 +106,7 @@ class ByFaces:
             C, H, before = _along(film, at, at.y[rows], at.across[:, rows], cut)
             positive = positive and all(bool((a > 0.0).all()) for a in (C, H, before))
             if self.drags and positive:
-                films = self._sheared(film, at, at.y[rows], at.across[:, rows], before / H)
+                films = self._sheared(film, at, rows, before / H)
                 for k, parts in enumerate(at.of_drags, start=self.count):
                     for column, part, of in zip((0, 1, 1, 2, 3), parts, films, strict=True):
                         out[k, column] += _total(part, some, of)[0]
@@ -156,13 +156,15 @@ class ByFaces:
         of = [(self._pull, pulls), (self._whole, shears), (self._void, shears), *((one, pulls) for one in self._outer)]
         return [[self._added(a, b * lever, lines) for a, b in of] for lever in levers]
 
-    def _sheared(self, film: Around, at: "Laid", y: Array, across: Array, void: Array) -> list[Array]:
+    def _sheared(self, film: Around, at: "Laid", rows: Rows, void: Array) -> list[Array]:
         """By what `_drag_parts` count on the x faces of some lines. void : the film of the void, in parts of the wall's."""
         places, steps = at.grid.x[0], at.steps
         x = np.append(places[0] - steps[0] / 2, places + steps[1:] / 2)[None]
-        h, resting, moving = sheared_lines(film, x, y[:, None], across)
+        h, *lengths = sheared_lines(film, x, at.y[rows][:, None], at.across[:, rows])
+        void = void if self._nodal else np.ones(1)
+        resting, moving = linear(np.where, 1.0 + void * self._void[0][rows], *lengths)  # lines that are added up have one pair
         pull, full = 0.5 * h, steps / moving
-        return [pull, steps * resting + full, full * void if self._nodal else full, pull[:, :1], pull[:, -1:]]
+        return [pull, steps * resting + full, full * void, pull[:, :1], pull[:, -1:]]
 
     def _added(self, a: Array, weights: Array, first: Rows) -> tuple[Array, Array]:
         """Runs of rows added up with their weights, shape (weights, runs, columns), which are kept, and what is left of the

@@ -10,7 +10,7 @@ from ...base.parallel import Array
 from .cavity import cavity_sign
 from .contact import areas
 from .effects import Answer, around, framed_by
-from .flows import point_weights, sheared_faces, volume_unit
+from .flows import linear, point_weights, sheared_faces, volume_unit
 from .forces import open_pressures
 from .reynolds import sides
 from .strip import line_weights
@@ -86,12 +86,12 @@ def carried(at: Answer) -> Carried:
     for flow, near, is_free in zip(pushed, beside, other_free, strict=True):
         heat += np.where(is_free, 0.5, 1.0) * flow * (p - near)
     # Where the end is closed or a mirror nothing beyond takes its half, and nothing flows.
-    shear, drag = _shear(at, dy, other_free)
-    sheared = np.where(free, shear, 0.0)
+    by_wall, drag = _shear(at, dy, other_free)
+    sheared = np.where(free, by_wall, 0.0)
     if problem.contact is not None:
         carrying = problem.contact.p_a.reshape(box) * areas(problem) * grid.stretch(grid.y)
-        shear = shear + abs(problem.U) * problem.contact.friction * carrying
-    power_shear = float(problem.reduce.sum(np.where(free, shear, 0.0)))
+        by_wall = by_wall + abs(problem.U) * problem.contact.friction * carrying
+    power_shear = float(problem.reduce.sum(np.where(free, by_wall, 0.0)))
     pressures = problem.reduce.sum(np.sum(k, axis=0)) * problem.reduce.max(np.abs(at.p)) ** 2  # what they could turn into heat
     if not problem.U and not problem.reduce.sum(np.abs(heat)) > NOTHING * pressures:
         heat = np.zeros(box)  # rounding
@@ -109,7 +109,7 @@ def carried(at: Answer) -> Carried:
         stays = np.where(free, unit * s.storage * (1.0 - r), 0.0)
         pumped -= float(problem.reduce.sum(np.where(free, p - least, 0.0) * (stays - unit * s.kept)))
         was = np.where(free, area * problem.stored.on(grid, problem.stored.carried), 0.0)
-    heat, power = np.where(free, heat + shear, 0.0), power_shear + push + pumped
+    heat, power = np.where(free, heat + by_wall, 0.0), power_shear + push + pumped
     return Carried(q, free, other_free, heat, power, area, sheared, turns, stays, was)
 
 
@@ -134,12 +134,13 @@ def _shear(at: Answer, dy: float, other_free: list[Any]) -> tuple[Array, Array]:
     liquid_west = grid.ghosted(np.ascontiguousarray(liquid).ravel(), outside=1.0)[1:-1, :-2]
     rims = grid.rims(1) if grid.dim == 2 else (0.0, 0.0)
     rows = problem.U**2 * dy * grid.stretch(grid.y) ** 3 * (line_weights(grid) + 0.5 * (rims[0] * south + rims[1] * north))
-    shear = np.zeros(box)
+    total = np.zeros(box)
     for mu, h, share, is_free, wall, dx in (
         (mu_west, faces[0], liquid_west, other_free[0], closed[0], before),
         (mu_east, faces[1], liquid, other_free[1], closed[1], behind),
     ):
-        inner = np.where(is_free, 0.5, 1.0) * (h[0] + share / h[1])
+        a, b = linear(np.where, share, *h)
+        inner = np.where(is_free, 0.5, 1.0) * (a + share / b)
         at_wall = 0.5 * np.where(full, 4.0, 1.0 - r) / s.h
-        shear = shear + dx * mu * np.where(wall, at_wall, inner)
-    return rows * shear, volume_unit(problem) * (s.couette_E + s.b_E * r)
+        total = total + dx * mu * np.where(wall, at_wall, inner)
+    return rows * total, volume_unit(problem) * (s.couette_E + s.b_E * r)

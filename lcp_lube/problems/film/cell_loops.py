@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ...base.compiled import kernel, piece
 from ...base.parallel import Array
 from .certify import cell_misfit
-from .flows import face_drag
+from .flows import face_drag, linear
 
 
 @piece
@@ -17,7 +17,7 @@ def choose(condition: Any, a: Any, b: Any) -> Any:
     return a if condition else b
 
 
-misfit, face = piece(cell_misfit), piece(face_drag)
+misfit, face, lengths = piece(cell_misfit), piece(face_drag), piece(linear)
 
 
 @piece
@@ -70,6 +70,7 @@ def loop_drag(
     h: Array,
     resting: Array,
     moving: Array,
+    first: Array,
     couette: Array,
     b: Array,
     r: Array,
@@ -85,11 +86,15 @@ def loop_drag(
     for j in range(ny):
         for i in range(nx - 1):
             east, push = face(
-                choose, h[j, i], resting[j, i], moving[j, i], couette[j, i], b[j, i], r[j, i], p[j, i], p[j, i + 1]
-            )
+                choose, lengths, h[j, i], resting[j, i], moving[j, i], first[j, i],
+                couette[j, i], b[j, i], r[j, i], p[j, i], p[j, i + 1],
+            )  # fmt: skip
             total[i] += lines[j] * columns[i] * east + scale[j] * push
         i = nx - 1
-        east, push = face(choose, h[j, i], resting[j, i], moving[j, i], couette[j, i], b[j, i], r[j, i], p[j, i], beyond[j])
+        east, push = face(
+            choose, lengths, h[j, i], resting[j, i], moving[j, i], first[j, i],
+            couette[j, i], b[j, i], r[j, i], p[j, i], beyond[j],
+        )  # fmt: skip
         total[i] += lines[j] * columns[i] * east + scale[j] * push
     return total.sum()
 

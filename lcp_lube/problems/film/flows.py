@@ -138,7 +138,7 @@ def _before_first(problem: LubricationProblem, p: Array, lifted: complex) -> tup
     """`face_drag` of the faces before the first points, as parts of the faces behind these."""
     grid = problem.grid
     before, behind = grid.steps(0)[:2]
-    h, resting, moving = sheared_faces(problem, grid.x[:, :1] - before / 2, lifted)
+    h, resting, moving, _ = sheared_faces(problem, grid.x[:, :1] - before / 2, lifted)
     return before / behind * (resting + 1.0 / moving), 0.5 * h * (p[:, :1] - problem.p_sides[0])
 
 
@@ -160,7 +160,7 @@ def drag(problem: LubricationProblem, scheme: BoxScheme, p_pa: Array, r: Array, 
     if walls[1].any():
         p_east[:, -1] = p[:, -1]
     faces = sheared_faces(problem, grid.x + behind / 2, lifted)
-    east, push = face_drag(np.where, *faces, s.couette_E, s.b_E, r, p, p_east)
+    east, push = face_drag(np.where, linear, *faces, s.couette_E, s.b_E, r, p, p_east)
     if walls[1].any():  # its faces have neither
         east[:, -1] = 0.0
     own, push_own = np.zeros_like(east), np.zeros_like(east[:, :1])
@@ -178,12 +178,19 @@ def drag(problem: LubricationProblem, scheme: BoxScheme, p_pa: Array, r: Array, 
     return np.asarray(per_row * east + push * scale), own
 
 
+def linear(where: Any, liquid: Any, resting: Any, moving: Any, first: Any) -> tuple[Any, Any]:
+    """a and b of `sheared_faces` with c where that is less; what shears the face is then a + liquid/b."""
+    layer = (liquid / first).real < (resting + liquid / moving).real
+    return where(layer, 0.0, resting), where(layer, first, moving)
+
+
 def face_drag(
-    where: Any, h: Any, resting: Any, moving: Any, couette: Any, b: Any, r: Any, p: Any, p_east: Any
+    where: Any, linear: Any, h: Any, resting: Any, moving: Any, first: Any, couette: Any, b: Any, r: Any, p: Any, p_east: Any
 ) -> tuple[Any, Any]:
     """Of arrays, or in `cell_loops` of one face: what shears it per mu U (1/m), and the pull of the pressure (N/m)."""
-    liquid = b * r / where(couette == 0.0, np.inf, couette)
-    return resting + (1.0 + liquid) / moving, 0.5 * h * (p_east - p)
+    liquid = 1.0 + b * r / where(couette == 0.0, np.inf, couette)
+    a, b_liquid = linear(where, liquid, resting, moving, first)
+    return a + liquid / b_liquid, 0.5 * h * (p_east - p)
 
 
 def beside(grid: Grid, p: Array) -> Array:
@@ -195,12 +202,14 @@ def beside(grid: Grid, p: Array) -> Array:
     return out
 
 
-def sheared_faces(problem: LubricationProblem, x: Array, lifted: complex = 0.0) -> tuple[Array, Array, Array]:
-    """The film h of a face of each owned point, at x, m, and what shears it per mu U: a + liquid/b, as a (1/m) and b (m).
+def sheared_faces(problem: LubricationProblem, x: Array, lifted: complex = 0.0) -> tuple[Array, Array, Array, Array]:
+    """The film h of a face of each owned point, at x, m, and what shears it per mu U: the less of a + liquid/b and liquid/c, as
+    a (1/m), b and c (m).
 
-    liquid is the part of the whole film's flow that there is. Where no edge along the flow divides the cell, a = 0 and b = h.
+    liquid is the part of the whole film's flow that there is. Where no edge along the flow divides the cell, a = 0, b = c = h.
     In the strips on both sides of an edge a cavity carries a layer of one thickness t, or the whole film where that is thinner:
-    t/h^2, and 1/h. That is linear in what flows between a film that is full in the thinnest strip alone and one that is full.
+    t/h^2, and 1/h. That is linear in what flows up to a film that is full in the thinnest strip alone (c), and taken as linear
+    from there to one that is full (a, b). Without liquid, which would carry the heat away, nothing shears a face.
     """
     grid, film = problem.grid, Around(problem.film, problem.grid)
     if problem.edged:
@@ -208,13 +217,15 @@ def sheared_faces(problem: LubricationProblem, x: Array, lifted: complex = 0.0) 
     at, d = (lambda x: film(x, grid.y) + lifted), 1e-6 * grid.spacing[0]
     h: Any = 2.0 / (1.0 / at(x - d) + 1.0 / at(x + d))  # an edge may lie on the face
     h = np.broadcast_to(h, (grid.box[0], x.shape[1]))
-    return h, np.broadcast_to(h.dtype.type(0.0), h.shape), h
+    return h, np.broadcast_to(h.dtype.type(0.0), h.shape), h, h
 
 
-def sheared_lines(film: Around, x: Array, y: Array, across: Array | None, lifted: complex = 0.0) -> tuple[Array, Array, Array]:
+def sheared_lines(
+    film: Around, x: Array, y: Array, across: Array | None, lifted: complex = 0.0
+) -> tuple[Array, Array, Array, Array]:
     """`sheared_faces` of some lines, y a column of them, with what lies before and behind each; None: of a film in 1D."""
     h: Any = np.broadcast_to(film(x, y) + lifted, (y.shape[0], x.shape[1]))
-    resting, moving = np.broadcast_to(h.dtype.type(0.0), h.shape), h
+    resting, moving, first = np.broadcast_to(h.dtype.type(0.0), h.shape), h, h
     jumps = film.jumps("y") if across is not None else ()
     if across is not None and jumps:
         rows, in_strips, shares = strips(film, x[0], y[:, 0], across, jumps)
@@ -222,8 +233,10 @@ def sheared_lines(film: Around, x: Array, y: Array, across: Array | None, lifted
             thinnest, uneven = in_strips.min(axis=0) + lifted, np.ptp(in_strips, axis=0) > 1e-9 * in_strips.max(axis=0)
             parts = in_strips + lifted
             over = parts - thinnest  # of which the difference of both is made: they may agree in all digits
-            mean, full, more, above = (np.sum(shares * part, axis=0) for part in (parts, 1.0 / parts, over / parts**2, over))
+            sums = (parts, 1.0 / parts, parts**-2.0, over / parts**2, over)
+            mean, full, thin, more, above = (np.sum(shares * part, axis=0) for part in sums)
             slope = np.where(uneven, mean * more / np.where(uneven, above, 1.0), full)
-            h, resting, moving = np.array(h), np.array(resting), np.array(h)
+            h, resting, moving, first = np.array(h), np.array(resting), np.array(h), np.array(h)
             h[rows], resting[rows], moving[rows] = mean, full - slope, 1.0 / slope
-    return h, resting, moving
+            first[rows] = 1.0 / np.where(uneven, mean * thin, slope)
+    return h, resting, moving, first

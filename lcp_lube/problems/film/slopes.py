@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...base.parallel import Array
 from .cavity import cavity_sign
 from .effects import around
-from .flows import SIDES, friction, point_weights, sheared_faces, side_flows, volume_unit
+from .flows import SIDES, friction, linear, point_weights, sheared_faces, side_flows, volume_unit
 from .forces import totals, weights
 from .grooves import GroovedProblem
 from .lubrication import LubricationProblem
@@ -106,12 +106,13 @@ def _friction(problem: LubricationProblem, tangent: Tangent | None, p: Array, r:
     weight, rims = line_weights(grid), grid.rims(1) if grid.dim == 2 else (0.0, 0.0)
     first, last, south, north = sides(grid)
     walls = sides(grid, ("closed",))[:2]
-    h_east, resting, h_moving = sheared_faces(problem, grid.x + behind / 2)
+    h_east, *lengths = sheared_faces(problem, grid.x + behind / 2)
     full = (cavity_sign(problem.reduce, p, r) >= 0).reshape(grid.box) if "closed" in grid.ends[0] else np.ones(1, dtype=bool)
     void, passes = r.reshape(grid.box), ~walls[1]
     share = np.zeros(grid.box)  # the liquid's share of a face is 1 + share r
     np.divide(s.b_E, s.couette_E, out=share, where=passes & (s.couette_E != 0.0))
-    sheared = share / np.where(passes, h_moving, 1.0)
+    resting, moving = linear(np.where, 1.0 + share * void, *lengths)
+    sheared = share / np.where(passes, moving, 1.0)
     parts: list[tuple[NDArray[np.bool_], Any]] = list(zip(walls, (0.5 * before / behind, 0.5), strict=True))
     parts = [(wall, part) for wall, part in parts if wall.any()]
     for wall, part in parts:
@@ -122,16 +123,16 @@ def _friction(problem: LubricationProblem, tangent: Tangent | None, p: Array, r:
     towards = np.where(passes, h_east, 0.0) * pull
     dp = grid.ghosted(np.where(last, 0.0, towards).ravel(), outside=0.0)[1:-1, :-2] - towards
     if first.any():
-        h_west, *west = sheared_faces(problem, grid.x[:, :1] - before[:1] / 2)
+        h_west, *west, _ = sheared_faces(problem, grid.x[:, :1] - before[:1] / 2)
         dp[:, :1] += h_west * pull
     if tangent is not None and tangent.viscosity is not None:  # that of a face follows the mean of its two points' pressures
         own, other = tangent.viscosity  # d log(mu)/dp at the west and the east point of the east face
-        shear = np.where(passes, resting + (1.0 + share * void) / h_moving, 0.0)
+        by_wall = np.where(passes, resting + (1.0 + share * void) / moving, 0.0)
         if first.any():
-            shear[:, :1] += before[0] / behind[0] * (west[0] + 1.0 / west[1])
+            by_wall[:, :1] += before[0] / behind[0] * (west[0] + 1.0 / west[1])
         for wall, part in parts:
-            shear = shear + np.where(wall, part * np.where(full, 4.0, 1.0 - void) / s.h, 0.0)
-        drag = problem.mu * behind * lines * shear
+            by_wall = by_wall + np.where(wall, part * np.where(full, 4.0, 1.0 - void) / s.h, 0.0)
+        drag = problem.mu * behind * lines * by_wall
         dp = dp + drag * own + grid.ghosted((drag * other).ravel(), outside=0.0)[1:-1, :-2]
     return Slope(dp.ravel(), (problem.mu * behind * lines * sheared).ravel())
 
