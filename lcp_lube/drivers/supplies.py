@@ -92,7 +92,8 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         P = np.array(known)
         if model.stored is not None:
             P = supply_step.Sources(supplies).foreseen(near.problem, near.fields["p"])
-    known_before = shut and len(supplies) == 1  # nothing flows, through its restrictor neither, whatever rounding says
+    # Nothing flows in a steady film, through its restrictor neither, whatever rounding says.
+    known_before = shut and len(supplies) == 1 and model.stored is None
     P = np.array([supplies[0].p_s]) if known_before else P
     other = np.full(2, np.nan)  # of one supply: the last pressure that was too low, and too high
     ahead: Fields | None = None  # of the film with the next pressures

@@ -60,6 +60,8 @@ def answer(run: Run) -> Solution:
         solves = f"{run.solves / max(count, 1):.1f} solves each, " if run.solves > count else ""
         run.message = f"{count} time steps, {solves}{iterations_of(run.steps) / max(run.solves, 1):.1f} iterations a solve"
         run.message += f"; {march.defect:.1e} of the oil lost"
+        if march.defect > run.worst().tol:
+            run.outcome = Outcome.WRONG_SOLUTION
     if run.seen is not None:
         problem = run.seen.answer(problem)
     details = {

@@ -6,11 +6,13 @@ puts -2 dx weight h on r's diagonal and 2 dx (old - weight h) to c. -B gains a p
 family as the steady problem, and what holds for that one holds for it.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...base.parallel import Array
 from ..grid import Grid
@@ -19,6 +21,9 @@ from .edges import GAUSS, _pieces, jumps_of
 
 if TYPE_CHECKING:
     from .lubrication import LubricationProblem
+
+
+SEAM, SAME = 1e-12, 1e-9  # of a ring: how far before its end it is looked at; and by what its ends may differ where it closes
 
 
 @dataclass(frozen=True)
@@ -85,11 +90,10 @@ def mean_film(grid: Grid, film: Any) -> Array:
     Else a pocket that travels would fill a whole cell at the moment when its edge passes the point.
     """
     h = np.array(np.broadcast_to(film(grid.x, grid.y), grid.box), dtype=float)
-    x_jumps, y_jumps = jumps_of(film, "x"), jumps_of(film, "y")
-    if not (x_jumps or y_jumps):
+    jumps = [_jumps(grid, film, side) for side in range(grid.dim)]
+    if not any(jumps):
         return h
-    x_faces, lines = grid.nodes_and_faces(0)[1], grid.y[:, 0]
-    columns, pieces = _pieces(x_faces[:-1], x_faces[1:], x_jumps)
+    columns, pieces = _cut(grid, 0, jumps[0])
 
     def along(y: Array) -> Array:
         values = np.array(np.broadcast_to(film(grid.x, y[:, None]), (y.size, grid.box[1])))
@@ -97,15 +101,42 @@ def mean_film(grid: Grid, film: Any) -> Array:
             mean = 0.0
             for a, b in pairwise(pieces):
                 for part in GAUSS:
-                    piece = np.broadcast_to(film((a + part * (b - a))[None, :], y[:, None]), (y.size, columns.size))
+                    x = _inside(grid, 0, a + part * (b - a))
+                    piece = np.broadcast_to(film(x[None, :], y[:, None]), (y.size, columns.size))
                     mean = mean + 0.5 * (b - a) / (pieces[-1] - pieces[0]) * piece
             values[:, columns] = mean
         return values
 
-    h = along(lines)
+    h = along(grid.y[:, 0])
     if grid.dim == 2:
-        y_faces = grid.nodes_and_faces(1)[1]
-        rows, strips = _pieces(y_faces[:-1], y_faces[1:], y_jumps)
+        rows, strips = _cut(grid, 1, jumps[1])
         if rows.size:
-            h[rows] = sum(((b - a) / (strips[-1] - strips[0]))[:, None] * along(0.5 * (a + b)) for a, b in pairwise(strips))
+            middles = [_inside(grid, 1, 0.5 * (a + b)) for a, b in pairwise(strips)]
+            shares = [((b - a) / (strips[-1] - strips[0]))[:, None] for a, b in pairwise(strips)]
+            h[rows] = sum(share * along(y) for share, y in zip(shares, middles, strict=True))
     return h
+
+
+def _jumps(grid: Grid, film: Any, side: int) -> list[float]:
+    """`jumps_of` a film; round a ring the seam is an edge too where the film's ends differ, and all come again beyond it."""
+    jumps = list(jumps_of(film, "xy"[side]))
+    if not grid.periodic[side]:
+        return jumps
+    start, turn = grid.origin[side], grid.lengths[side]
+    ends = np.array([[start], [start + turn * (1.0 - SEAM)]])
+    a, b = (film(at, grid.y[:, :1]) if side == 0 else film(grid.x[:1], at) for at in ends[:, None])
+    seam = [start + turn] if np.max(np.abs(b - a), initial=0.0) > SAME * np.max(a, initial=0.0) else []
+    return [*jumps, *seam, *(turn + at for at in jumps)]
+
+
+def _cut(grid: Grid, side: int, jumps: Sequence[float]) -> tuple[NDArray[np.int64], Array]:
+    """`_pieces` of the owned cells in x (side 0) or y; round a ring the last face is the first one."""
+    faces = grid.nodes_and_faces(side)[1]
+    ends = np.where(faces[1:] > faces[:-1], faces[1:], faces[1:] + grid.lengths[side] * grid.periodic[side])
+    return _pieces(faces[:-1], ends, jumps)
+
+
+def _inside(grid: Grid, side: int, places: Array) -> Array:
+    """Places that may lie beyond the seam of a ring, within its length."""
+    start, turn = grid.origin[side], grid.lengths[side]
+    return np.where(places - start > turn, places - turn, places) if grid.periodic[side] else places
