@@ -78,3 +78,15 @@ def test_behind_a_closed_inlet():
     line["fluid"] = {"mu": 0.05, "p_supply": 1e8}  # full
     with solve(line, model="full") as s:
         assert s.outcome == "no_solution" and "does not flow" in s.message
+
+
+@pytest.mark.parametrize("pocket", [{"x_mm": [3.05, 4.44], "y_mm": [1.34, 2.82]}, None])
+def test_dry_films_behind_a_closed_side(pocket):
+    """What a pocket's wall cuts holds no oil either, so nothing shears it; heat of no oil at all is rounding."""
+    film = [{"shape": "linear", "h_start": 6.5e-6, "h_end": 3.9e-6 if pocket else 9e-6}]
+    film += [{"shape": "pocket", "depth": 2.5e-6, **pocket}] if pocket else []
+    data = {"family": "bearing", "dimension": 2, "L_mm": 6.28, "width_mm": 4.59, "U": 7.4, "nx": 27, "ny": 12, "film": film}
+    data |= {"fluid": {"mu": 0.033, "p_supply": 1e5 if pocket else 0.0}, "sides": {"west": "closed"}}
+    with solve({**data, "temperature": {"beta": 0.03}}, model="full") as s:
+        assert s.converged and s.certificate.measures["heat_defect"] < 1e-8
+        assert s.heat_out == pytest.approx(s.heat_power, rel=1e-8, abs=1e-12) and (s.heat_power > 1e-3) == bool(pocket)

@@ -17,7 +17,9 @@ from .table import EffectTable
 Kelvin = Annotated[Finite, Field(ge=oils.LOWEST, le=oils.HIGHEST)]
 NEWTON, FOUND, NEAR = 30, 1e-9, 1e-2  # steps, and K: of T ahead; for derivatives by T
 ALIKE = 0.03  # of log(viscosity): a change after which one more step would move T by less than a part in 1000
-LITTLE = 1e-6  # of the heat that walls could take, and that films hold over a step's length: the balance of less is not told
+LITTLE = (
+    1e-6  # of the heat of a full film, that walls could take, and that films hold for a step: the balance of less is rounding
+)
 POINTS = {"exponential": 2, "walther": 2, "roelands": 2, "vogel": 3}
 
 
@@ -187,7 +189,8 @@ class Heat(Effect):
         else:  # nothing flows out: in time what stays in the film is as warm as that is
             T_out = effective if at.problem.stored is not None else np.inf if power > 0 else table.T_in
         walls = table.exchange * float(reduce.sum(flow.area)) * max(reduce.max(T) - table.T_in, abs(self.wall))
-        gross = walls + rho_c * float(reduce.sum(np.abs(flow.kept)))
+        drag = at.base.U**2 * float(reduce.sum(flow.area.ravel() * at.mu / at.h))
+        gross = walls + drag + rho_c * float(reduce.sum(np.abs(flow.kept)))
         size = max(abs(flow.power), abs(power), abs(out), abs(stored), LITTLE * gross)
         told = {
             "temperature_max": max(reduce.max(T), T_out if table.model == "effective" else -np.inf),
