@@ -64,7 +64,9 @@ class CoupledNewton(CoupledResponse):
         return R
 
     def _size_of(self, R: Array) -> float:
-        """The square of the size of the fields' changes that R stands for."""
+        """The square of the size of the fields' changes that R stands for; inf where it overflows."""
+        if not np.isfinite(self.loop.base.reduce.norm(R)):
+            return np.inf
         z = self._linear.solve([R[: self.n]])[0] * np.where(self.cavity, 1.0, 1.0 / self.p_max)
         size = float(self.loop.base.reduce.dot(z, z) + self.loop.base.reduce.dot(R[self.n :], R[self.n :]))
         return size if np.isfinite(size) else np.inf

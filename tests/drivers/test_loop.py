@@ -5,6 +5,7 @@ import pytest
 
 from lcp_lube import solve
 from lcp_lube.drivers import loop, nonlinear
+from lcp_lube.drivers.coupled_newton import CoupledNewton
 
 FILM = [{"shape": "linear", "h_start": 4e-5, "h_end": 2e-5}]
 SOFT = {"family": "bearing", "L": 0.1, "U": 5.0, "n": 24, "fluid": {"mu": 0.02, "p_supply": 1e5}, "film": FILM}
@@ -34,6 +35,20 @@ def test_newton_goes_on_in_a_time_step(monkeypatch):
     monkeypatch.setattr(loop, "PATIENCE", 0)
     with solve(march, model="full") as s:
         assert s.converged and s.load == pytest.approx(load, rel=1e-7)
+
+
+def test_a_step_of_newtons_method_that_overflows_is_halved(monkeypatch):
+    own, calls = CoupledNewton._left, list[int]()
+
+    def left(self, p, r, x):
+        calls.append(len(calls))
+        return own(self, p, r, x) * (np.inf if len(calls) == 2 else 1.0)
+
+    monkeypatch.setattr(loop, "MOST_SOLVES", 30)
+    monkeypatch.setattr(loop, "PATIENCE", 0)
+    monkeypatch.setattr(CoupledNewton, "_left", left)
+    with np.errstate(invalid="ignore"), solve(SOFT, model="full") as s:
+        assert s.converged and len(calls) > 2
 
 
 def test_what_does_not_settle_ends_at_its_best(monkeypatch):
