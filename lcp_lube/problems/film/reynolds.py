@@ -15,7 +15,7 @@ from ..strips import each_strip, in_strips, places_of
 from .edges import Around
 from .integrals import LineIntegrals, check_film
 from .stored import Stored
-from .strip import coefficients_of, dragged, entering, entering_at, framed, leaving, leaving_at, line_weights, stream_weights
+from .strip import coefficients_of, dragged, entering, entering_at, leaving, leaving_at, line_weights, stream_weights
 
 Film = Callable[[Array, Array], Array]
 USUAL = 1e6  # the largest coefficient lies between this and its inverse: absolute tolerances then mean something
@@ -225,15 +225,15 @@ def coefficients(
     # With a frame of neighbours, as sweeps want them (`solvers.fas.levels`).
     frames = ((ny + 2, nx + 3), (ny + 3, nx + 2), (ny + 2, nx + 2), (ny, nx + 1), (ny, nx + 1))
     kind = np.asarray(film(grid.x[:, :1], grid.y[:1])).dtype
-    kx, ky, c_frame = (framed(shape, kind) for shape in frames[:3])
-    wall, films = ((np.empty if U else np.zeros)(shape, dtype=kind) for shape in frames[3:])
+    kx, ky, c_frame, wall, films = (np.zeros(shape, dtype=kind) for shape in frames)
     void = films if nodal else wall if U else np.zeros_like(wall)
 
     def make(rows: slice) -> None:
         strip = grid if rims else places_of(grid, rows)
         parts = coefficients_of(strip, film, p_unit / (6.0 * mu), U or 1.0, scheme, mean_cubes, rims, cavity, integrals, seen)
         kx[1:-1, 1:-1][rows], films[rows] = parts[0], parts[2]
-        ky[1:-1, 1:-1][rows.start : rows.stop + 1] = parts[1]
+        if grid.dim == 2:
+            ky[1:-1, 1:-1][rows.start : rows.stop + 1] = parts[1]
         (wall if U else void)[rows] = parts[3 if U else 4]
 
     if rims:

@@ -72,13 +72,6 @@ def coefficients_of(
     return k_x, k_y, h_x[:, :-1], wall, void
 
 
-def framed(shape: tuple[int, int], kind: Any) -> Array:
-    """An array with a frame of zeros; what is inside is to be written."""
-    out = np.empty(shape, dtype=kind)
-    out[0] = out[-1] = out[:, 0] = out[:, -1] = 0.0
-    return out
-
-
 def line_weights(grid: Grid) -> Array:
     """Widths of the owned lines of cells, in mean spacings, shape (ny_local, 1); 1 in 1D."""
     return grid.widths(1)[:, None] if grid.dim == 2 else np.ones((1, 1))
