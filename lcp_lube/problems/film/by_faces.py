@@ -123,7 +123,7 @@ class ByFaces:
         total = grid.comm.allreduce(np.append(out, float(not positive)))
         return None if total[-1] else total[:-1].reshape(out.shape)
 
-    def _laid(self, grid: Grid, level: bool, cut: tuple[float, ...]) -> "Laid":
+    def _laid(self, grid: Grid, level: bool, cut: tuple[float, ...]) -> Laid:
         """Its lines, those of the problem's own grid made once for films that jump along the same ones."""
         key = level, cut
         if grid is self.grid and key in self._own:
@@ -156,7 +156,7 @@ class ByFaces:
         of = [(self._pull, pulls), (self._whole, shears), (self._void, shears), *((one, pulls) for one in self._outer)]
         return [[self._added(a, b * lever, lines) for a, b in of] for lever in levers]
 
-    def _sheared(self, film: Around, at: "Laid", rows: Rows, void: Array) -> list[Array]:
+    def _sheared(self, film: Around, at: Laid, rows: Rows, void: Array) -> list[Array]:
         """By what `_drag_parts` count on the x faces of some lines. void : the film of the void, in parts of the wall's."""
         places, steps = at.grid.x[0], at.steps
         x = np.append(places[0] - steps[0] / 2, places + steps[1:] / 2)[None]

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ...base.parallel import Array
 from ..grid import Grid
 from ..transfer import Pick, numbers
-from .edges import GAUSS, _pieces, jumps_of
+from .edges import GAUSS, Around, _pieces
 
 if TYPE_CHECKING:
     from .lubrication import LubricationProblem
@@ -89,8 +89,9 @@ def mean_film(grid: Grid, film: Any) -> Array:
 
     Else a pocket that travels would fill a whole cell at the moment when its edge passes the point.
     """
+    film = Around(film, grid)
     h = np.array(np.broadcast_to(film(grid.x, grid.y), grid.box), dtype=float)
-    jumps = [_jumps(grid, film, side) for side in range(grid.dim)]
+    jumps = [_jumps(film, side) for side in range(grid.dim)]
     if not any(jumps):
         return h
     columns, pieces = _cut(grid, 0, jumps[0])
@@ -101,8 +102,7 @@ def mean_film(grid: Grid, film: Any) -> Array:
             mean = 0.0
             for a, b in pairwise(pieces):
                 for part in GAUSS:
-                    x = _inside(grid, 0, a + part * (b - a))
-                    piece = np.broadcast_to(film(x[None, :], y[:, None]), (y.size, columns.size))
+                    piece = np.broadcast_to(film((a + part * (b - a))[None, :], y[:, None]), (y.size, columns.size))
                     mean = mean + 0.5 * (b - a) / (pieces[-1] - pieces[0]) * piece
             values[:, columns] = mean
         return values
@@ -111,22 +111,19 @@ def mean_film(grid: Grid, film: Any) -> Array:
     if grid.dim == 2:
         rows, strips = _cut(grid, 1, jumps[1])
         if rows.size:
-            middles = [_inside(grid, 1, 0.5 * (a + b)) for a, b in pairwise(strips)]
-            shares = [((b - a) / (strips[-1] - strips[0]))[:, None] for a, b in pairwise(strips)]
-            h[rows] = sum(share * along(y) for share, y in zip(shares, middles, strict=True))
+            h[rows] = sum(((b - a) / (strips[-1] - strips[0]))[:, None] * along(0.5 * (a + b)) for a, b in pairwise(strips))
     return h
 
 
-def _jumps(grid: Grid, film: Any, side: int) -> list[float]:
-    """`jumps_of` a film; round a ring the seam is an edge too where the film's ends differ, and all come again beyond it."""
-    jumps = list(jumps_of(film, "xy"[side]))
+def _jumps(film: Around, side: int) -> Sequence[float]:
+    """Edges in x (side 0) or y; round a ring the seam is one too where the film's ends differ."""
+    grid, found = film.grid, film.jumps("xy"[side])
     if not grid.periodic[side]:
-        return jumps
+        return found
     start, turn = grid.origin[side], grid.lengths[side]
     ends = np.array([[start], [start + turn * (1.0 - SEAM)]])
     a, b = (film(at, grid.y[:, :1]) if side == 0 else film(grid.x[:1], at) for at in ends[:, None])
-    seam = [start + turn] if np.max(np.abs(b - a), initial=0.0) > SAME * np.max(a, initial=0.0) else []
-    return [*jumps, *seam, *(turn + at for at in jumps)]
+    return [*found, start + turn] if np.max(np.abs(b - a), initial=0.0) > SAME * np.max(a, initial=0.0) else found
 
 
 def _cut(grid: Grid, side: int, jumps: Sequence[float]) -> tuple[NDArray[np.int64], Array]:
@@ -134,9 +131,3 @@ def _cut(grid: Grid, side: int, jumps: Sequence[float]) -> tuple[NDArray[np.int6
     faces = grid.nodes_and_faces(side)[1]
     ends = np.where(faces[1:] > faces[:-1], faces[1:], faces[1:] + grid.lengths[side] * grid.periodic[side])
     return _pieces(faces[:-1], ends, jumps)
-
-
-def _inside(grid: Grid, side: int, places: Array) -> Array:
-    """Places that may lie beyond the seam of a ring, within its length."""
-    start, turn = grid.origin[side], grid.lengths[side]
-    return np.where(places - start > turn, places - turn, places) if grid.periodic[side] else places

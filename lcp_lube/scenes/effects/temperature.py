@@ -17,9 +17,7 @@ from .table import EffectTable
 Kelvin = Annotated[Finite, Field(ge=oils.LOWEST, le=oils.HIGHEST)]
 NEWTON, FOUND, NEAR = 30, 1e-9, 1e-2  # steps, and K: of T ahead; for derivatives by T
 ALIKE = 0.03  # of log(viscosity): a change after which one more step would move T by less than a part in 1000
-LITTLE = (
-    1e-6  # of the heat of a full film, that walls could take, and that films hold for a step: the balance of less is rounding
-)
+LITTLE = 1e-6  # of the heat of a full film, that walls could take, and that films hold for a step: less is rounding
 POINTS = {"exponential": 2, "walther": 2, "roelands": 2, "vogel": 3}
 
 
