@@ -104,7 +104,7 @@ class March:
             for name, values in ahead.items():
                 values += c * ((last[name] - before[name]) / a - (before[name] - self.fields[2][name]) / b)
         P, R = (self.grid.reduce.max(last[name]) or 1.0 for name in ("p", "r"))
-        z = ahead["p"] / P - ahead["r"] / R
+        z = np.where(self.full[0], ahead["p"] / P, -ahead["r"] / R)  # where p > 0 some methods leave r a rounding
         return {"p": P * np.maximum(z, 0.0), "r": R * np.maximum(-z, 0.0)}
 
     def accept(

@@ -23,6 +23,7 @@ from .kernels import balance_row
 
 LEAST = 0.5  # of a pressure, in one step
 STEP = 1e-3  # of a pressure, by which the coarsest grid's answer to it is found
+EMPTY = 1e-3  # p_unit: a start for those that fields have empty, as steps are parts of a pressure
 SAME = 1e-3  # relative changes of pressures that end the coarsest grid's steps
 ROUNDS = 4  # of these, at most
 LEAST_PART = 0.5  # of a change of pressures by the coarse grids
@@ -149,7 +150,8 @@ def foreseen(problem: LubricationProblem, p: Array) -> bool:
     held = problem.held
     if held is None or not (free := _free(held)):
         return False
-    problem.hold_at(_at(problem, {k: problem.reduce.max(np.where(held.owner.ravel() == k, p, 0.0)) for k in free}))
+    own = {k: problem.reduce.max(np.where(held.owner.ravel() == k, p, 0.0)) or EMPTY for k in free}
+    problem.hold_at(_at(problem, own))
     return True
 
 
