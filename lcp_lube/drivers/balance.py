@@ -171,19 +171,10 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         solution.message = f"{table.load:g} asked for; the nearest of {count} tried: {answer}; balance.range was {looked}"
     solution.times = times
     by_t = (unknown.to_value(t + STEP) - unknown.to_value(t - STEP)) / (2.0 * STEP)
-    solution.settings |= {
-        "load_slope": None if steep is None else steep * load / by_t,  # dW/dvalue, a few digits of it
-        "balance": {
-            "vary": unknown.key,
-            "value": value,
-            "load": table.load,
-            "carried": load,
-            "iterations": count,
-            "solves": solves,
-            "work": work,
-        },
-        "why": [*solution.settings["why"], f"balance: {answer}, found in {count} solves on this grid, {solves} in all"],
-    }
+    solution.settings["load_slope"] = None if steep is None else steep * load / by_t  # dW/dvalue, a few digits of it
+    record = {"vary": unknown.key, "value": value, "load": table.load, "carried": load}
+    solution.settings["balance"] = record | {"iterations": count, "solves": solves, "work": work}
+    solution.because(f"balance: {answer}, found in {count} solves on this grid, {solves} in all", after=True)
     return solution
 
 

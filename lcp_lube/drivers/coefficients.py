@@ -29,7 +29,7 @@ from ..scenes.thrust import ThrustScene
 from ..scenes.tilting import TiltingPadScene
 from .coupled_response import CoupledResponse
 from .grooves import SolvedFilm, films_of
-from .impedance import impedance, stiffness
+from .impedance import displacements, impedance, level, stiffness
 from .pad_coordinates import Bearing, JournalPads, ThrustPads, bearing_of
 from .response import Change, Moved, Response
 from .turned import Mirrored
@@ -55,15 +55,10 @@ class Coefficients:
 def motions_of(turning: Turning | None, tilt: bool, middle: float, along: float = 0.0) -> list[Change]:
     """dh/de of each motion; along : angle of the load, rad from where theta is counted."""
     if turning is None:
-        return [lambda x, y: np.ones(np.broadcast_shapes(x.shape, y.shape))]
-    theta, aside = turning.theta, along + 0.5 * math.pi
-    changes: list[Change] = [
-        lambda x, y: -np.cos(theta(x) - along) + 0.0 * y,
-        lambda x, y: -np.cos(theta(x) - aside) + 0.0 * y,
-        lambda x, y: (y - middle) * changes[0](x, y),
-        lambda x, y: (y - middle) * changes[1](x, y),
-    ]
-    return changes if tilt else changes[:2]
+        return [level]
+    moved = displacements(turning, along=along)
+    tilted: list[Change] = [lambda x, y, one=one: (y - middle) * one(x, y) for one in moved]  # type: ignore[misc]
+    return [*moved, *tilted] if tilt else moved
 
 
 def coefficients(

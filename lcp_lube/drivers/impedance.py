@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..base.parallel import Array
 from ..problems.film.effects import factors
 from ..problems.film.fluid import Law
 from ..problems.film.turning import Turning
@@ -15,16 +16,22 @@ from .coupled_response import CoupledResponse
 from .frozen import Frozen
 from .response import Change, Response
 
-Mode = Change  # dh of a rigid motion of a wall, by its coordinate, of x and y (m)
+
+def level(x: Array, y: Array) -> Array:
+    """dh of a film that is thicker everywhere, by as much."""
+    return np.ones(np.broadcast_shapes(x.shape, y.shape))
 
 
-def displacements(turning: Turning, first: float) -> list[Mode]:
-    """dh of a displacement of the journal along the load and a quarter of a turn ahead; first : x of the ring at x = 0, m."""
+def displacements(turning: Turning, first: float = 0.0, along: float = 0.0) -> list[Change]:
+    """dh of a displacement of the journal along the load and a quarter of a turn ahead.
 
-    def towards(angle: float) -> Mode:
+    first : x of the ring at x = 0, m; along : angle of the load, rad from where theta is counted.
+    """
+
+    def towards(angle: float) -> Change:
         return lambda x, y: -np.cos(turning.theta(x + first) - angle) + 0.0 * y
 
-    return [towards(0.0), towards(0.5 * math.pi)]
+    return [towards(along), towards(along + 0.5 * math.pi)]
 
 
 def impedance(response: Response | CoupledResponse, frequencies: Sequence[float], stored: bool = True) -> Any:

@@ -1,8 +1,11 @@
 """Nested iteration: the same scene on a sequence of grids, each started from the answer on the one before."""
 
+from math import prod
+
 from ..problems.solution import Fields, Problem
 
 MIN_POINTS = {1: 50, 2: 24}  # coarsest grid, points a side: small enough to cost nothing, with a front to be found
+COARSER = 0.7  # points of a grid `halved` over those of the finer one, at most
 
 
 def level_shapes(shape: tuple[int, ...], ranks: int = 1) -> list[tuple[int, ...]]:
@@ -14,6 +17,13 @@ def level_shapes(shape: tuple[int, ...], ranks: int = 1) -> list[tuple[int, ...]
     while min(shapes[0]) // 2 >= MIN_POINTS[len(shape)] and (len(shape) == 1 or (shapes[0][1] - 1) // 2 >= 2 * ranks):
         shapes.insert(0, tuple((n - 1) // 2 for n in shapes[0]))
     return shapes
+
+
+def halved(shape: tuple[int, ...], fewest: int, across: int) -> tuple[int, int] | None:
+    """Half of the points along, at least so few, and across where these are so many; None where that saves too little."""
+    nx, ny = shape
+    coarse = max(nx // 2, fewest), ny // 2 | 1 if ny >= across else ny
+    return coarse if prod(coarse) <= COARSER * nx * ny else None
 
 
 def guess(level: Problem, near: tuple[Problem, Fields] | None, interior: bool) -> Fields | None:

@@ -1,8 +1,6 @@
 """What moves rigidly in a march: a journal or a film's level, and pads that tilt, as coordinates with a mass each."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import replace
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -20,8 +18,9 @@ from . import pads
 from .ask import Ask
 from .compose import Inner
 from .grooves import SideBySide, SolvedFilm, films_of
-from .impedance import Mode, displacements, stiffness
-from .pad_coordinates import Films, JournalPads, PadFilm, ThrustPads
+from .impedance import displacements, level, stiffness
+from .pad_coordinates import FilmWithModes, JournalPads, ThrustPads
+from .response import Change
 from .step import TimeStep
 
 
@@ -91,27 +90,14 @@ class Coordinates:
             solution.destroy()
         return q, np.concatenate([velocity, np.zeros(q.size - place.size)])
 
-    @contextmanager
-    def films(self, step: TimeStep, solution: Solution) -> Iterator[Films]:
-        """Of a solved step, with the modes by which the coordinates move them. Collective."""
-        problem: Any = solution.problem
-        if isinstance(problem, GroovedProblem):
-            with films_of(step, problem, solution.fields) as films:
-                yield replace(films, mine=[self._film(one) for one in films.mine])  # type: ignore[misc]
-            return
-        comm, modes = problem.grid.comm, self._modes(0.0)
-        film = PadFilm(problem, step.model, solution.fields, modes, range(len(modes)))
-        yield SideBySide(comm, comm, [film])
-
-    def _film(self, one: SolvedFilm) -> PadFilm:
+    def _film(self, one: SolvedFilm) -> FilmWithModes:
         if isinstance(self.scene, TiltingPadScene) and self.pads is not None:
             return self.pads._pad(one)  # type: ignore[no-any-return]
-        return PadFilm(one.problem, one.film.model, one.fields, self._modes(one.first), (0, 1))
+        return FilmWithModes(one.problem, one.film.model, one.fields, self._modes(one.first), (0, 1))
 
-    def _modes(self, first: float) -> list[Mode]:
+    def _modes(self, first: float) -> list[Change]:
         if self.journal:
             return displacements(self.scene.turning, first)
-        level: Mode = lambda x, y: np.ones(np.broadcast_shapes(np.shape(x), np.shape(y)))  # noqa: E731
         return [level, *(self.scene.tilt_modes if self.pads is not None else ())]
 
     def forces(self, solution: Solution) -> Array:
@@ -123,8 +109,17 @@ class Coordinates:
 
     def stiffness(self, step: TimeStep, solution: Solution) -> Array:
         """Minus the derivatives of `forces` by m and rad. Collective."""
-        with self.films(step, solution) as films:
-            return films.sum(lambda one: one.spread(stiffness(one.response()), self.unit.size))
+        problem: Any = solution.problem
+
+        def of(film: FilmWithModes) -> Array:
+            return film.spread(stiffness(film.response()), self.unit.size)  # type: ignore[no-any-return]
+
+        if isinstance(problem, GroovedProblem):
+            with films_of(step, problem, solution.fields) as films:
+                return films.sum(lambda one: of(self._film(one)))
+        comm, modes = problem.grid.comm, self._modes(0.0)
+        film = FilmWithModes(problem, step.model, solution.fields, modes, range(len(modes)))
+        return SideBySide(comm, comm, [film]).sum(of)
 
     def told(self, place: Sequence[float]) -> dict[str, Any]:
         """As numbers of an answer."""

@@ -18,21 +18,21 @@ from ..scenes.scene import Scene, Solvable
 from ..scenes.thrust import ThrustScene
 from ..scenes.tilting import TiltingPadScene
 from .grooves import SideBySide, SolvedFilm, films_of
-from .impedance import Mode, displacements, held
-from .response import Response
+from .impedance import displacements, held, level
+from .response import Change, Response
 
 FEWEST = 8  # points of a coarse grid along a pad
 MOMENTS = 1e-8  # of the load times the lever, about a pivot
 
 
 @dataclass(frozen=True)
-class PadFilm:
+class FilmWithModes:
     """A film with its modes and the numbers of the coordinates that they belong to."""
 
     problem: LubricationProblem
     model: Model
     fields: Fields
-    modes: Sequence[Mode]
+    modes: Sequence[Change]
     numbers: Sequence[int]
 
     def response(self) -> Response:
@@ -46,7 +46,7 @@ class PadFilm:
         return out
 
 
-Films = SideBySide[PadFilm]
+Films = SideBySide[FilmWithModes]
 
 
 @dataclass
@@ -97,7 +97,7 @@ class JournalPads:
         with films_of(held(scene, solution), solution.problem, solution.fields) as films:  # type: ignore[arg-type]
             yield replace(films, mine=[self._pad(one) for one in films.mine])  # type: ignore[misc]
 
-    def _pad(self, one: SolvedFilm) -> PadFilm:
+    def _pad(self, one: SolvedFilm) -> FilmWithModes:
         turning, first = self.scene.turning, one.first
         middle = math.degrees(float(turning.theta(np.array(first + 0.5 * one.problem.grid.lengths[0]))))
         off = [
@@ -110,7 +110,7 @@ class JournalPads:
         def tilt(x: Array, y: Array) -> Array:
             return -turning.R * np.sin(turning.theta(x + first) - pivot) + 0.0 * y
 
-        return PadFilm(one.problem, one.film.model, one.fields, [*displacements(turning, first), tilt], [0, 1, 2 + k])
+        return FilmWithModes(one.problem, one.film.model, one.fields, [*displacements(turning, first), tilt], [0, 1, 2 + k])
 
     @property
     def keys(self) -> Sequence[str]:
@@ -137,7 +137,7 @@ class JournalPads:
         lever = _moments(self.scene) * (load or 1.0) * 0.5 * self.scene.D
         return np.array([fx + load, fy, *moments]), np.array([tol * load] * 2 + [lever] * len(moments))
 
-    def told(self, solution: Solution, q: Array) -> dict[str, Any]:
+    def told(self, q: Array) -> dict[str, Any]:
         value = float(np.hypot(*q[:2])) / self.scene.clearance
         return {"vary": "eccentricity", "value": value, "attitude_deg": math.degrees(math.atan2(q[1], q[0])), "tilts": q[2:]}
 
@@ -175,10 +175,10 @@ class ThrustPads:
     @contextmanager
     def films(self, scene: Scene, solution: Solution) -> Iterator[Films]:
         assert isinstance(scene, ThrustScene) and isinstance(solution.problem, LubricationProblem)
-        modes = [lambda x, y: 1.0 + 0.0 * (x + y), *scene.tilt_modes]
+        modes = [level, *scene.tilt_modes]
         film, grid = held(scene, solution), solution.problem.grid
         problem = film.build(grid.petsc_comm)
-        yield SideBySide(grid.comm, grid.comm, [PadFilm(problem, film.model, solution.fields, modes, [0, 1, 2])])
+        yield SideBySide(grid.comm, grid.comm, [FilmWithModes(problem, film.model, solution.fields, modes, [0, 1, 2])])
         problem.destroy()
 
     @property
@@ -198,7 +198,7 @@ class ThrustPads:
         lever = _moments(self.scene) * abs(load or 1.0) * self.scene.side_lengths[0]
         return pushes - np.array([load, 0.0, 0.0]), np.array([(table.tol if table else 1.0) * abs(load or 1.0), lever, lever])
 
-    def told(self, solution: Solution, q: Array) -> dict[str, Any]:
+    def told(self, q: Array) -> dict[str, Any]:
         return {"vary": "h_min", "value": float(q[0]), "tilts": q[1:]}
 
 

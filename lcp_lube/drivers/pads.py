@@ -10,7 +10,7 @@ which the journal has moved so far that it finds no place with stiffness idles: 
 """
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,10 +24,11 @@ from .ask import Ask
 from .chain import Chain
 from .compose import Inner
 from .impedance import stiffness
-from .pad_coordinates import Bearing, Films, PadFilm, bearing_of
+from .levels import halved
+from .pad_coordinates import Bearing, Films, FilmWithModes, bearing_of
 
 MOST_SOLVES = 80  # on a grid: the end of a search that goes round: pads without preload, which idle, took up to 65
-COARSER, FINE = 0.7, 7  # points of a coarse grid over those of the scene's, at most; points across that are halved
+FINE = 7  # points across that are halved
 THINNER, THICKER = 0.7, 3.0  # parts of a film anywhere by which a step may change it
 THINNEST = 1e-5  # film over the clearance, below which no load is looked for: a difference quotient's step is a tenth of it
 ROUNDING = 1e-15  # a step in parts of the coordinates' sizes, of which a film knows nothing
@@ -53,32 +54,32 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     if warm:
         q = np.where(bearing.free, bearing.sizes * np.asarray(known), q)
     idles, solves, work, first = np.zeros(q.size, dtype=bool), 0, 0.0, None
-    if not warm and ask.nested is not False and (coarse := _coarse(scene.shape, bearing.fewest)) is not None:
-        first, at, solves, found, there, _ = _on_grid(scene.with_shape(coarse), ask, inner, q, idles)
-        work = solves * math.prod(coarse) / math.prod(scene.shape)
-        if found:
-            q, idles, ask = at, there, replace(ask, start=first)
-    solution, q, count, found, _, why = _on_grid(scene, ask, inner, q, idles)
+    if not warm and ask.nested is not False and (coarse := halved(scene.shape, bearing.fewest, FINE)) is not None:
+        first = _on_grid(scene.with_shape(coarse), ask, inner, q, idles)
+        solves, work = first.count, first.count * math.prod(coarse) / math.prod(scene.shape)
+        if first.found:
+            q, idles, ask = first.q, first.idles, replace(ask, start=first.solution)
+    end = _on_grid(scene, ask, inner, q, idles)
     if first is not None:
-        first.destroy()
-    _tell(scene, bearing, solution, q, found, {"iterations": count, "solves": solves + count, "work": work + count}, why)
-    return solution
+        first.solution.destroy()
+    _tell(scene, bearing, end, {"iterations": end.count, "solves": solves + end.count, "work": work + end.count})
+    return end.solution
 
 
-def _coarse(shape: tuple[int, ...], fewest: int) -> tuple[int, int] | None:
-    """Half of the points each way, at least so few along; None where that saves too little."""
-    nx, ny = shape
-    coarse = max(nx // 2, fewest), ny // 2 | 1 if ny >= FINE else ny
-    return coarse if math.prod(coarse) <= COARSER * nx * ny else None
+@dataclass(frozen=True)
+class _End:
+    """Where the search on a grid has ended, after `count` solves. idles : tilts of pads that do; why : nothing was found."""
+
+    solution: Solution
+    q: Array
+    count: int
+    found: bool
+    idles: NDArray[np.bool_]
+    why: str
 
 
-def _on_grid(
-    scene: Scene, ask: Ask, inner: Inner, q: Array, idles: NDArray[np.bool_]
-) -> tuple[Solution, Array, int, bool, NDArray[np.bool_], str]:
-    """Newton's method on one grid: solution, place, solves, whether it was found, what idles there, and why none was found.
-
-    idles : tilts of pads that idle on a coarser grid. Collective.
-    """
+def _on_grid(scene: Scene, ask: Ask, inner: Inner, q: Array, idles: NDArray[np.bool_]) -> _End:
+    """Newton's method on one grid. idles : tilts of pads that idle on a coarser one. Collective."""
     bearing = bearing_of(scene)
     assert bearing is not None  # as in `solve`
     chain = Chain(ask, inner)
@@ -125,7 +126,7 @@ def _on_grid(
             K[k, k] > 0 for k in bearing.pitches if bearing.free[k]
         )
         q = q + step
-    return solution, q, count, found, nudges >= NUDGES, why + _left(bearing, off, counts, idle)
+    return _End(solution, q, count, found, nudges >= NUDGES, why + _left(bearing, off, counts, idle))
 
 
 def _left(bearing: Bearing, off: Array, counts: Array, idle: list[bool]) -> str:
@@ -137,7 +138,7 @@ def _left(bearing: Bearing, off: Array, counts: Array, idle: list[bool]) -> str:
     return "".join(f"; {what}{', '.join(which)}" for what, which in told.items() if which)
 
 
-def _places(film: PadFilm) -> tuple[Array, Array]:
+def _places(film: FilmWithModes) -> tuple[Array, Array]:
     """x, y of all points of the film, its sides among them, on every rank."""
     grid = film.problem.grid
     return grid.with_neighbours(0)[None, :], grid.with_neighbours(1)[:, None]
@@ -149,7 +150,7 @@ def _step(bearing: Bearing, films: Films, K: Array, off: Array, counts: Array, n
     scaled = -K[np.ix_(free, free)] * bearing.sizes[free] / counts[free, None]
     step[free] = bearing.sizes[free] * np.linalg.lstsq(scaled, -off[free] / counts[free], rcond=1e-13)[0]
 
-    def share(film: PadFilm) -> float:
+    def share(film: FilmWithModes) -> float:
         x, y = _places(film)
         moved = sum(step[k] * mode(x, y) for k, mode in zip(film.numbers, film.modes, strict=True))
         change = moved / film.problem.film(x, y)
@@ -159,14 +160,15 @@ def _step(bearing: Bearing, films: Films, K: Array, off: Array, counts: Array, n
     return films.min(share) * step
 
 
-def _tell(scene: Any, bearing: Bearing, solution: Solution, q: Array, found: bool, counts: dict[str, float], why: str) -> None:
-    """Outcome, record and the pads' numbers on the solution. why : where none was found. Collective."""
-    values, told = solution.problem.quantities(solution.fields), bearing.told(solution, q)
+def _tell(scene: Any, bearing: Bearing, end: _End, counts: dict[str, float]) -> None:
+    """Outcome, record and the pads' numbers on the solution. Collective."""
+    solution, q = end.solution, end.q
+    values, told = solution.problem.quantities(solution.fields), bearing.told(q)
     place = f"{told['vary']} = {told['value']:.8g}, tilts {', '.join(f'{tilt:.4g}' for tilt in told['tilts'])} rad"
-    if solution.converged and not found:
+    if solution.converged and not end.found:
         wanted = "" if scene.balance is None else f"{scene.balance.load:g} asked for; "
         solution.outcome = Outcome.LOAD_NOT_CARRIED
-        solution.message = f"{wanted}no balance was found {why}; the last: {place} carries {values['load']:.8g}"
+        solution.message = f"{wanted}no balance was found {end.why}; the last: {place} carries {values['load']:.8g}"
     tilts = [float(tilt) for tilt in told["tilts"]]
     solution.problem.more |= {"pad_tilts": tilts}  # type: ignore[attr-defined]
     solution.settings |= {"coordinates": [float(one) for one in q], "relative_coordinates": q / bearing.sizes}

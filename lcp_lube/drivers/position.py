@@ -28,11 +28,11 @@ from .chain import Chain
 from .coefficients import by_film, motions_of, placed
 from .compose import Inner
 from .impedance import stiffness
+from .levels import halved
 from .winding import places
 
 MOST_SOLVES = 25  # on a grid
 COARSEST, COARSE_TOL = (36, 7), 1e-2  # fewest points around and across, and how well a coarse grid's place is worth knowing
-COARSER = 0.7  # points of a grid over those of the next finer one, at most
 SEEN = 0.5  # a mesh in parts of the stretch sqrt(2 (1 - s)) on which the film is thin, at most
 MOST_COARSE = 8  # solves on a grid that is not the last
 LONGEST = (2.0, 0.4)  # of a step in t and in the attitude (rad)
@@ -131,8 +131,8 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     solution.settings |= {
         "balance": record | {"iterations": count, "solves": solves, "work": work},
         "attitude_deg": math.degrees(phi),
-        "why": [*solution.settings["why"], f"balance: {answer}, found in {count} solves on this grid, {solves} in all"],
     }
+    solution.because(f"balance: {answer}, found in {count} solves on this grid, {solves} in all", after=True)
     return solution
 
 
@@ -157,12 +157,9 @@ def _fewest(scene: GroovedJournalScene, s: float) -> float:
 def _coarse(scene: GroovedJournalScene, s: float) -> list[tuple[int, ...]]:
     """Grids from coarse to fine."""
     shapes, fewest = [scene.shape], math.ceil(_fewest(scene, s))
-    while True:
-        nx, ny = shapes[0]
-        coarser = max(nx // 2, fewest), ny // 2 | 1 if ny >= 2 * COARSEST[1] else ny
-        if math.prod(coarser) > COARSER * nx * ny:
-            return shapes
+    while (coarser := halved(shapes[0], fewest, 2 * COARSEST[1])) is not None:
         shapes.insert(0, coarser)
+    return shapes
 
 
 def touching(scene: GroovedJournalScene, phi: float) -> float:
