@@ -110,7 +110,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         level_begin, before, earlier = perf_counter(), solution, before
         near = ask.start if before is None else _start(before, prod(shape)) if ask.nested is not False else None
         stopping = _stopping(ask, tol, before) if before is not None or (pairs and not ring) else ask.stopping
-        halved = ask.reduction and (len(shape) == 1 or prod(shape) > WHOLE[loops if before is None else before.asked == "fas"])
+        halved = ask.reduction and (not plane or prod(shape) > WHOLE[loops if before is None else before.asked == "fas"])
         this = replace(ask, accuracy=None, stopping=stopping, start=near, nested=False, reduction=halved)
         by_loops = loops and (plane or (line and shape[0] <= ELIMINATED))
         solution = inner(scene.with_shape(shape), replace(this, direct_below=0) if by_loops else this)

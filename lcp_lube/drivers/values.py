@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..base.parallel import Array
-from ..problems.film.forces import totals
+from ..problems.film.forces import of_line, totals
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.strip import stream_weights
 from ..problems.film.turned import TurnedProblem
@@ -92,7 +92,7 @@ class Values:
         if self.line is None:
             return np.nan
         if self._known is None:
-            if name == self.quantity and (found := carried(*self.line, name)) is not None:
+            if name == self.quantity and (found := carried(self.line[0], None, name)) is not None:
                 return found
             self._known = scalars(self.line[0].quantities(self.line[1]))
         return self._known.get(name, np.nan)
@@ -121,22 +121,30 @@ class Values:
         return out
 
 
-def carried(problem: Problem, fields: Fields, quantity: str) -> float | None:
-    """An integral of the pressure without all other numbers, where a scene makes nothing else of it; else None. Collective."""
+def carried(problem: Problem, fields: Fields | None, quantity: str) -> float | None:
+    """An integral of the pressure without all other numbers, where a scene makes nothing else of it; else None. Collective.
+
+    fields : None: that of a line as its film has it.
+    """
     kept = problem.grid.comm.size == 1 and problem.grid.size <= LARGE
     if quantity not in INTEGRALS or not isinstance(problem, LubricationProblem) or not kept or problem.more:
         return None
     if isinstance(problem, TurnedProblem) or (problem.extras is not None and problem.shaft is None):
         return None
-    return _integral(problem, fields["p"] * problem.p_unit, quantity)
+    return _integral(problem, None if fields is None else fields["p"] * problem.p_unit, quantity)
 
 
-def _integral(problem: LubricationProblem, p_pa: Array, quantity: str) -> float:
-    """One of INTEGRALS, as `forces` has it. Collective."""
+def _integral(problem: LubricationProblem, p_pa: Array | None, quantity: str) -> float:
+    """One of INTEGRALS, as `forces` has it; p_pa : None as in `carried`. Collective."""
     names = ("force_x", "force_y") if quantity == "load" and problem.shaft is not None else (quantity,)
     from ..problems.film.known import known_of  # here: of runs to an accuracy alone
 
-    found = totals(problem, p_pa, known_of(problem), names)
+    known = known_of(problem)
+    if p_pa is None:
+        assert known is not None  # as `known_line` found
+        found = of_line(problem, known, names)
+    else:
+        found = totals(problem, p_pa, known, names)
     return hypot(found["force_x"], found["force_y"]) if len(names) == 2 else found[quantity]
 
 

@@ -242,11 +242,12 @@ def _gauss(f: Callable[[Array], Array], a: Array, b: Array) -> Array:
     return half * np.sum(f(points) * _WEIGHT, axis=-1)
 
 
-def bisect(f: Callable[[Array], Array], a: Array, b: Array) -> Array:
+def bisect(f: Callable[[Array], Array], a: Array, b: Array, ends: tuple[Array, Array] | None = None) -> Array:
     """Return the roots of f, positive at a and not at b, in all brackets at once; rounding cannot make it fail.
 
     Where they are few, f is asked at many places of a bracket at once, along a first axis: a call costs more than a place then.
-    They lie closest around the chord's root, so that a bracket of a smooth f shrinks to what the chord errs by.
+    They lie closest around the chord's root, so that a bracket of a smooth f shrinks to what the chord errs by. ends : f at
+    a and at b, where they are known.
     """
     if not np.size(a):
         return b
@@ -254,11 +255,11 @@ def bisect(f: Callable[[Array], Array], a: Array, b: Array) -> Array:
     even, near = (np.arange(1, 8) / 8.0, 4.0 ** -np.arange(2.0, 14.0)) if few else (np.array([0.5]), np.zeros(0))
     column = (-1, *[1] * np.ndim(a))
     even, around = even.reshape(column), np.concatenate([-near, 0.0 * near[:1], near]).reshape(column)
-    f_a, f_b = np.ones_like(a), -np.ones_like(b)  # not known
+    f_a, f_b = ends or (np.ones_like(a), -np.ones_like(b))
     for _ in range(60):
         with np.errstate(all="ignore"):
-            chord = np.nan_to_num(f_a / (f_a - f_b), nan=0.5)
-        inside = np.clip(a + (b - a) * np.concatenate([even + 0.0 * chord, chord + around]), a, b)
+            chord = np.fmax(np.fmin(f_a / (f_a - f_b), 1.0), 0.0)
+        inside = np.minimum(np.maximum(a + (b - a) * np.concatenate([even + 0.0 * chord, chord + around]), a), b)
         if not ((a < inside) & (inside < b)).any():
             break
         inside.sort(axis=0)

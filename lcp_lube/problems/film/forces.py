@@ -89,13 +89,18 @@ def totals(
         if name != "pressure_integral":
             out[name] += contact.total(problem, weight)
     if known is not None:
-        outside = known.ambient(problem)
-        for (name, discrete), (above, weight) in zip(
-            zip(by, integrals(problem, known.p_pa, asked), strict=True), asked, strict=True
+        for (name, told), discrete in zip(
+            of_line(problem, known, by).items(), integrals(problem, known.p_pa, asked), strict=True
         ):
-            above = above if name == "pressure_integral" or hasattr(weight, "above") else outside
-            out[name] += known.line.integral(antiderivative(problem, name), above) - discrete
+            out[name] += told - discrete
     return out
+
+
+def of_line(problem: LubricationProblem, known: Known, wanted: Collection[str]) -> dict[str, float]:
+    """`totals` of these names as the film of a line has them."""
+    outside, every = known.ambient(problem), weights(problem)
+    above = {name: 0.0 if name == "pressure_integral" else getattr(every[name], "above", outside) for name in wanted}
+    return {name: known.line.integral(antiderivative(problem, name), one) for name, one in above.items()}
 
 
 def _above(problem: LubricationProblem, name: str, weight: Weight) -> float:

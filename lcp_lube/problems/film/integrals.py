@@ -29,6 +29,8 @@ from .edges import marks_of
 _XI, _WEIGHT = np.polynomial.legendre.leggauss(8)
 TO_POWERS = np.linalg.inv(np.vander(_XI, increasing=True))  # of what has values at Gauss points
 _UPTO = polyval(_XI, polyint(TO_POWERS, lbnd=-1.0))  # its integrals up to them
+# The last three of its coefficients in Legendre's polynomials: a kink's are as large as what Gauss' rule errs by there.
+_TAIL = _WEIGHT[:, None] * np.polynomial.legendre.legvander(_XI, 7)[:, 5:] * (np.arange(5, 8) + 0.5)
 TOL = 1e-11  # of a panel's Int h^-3; less would chase the rounding of h
 FIRST = 512  # panels at least before any is halved: a ridge of a thousandth of the line meets a Gauss point
 PANELS = 200_000  # beyond the first ones, about the most
@@ -68,9 +70,9 @@ class LineIntegrals:
         self.spans: tuple[Any, ...] | None = None  # between supplies (`known.Span`)
         self.ring: tuple[float, float] | None = None  # where a turn begins, and its length, m
         self.edges = np.asarray(list(edges), dtype=float)
-        self.ends = points if fine else self._panels(self.edges)
+        self.ends, h = (points, None) if fine else self._panels(self.edges)
         self.at_gauss = _gauss_points(self.ends[:-1], self.ends[1:])  # shape (panels, 8)
-        self.h = self.film_at(self.at_gauss)
+        self.h = self.film_at(self.at_gauss) if h is None else h
         self.thicker, self.swollen = self.oil_at(self.at_gauss)
         self.first = np.searchsorted(self.ends, points)  # the panel behind each point
         self._of_panels = self._integrals(self.ends[:-1], self.ends[1:], self.h, self.thicker, self.swollen)
@@ -88,8 +90,11 @@ class LineIntegrals:
         """What a wall drags through places where the film is full, over its speed: h rho/rho_0, m."""
         return self.film_at(x) / self.oil_at(x)[1]  # type: ignore[no-any-return]
 
-    def _panels(self, edges: Array) -> Array:
-        """Ends of the panels; each point among them, to the bit."""
+    def _panels(self, edges: Array) -> tuple[Array, Array | None]:
+        """Ends of the panels, each point among them, to the bit; and the film at their Gauss points, if that is known by then.
+
+        Of a film that tells all its edges a panel is good where h^-3 is a polynomial to TOL; else its halves are looked at.
+        """
         points = self.points
         length = points[-1] - points[0]
         edges = np.unique(edges[(edges > points[0]) & (edges < points[-1])])
@@ -100,26 +105,34 @@ class LineIntegrals:
             inner = ends[:-1, None] + np.diff(ends)[:, None] * (np.arange(1, parts) / parts)
             ends = np.sort(np.concatenate([ends, inner.ravel()]))
         found, a, b = [ends], ends[:-1], ends[1:]
+        h, cubes = self._cubes(a, b)
+        if getattr(self.film, "smooth_between", False):
+            doubtful = ~(np.abs(cubes @ _TAIL).sum(axis=1) <= TOL * (cubes @ _WEIGHT))
+            a, b = a[doubtful], b[doubtful]
         total = 0
-        for _ in range(HALVINGS):
+        for _ in range(HALVINGS if a.size else 0):
             middle = 0.5 * (a + b)
-            whole, left, right = (self._cubes(*pair) for pair in ((a, b), (a, middle), (middle, b)))
+            whole, left, right = (
+                0.5 * (end - start) * (self._cubes(start, end)[1] @ _WEIGHT)
+                for start, end in ((a, b), (a, middle), (middle, b))
+            )
             bad = ~(np.abs(whole - left - right) <= TOL * (left + right)) & (b - a > SAME * length)
             total += int(np.count_nonzero(bad))
             if not bad.any() or total > PANELS:
                 break
             found.append(middle[bad])
             a, b = np.concatenate([a[bad], middle[bad]]), np.concatenate([middle[bad], b[bad]])
-        return np.sort(np.concatenate(found))
+        return (ends, h) if len(found) == 1 else (np.sort(np.concatenate(found)), None)
 
-    def _cubes(self, a: Array, b: Array) -> Array:
+    def _cubes(self, a: Array, b: Array) -> tuple[Array, Array]:
+        """h and h^-3 at the panels' Gauss points."""
         x = _gauss_points(a, b)
         h = self.film_at(x)
         if not np.all(h > 0):
             at = np.unravel_index(np.argmin(np.nan_to_num(h, nan=-np.inf)), h.shape)
             found = f"{h[at]:g} m" if np.isfinite(h[at]) else "no number"
             raise InputError(f"film {found} at x = {x[at]:g} m: it must be positive everywhere")
-        return 0.5 * (b - a) * (h**-3.0 @ _WEIGHT)
+        return h, h**-3.0
 
     @staticmethod
     def _integrals(a: Array, b: Array, h: Array, thicker: Any = 1.0, swollen: Any = 1.0) -> Array:
@@ -152,8 +165,9 @@ class LineIntegrals:
     def looks(self) -> tuple[Array, Array]:
         """Places in every panel, its ends from within among them, and what they `carries`, shape (panels, 10)."""
         low, high = np.nextafter(self.ends[:-1], np.inf), np.nextafter(self.ends[1:], -np.inf)
-        places = np.concatenate([low[:, None], self.at_gauss, high[:, None]], axis=1)
-        return places, self.carries(places)
+        ends = self.carries(np.stack([low, high], axis=1))
+        within = [ends[:, :1], self.h / self.swollen, ends[:, 1:]]
+        return np.concatenate([low[:, None], self.at_gauss, high[:, None]], axis=1), np.concatenate(within, axis=1)
 
     @property
     def films(self) -> Array:
@@ -188,17 +202,18 @@ class LineIntegrals:
         return 0.5 * np.diff(self.ends) * (at_gauss @ _WEIGHT)
 
 
-def line_integrals(grid: Grid, film: Any) -> LineIntegrals:
+def line_integrals(grid: Grid, film: Any, checked: bool = False) -> LineIntegrals:
     """Those between all points of a line, from the place beside the first to that beside the last: a side, or round the ring.
 
-    Every rank has all of them.
+    Every rank has all of them. checked : whether the film is known to be positive at the points.
 
     Raises
     ------
     InputError : a film that is not positive, at a point or between them.
     """
-    with np.errstate(all="ignore"):
-        check_film(grid, film)
+    if not checked:
+        with np.errstate(all="ignore"):
+            check_film(grid, film)
     (x,), start, length = grid.lines, grid.origin[0], grid.lengths[0]
     edges = np.array(marks_of(film))
     if not grid.periodic[0]:

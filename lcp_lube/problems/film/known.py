@@ -139,14 +139,15 @@ def known_of(problem: LubricationProblem) -> Known | None:
     data: Any = (oil.mu, problem.U, problem.p_sides[:2], problem.r_in, supplies, oil.law, tuple(map(id, oil.effects)))
     with np.errstate(all="ignore"):
         if data not in line.known:
-            line.known[data] = _film(problem, line, spans, supplies, oil), oil.effects  # which keep their ids
-        fed = line.known[data][0]
-        found = None if fed is None else _points(problem, spans, supplies, oil)
+            line.known[data] = [_film(problem, line, spans, supplies, oil), oil.effects, None]  # which keep their ids
+        fed, _, found = line.known[data]
+        if fed is not None and (found is None or oil.effects):  # which make other faces of other answers
+            found = line.known[data][2] = _points(problem, spans, supplies, oil)
     if fed is None or found is None:
         return None
     p, r, P, flows = found
     more_Q = np.array([one.Q for one in fed.lines]) - flows
-    p, r = (field[grid.x_start : grid.x_end] for field in (p, r))
+    p, r = (field[grid.x_start : grid.x_end].copy() for field in (p, r))
     if problem.held is not None:
         p = np.where(problem.held.mask.ravel(), np.append(P, 0.0)[problem.held.owner].ravel(), p)
     return Known(fed, p, r, P, more_Q)

@@ -132,13 +132,16 @@ class Flow:
     crossings: Array | None = None
 
 
-def crossings(line: LineIntegrals, U: float, level: float) -> Array:
-    """Where U h goes through a level."""
+def crossings(line: LineIntegrals, U: float, level: float, exactly: bool = True) -> Array:
+    """Where U h goes through a level; else where straight lines between the looks do."""
     places, h = line.looks
     over = level < U * h
     k, i = np.nonzero(over[:, 1:] != over[:, :-1])
     sign = np.where(over[k, i], 1.0, -1.0)
-    return bisect(lambda x: sign * (U * line.carries(x) - level), places[k, i], places[k, i + 1])
+    (a, b), (f_a, f_b) = ([of[k, i + one] for one in (0, 1)] for of in (places, U * h - level))
+    if not exactly:
+        return a + (b - a) * (f_a / (f_a - f_b))  # type: ignore[no-any-return]
+    return bisect(lambda x: sign * (U * line.carries(x) - level), a, b, (sign * f_a, sign * f_b))
 
 
 def line_flow(
@@ -152,14 +155,16 @@ def line_flow(
     if p_a == 0.0 and (enters := U * float(line.looks[1][0, 0]) * (1.0 - r_in)) < least:
         least, at = enters, np.inf
     x: Array | None = None
-    for _ in range(MOST if U and least else 0):
-        x = crossings(line, U, least)
+    for look in range(MOST if U and least else 0):
+        x = crossings(line, U, least, exactly=look > 0)  # M is level there: the first one errs by the fourth power of a look
         J_x, F_x = _J_F(line, mu, U, x)
         Q, J_Q = _least((p_a + F_x) / J_x, J_x)
         if not least * (1.0 - SETTLED) > Q:
-            break
+            if look:
+                break
+            continue
         near, least, at = least * (1.0 - NEAR) <= Q, Q, J_Q
-        if near:
+        if near and look:
             break
         x = None
     Q_full = float((p_a - p_b + F[-1]) / J[-1])
@@ -212,7 +217,7 @@ def solve_line(
         J_t, F_t = _J_F(line, mu, U, t)
         return Z[k + 1] - (F_t - Q * J_t) - p[k + 1]
 
-    x_f = bisect(below, x[k], x[k + 1])
+    x_f = bisect(below, x[k], x[k + 1], (rise[k] - p[k + 1], -p[k + 1]))
     begins = x_f - x[k] <= SAME * x[-1]
     dry[k[begins]] = False
     apart = ~begins & (x[k + 1] - x_f > SAME * x[-1])
