@@ -60,6 +60,8 @@ def differences(f: Callable[[float], Array], a: float, scale: float, sizes: Arra
 
     d = QUICK * scale
     low, high, here = at(-d), at(d), at(0.0)
+    if low is None and high is None:
+        raise known[d]  # type: ignore[misc]
     if here is not None and (low is None) != (high is None):  # values to one side
         d = d if low is None else -d
         low, here, high = here, at(d), at(2.0 * d)
@@ -92,7 +94,7 @@ def differences(f: Callable[[float], Array], a: float, scale: float, sizes: Arra
         if (excess <= SMOOTH and not jump.any()) or np.isinf(kinks).any():
             break
     if best is None:
-        raise max((change, one) for change, one in known.items() if isinstance(one, InputError))[1]
+        raise next(one for one in known.values() if isinstance(one, InputError))
     slope, steps = best[1], np.isinf(kinks)
     if steps.any() or not slope.all():
         chord, more = stepped(slope == 0.0)
@@ -104,6 +106,8 @@ def differences(f: Callable[[float], Array], a: float, scale: float, sizes: Arra
 def _chord(at: Callable[[float], Array | None], d: float) -> Array:
     """Slope between a - d and a + d, or from a on where one of them has no value; NaN where neither has."""
     low, high, here = at(-d), at(d), at(0.0)
+    if low is None and high is None:
+        raise known[d]  # type: ignore[misc]
     if low is not None and high is not None:
         return (high - low) / (2.0 * d)
     if here is None or (low is None and high is None):
