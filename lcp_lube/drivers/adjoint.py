@@ -114,24 +114,20 @@ class Adjoint:
         return self._here if found is None else found
 
     def _solve(self, rows: list[Array]) -> list[Array]:
-        eq = self.equations
-        problem = eq.problem(self.p)
-        if self._halved:
-            linear: Linear | Halved = Halved(problem, self.cavity, self.scene, least=self._least)
+        eq, law, p = self.equations, self.equations.law, self.p
+        free = eq.constant.held is None and eq.held is None
+        if law and free and not law.dowson_higginson:  # J's rows by q are those of a constant fluid
+            rows, p, law = [np.where(self.cavity, 1.0, law.viscosity(p)) * row for row in rows], law.reduced(p), None
+        problem = eq.constant if law is None else eq.problem(p)
+        if law is None and free and not eq.turned and self.reported.grid.size > self._least and self._reduction == "mirror":
+            linear: Linear | Halved = Halved(problem, self.cavity, eq.film, least=self._least)
         else:
-            entries = None if eq.law is None else eq.tangent(self.p, self.r).entries(problem.scheme)
+            entries = None if law is None else eq.tangent(p, self.r).entries(problem.scheme)
             linear = Linear(problem, self.cavity, entries, eq.held, least=self._least)
         try:
-            return linear.solve_transposed(rows, unknowns(self.cavity, self.p, self.r, eq.constant.p_unit))
+            return linear.solve_transposed(rows, unknowns(self.cavity, p, self.r, eq.constant.p_unit))
         finally:
             linear.destroy()
-
-    @property
-    def _halved(self) -> bool:
-        """Whether the film was solved on half its width, and nothing stands in the way of doing so again."""
-        eq = self.equations
-        plain = eq.law is None and not eq.turned and eq.constant.held is None and eq.held is None
-        return plain and self.reported.grid.size > self._least and self._reduction == "mirror"
 
     def lagrangians(self, scene: Scene, pressures: Sequence[float] | None = None) -> Array:
         """L of every quantity and condition at a scene near by, the fields held. Collective.

@@ -66,17 +66,16 @@ class Equations:
         dry: Array | None = None,
         solved: Any = None,
     ):
-        model = check_film(scene)
-        if model.effects:
+        if (given := check_film(scene)).effects:
             raise InputError(
                 f"{scene.name}: derivatives by the film itself, and errors of cells, are of films without effects; see --model"
             )
-        self.scene, self.turned = scene, model.U < 0
+        self.scene, self.turned = scene, given.U < 0
         film: Any = Mirrored(scene) if self.turned else scene
-        model = film.model
+        model: Model = film.model
         self.law, self._p_sides = model.law, model.p_sides
         film = Frozen(film, self.law) if self.law else film
-        self.model: Model = film.constant if self.law else model
+        self.film, self.model = film, film.constant if self.law else model
         places = None if near is None or near.grid.even else followed(near.grid, near.model, self.model)
         self._lent = type(solved) is LubricationProblem and not (self.turned or self.law or solved.held)
         if self._lent:
@@ -85,6 +84,7 @@ class Equations:
             self.constant = film.build(comm)
         else:
             self.constant = replace(self.model, places=places).build(near.grid.shape, comm)
+        self._at: tuple[Any, ...] = (None,)  # p, the constant film, and what the fluid makes of it there
         if dry is not None and self.constant.coefficients_for is not None and not self._lent:
             self.constant = self.constant.revised(dry)
         self.grid: Grid = self.constant.grid
@@ -94,13 +94,12 @@ class Equations:
 
     def problem(self, p: Array) -> LubricationProblem:
         """The film, with its fluid's coefficients at p."""
-        if self.law is None:
-            return self.constant
-        return effective(self.constant, self.law, p, self._p_sides)  # type: ignore[arg-type]
+        if self.law is not None and not (self._at[0] is p and self._at[1] is self.constant):
+            self._at = p, self.constant, effective(self.constant, self.law, p, self._p_sides)  # type: ignore[arg-type]
+        return self.constant if self.law is None else self._at[2]  # type: ignore[no-any-return]
 
     def tangent(self, p: Array, r: Array) -> Tangent:
-        problem = self.problem(p)
-        return tangent(problem, self.law, self.constant, p / problem.p_unit, r)
+        return tangent(self.problem(p), self.law, self.constant, p / self.constant.p_unit, r)
 
     @property
     def held(self) -> Any:
@@ -157,9 +156,9 @@ class Equations:
 
     def slope(self, p: Array, r: Array, name: str, last: bool = False) -> slopes.Slope:
         """dQ/dp (p in p_unit) and dQ/dr of one of `numbers` (`slopes.slope`). Collective."""
-        problem, name = self.problem(p), FLIPPED.get(name, name) if self.turned else name
+        name = FLIPPED.get(name, name) if self.turned else name
         tangent = self.tangent(p, r) if "flow_" in name or (self.law and name in DRAGS) else None
-        found = slopes.slope(problem, tangent, p / problem.p_unit, r, name, last)
+        found = slopes.slope(self.problem(p), tangent, p / self.constant.p_unit, r, name, last)
         return slopes.Slope(-found.p, -found.r) if self.turned and name in DRAGS else found
 
     def report(self, numbers: dict[str, float]) -> dict[str, float]:

@@ -1,11 +1,11 @@
-"""L of a film's integrals, drag and largest pressure at scenes near by, without problems: what they change of lambda' G.
+"""L of a film's integrals, drag, flows and largest pressure at scenes near by, without problems: what they change of lambda' G.
 
 A problem's coefficients and its balance cost many times what its film at the faces does (`problems/film/by_faces`), and a
 viscosity, a speed or a pressure of a side costs nothing, as the balance is linear in them.
 Barus' law has another q, as p is held.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import fields
 from functools import cached_property
@@ -16,6 +16,7 @@ import numpy as np
 from ..base.parallel import Array
 from ..problems.film import forces
 from ..problems.film.by_faces import ByFaces
+from ..problems.film.flows import SIDES
 from ..problems.film.fluid import Law
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
@@ -25,9 +26,10 @@ from ..problems.grid import Grid
 from ..problems.strips import moved
 from ..registry import SMALL
 from ..scenes.scene import Scene
-from .equations import DRAGS, Equations, followed
+from .equations import DRAGS, FLIPPED, Equations, followed
 from .turned import Mirrored
 
+FLOWS = [f"flow_{side}" for side in SIDES]
 FREE = {"gap", "mu", "U", "p_unit", "p_c", "sides", "exact", "extras", "shaft", "levers", "law"}  # what may differ
 FREE |= {"lengths", "polar", "places"}  # where its lines of points lie
 
@@ -53,19 +55,24 @@ class NearFilms:
         self.lambdas, self.numbers = lambdas, numbers
         self._columns: dict[bytes, Array] = {}
         self.wanted = {part for one in parts.values() for part in one}
-        constant = not (equations.law and equations.law.dowson_higginson)
-        alone = constant and can(equations.constant, self.model, SMALL)
         self.drags = tuple(name for name in DRAGS if name in self.wanted)
+        self.flows = tuple(name for name in FLOWS if name in self.wanted)
         by_p = {*forces.weights(equations.constant), "p_max"}
-        self.known = alone and self.wanted <= by_p | (set() if equations.law else {*DRAGS})
+        self.known = can(equations.constant, self.model, SMALL) and self.wanted <= by_p.union(DRAGS, FLOWS)
 
     @cached_property
     def _own(self) -> ByFaces:
-        return self._by_faces(self.equations.law or Law())
+        return self._by_faces(self._law, self.equations._p_sides)
 
-    def _by_faces(self, law: Law) -> ByFaces:
+    @property
+    def _law(self) -> Law:
+        return self.equations.law or Law()
+
+    def _by_faces(self, law: Law, p_sides: Sequence[float]) -> ByFaces:
         problem, rows = self.equations.constant, list(self.lambdas.values())
-        return ByFaces(problem, self.model.scheme, law.reduced(self.p), self.r, rows, self.drags)
+        names = [FLIPPED.get(name, name) if self.equations.turned else name for name in self.flows]
+        flows = [name.removeprefix("flow_") for name in names]
+        return ByFaces(problem, self.model.scheme, law, self.p, self.r, p_sides, rows, self.drags, flows)
 
     @cached_property
     def _here(self) -> Array | None:
@@ -73,14 +80,16 @@ class NearFilms:
 
     @cached_property
     def _told(self) -> dict[str, float]:
-        return self._totals(self.equations.constant)
+        own = copy(self.equations.constant)
+        own.p_sides = self.equations._p_sides  # type: ignore[assignment]  # not as q of Barus' law
+        return self._totals(own)
 
     def _totals(self, problem: LubricationProblem) -> dict[str, float]:
         """The numbers, with the integrals of a film's pressure, which is held, and its largest one."""
         found = forces.totals(problem, self.p, wanted=self.wanted, columns=self._columns)
         if "p_max" in self.wanted:
             found["p_max"] = largest_pressure(problem, self.p)[0] + problem.p_c
-        return self.numbers | {name: found[name] for name in self.wanted.difference(DRAGS)}
+        return self.numbers | {name: found[name] for name in self.wanted.difference(DRAGS, FLOWS)}
 
     def lagrangians(self, scene: Scene) -> Array | None:
         """L of every quantity; None where it is not that of another film at these points."""
@@ -89,18 +98,18 @@ class NearFilms:
         eq = self.equations
         film: Any = Mirrored(scene) if eq.turned else scene
         model: Model = film.model
-        if model.U <= 0.0 or model.effects or model.dense or not self._alike(model) or film.shape != eq.grid.shape:
+        if model.U <= 0.0 or model.effects or not self._alike(model) or film.shape != eq.grid.shape:
             return None
         grid, law, p_sides = self._grid(model), model.law or Law(), model.p_sides
-        if self.drags and model.law:  # which drags by the viscosity at every point
-            return None
-        sums = None if grid is None else self._sums(model.gap, law, grid)
+        sums = None if grid is None else self._sums(model.gap, law, grid, p_sides)
         if grid is None or sums is None:
             return None
-        q_sides = [float(law.reduced(np.array(p))) for p in p_sides]
+        last, q_sides = len(self.lambdas) + len(self.drags), [float(law.reduced(np.array(p))) for p in p_sides]
         pressed, dragged = sums[:, 0] + sums[:, 2:] @ np.array(q_sides), model.U * sums[:, 1]
-        G = (pressed / model.mu + dragged)[: len(self.lambdas)]
-        drags = (-1.0 if eq.turned else 1.0) * (pressed + model.mu * dragged)[len(self.lambdas) :]
+        flows = pressed / model.mu + dragged
+        G, numbers = flows[: len(self.lambdas)], dict(zip(self.flows, 0.5 * grid.spacing[1] * flows[last:], strict=True))
+        for name, of, shear in zip(self.drags, sums[len(self.lambdas) : last], dragged[len(self.lambdas) : last], strict=True):
+            numbers[name] = (-1.0 if eq.turned else 1.0) * (of[0] + of[2:] @ np.array(p_sides) + model.mu * shear)
         lean, near = copy(eq), copy(eq.constant)
         near.grid = grid
         near.mu, near.U, near.p_c, near.p_sides = model.mu, model.U, model.p_c, p_sides  # type: ignore[assignment]
@@ -108,13 +117,13 @@ class NearFilms:
         near.levers, own = model.levers, self.model
         same = (eq._p_sides, eq.constant.p_c) == (p_sides, near.p_c) and grid is eq.grid
         same = same and _same((own.shaft, own.levers), (near.shaft, near.levers))
-        numbers = self._told if same else self._totals(near)
-        report = lean.report(numbers | dict(zip(self.drags, map(float, drags), strict=True)))
+        report = lean.report((self._told if same else self._totals(near)) | {name: float(a) for name, a in numbers.items()})
         return np.array([report[name] for name in self.lambdas]) - G / eq.constant.scheme.flow_unit
 
-    def _sums(self, gap: Any, law: Law, grid: Grid) -> Array | None:
-        if (law.barus or None) != ((self.equations.law and self.equations.law.barus) or None):
-            return self._by_faces(law).sums(gap, grid)
+    def _sums(self, gap: Any, law: Law, grid: Grid, p_sides: tuple[float, ...]) -> Array | None:
+        at_sides = law.dowson_higginson or (law.barus and self.drags)  # whether what faces there count depends on the pressure
+        if law != self._law or (at_sides and p_sides != self.equations._p_sides):
+            return self._by_faces(law, p_sides).sums(gap, grid)
         if grid is self.equations.grid and _same(gap, self.model.gap):
             return self._here
         return self._own.sums(gap, grid)

@@ -4,9 +4,10 @@ With G_i the balance of a point (`reynolds`), w' G is linear in the conductances
 
     w' G = sum of C k (w_i - w_j)(p_i - p_j)/(6 mu)  +  U sum of H s (w_i - w_j)(1 - r_i),
 
-k and s being products of what a column and what a line of the grid has. Where a film is the same along y from edge to edge, the
-lines between two edges are added up once, and another film costs its values on one of them. The drag at the wall (`flows.drag`)
-is such a sum too, of h and 1/h at the faces.
+k and s being products of what a column and what a line of the grid has; a fluid's density multiplies both at each face, as the
+mean of its points'. Where a film is the same along y from edge to edge, the lines between two edges are added up once, and
+another film costs its values on one of them. The drag at the wall (`flows.drag`) is such a sum too, of h and 1/h at the faces,
+and so are the flows through the sides (`flows.side_flows`).
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,7 +21,9 @@ from ...base.parallel import Array
 from ..grid import Grid
 from ..strips import STRIP, ghosted, in_strips
 from .edges import Around, face_film, jumps_of, level, pairs
-from .flows import line_shares, linear, sheared_lines
+from .effects import framed_by
+from .flows import SIDES, line_shares, linear, sheared_lines
+from .fluid import Law
 from .lubrication import LubricationProblem
 from .reynolds import sides
 from .strip import line_weights, stream_weights
@@ -47,6 +50,7 @@ class Laid:
     of_lines: list[Any]
     of_faces: Any
     of_drags: list[Any]
+    of_flows: Array
 
 
 class ByFaces:
@@ -54,15 +58,18 @@ class ByFaces:
 
     Parameters
     ----------
-    q : owned points, Pa above p_c; of Barus' law the reduced pressure. r : owned points. rows : the weights w.
-    drags : of them `friction` and `friction_torque`, which follow the rows' sums; where q is the pressure.
+    problem : of a fluid of constant viscosity and density. law : of its own fluid.
+    p : owned points, Pa above p_c, r : owned points. p_sides : Pa above p_c. rows : the weights w.
+    drags : of them `friction` and `friction_torque`, which follow the rows' sums. flows : sides, whose flows follow those.
     """
 
     def __init__(
-        self, problem: LubricationProblem, scheme: str, q: Array, r: Array, rows: Sequence[Array], drags: Sequence[str] = ()
-    ):
+        self, problem: LubricationProblem, scheme: str, law: Law, p: Array, r: Array, p_sides: Sequence[float],
+        rows: Sequence[Array], drags: Sequence[str] = (), flows: Sequence[str] = (),
+    ):  # fmt: skip
         from .cell_loops import loop_by_faces
 
+        q = law.reduced(p)
         self.grid = grid = problem.grid
         (ny, nx), self.count = grid.box, len(rows)
         at_face, before = scheme != "upwind", scheme != "face"  # where the wall's film is taken, and where the void's
@@ -79,28 +86,46 @@ class ByFaces:
         for end, owned in ((0, grid.y_start == 0), (-1, grid.y_end == grid.shape[1])):
             if owned and grid.ends[1][end] in ("closed", "mirror"):
                 across[:, end] = 0.0
+        west, east, south, north = (float(mask.any()) for mask in sides(grid))
+        columns, rims = np.outer([west, east], np.ones(ny)), np.outer([south, north], np.ones(nx))  # of the faces at the sides
+        if law.dowson_higginson:
+            dense = framed_by(grid, law.density(p), [float(law.density(np.array(P))) for P in p_sides])
+            by_x, by_y = (0.5 * (a[..., 1:] + a[..., :-1]) for a in (dense[1:-1], dense[:, 1:-1].T))
+            for part in (along, wall, *([] if void is wall else [void])):
+                part *= by_x
+            across *= by_y.T
+            columns, rims = columns * by_x[:, [0, -1]].T, rims * by_y[:, [0, -1]].T
         self._along, self._across = along, across
         self._at_face, self._before = wall if at_face else None, void if before else None
-        west, east, south, north = (float(mask.any()) for mask in sides(grid))
-        self._beside = [-mask * np.array([one[:, at] for one in w]) for mask, at in ((west, slice(1)), (east, slice(-1, None)))]
-        self._ends = -south * np.array([one[0] for one in w]), -north * np.array([one[-1] for one in w])
-        self.drags, self._nodal = drags, scheme == "nodal"
+        self._beside = [-np.array([a[:, [at]] * columns[at, :, None] for a in w]) for at in (0, -1)]
+        self._ends = [-np.array([a[at] * rims[at] for a in w]) for at in (0, -1)]
+        self.drags, self.flows, self._nodal = drags, flows, scheme == "nodal"
         if drags:
             own = np.append(west, np.ones(nx))  # the first face is the neighbour's, but at a side
-            self._pull = own * np.diff(grid.ghosted(q, 0.0)[1:-1])[None]
-            self._whole = np.broadcast_to(own, self._pull.shape)
+            thick: Any = 1.0
+            if law.barus:  # the viscosity of an east face; the first point's west face has that of its other one
+                framed = framed_by(grid, p, p_sides)[1:-1, 1:]
+                thick = np.insert(law.viscosity(0.5 * (framed[:, :-1] + framed[:, 1:])), 0, 0.0, axis=1)
+                thick[:, 0] = thick[:, 1]
+            self._pull = own * np.diff(grid.ghosted(p, 0.0)[1:-1])[None]
             self._void = -np.insert(r.reshape(grid.box), 0, 0.0, axis=1)[None]
+            self._whole, self._less = np.broadcast_to(own * thick, self._pull.shape), self._void * thick
             self._outer = [np.full((1, ny, 1), side) for side in (-west, east)]
+        if flows:  # of what the wall drags, and of what the pressure drives, through the faces at the sides
+            q, r = q.reshape(grid.box), r.reshape(grid.box)
+            self._through = columns, -columns * np.array([np.full(ny, enters), r[:, -1]]), columns * q[:, [0, -1]].T
+            self._off = rims, rims * q[[0, -1]]
         self._known: dict[tuple[int, bytes], tuple[Array, Array]] = {}
         self._own: dict[tuple[bool, tuple[float, ...]], Laid] = {}
 
     def sums(self, gap: Any, grid: Grid) -> Array | None:
         """What the pressures (m2/s Pa s) and the wall (m) make of each, and by what it grows with each side's pressure: shape
-        (weights, 6); None for a film that is not positive. Of drags what the pressures (N) and mu U (m) make.
-        grid : the problem's, or the same points elsewhere."""
+        (weights, 6); None for a film that is not positive. Of drags what the pressures (N) and mu U (m) make, of flows
+        twice what leaves per mean spacing in y. grid : the problem's, or the same points elsewhere."""
         film = Around(gap, grid)
         cut = [jumps_of(film, axis) for axis in "xy"]
-        out, positive = np.zeros((self.count + len(self.drags), 6)), True
+        first = self.count + len(self.drags)
+        out, positive = np.zeros((first + len(self.flows), 6)), True
         balances, at = out[: self.count], self._laid(grid, level(film), tuple(cut[1]))
         for some, rows in _strips(at.lines, grid.box[1]):
             C, H, before = _along(film, at, at.y[rows], at.across[:, rows], cut)
@@ -114,12 +139,19 @@ class ByFaces:
             for k, part, values in zip((0, 1, 1, 2, 3), at.of_lines, (C, H, before, C[:, :1], C[:, -1:]), strict=True):
                 if part is not None:
                     balances[:, k] += _total(part, some, values)
+            if self.flows:
+                wall, void = (H if self._at_face is not None else before), (H if self._before is None else before)
+                outer = np.array([a[:, end] for a in (C, wall, void) for end in (0, -1)])
+                out[first:, :4] += np.einsum("fkal,al->fk", at.of_flows[:, :, :, some], outer)
         for some, rows in _strips(at.faces, grid.box[1]):
             C = _across(film, at, pairs(at.y_places[0])[:, rows], at.y_places[1][rows], cut) * at.widths
             positive = positive and bool((C > 0.0).all())
             balances[:, 0] += _total(at.of_faces, some, C)
             for k, end, here in ((4, 0, some.start == 0), (5, -1, some.stop == at.faces.size)):
                 balances[:, k] += here * at.ends[end] * (self._ends[end] @ C[end])
+                if SIDES[k - 2] in self.flows:
+                    by_side, own = (here * at.ends[end] * (of[end] @ C[end]) for of in self._off)
+                    out[first + self.flows.index(SIDES[k - 2]), [k, 0]] += -by_side, own
         total = grid.comm.allreduce(np.append(out, float(not positive)))
         return None if total[-1] else total[:-1].reshape(out.shape)
 
@@ -144,6 +176,7 @@ class ByFaces:
             [None if a is None else self._added(a, b, lines) for a, b in of_lines],
             self._added(self._across, ends, faces),
             self._drag_parts(grid, lines) if self.drags else [],
+            self._flow_parts(grid, lines, pressed, dragged) if self.flows else np.zeros(0),
         )  # fmt: skip
         if grid is self.grid:
             self._own[key] = found
@@ -153,8 +186,24 @@ class ByFaces:
         """The same of the drags'."""
         shears, pulls = (share[:, 0] for share in np.broadcast_arrays(*line_shares(grid)))
         levers = [grid.polar[0] + grid.y[:, 0] if name == "friction_torque" and grid.polar else 1.0 for name in self.drags]
-        of = [(self._pull, pulls), (self._whole, shears), (self._void, shears), *((one, pulls) for one in self._outer)]
+        of = [(self._pull, pulls), (self._whole, shears), (self._less, shears), *((one, pulls) for one in self._outer)]
         return [[self._added(a, b * lever, lines) for a, b in of] for lever in levers]
+
+    def _flow_parts(self, grid: Grid, first: Rows, pressed: Array, dragged: Array) -> Array:
+        """By what flows out of sides count on the conductances and the wall's and void's films of first and last x faces, as
+        `sums` has its columns: shape (flows, 4, 6, runs of lines)."""
+        (there, void, driven), found = self._through, np.zeros((len(self.flows), 4, 6, dragged.size))
+        ends = [0.5 * rim * at[:, 0] for rim, at in zip(grid.rims(1), sides(grid)[2:], strict=True)]
+        strips = {side: dragged / line_weights(grid)[:, 0] * end for side, end in zip(SIDES[2:], ends, strict=True)}
+        for part, side in zip(found, self.flows, strict=True):
+            if side in strips:
+                enters, leaves = strips[side], -strips[side]
+            else:
+                all_lines, k = dragged + sum(strips.values()), SIDES.index(side)
+                enters, leaves = -all_lines * (k == 0), all_lines * (k == 1)
+                part[0, k], part[2 + k, k] = pressed * driven[k], -pressed * there[k]
+            part[1, 2:] = [a * b for of in (there, void) for a, b in zip((enters, leaves), of, strict=True)]
+        return np.add.reduceat(found, first, axis=3)
 
     def _sheared(self, film: Around, at: Laid, rows: Rows, void: Array) -> list[Array]:
         """By what `_drag_parts` count on the x faces of some lines. void : the film of the void, in parts of the wall's."""
