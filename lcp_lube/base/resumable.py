@@ -1,7 +1,7 @@
 """A csv that a long experiment fills row by row, and takes up again where it was left."""
 
 import csv
-import os
+import io
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
@@ -11,6 +11,7 @@ from mpi4py import MPI
 
 from ..errors import InputError
 from . import origin
+from .files import write_text
 from .together import on_all_ranks
 
 Row = dict[str, str]
@@ -111,7 +112,12 @@ class ResumableCsv:
 
     def write(self) -> None:
         """Replace the file; to be called before a long run, to hear whether it can be written."""
-        self._on_rank_0(self._write)
+        self._on_rank_0(lambda: self.path.parent.mkdir(parents=True, exist_ok=True))
+        text = io.StringIO()
+        writer = csv.DictWriter(text, self.columns, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(self.rows)
+        write_text(self.path, text.getvalue(), self.comm)
 
     def _read(self) -> list[Row]:
         if not self.path.exists():
@@ -122,26 +128,13 @@ class ResumableCsv:
             reader = csv.DictReader(file, restval="")
             missing = set(self.key) - set(reader.fieldnames or ())
             if missing:
-                raise InputError(f"{self.path}: no csv of this experiment, it has no column {sorted(missing)[0]}; move it away")
+                raise InputError(f"{self.path}: no csv of this experiment, it has no column {min(missing)}; move it away")
             names = dict.fromkeys([*self.columns, *(reader.fieldnames or ())]) if self.growing else self.columns
             return [{name: row.get(name) or "" for name in names} for row in reader]
 
     def _grow(self, names: Iterable[str]) -> None:
         if self.growing:
             self.columns += [name for name in names if name not in self.columns]
-
-    def _write(self) -> None:
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        temporary = self.path.with_name(f".{self.path.name}.{os.getpid()}")
-        try:
-            with temporary.open("w", newline="", encoding="utf-8") as file:
-                writer = csv.DictWriter(file, self.columns, lineterminator="\n")
-                writer.writeheader()
-                writer.writerows(self.rows)
-            os.replace(temporary, self.path)
-        except BaseException:  # Ctrl-C too
-            temporary.unlink(missing_ok=True)
-            raise
 
     def _on_rank_0(self, call: Callable[[], Any]) -> Any:
         """The call's result on every rank; its failure too, as an InputError."""

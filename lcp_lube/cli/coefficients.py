@@ -12,16 +12,14 @@ from ..api import solve
 from ..base.files import write_text
 from ..base.options import check_unread
 from ..base.progress import Line
-from ..drivers.coefficients import Coefficients, check_frequencies, coefficients, placed, stability
+from ..drivers.coefficients import Coefficients, check_film, check_frequencies, coefficients, placed, stability
 from ..errors import InputError, NotFound
 from ..output.console import say
 from ..output.files import check_target
 from ..output.results import as_dict, finite
 from ..output.style import save_figure
-from ..problems.film.model import Model
 from ..problems.film.turning import Turning
 from ..problems.solution import Outcome, Solution
-from ..scenes.moving import motion_of
 from ..scenes.scene import Scene, as_scene
 from .asked import ask_of, scene_of
 from .sweep import parse_axis
@@ -109,16 +107,6 @@ def _first(scene: Scene, solution: Solution, frequencies: list[float]) -> Coeffi
         return coefficients(scene, solution, frequencies[:1])[0]
     except NotFound:
         return None
-
-
-def check_film(scene: Scene, tilt: bool) -> None:
-    """Refuse before the solve what has no coefficients."""
-    if not isinstance(getattr(scene, "model", None), Model):
-        raise InputError(f"scene {scene.name}: coefficients are of films; it has no part that could be displaced")
-    if motion_of(scene) is not None:
-        raise InputError(f"scene {scene.name}: coefficients are of films at rest in time; leave [motion] out")
-    if tilt and getattr(scene, "turning", None) is None:
-        raise InputError(f"scene {scene.name}: --tilt is of journals with a width")
 
 
 def report(found: list[Coefficients], scene: Scene, data: dict[str, Any]) -> dict[str, Any]:

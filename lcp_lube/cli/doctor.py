@@ -73,7 +73,7 @@ def inspect() -> dict[str, Any]:
         "mpi": re.split(r"[,\n]", MPI.Get_library_version().strip("\0 "))[0].strip(),
         "mpiexec": shutil.which("mpiexec"),
         "ranks": MPI.COMM_WORLD.size,
-        "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
+        "cores": len(os.sched_getaffinity(0)),
         "omp_num_threads": os.environ.get("OMP_NUM_THREADS"),
         "memory_gb": round(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 1e9, 1),
     }

@@ -36,7 +36,7 @@ def jobs_for(asked: int | None, chains: int, sizes: Sequence[int]) -> int:
         return min(asked, chains)
     if launched() or sum(sizes) < WORTH or max(sizes) > HEAVY:
         return 1
-    return min(len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1, chains)
+    return min(len(os.sched_getaffinity(0)), chains)
 
 
 def serve(rows_of: Callable[[Sequence[int]], Iterable[tuple[int, Row]]]) -> None:

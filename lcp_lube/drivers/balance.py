@@ -16,10 +16,10 @@ import numpy as np
 
 from ..errors import InputError, NotFound
 from ..problems.film.integrals import thinnest
-from ..problems.film.model import Model
 from ..problems.film.turned import TurnedProblem
 from ..problems.solution import Outcome, Solution
 from ..scenes.balance import BalanceTable
+from ..scenes.moving import film_of
 from ..scenes.scene import Scene, Solvable, as_scene
 from .ask import Ask
 from .chain import added
@@ -181,8 +181,8 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
 def exact_slope(scene: Any, solution: Solution, unknown: Variable, t: float, W: float) -> float | None:
     """d log W/dt by the stiffness of a film that carries W, if t displaces a journal, or a flat wall and no effects but a
     fluid's law act; else None. Collective."""
-    model, turning = getattr(scene, "model", None), getattr(scene, "turning", None)
-    if not isinstance(model, Model) or (model.effects and turning is None):
+    model, turning = film_of(scene), getattr(scene, "turning", None)
+    if model is None or (model.effects and turning is None):
         return None
     from ..scenes.thrust import ThrustScene  # here, as above
     from .coefficients import coefficients

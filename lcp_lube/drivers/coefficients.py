@@ -23,7 +23,7 @@ from ..problems.film.turned import TurnedProblem
 from ..problems.film.turning import Turning
 from ..problems.solution import Fields, Solution
 from ..scenes.effects.named import without
-from ..scenes.moving import motion_of
+from ..scenes.moving import film_of, motion_of
 from ..scenes.scene import Scene, Solvable
 from ..scenes.thrust import ThrustScene
 from ..scenes.tilting import TiltingPadScene
@@ -85,15 +85,10 @@ def coefficients(
     NotFound : effects whose linearised equations GMRES does not solve.
     """
     pads, scene = bearing_of(scene), placed(scene, solution)
-    model: Model | None = getattr(scene, "model", None)
-    if not isinstance(model, Model):
-        raise InputError(f"scene {scene.name}: coefficients are of films; it has no part that could be displaced")
-    if motion_of(scene) is not None:
-        raise InputError(f"scene {scene.name}: coefficients are of films at rest in time; leave [motion] out")
-    turning: Turning | None = getattr(scene, "turning", None)
-    if tilt and (turning is None or len(model.lengths) == 1 or isinstance(scene, TiltingPadScene)):
-        raise InputError(f"scene {scene.name}: --tilt is of journals with a width")
+    check_film(scene, tilt)
     check_frequencies(frequencies)
+    model: Model = scene.model
+    turning: Turning | None = getattr(scene, "turning", None)
     ring = solution.problem
     if isinstance(ring, TurnedProblem):  # a flat film: its mirror image answers to motions along the normal as it does
         scene, fields, ring = Mirrored(scene), ring.there(solution.fields), ring.moving
@@ -152,6 +147,17 @@ def by_film(of: Callable[[Any], Any], scene: Any, solution: Solution, motions: S
     symmetric = solution.settings.get("details", {}).get("reduction") == "mirror"
     ring: Any = solution.problem
     return summed(of, scene, model, ring, solution.fields, motions, symmetric)
+
+
+def check_film(scene: Any, tilt: bool) -> None:
+    """Raise InputError for what has no coefficients."""
+    model = film_of(scene)
+    if model is None:
+        raise InputError(f"scene {scene.name}: coefficients are of films; it has no part that could be displaced")
+    if motion_of(scene) is not None:
+        raise InputError(f"scene {scene.name}: coefficients are of films at rest in time; leave [motion] out")
+    if tilt and (getattr(scene, "turning", None) is None or len(model.lengths) == 1 or isinstance(scene, TiltingPadScene)):
+        raise InputError(f"scene {scene.name}: --tilt is of journals with a width")
 
 
 def check_frequencies(frequencies: Sequence[float]) -> None:

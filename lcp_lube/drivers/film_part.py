@@ -26,6 +26,7 @@ from ..problems.grid import EVEN, Grid, some_places
 from ..problems.solution import Fields, Problem
 from ..problems.strips import STRIP
 from ..problems.transfer import numbers
+from ..scenes.moving import film_of
 from ..scenes.scene import Derived, Solvable
 
 SAME = 1e-12  # relative difference that coordinates' rounding leaves between two values of one film
@@ -49,8 +50,8 @@ def applies(scene: Solvable) -> bool:
 
 def model_of(scene: Solvable) -> Model | None:
     """The film behind a scene, where it is one of a fluid with constant viscosity and density."""
-    model = getattr(scene, "model", None)
-    return model if isinstance(model, Model) and model.law is None and not model.effects else None
+    model = film_of(scene)
+    return model if model is not None and model.law is None and not model.effects else None
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,7 @@ from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.supplies import Supply, supply_flows
 from ..problems.solution import Enclosure, Fields, Outcome, Solution
+from ..scenes.moving import film_of
 from ..scenes.scene import Derived, Solvable
 from .ask import Ask
 from .chain import Chain
@@ -59,8 +60,8 @@ class Fed(Derived):
 
 def applies(scene: Solvable, ask: Ask) -> bool:
     """Whether the film has a supply whose pressure has to be found."""
-    model = getattr(scene, "model", None)
-    return not isinstance(scene, Fed) and isinstance(model, Model) and any(one.open for one in model.supplies)
+    model = film_of(scene)
+    return not isinstance(scene, Fed) and model is not None and any(one.open for one in model.supplies)
 
 
 def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:

@@ -8,6 +8,7 @@ from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.turned import TurnedProblem
 from ..problems.solution import Solution
+from ..scenes.moving import film_of
 from ..scenes.scene import Derived, Solvable
 from .ask import Ask, Start
 from .compose import Inner
@@ -27,8 +28,8 @@ class Mirrored(Derived):
 
 def applies(scene: Solvable, ask: Ask) -> bool:
     """Whether the scene is a film whose wall moves to smaller x."""
-    model = getattr(scene, "model", None)
-    return isinstance(model, Model) and model.U < 0
+    model = film_of(scene)
+    return model is not None and model.U < 0
 
 
 def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:

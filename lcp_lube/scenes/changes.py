@@ -1,5 +1,6 @@
 """Single values of a scene changed by their keys: --set KEY=VALUE, with tables as film.pocket.depth or sides.west.p."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -47,6 +48,16 @@ def changed(data: dict[str, Any], changes: dict[str, Any], prefixes: set[str], k
             del table[old]
         table[path[-1]] = value
     return out
+
+
+def flat(table: Any, path: str = "") -> Any:
+    """Tables in tables by the paths of their keys, {'film.pocket.depth': ...}; what is no table as it is."""
+    if not isinstance(table, Mapping):
+        return table
+    found: dict[str, Any] = {}
+    for key, value in table.items():
+        found |= flat(value, f"{path}{key}.") if isinstance(value, Mapping) else {f"{path}{key}": value}
+    return found
 
 
 def plain(data: Any) -> Any:

@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field
 
 from ..errors import InputError
+from .changes import flat
 from .formula import Formula, TimeText
 from .scene import Finite, Positive
 from .units import Measured, measured
@@ -16,16 +17,6 @@ AtTime = Annotated[float | str, TimeText]
 Pair = tuple[AtTime, AtTime]
 Course = Callable[[float], tuple[float, ...]]  # [X, Y] of a journal, or a film's level, at the time t
 TOL = 1e-3  # where neither steps, nor dt, nor tol is given
-
-
-def _flat(table: Any, prefix: str = "") -> Any:
-    """{'film.pocket.depth': ...} from tables in tables."""
-    if not isinstance(table, dict):
-        return table
-    found: dict[str, Any] = {}
-    for key, value in table.items():
-        found |= _flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {prefix + key: value}
-    return found
 
 
 class MotionTable(Measured):
@@ -46,7 +37,7 @@ class MotionTable(Measured):
     fill: Annotated[Finite, Field(gt=0, le=1)] | None = Field(
         None, description="at t = 0 this part of the film is oil, everywhere, in place of `start`"
     )
-    set: Annotated[dict[str, AtTime | list[AtTime]], BeforeValidator(_flat)] = Field(
+    set: Annotated[dict[str, AtTime | list[AtTime]], BeforeValidator(flat)] = Field(
         {}, description="numbers of the scene that change, by their keys (as in --set): formulas of t, in SI"
     )
     journal: Pair | None = Field(None, description="where the journal is: [X, Y], formulas of t")

@@ -22,6 +22,12 @@ SPEEDS = ("U", "omega", "speed_rpm")  # keys of the wall's speed
 PIECES = 64  # of the time, where the speed changes
 
 
+def film_of(scene: Any) -> Model | None:
+    """The film behind a scene, or what a driver has made of one; None of what is no film."""
+    model = getattr(scene, "model", None)
+    return model if isinstance(model, Model) else None
+
+
 def motion_of(scene: Any) -> MotionTable | None:
     """The [motion] of a scene that has one."""
     return getattr(scene, "motion", None)

@@ -2,10 +2,10 @@
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, field_validator
+from pydantic import Field
 
 from ..problems.film.grooves import Groove
 from ..problems.film.model import Model, Side
@@ -30,18 +30,11 @@ class ShaftScene(FilmScene):
     p_groove: NotNegative = measured("Pa", 0.0, "pressure in the grooves, above p_c")
     p_end: NotNegative = measured("Pa", 0.0, "pressure at both ends, above p_c")
     p_c: Finite = measured("Pa", 0.0, "cavitation pressure")
-    scheme: str | None = Field("face", description="form of the Couette flux: face")
+    scheme: Literal["face"] = Field("face", description="form of the Couette flux")
     n: Count = Field(360, description="points around, and an odd number near a sixteenth of them across")
     nx: Count | None = Field(None, description="points around; default n")
     ny: Count | None = Field(None, description="points across; default as n says")
     balance: BalanceTable | None
-
-    @field_validator("scheme")
-    @classmethod
-    def _face(cls, scheme: str | None) -> str | None:
-        if scheme != "face":
-            raise ValueError("face is allowed")
-        return scheme
 
     @property
     def shape(self) -> tuple[int, ...]:

@@ -78,15 +78,13 @@ class ThrustScene(WithEffects):
     supply: list[SupplyTable] = Field([], description="supplies inside each pad; pressures are absolute")
     h_offset: Finite = metres(0.0, "added to the film everywhere: its level")
     balance: BalanceTable | None = Field(None, description="load for the whole bearing to carry, and what is found for it")
-    scheme: str | None = Field("face", description="form of the Couette flux: face")
+    scheme: Literal["face"] = Field("face", description="form of the Couette flux")
     n: Count = Field(100, description="points along a pad, and half of them across")
     nx: Count | None = Field(None, description="points along the angle; default n")
     ny: Count | None = Field(None, description="points along the radius; default half of n")
 
     def check(self) -> None:
         super().check()
-        if self.scheme != "face":
-            raise ValueError(f"scheme = {self.scheme}: face is allowed")
         if not self.D_inner < self.D_outer:
             raise ValueError(f"D_inner = {self.D_inner:g}: less than D_outer = {self.D_outer:g} is needed")
         if self.pad_deg is not None and self.pads * self.pad_deg > 360.0 * (1 + 1e-9):

@@ -14,6 +14,7 @@ from ..drivers.gradient import Gradient
 from ..drivers.march_gradient import means
 from ..errors import InputError
 from ..problems.solution import Solution
+from ..scenes.changes import flat
 from ..scenes.moving import motion_of
 from ..scenes.scene import Scene
 from ..scenes.values import key_of, unit_of, values_of, with_values
@@ -44,7 +45,7 @@ def deviations(scene: Scene, tolerances: Mapping[str, Any]) -> dict[str, float]:
     Raises InputError for a key that is no number of the scene, a text that is none, a deviation that is not positive.
     """
     values, out = values_of(scene), {}
-    for text, given in _flat(tolerances).items():
+    for text, given in flat(tolerances).items():
         if text == LEVEL and "h" not in values:
             if "h_offset" not in values:
                 raise InputError(
@@ -65,14 +66,6 @@ def deviations(scene: Scene, tolerances: Mapping[str, Any]) -> dict[str, float]:
             what = f"{values[key]:g} is the value" if relative else "more than 0 is needed"
             raise InputError(f"--tolerance {text}={given}: {what}")
         out[key] = float(size)
-    return out
-
-
-def _flat(table: Mapping[str, Any], path: str = "") -> dict[str, Any]:
-    """Nested tables by the paths of their keys."""
-    out: dict[str, Any] = {}
-    for key, value in table.items():
-        out |= _flat(value, f"{path}{key}.") if isinstance(value, Mapping) else {f"{path}{key}": value}
     return out
 
 

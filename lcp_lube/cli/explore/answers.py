@@ -23,7 +23,7 @@ from ...output.results import as_dict, finite
 from ...problems.solution import Fields, Outcome, Problem, Solution
 from ...registry import scene_names
 from ...scenes.moving import motion_of
-from ...scenes.scene import Scene, load_scene, parse_changes, scene_line
+from ...scenes.scene import Scene, as_scene, parse_changes, scene_line
 from ...scenes.written import toml_of
 from .controls import controls
 
@@ -78,7 +78,7 @@ class Answers:
         if what == "solve":
             return _json(self.solve(changes, level, alive, lambda answer: show(_json(answer)))), JSON
         if what == "toml":
-            return toml_of(load_scene(self.base, changes)).encode(), "application/toml"  # type: ignore[arg-type]
+            return toml_of(as_scene(self.base, changes)).encode(), "application/toml"
         if what == "picture":
             return self.picture(changes, level, alive), "image/png"
         raise InputError(f"{what}: no such question")
@@ -190,7 +190,7 @@ class Answers:
 
     def _asked(self, changes: dict[str, Any], level: int) -> tuple[Scene, Ask]:
         """The scene on the grid of a level, or what is asked of a ladder that ends there."""
-        scene = load_scene(self.base, changes)  # type: ignore[arg-type]
+        scene = as_scene(self.base, changes)
         moves = self.moves
         shape, grooved = scene.shape, bool(getattr(getattr(scene, "model", None), "grooves", ()))  # their edges are points
         while prod(shape) > (self._most if level else self._points) and min(shape) > 8:
@@ -201,7 +201,7 @@ class Answers:
         if level or moves or not self._slow:
             return scene.with_shape(shape), self.ask
         if (balance := getattr(scene, "balance", None)) is not None and balance.tol < QUICK:
-            scene = load_scene(scene, {"balance.tol": QUICK})  # type: ignore[arg-type]
+            scene = as_scene(scene, {"balance.tol": QUICK})
         stopping = self.ask.stopping or {"eps1": QUICK}
         # So few points are solved in less time than it takes to see that half of them would do.
         return scene.with_shape(shape), replace(self.ask, stopping=stopping, start=self._near, reduction=False)

@@ -1,6 +1,5 @@
 """[viscosity]: a viscosity that varies in x and y, by a formula or a file: what the oil is where, whatever the answer."""
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal
@@ -34,12 +33,9 @@ class ViscosityMap(EffectTable):
     def effect(self, scene: Any) -> "Places":
         if self.factor is not None:
             return Places(Formula(self.factor), scene.name)
-        lengths = getattr(scene, "side_lengths", None) or (math.pi * scene.D, scene.L_over_D * scene.D)
         assert self.file is not None  # as `check` found
-        return Places(
-            read_profile((scene._folder or Path()) / self.file, lengths, self.interpolation, 1.0, UNITS[self.unit_x]),
-            scene.name,
-        )
+        path, unit = (scene._folder or Path()) / self.file, UNITS[self.unit_x]
+        return Places(read_profile(path, scene.side_lengths, self.interpolation, 1.0, unit), scene.name)
 
 
 @dataclass(frozen=True)
