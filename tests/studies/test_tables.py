@@ -260,10 +260,10 @@ def test_a_failed_write_leaves_the_old_csv(small_paper: list[str], tmp_path: Pat
     old = path.read_text().splitlines(keepends=True)[:-1]
     path.write_text("".join(old))
 
-    def full(self: Any, rows: Any) -> None:
+    def full(self: Any, text: str, encoding: str) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(csv.DictWriter, "writerows", full)
+    monkeypatch.setattr(Path, "write_text", full)
     with pytest.raises(InputError, match="No space left on device"):
         run_published_table("small", 1, results=tmp_path)
     assert path.read_text() == "".join(old)
