@@ -66,44 +66,49 @@ def cut_faces(
     for some in (anew[k : k + TOGETHER] for k in range(0, anew.size, TOGETHER)):
         at = j[some], i[some]
         dry = cavity[at], cavity[at[0], at[1] + 1]
-        t = a[at[1], None] + d[at[1], None] * ((np.arange(IN_SERIES) + 0.5) / IN_SERIES)
+        t = a[at[1]] + d[at[1]] * ((np.arange(IN_SERIES) + 0.5) / IN_SERIES)[:, None, None]
         looks = ((np.arange(SIDE_BY_SIDE) + 0.5) / SIDE_BY_SIDE)[:, None] * width[at[0]] + low[at[0]]
         ends = [partial(film, nodes[at[1] + k], lines[at[0]]) for k in (0, 1)]
-        cubes[some], films[some] = _of_faces(film(t, looks[:, :, None]), ends, dry, along_flow)
+        h = film(t, looks)
+        known = _in_series(h) if full is None else (cubes[some], films[some])
+        cubes[some], films[some] = _of_faces(h, ends, dry, along_flow, known)
     return cut, cubes, films
 
 
-def _of_faces(h: Array, ends: Sequence[Callable[[], Array]], dry: Sequence[Flags], along_flow: bool) -> tuple[Array, Array]:
-    """C and H of faces from the film at all looks, shape (side by side, faces, in series).
+def _of_faces(
+    h: Array, ends: Sequence[Callable[[], Array]], dry: Sequence[Flags], along_flow: bool, known: tuple[Array, Array]
+) -> tuple[Array, Array]:
+    """C and H of faces from the film at all looks, shape (in series, side by side, faces): sums run fastest along the first.
 
-    ends : the film at their first and last points. dry : whether these are cavitated.
+    ends : the film at their first and last points. dry : whether these are cavitated. known : C and H of full faces.
     """
-    cubes, films = _in_series(h)
+    cubes, films = known
     some = np.flatnonzero(dry[0] | dry[1])  # a full face resists all along: only beside a cavity a part may do it alone
     if not some.size:
         return cubes, films
-    seen = np.real(h[:, some])
-    thinnest, thickest = seen.min(axis=(0, 2)), seen.max(axis=(0, 2))
+    seen = np.real(h[..., some])
+    thinnest, thickest = seen.min(axis=(0, 1)), seen.max(axis=(0, 1))
     between = thinnest + THIN * (thickest - thinnest)
     first, last = (np.real(end()[some]) > between for end in ends)  # whether the points lie in the recess
     dry_first, dry_last = (flags[some] for flags in dry)
     void = np.where(first == last, dry_first & dry_last, np.where(last, dry_last, dry_first & np.bool_(not along_flow)))
-    seen = seen[:, void]
-    thin = seen <= between[void, None]
+    seen = seen[..., void]
+    thin = seen <= between[void]
     if along_flow:  # the film before the first place where it becomes thick
-        thin = np.logical_and.accumulate(thin, axis=2)
-        alone = thin[..., 0] & (seen[..., -1] > between[void])
+        thin = np.logical_and.accumulate(thin, axis=0)
+        alone = thin[0] & (seen[-1] > between[void])
     else:
-        alone = thin.any(axis=2)
-    cubes[some[void]], films[some[void]] = _in_series(h[:, some[void]], thin | ~alone[..., None])
+        alone = thin.any(axis=0)
+    cubes[some[void]], films[some[void]] = _in_series(h[..., some[void]], thin | ~alone)
     return cubes, films
 
 
 def _in_series(h: Array, resists: Flags | None = None) -> tuple[Array, Array]:
     """C and H of faces: means over lines of looks, on each of which what `resists` (None: all of it) does so in series."""
-    drag = 1.0 / h**2 if resists is None else np.where(resists, 1.0 / h**2, 0.0)
-    resistance = np.mean(drag / h, axis=2)
-    return np.mean(1.0 / resistance, axis=0), np.mean(np.mean(drag, axis=2) / resistance, axis=0)
+    inverse = 1.0 / h
+    drag = inverse * inverse if resists is None else np.where(resists, inverse * inverse, 0.0)
+    resistance = np.mean(drag * inverse, axis=0)
+    return np.mean(1.0 / resistance, axis=0), np.mean(np.mean(drag, axis=0) / resistance, axis=0)
 
 
 def rims_across_x(

@@ -102,8 +102,8 @@ class DimpleArray:
         half = 0.5 * self.size * (1.0 + EDGE)
         if self.form == "square":
             return np.where((across <= half) & (along <= half), self.depth, 0.0)
-        part = (across**2 + along**2) / half**2
-        return np.where(part <= 1.0, self.depth * (1.0 - part if self.form == "dome" else 1.0), 0.0)
+        part = across**2 + along**2
+        return np.where(part <= half**2, self.depth * (1.0 - part / half**2 if self.form == "dome" else 1.0), 0.0)
 
     def breakpoints(self) -> tuple[float, ...]:
         start, end = self.x
@@ -236,11 +236,9 @@ class Sum:
     def __call__(self, x: ArrayLike, y: ArrayLike | None = None, /) -> Array:
         """h (m) at x and y (m), with the broadcast shape of both."""
         x_, y_ = (np.asarray(a, dtype=float) for a in (x, 0.0 if y is None else y))
-        h = self.parts[0](x_, y_)
-        for part in self.parts[1:]:
-            h = h + part(x_, y_)
+        h, whole = sum((part(x_, y_) for part in self.parts[1:]), self.parts[0](x_, y_)), np.broadcast(x_, y_).shape
         h = h if self.floor is None else np.maximum(h, self.floor)
-        return h + np.zeros(np.broadcast(x_, y_).shape)  # a new array
+        return h if h.shape == whole and len(self.parts) > 1 else h + np.zeros(whole)  # a new array
 
     @property
     def smooth_between(self) -> bool:
@@ -288,7 +286,9 @@ class Sum:
         return out
 
 
-def _within(t: Array, start: float, end: float) -> NDArray[np.bool_]:
+def _within(t: Array, start: float, end: float) -> NDArray[np.bool_] | np.bool_:
+    if start == -np.inf and end == np.inf:
+        return np.True_
     slack = EDGE * max(abs(v) for v in (start, end, 0.0) if np.isfinite(v))
     return (t >= start - slack) & (t <= end + slack)
 
