@@ -6,7 +6,6 @@ order of the parts.
 
 import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from threading import Lock
 from typing import Any
@@ -23,18 +22,21 @@ PARTS = 8  # of the lines of such a grid
 class Crew:
     """So many threads, the calling one among them; the others start with the first work for them.
 
-    One piece of work at a time: a task must not ask the crew for another one.
+    One piece of work at a time: what a task asks the crew for, its own thread does.
     """
 
     def __init__(self, threads: int):
         self.threads = threads
-        self._others: ThreadPoolExecutor | None = None
+        self._others: Any = None
         self._busy = Lock()
 
-    def run(self, task: Callable[[int], Any], count: int) -> list[Any]:
-        """What task(0) to task(count - 1) return; they run at the same time where there are as many threads."""
+    def run(self, task: Callable[[int], Any], count: int, together: bool = False) -> list[Any]:
+        """What task(0) to task(count - 1) return; they run at the same time where there are as many threads.
+
+        together : they wait for one another, and must all be at work.
+        """
         some = min(self.threads, count)
-        if some < 2:
+        if some < 2 or not self._busy.acquire(blocking=together):
             return [task(k) for k in range(count)]
         out, errors = [None] * count, np.geterr()  # of arithmetic: each thread has settings of its own
 
@@ -43,12 +45,16 @@ class Crew:
                 for k in range(first, count, some):
                     out[k] = task(k)
 
-        with self._busy:  # parts that wait for one another must all be at work
+        try:
+            from concurrent.futures import ThreadPoolExecutor
+
             self._others = self._others or ThreadPoolExecutor(self.threads - 1, "lcp-lube")
             others = [self._others.submit(every, first) for first in range(1, some)]
             every(0)
             for one in others:
                 one.result()
+        finally:
+            self._busy.release()
         return out
 
     def rows(self, task: Callable[[int, int], Any], lines: int, points: int) -> list[Any]:

@@ -8,6 +8,8 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from .crew import FEWEST, crew
+
 Array = NDArray[np.float64]
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -64,8 +66,8 @@ class Reduce:
 
     def norm(self, *arrays: Array) -> float:
         """Euclidean norm of the arrays laid end to end."""
-        squares = (float(np.dot(a, a) if a.ndim == 1 else np.einsum("ij,ij->", a, a)) for a in arrays)
-        return float(np.sqrt(self._total(sum(squares))))
+        square = lambda a: float(np.dot(a, a) if a.ndim == 1 else np.einsum("ij,ij->", a, a))  # noqa: E731
+        return float(np.sqrt(self._total(sum(sum(_of_parts(square, a)) for a in arrays))))
 
     def _total(self, own: float) -> float:
         return own if self.comm.size == 1 else self.comm.allreduce(own)
@@ -80,14 +82,20 @@ class Reduce:
 
     def largest(self, a: Array) -> float:
         """Largest |entry|, as `max`, without an array of them."""
-        return self.max(np.array([np.max(a), -np.min(a)]) if a.size else a)
+        return self.max(np.array(_of_parts(lambda part: (np.max(part), -np.min(part)), a)) if a.size else a)
 
     def _extremum(self, a: Array, empty: float, op: MPI.Op) -> float:
-        value = float((np.minimum if op == MPI.MIN else np.maximum).reduce(a, axis=None)) if a.size else empty
+        reduced = (np.minimum if op == MPI.MIN else np.maximum).reduce
+        value = float(reduced(_of_parts(lambda part: reduced(part, axis=None), a))) if a.size else empty
         if self.comm.size == 1:
             return value
         bad = self.comm.allreduce(bool(np.isnan(value)), MPI.LOR)
         return float("nan") if bad else self.comm.allreduce(value, op)
+
+
+def _of_parts(task: Callable[[NDArray], Any], a: NDArray) -> list[Any]:
+    """What is made of an array, or by several threads of the parts of a large one."""
+    return [task(a)] if a.size < FEWEST else crew().rows(lambda start, end: task(a[start:end]), len(a), a.size)
 
 
 def _over(one: bool) -> Reduce:

@@ -74,6 +74,13 @@ def test_settings_of_arithmetic_reach_every_thread():
     assert found == ["ignore"] * 4
 
 
+def test_a_task_asks_for_more():
+    """Its own thread does what it asks for; the parts' order is kept."""
+    team = crew.Crew(2)
+    assert team.run(lambda k: team.run(lambda m: 10 * k + m, 2), 3) == [[0, 1], [10, 11], [20, 21]]
+    assert team.run(lambda k: k, 2, together=True) == [0, 1]
+
+
 MODULES = [f"lcp_lube.solvers.fas.{path.stem}" for path in Path(fas.__file__).parent.glob("*.py")]
 
 

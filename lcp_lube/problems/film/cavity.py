@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ...base.crew import crew
 from ...base.parallel import Array, Reduce
 
 VOID = 1e-9  # void fraction up to which a film counts as full: below what any solve resolves, and nothing that one could see
@@ -28,10 +29,14 @@ def cavity_sign(reduce: Reduce, p: Array, r: Array) -> Array:
 
 def cavitated(reduce: Reduce, p: Array, r: Array) -> NDArray[np.bool_]:
     """Where `cavity_sign` is negative. Collective."""
-    p_max, out = reduce.largest(p), r > VOID
-    for k in range(0, len(p), BLOCK):  # what lies between stays in the cache: new memory takes longer than the arithmetic
-        own = p[k : k + BLOCK]
-        out[k : k + BLOCK] &= (own / p_max if p_max > 0 else own) < r[k : k + BLOCK]
+    p_max, out = reduce.largest(p), np.empty(p.shape, dtype=bool)
+
+    def look(k: int) -> None:
+        some = slice(k * BLOCK, (k + 1) * BLOCK)
+        np.greater(r[some], VOID, out=out[some])
+        out[some] &= (p[some] / p_max if p_max > 0 else p[some]) < r[some]
+
+    crew().run(look, -(-len(p) // BLOCK))  # what lies between stays in the cache: new memory takes longer than the arithmetic
     return out
 
 

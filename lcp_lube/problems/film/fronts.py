@@ -48,13 +48,18 @@ def line_fronts(problem: LubricationProblem, p: Array, r: Array, dry: NDArray[np
     grid, film, s = problem.grid, problem.film, problem.scheme
     start, steps = grid.origin[0], grid.steps(0)
     behind, ahead = steps[:-1], steps[1:]
-    cavity = ghosted(grid, dry, 0.0)(slice(0, grid.box[0]))[1:-1] > 0
-    opens = [kind == "open" for kind in grid.ends[0]]
-    if grid.x_start == 0 and opens[0]:
-        cavity[:, 0] = problem.r_in > 0
+    framed, opens = ghosted(grid, dry, 0.0), [kind == "open" for kind in grid.ends[0]]
     if grid.dim == 1 and opens[0]:
         Q = problem.boundary_flows(p, r)[0]
-    begins, ceases = _turns(cavity[:, :-2], cavity[:, 1:-1])
+
+    def turns(rows: slice) -> tuple[NDArray, ...]:
+        cavity = framed(rows)[1:-1] > 0
+        if grid.x_start == 0 and opens[0]:
+            cavity[:, 0] = problem.r_in > 0
+        (begun, here), (ceased, there) = _turns(cavity[:, :-2], cavity[:, 1:-1])
+        return begun + rows.start, here, ceased + rows.start, there
+
+    *begins, ended, there = (np.concatenate(parts) for parts in zip(*each_strip(grid, turns), strict=True))
     row, i = begins
     if not (grid.dim == 1 and opens[0]):
         Q = s.flow_unit * (s.couette_E[row, i] + s.b_E_at(row, i) * r.reshape(grid.box)[row, i]) / stream_weights(grid)[row, 0]
@@ -65,7 +70,7 @@ def line_fronts(problem: LubricationProblem, p: Array, r: Array, dry: NDArray[np
     shift = np.zeros(grid.box[0])
     np.add.at(shift, row, (x - 0.5 * behind)[i] - ruptures)
     starts = row, i, ruptures
-    row, i = ceases
+    row, i = ended, there
     pressed = s.k_W[row, i] * p.reshape(grid.box)[row, i]
     whole = grid.box[1] == grid.shape[0]  # nothing enters the first point of a whole line that is open
     lacking = s.b_W_at(row, i) * (r.reshape(grid.box)[row, i - 1] if whole else grid.ghosted(r, outside=0.0)[row + 1, i])
@@ -74,7 +79,7 @@ def line_fronts(problem: LubricationProblem, p: Array, r: Array, dry: NDArray[np
     np.add.at(shift, row, ((0.5 - back) * behind[i]))
     closes, ends, places = row, i, (x[i] - back * behind[i])
     if grid.x_end == grid.shape[0] and opens[1]:
-        row = np.flatnonzero(cavity[:, -2])
+        row = np.flatnonzero(dry.reshape(grid.box)[:, -1])
         if problem.p_sides[1] > 0:  # before a side above the cavitation pressure: it is the full point
             pressed = s.k_E[row, -1] * (problem.p_sides[1] / problem.p_unit)
             lacking = -s.b_E_at(row, grid.box[1] - 1) * r.reshape(grid.box)[row, -1]

@@ -9,6 +9,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from ...base.crew import crew
 from ...base.parallel import Array
 from .cavity import cavitated
 from .flows import friction, side_flows
@@ -152,9 +153,6 @@ class Scaled:
     def __getitem__(self, part: Any) -> Any:
         return self._a[part] * self._by
 
-    def max(self, axis: int) -> Array:
-        return np.asarray(self._a.max(axis=axis) * self._by)
-
     def reshape(self, shape: tuple[int, ...]) -> Scaled:
         return Scaled(self._a.reshape(shape), self._by)
 
@@ -207,7 +205,8 @@ def largest_of(
 
     Of equals, to within the tolerance of a solve, the first in x and then y, whatever the ranks.
     """
-    columns = -values.min(axis=0) if opposite else values.max(axis=0)
+    parts = crew().rows(lambda a, b: -values[a:b].min(axis=0) if opposite else values[a:b].max(axis=0), len(y), len(y) * len(x))
+    columns = np.max(parts, axis=0)
     largest = problem.reduce.max(columns)
     if not np.isfinite(largest):
         return largest, None

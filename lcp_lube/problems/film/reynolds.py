@@ -163,7 +163,7 @@ def box_scheme(grid: Grid, film: Film, **data: Any) -> BoxScheme:
     conducting = [faces[0][:, west:], faces[1][:, east:]] + ([faces[2][south:], faces[3][north:]] if grid.dim == 2 else [])
     stores = [] if box.storage is None else [box.storage]
     smallest = float(np.min([reduce.min(a) for a in (box.h, *ends, *conducting, *stores)]))  # NaN stays NaN
-    voids = np.array([np.max(np.abs(part.b_C)) for _, part in box.in_strips(grid)])
+    voids = np.array(each_strip(grid, lambda rows: np.max(np.abs(box.rows(rows).b_C))))
     largest = max(*map(reduce.max, faces), reduce.max(voids), reduce.largest(box.c))
     if not (smallest > 1 / LARGE and largest < LARGE):
         with np.errstate(all="ignore"):
@@ -265,7 +265,7 @@ def coefficients(
     if north:
         k_N[-1] = 0.0
     couette_W, couette_E, c = wall[:, :-1], wall[:, 1:], c_frame[1:-1, 1:-1]
-    np.subtract(couette_W, couette_E, out=c)
+    each_strip(grid, lambda rows: np.subtract(couette_W[rows], couette_E[rows], out=c[rows]))
     for conductance, points, p_side in zip((k_W, k_E, k_S, k_N), side_points(grid), p_sides, strict=True):
         c[points] += conductance[points] * (p_side / p_unit)
     enters = grid.x_start > 0 or (grid.periodic[0] and U != 0.0)  # or else what does is in c

@@ -14,14 +14,16 @@ def series(a: float, b: float) -> float:
 
 
 @kernel
-def coarsen_x_faces(kx: Array, ky: Array, out: Array, y0: int, by_x: bool, by_y: bool, harmonic: bool, beyond: bool) -> None:
-    """Conductances of the coarse x faces: in series along x, added up across with the restriction's weights.
+def coarsen_x_faces(
+    kx: Array, ky: Array, out: Array, y0: int, by_x: bool, by_y: bool, harmonic: bool, beyond: bool, start: int, end: int
+) -> None:
+    """Of rows start + 1 to end the coarse x faces' conductances: in series along x, added up across by restriction's weights.
 
     beyond: the last coarse point is the last fine one, and only one fine face lies between it and the side.
     """
-    n_rows, n_faces = out.shape[0] - 2, out.shape[1] - 2
+    n_faces = out.shape[1] - 2
     shift = (1 - y0 % 2 if by_y else 0) + 1
-    for J in range(n_rows):
+    for J in range(start, end):
         m = shift + (2 * J if by_y else J)
         for f in range(1, n_faces + 1):
             i = 2 * f - 1 if by_x else f  # the face's column, or that of the first of two, between which point i lies
@@ -40,12 +42,14 @@ def coarsen_x_faces(kx: Array, ky: Array, out: Array, y0: int, by_x: bool, by_y:
 
 
 @kernel
-def coarsen_y_faces(kx: Array, ky: Array, out: Array, y0: int, by_x: bool, by_y: bool, harmonic: bool, beyond: bool) -> None:
+def coarsen_y_faces(
+    kx: Array, ky: Array, out: Array, y0: int, by_x: bool, by_y: bool, harmonic: bool, beyond: bool, start: int, end: int
+) -> None:
     """The same for y faces; where lines are coarsened they are halved, as every row is a balance per unit width."""
     n_faces, n_columns = out.shape[0] - 2, out.shape[1] - 2
     # Row of the even line under the first coarse face; the face south of row m is ky[m].
     shift = (0 if y0 % 2 == 1 else 1) if by_y else 1
-    for f in range(1, n_faces + 1):
+    for f in range(start + 1, end + 1):
         m = shift + (2 * f - 2 if by_y else f - 1)
         for k in range(1, n_columns + 1):
             i = 2 * k if by_x else k

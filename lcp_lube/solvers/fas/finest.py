@@ -11,9 +11,7 @@ from ...problems.film.lubrication import LubricationProblem
 from ...problems.film.tangent import renew
 from ...problems.grid import Grid
 from ...problems.solution import Fields
-from ...problems.strips import in_strips
-from . import held, loops
-from .kernels import pressure_and_void
+from . import held, kernels, loops
 from .levels import FEWEST_LINES, Level, carried
 
 SHARP = 1e-12  # of the largest flow of void: less is rounding
@@ -150,11 +148,10 @@ def give_up(levels: list[Level], problem: LubricationProblem) -> Fields | None:
     z = level.z
     if level.held is not None or level.void is not None or z.shape != (grid.box[0] + 2, grid.box[1] + 2):
         return None
-    p, r = z.ravel()[: grid.local_size].reshape(grid.box), np.empty(grid.box)
-    for rows in in_strips(grid):  # one after the other: a point of p lies before the z that it is made of
-        pressure_and_void(z[1:-1, 1:-1][rows], problem.scheme.rows(rows).b_C, p[rows], r[rows])
+    p, r = z.ravel()[: grid.local_size], loops.void(z[1:-1, 1:-1], problem.scheme, grid)
+    kernels.pressure(z[1:-1, 1:-1], p.reshape(grid.box))
     level.z = np.zeros((0, 0))
-    return {"p": p.ravel(), "r": r.ravel()}
+    return {"p": p, "r": r}
 
 
 def take_back(level: Level, problem: LubricationProblem, fields: Fields | None) -> None:

@@ -200,10 +200,20 @@ def add_balance(z: Array, kx: Array, ky: Array, c: Array, carry: Array | None, s
 
 
 @kernel
-def pressure_and_void(z: Array, b_C: Array, p: Array, r: Array) -> None:
-    """Into p and r those of z, whose frame is left out."""
+def void(z: Array, b_C: Array, r: Array) -> None:
+    """Into r that of z, whose frame is left out."""
     for j in range(z.shape[0]):
         for i in range(z.shape[1]):
             here = z[j, i]
-            p[j, i] = here if here > 0.0 else 0.0
             r[j, i] = here / b_C[j, i] if here < 0.0 else 0.0
+
+
+@kernel
+def pressure(z: Array, p: Array) -> None:
+    """Into p that of z, whose frame is left out; p may lie in z's place, none of its points behind the one it is made of."""
+    here = np.empty(z.shape[1])
+    for j in range(z.shape[0]):
+        for i in range(z.shape[1]):
+            here[i] = max(z[j, i], 0.0)
+        for i in range(z.shape[1]):
+            p[j, i] = here[i]

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ...base.parallel import Array
-from . import coarsen, exact, held, loops, starts, transfer
+from . import exact, held, loops
 
 FEWEST = 3  # points a side of the coarsest grid, at least
 FEWEST_LINES = 16  # of a rank; grids with fewer are held whole by every rank. With 8 a dimpled pad stalls on three
@@ -194,7 +194,7 @@ def _coarser(fine: Level, harmonic: bool) -> Level | None:
     # Without a point in between, the two ends of a period would be neighbours on the coarse grid and not on the fine one.
     can_x = fine.nx // 2 >= FEWEST and not (fine.periodic[0] and fine.nx % 2)
     can_y = fine.ny // 2 >= FEWEST and not (fine.periodic[1] and fine.ny % 2)
-    mean_x, mean_y = (float(fine.part(k)[1:-1, 1:-1].mean()) for k in (fine.kx, fine.ky))
+    mean_x, mean_y = (loops.mean(fine.part(k)) for k in (fine.kx, fine.ky))
     if fine.comm is not None:
         mean_x, mean_y = (fine.comm.allreduce(mean) for mean in (mean_x, mean_y))
     by_x = can_x and (mean_y <= STRONG * mean_x or not can_y)
@@ -213,9 +213,9 @@ def _coarser(fine: Level, harmonic: bool) -> Level | None:
     beyond_x = by_x and fine.nx % 2 == 0 and not fine.periodic[0]
     beyond_y = by_y and fine.ny % 2 == 0 and not fine.periodic[1] and last
     flags = (fine.first, by_x, by_y, harmonic)
-    kx, ky = (fine.kx, fine.ky) if fine.held is None else held.marked(fine)
-    coarsen.coarsen_x_faces(kx, fine.ky, coarse.part(coarse.kx), *flags, beyond_x)
-    coarsen.coarsen_y_faces(fine.kx, ky, coarse.part(coarse.ky), *flags, beyond_y)
+    marked = (fine.kx, fine.ky) if fine.held is None else held.marked(fine)
+    of_x, of_y = (marked[0], fine.ky, coarse.part(coarse.kx)), (fine.kx, marked[1], coarse.part(coarse.ky))
+    loops.coarsen((*of_x, beyond_x), (*of_y, beyond_y), *flags)
     for a in (coarse.kx, coarse.ky):
         coarse.gather(a)
     if fine.held is not None:
@@ -224,7 +224,7 @@ def _coarser(fine: Level, harmonic: bool) -> Level | None:
         coarse.void, before = np.zeros((3, *coarse.z.shape)), np.zeros_like(coarse.z)
         leaves, stored, gives = coarse.void
         for values, into in zip(fine.void, (leaves, before), strict=False):
-            transfer.inject(values, coarse.part(into), fine.first, by_x, by_y)
+            loops.inject(values, coarse.part(into), fine.first, by_x, by_y)
             coarse.gather(into)
         for values, into in zip(fine.void[1:], (stored, gives), strict=True):
             restrict(fine, coarse, into, harmonic, values)
@@ -247,7 +247,7 @@ def right_sides(levels: Sequence[Level], harmonic: bool) -> None:
 
 def smooth(level: Level) -> bool:
     """Whether the film has no steps that this grid sees (`starts.smooth`). Collective."""
-    found = starts.smooth(level.kx, level.ky)
+    found = loops.smooth(level.kx, level.ky)
     return found if level.comm is None else level.comm.allreduce(found, MPI.LAND)
 
 
@@ -272,7 +272,8 @@ def solve(level: Level) -> bool:
 
 def restrict(fine: Level, coarse: Level, out: Array, harmonic: bool, given: Array | None = None) -> None:
     """The fine level's residual, or something else that is given there, on the coarse one. Collective."""
-    out[:] = 0.0
+    if coarse.whole:
+        out[:] = 0.0
     where = (fine.first, fine.by_x, fine.by_y, harmonic, fine.periodic[0], given is None)
     c = fine.c if given is None else given
     loops.restrict(fine.z, fine.kx, fine.ky, c, coarse.part(out), *where, fine.carry)

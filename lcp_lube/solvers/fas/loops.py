@@ -14,11 +14,11 @@ from ...problems.film.reynolds import BoxScheme
 from ...problems.grid import Grid
 from ...problems.solution import Fields
 from ...problems.strips import each_strip
+from . import coarsen as coarsening
 from . import fronts, kernels, starts, transfer
 from .waiting import LINE, SLOTS
 
 COLUMNS = 128  # of a part of a line, at least
-inject = transfer.inject
 
 
 def sweep(z: Array, *others: Any) -> None:
@@ -30,7 +30,7 @@ def sweep(z: Array, *others: Any) -> None:
         kernels.sweep(z, *others)
         return
     done, west = np.zeros((parts, LINE), dtype=np.int64), np.zeros((parts, SLOTS, LINE))
-    crew().run(lambda part: kernels.sweep(*(z, *others, part, done, west)), parts)
+    crew().run(lambda part: kernels.sweep(*(z, *others, part, done, west)), parts, together=True)
 
 
 def relax_front(z: Array, *others: Any) -> int:
@@ -40,12 +40,34 @@ def relax_front(z: Array, *others: Any) -> int:
     blocks = min(PARTS, z.shape[0] - 2)
     threads = min(crew().threads, (blocks + 1) // 2)
     done, near = np.zeros((blocks, LINE), dtype=np.int64), np.zeros((2, blocks), dtype=np.int64)
-    return int(crew().run(lambda k: fronts.relax_front(*(z, *others, k, threads, done, near)), threads)[0])
+    sweep_blocks = lambda k: fronts.relax_front(*(z, *others, k, threads, done, near))  # noqa: E731
+    return int(crew().run(sweep_blocks, threads, together=True)[0])
 
 
 def norms(z: Array, *others: Any) -> Array:
     """`kernels.norms` of all rows."""
     return np.sum(_by_rows(lambda start, end: kernels.norms(*(z, *others, start, end)), z), axis=0)
+
+
+def mean(a: Array) -> float:
+    """Of all within the frame."""
+    inside = a[1:-1, 1:-1]
+    return float(sum(crew().rows(lambda start, end: inside[start:end].sum(), len(inside), a.size)) / inside.size)
+
+
+def inject(z: Array, out: Array, *others: Any) -> None:
+    _into(out, z, transfer.inject, z, out, *others)
+
+
+def coarsen(x_faces: Any, y_faces: Any, *flags: Any) -> None:
+    """`coarsen`; x_faces, y_faces : what they are made of, where they go, and whether the last one stands for one alone."""
+    for loop, (kx, ky, out, beyond) in ((coarsening.coarsen_x_faces, x_faces), (coarsening.coarsen_y_faces, y_faces)):
+        _into(out, kx, loop, kx, ky, out, *flags, beyond)
+
+
+def smooth(kx: Array, ky: Array) -> bool:
+    """`starts.smooth` of all rows."""
+    return all(_by_rows(lambda start, end: starts.smooth(*(kx, ky, start, end)), kx))
 
 
 def add_balance(z: Array, *others: Any) -> None:
@@ -62,16 +84,32 @@ def interpolate(z: Array, *others: Any) -> None:
 
 def restrict(z: Array, kx: Array, ky: Array, c: Array, out: Array, *others: Any) -> None:
     """Dealt out by the rows that are written to."""
-    crew().rows(lambda start, end: transfer.restrict(*(z, kx, ky, c, out, *others, start, end)), out.shape[0], z.size)
+
+    def give(start: int, end: int) -> None:
+        out[start:end] = 0.0
+        transfer.restrict(*(z, kx, ky, c, out, *others, start, end))
+
+    crew().rows(give, out.shape[0], z.size)
 
 
 def pressure_and_void(z: Array, scheme: BoxScheme, grid: Grid) -> Fields:
     """p and r of the owned points."""
-    p, r = np.empty(z.shape), np.empty(z.shape)
+    p = np.empty(z.shape)
+    each_strip(grid, lambda rows: kernels.pressure(z[rows], p[rows]))
+    return {"p": p.ravel(), "r": void(z, scheme, grid)}
 
-    each_strip(grid, lambda rows: kernels.pressure_and_void(z[rows], scheme.rows(rows).b_C, p[rows], r[rows]))
-    return {"p": p.ravel(), "r": r.ravel()}
+
+def void(z: Array, scheme: BoxScheme, grid: Grid) -> Array:
+    """r of the owned points."""
+    r = np.empty(z.shape)
+    each_strip(grid, lambda rows: kernels.void(z[rows], scheme.rows(rows).b_C, r[rows]))
+    return r.ravel()
 
 
 def _by_rows(task: Any, z: Array) -> list[Any]:
     return crew().rows(lambda start, end: task(start + 1, end + 1), z.shape[0] - 2, z.size)
+
+
+def _into(out: Array, z: Array, loop: Any, *given: Any) -> None:
+    """Dealt out by the rows that are written to, within the frame; z : has as many points as are read."""
+    crew().rows(lambda start, end: loop(*given, start, end), out.shape[0] - 2, z.size)

@@ -94,15 +94,16 @@ def smooth_row(coarse: Array, kx: Array, m: int, west: bool, east: bool, out: Ar
 
 
 @kernel
-def smooth(kx: Array, ky: Array) -> bool:
-    """Whether no two neighbouring faces, but at sides, conduct so differently that the film has a step there. Beside steps
-    pressures have kinks, and in a deep pocket the weights by conductances keep what differs by next to nothing."""
+def smooth(kx: Array, ky: Array, start: int, end: int) -> bool:
+    """Whether in rows start to end - 1 no two neighbouring faces, but at sides, conduct so differently that the film has a step
+    there. Beside steps pressures have kinks, and in a deep pocket the weights by conductances keep what differs by next to
+    nothing."""
     steps = 0
-    for m in range(1, kx.shape[0] - 1):
+    for m in range(start, end):
         for i in range(2, kx.shape[1] - 3):
             a, b = kx[m, i], kx[m, i + 1]
             steps += (a > SMOOTH * b) | (b > SMOOTH * a)
-    for m in range(2, ky.shape[0] - 3):
+    for m in range(max(start, 2), min(end, ky.shape[0] - 3)):
         for i in range(1, ky.shape[1] - 1):
             a, b = ky[m, i], ky[m + 1, i]
             steps += (a > SMOOTH * b) | (b > SMOOTH * a)

@@ -100,11 +100,11 @@ def restrict_row(r: Array, w: Array, by_x: bool, wrap: bool, out: Array) -> None
 
 
 @kernel
-def inject(z: Array, out: Array, y0: int, by_x: bool, by_y: bool) -> None:
-    """The values at the coarse points that are among the rank's."""
+def inject(z: Array, out: Array, y0: int, by_x: bool, by_y: bool, start: int = 0, end: int = 0) -> None:
+    """The values at the coarse points that are among the rank's; rows start + 1 to end."""
     sx, sy = 2 if by_x else 1, 2 if by_y else 1
     shift = (1 - y0 % 2 if by_y else 0) + 1  # row of the first coarse line among the rank's
-    for J in range(out.shape[0] - 2):
+    for J in range(start, end if end else out.shape[0] - 2):
         for k in range(1, out.shape[1] - 1):
             out[J + 1, k] = z[shift + sy * J, sx * k]
 
