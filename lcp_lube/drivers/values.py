@@ -68,7 +68,7 @@ class Values:
         self._misplaced.append(misplaced_film(problem) if self.line is None else inf)
         self._other = -3 if earlier is not None and size < APART * self._sizes[-2] else -2
         other = earlier if self._other == -3 else before
-        self._change = _change(solution, other, quantity) if self._pairs else (inf, inf)
+        self._change = _change(solution, other, quantity, self._own[self._other]) if other and self._pairs else (inf, inf)
         self.best = self._best(quantity, self._own)
         return self.best
 
@@ -158,8 +158,8 @@ def _numbers(solution: Solution) -> dict[str, float]:
     return {**sought(solution), **scalars(solution.numbers)} if solution.converged else {}
 
 
-def _change(solution: Solution, before: Solution | None, quantity: str) -> tuple[float, float]:
-    """How far the pressure has changed from the grid before, at the points of that. Collective.
+def _change(solution: Solution, before: Solution, quantity: str, value: float) -> tuple[float, float]:
+    """How far the pressure has changed from the grid before, at the points of that; value : of the quantity there. Collective.
 
     Returns
     -------
@@ -167,7 +167,7 @@ def _change(solution: Solution, before: Solution | None, quantity: str) -> tuple
         cancel within a dimple do not count, those that do so by chance across the film do. by_all : of |p - p'| over that of p.
     """
     problem, told = solution.problem, quantity in INTEGRALS and solution.converged
-    if before is None or not (told and before.converged) or not isinstance(problem, LubricationProblem):
+    if not (told and before.converged) or not isinstance(problem, LubricationProblem):
         return inf, inf
     coarse: Any = before.problem
     grid = coarse.grid
@@ -179,6 +179,9 @@ def _change(solution: Solution, before: Solution | None, quantity: str) -> tuple
         for ends, n in zip(((grid.x_start, grid.x_end), (grid.y_start, grid.y_end)), grid.shape, strict=True)
     )
     blocks = np.bincount((BLOCKS * row[:, None] + column).ravel(), changed.ravel(), BLOCKS**2)
-    by_blocks, own = float(np.sum(np.abs(grid.comm.allreduce(blocks)))), abs(_integral(coarse, p, quantity))
-    by_points, whole = coarse.reduce.sum(np.abs(changed)), _integral(coarse, p, INTEGRALS[1])
+    by_blocks, own = float(np.sum(np.abs(grid.comm.allreduce(blocks)))), abs(value)
+    by_points, whole = (
+        coarse.reduce.sum(np.abs(changed)),
+        value if quantity == INTEGRALS[1] else _integral(coarse, p, INTEGRALS[1]),
+    )
     return by_blocks / own if own else inf, by_points / whole if whole else inf

@@ -78,9 +78,11 @@ def interpolated(coarse: Grid, fine: Grid, field: Array) -> Array:
     if coarse.comm.size == 1:  # no matrix is needed for one field
         values = field.reshape(coarse.box)
         for side, n in enumerate(fine.shape):
-            along = _weights(np.arange(n), coarse, fine, side, False)
-            values = (along @ values.T).T if side == 0 else along @ values
-        return np.ascontiguousarray(values).ravel()
+            left, right = _between(np.arange(n), coarse, fine, side)
+            before, behind = (np.take(values, _inside(k, coarse, fine, side), axis=1 - side) for k in (left, left + 1))
+            part = right if side == 0 else right[:, None]
+            values = before + part * (behind - before)
+        return values.ravel()
     transfer = Transfer(coarse, fine)
     values = transfer(field)
     transfer.destroy()
@@ -101,14 +103,7 @@ def _weights(points: np.ndarray, coarse: Grid, fine: Grid, side: int, zero_bound
     from scipy.sparse import csr_matrix
 
     n_coarse = coarse.shape[side]
-    if coarse.places[side] is None and fine.places[side] is None:
-        left, right = _even_weights(points, coarse, fine, side)
-    else:
-        around, at = coarse.with_neighbours(side), fine.lines[side][points]
-        left = np.clip(np.searchsorted(around, at, side="right") - 1, 0, n_coarse)
-        right = (at - around[left]) / (around[left + 1] - around[left])
-        left = left - 1  # `around` begins with what lies before the first point
-        right = np.where(np.abs(right - np.rint(right)) < NESTED, np.rint(right), right)
+    left, right = _between(points, coarse, fine, side)
     rows = np.concatenate([np.arange(points.size)] * 2)
     columns = np.concatenate([left, left + 1])
     values = np.concatenate([1.0 - right, right])
@@ -117,9 +112,25 @@ def _weights(points: np.ndarray, coarse: Grid, fine: Grid, side: int, zero_bound
         columns = np.minimum(columns, last)  # beyond a closed end lies the mirror image
         used = (columns >= 0) & (columns < n_coarse) & (values > 0)
     else:
-        columns = columns % n_coarse if fine.periodic[side] else np.clip(columns, 0, n_coarse - 1)
-        used = values > 0
+        columns, used = _inside(columns, coarse, fine, side), values > 0
     return csr_matrix((values[used], (rows[used], columns[used])), shape=(points.size, n_coarse))
+
+
+def _inside(columns: np.ndarray, coarse: Grid, fine: Grid, side: int) -> np.ndarray:
+    """Numbers of coarse points beyond the sides as those that are taken in their place."""
+    n = coarse.shape[side]
+    return columns % n if fine.periodic[side] else np.clip(columns, 0, n - 1)
+
+
+def _between(points: np.ndarray, coarse: Grid, fine: Grid, side: int) -> tuple[np.ndarray, np.ndarray]:
+    """Number of the coarse point before each fine one, and the weight of the one behind."""
+    if coarse.places[side] is None and fine.places[side] is None:
+        return _even_weights(points, coarse, fine, side)
+    around, at = coarse.with_neighbours(side), fine.lines[side][points]
+    left = np.clip(np.searchsorted(around, at, side="right") - 1, 0, coarse.shape[side])
+    right = (at - around[left]) / (around[left + 1] - around[left])
+    # `around` begins with what lies before the first point.
+    return left - 1, np.where(np.abs(right - np.rint(right)) < NESTED, np.rint(right), right)
 
 
 def _even_weights(points: np.ndarray, coarse: Grid, fine: Grid, side: int) -> tuple[np.ndarray, np.ndarray]:
