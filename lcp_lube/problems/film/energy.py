@@ -30,6 +30,8 @@ from .effects import Answer, around, framed_by
 from .reynolds import sides
 
 RTOL = 1e-13  # of the linear solves
+FEW, MOST = 60, 2000  # its steps, and where whole factors would take too much
+WHOLE = 500_000  # points, at most, of which one rank makes whole factors
 STILL = 1e-11  # of the largest flow out of a cell: what is less is rounding
 EMPTY = 1e-9  # of a cell's liquid: less is rounding
 SAME = 1e-300  # what stands for 0 in a quotient
@@ -79,7 +81,7 @@ def heated(
     entries = [(0, 0, diagonal)]
     for (dj, di), a, near in list(zip(offsets, enters, flow.inside, strict=True))[: 2 * grid.dim]:
         entries.append((dj, di, np.where(still, 0.0, -rho_c * a * near)))
-    solver = reduce.through(transport := _Transport(assemble(grid, entries)))
+    solver = reduce.through(transport := _Transport(assemble(grid, entries), at.memory))
     heat = np.where(still, 0.0, flow.dissipation + np.where(free, more, 0.0) + H * wall + rho_c * flow.kept).ravel()
     left = reduce.sum(np.where(free & still & ~dry, np.maximum(flow.dissipation, 0.0), 0.0))
     nowhere = left > STILL * reduce.sum(np.abs(flow.dissipation))  # heat that no liquid carries away
@@ -150,19 +152,37 @@ def _to_and_from(flow: Carried, faces: Sequence[Any]) -> tuple[Array, Array]:
 
 
 class _Transport:
-    """The upwind matrix and its inner solver: incomplete factors follow the flow, so that few steps do."""
+    """The upwind matrix and its inner solver: incomplete factors follow the flow, so that few steps do; whole ones where they
+    do not, as in grooves that pump oil round and round (known : what was found so of this answer)."""
 
-    def __init__(self, mat: PETSc.Mat):
-        self.mat = mat
+    def __init__(self, mat: PETSc.Mat, known: dict[Any, Any]):
+        self.mat, self.known = mat, known
         self.ksp = PETSc.KSP().create(mat.comm)
         self.ksp.setOptionsPrefix("energy_")
         self.ksp.setOperators(mat)
         self.ksp.setType("gmres")
-        self.ksp.setTolerances(rtol=RTOL, atol=0.0, max_it=2000)
-        self.ksp.setGMRESRestart(60)
-        pc = self.ksp.getPC()
-        pc.setType("ilu" if mat.comm.getSize() == 1 else "bjacobi")
+        self.ksp.setGMRESRestart(FEW)
+        self.ksp.getPC().setType("ilu" if mat.comm.getSize() == 1 else "bjacobi")
+        self.ksp.setTolerances(rtol=RTOL, atol=0.0, max_it=FEW if self._factors else MOST)
         self.ksp.setFromOptions()
+        if known.get("turns"):
+            self._whole()
+
+    @property
+    def _factors(self) -> str | None:
+        """What makes whole factors of the matrix; None where it has too many points or PETSc has nothing for it."""
+        if self.mat.comm.getSize() == 1:
+            return "petsc" if self.mat.getSize()[0] <= WHOLE else None
+        return "mumps" if PETSc.Sys.hasExternalPackage("mumps") else None
+
+    def _whole(self) -> None:
+        self.known["turns"] = True
+        self.ksp.setType("preonly")
+        pc = self.ksp.getPC()
+        pc.setType("lu")
+        pc.setFactorSolverType(self._factors)
+        if self._factors == "petsc":
+            pc.setFactorOrdering("nd")
 
     def __call__(self, heat: Array, transposed: bool = False) -> tuple[Array, float]:
         """The solution, and its residual in parts of the right-hand side; transposed : that up the flow. Collective."""
@@ -170,6 +190,9 @@ class _Transport:
         b.setArray(heat)
         size = b.norm()
         (self.ksp.solveTranspose if transposed else self.ksp.solve)(b, x)
+        if self.ksp.getConvergedReason() == PETSc.KSP.ConvergedReason.DIVERGED_MAX_IT and self._factors:
+            self._whole()
+            (self.ksp.solveTranspose if transposed else self.ksp.solve)(b, x)
         values = x.array_r.copy()
         b.aypx(-1.0, self.mat * x)
         residual = b.norm() / size if size > 0 else 0.0
