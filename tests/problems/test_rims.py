@@ -1,7 +1,5 @@
 """Round edges: faces that they cut, for full and for cavitated dimples."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -22,7 +20,7 @@ def half_plane(x0: float):
 def test_series_where_full_the_thin_part_alone_before_a_cavity(cavity, C, H):
     film, rim = half_plane(0.25)
     dry = np.array([[False, bool(cavity)]])
-    cut, cubes, films = cut_faces(film, [rim], np.array([0.0, 1.0]), np.zeros(1), np.ones(2), dry, True)
+    cut, cubes, films = cut_faces(film, [rim], np.array([0.0, 1.0]), np.zeros(1), dry, True)
     assert cut.all()
     np.testing.assert_allclose(cubes, [C], rtol=1e-12)
     np.testing.assert_allclose(films, [H], rtol=1e-12)
@@ -33,7 +31,7 @@ def test_where_the_film_thins_again_both_parts_resist():
     film, rim = half_plane(0.25)
     back = (lambda t, s: film(1.0 - t, s)), (lambda t, s: rim(1.0 - t, s))
     dry = np.array([[True, False]])
-    _, cubes, _ = cut_faces(back[0], [back[1]], np.array([0.0, 1.0]), np.zeros(1), np.ones(2), dry, True)
+    _, cubes, _ = cut_faces(back[0], [back[1]], np.array([0.0, 1.0]), np.zeros(1), dry, True)
     np.testing.assert_allclose(cubes, [1 / (0.25 + 0.75 / 8)], rtol=1e-12)
 
 
@@ -98,11 +96,3 @@ def test_methods_and_halves_agree():
     assert turned.numbers["load"] == pytest.approx(first.numbers["load"], rel=1e-8)
     turned.destroy()
     first.destroy()
-
-
-def test_faces_seen_before_are_those_of_another_look():
-    """Only faces beside a cavity are looked at once more: to the last bit what all of them, looked at anew, are."""
-    with solve(pad(37)) as solution:
-        again = solution.problem
-        anew = partial(again.coefficients_for, seen=None)(cavity=again.dry)
-        assert again.dry.any() and all(np.array_equal(getattr(again.scheme, name), getattr(anew, name)) for name in anew.arrays)

@@ -206,7 +206,7 @@ class Model:
 
             owner = np.concatenate(grid.comm.allgather(owners(grid, self.supplies).ravel()))
             integrals.part(supplied(integrals, grid, self.supplies, owner))
-        scheme_for = partial(box_scheme, grid, self.gap, **self._data, integrals=integrals, seen={})
+        scheme_for = partial(box_scheme, grid, self.gap, **self._data, integrals=integrals)
         scheme = scheme_for()
         scheme, held = self._held(grid, scheme, integrals)
         problem = kind(

@@ -198,7 +198,6 @@ def coefficients(
     cavity: Array | None = None,
     integrals: LineIntegrals | None = None,
     stored: Stored | None = None,
-    seen: dict[int, Any] | None = None,
 ) -> BoxScheme:
     """Coefficients of the box scheme on the owned points, made strip by strip; the grid's ends say what its sides are.
 
@@ -215,7 +214,7 @@ def coefficients(
     mean_cubes : take h^3 at a face as the mean of the nodal values (scene 5) instead of the film at the face.
     r_in : void fraction that enters at an open west side.
     cavity : 1 at the owned points that are taken to be cavitated where round edges cut a face (`rims`), else 0; default 0.
-    stored : what the cells store, in a time step. seen : keeps faces that round edges cut, for other cavities on the same grid.
+    stored : what the cells store, in a time step.
     integrals : of a line's film (1D): fluxes between its points are exact for a full film; default: from the film at the faces.
     """
     (ny, nx), film = grid.box, Around(film, grid)
@@ -230,7 +229,7 @@ def coefficients(
 
     def make(rows: slice) -> None:
         strip = grid if rims else places_of(grid, rows)
-        parts = coefficients_of(strip, film, p_unit / (6.0 * mu), U or 1.0, scheme, mean_cubes, rims, cavity, integrals, seen)
+        parts = coefficients_of(strip, film, p_unit / (6.0 * mu), U or 1.0, scheme, mean_cubes, rims, cavity, integrals)
         kx[1:-1, 1:-1][rows], films[rows] = parts[0], parts[2]
         if grid.dim == 2:
             ky[1:-1, 1:-1][rows.start : rows.stop + 1] = parts[1]

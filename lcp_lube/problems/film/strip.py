@@ -9,7 +9,7 @@ from ...base.parallel import Array
 from ..grid import Grid
 from .edges import Around, face_film, jumps_of, pairs
 from .integrals import LineIntegrals
-from .rims import Faces, rims_across_x, rims_across_y
+from .rims import rims_across_x, rims_across_y
 
 
 def coefficients_of(
@@ -22,7 +22,6 @@ def coefficients_of(
     rims: Sequence[Any],
     cavity: Array | None,
     integrals: LineIntegrals | None,
-    seen: dict[int, Faces] | None = None,
 ) -> tuple[Array, Array, Array, Array, Array]:
     """Of some lines: conductances of x and y faces, h at the points and the one before, and what goes through x faces: what the
     wall drags, and what if all is void."""
@@ -50,7 +49,7 @@ def coefficients_of(
     else:
         cubes_x = cubes(h_face.T, h_x.T).T
     if rims:
-        cubes_x, h_face = rims_across_x(grid, film, rims, cavity, cubes_x, h_face, period[0], seen)
+        cubes_x, h_face = rims_across_x(grid, film, rims, cavity, cubes_x, h_face, period[0])
     m = grid.stretch(y)
     k_x, k_y = k * cubes_x / dx * (y_share / m), np.zeros((ny + 1, nx))
     if grid.dim == 2:
@@ -63,7 +62,7 @@ def coefficients_of(
             h_y = np.broadcast_to(film(x, y_nodes[:, None]), (ny + 2, nx)) if mean_cubes else h_x
             cubes_y = cubes(film(x, y_faces[:, None]), h_y)
         if rims:
-            cubes_y = rims_across_y(grid, film, rims, cavity, cubes_y, period[1], seen)
+            cubes_y = rims_across_y(grid, film, rims, cavity, cubes_y, period[1])
         arcs = k * cubes_y * (grid.spacing[0] * x_share)
         k_y = arcs * (grid.stretch(y_faces) / (grid.steps(1) * grid.spacing[1]))[:, None]
     weight = y_share * m
