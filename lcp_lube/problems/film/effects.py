@@ -153,21 +153,22 @@ class FaceFactors:
 
     k_W, k_E, k_S, k_N : of the conductances. u_W, u_E : of the wall's flows. mu : viscosity at the east face, over mu.
     stored : of what a full cell holds, in a time step; gives : by how much more for 1 Pa more, if it is not held, 1/Pa.
-    again : those of a rigid film at another pressure (p_unit, `tangent.renew`); None: they are held. rigid, at : these two.
+    law : by which density follows the pressure while the film is solved (`tangent.renew`); None: all is held.
+    rigid : the film without them. at : its q (p_unit) that they were renewed at.
     """
 
     grid: Grid
     values: dict[str, Array]
-    again: Any = None
-    rigid: Any = None
-    at: Any = None
+    law: Law | None = None
+    rigid: LubricationProblem | None = None
+    at: Array | None = None
 
     def on(self, grid: Grid, j: NDArray[np.int64], i: NDArray[np.int64]) -> "FaceFactors":
         """Those of a part of the film, whose points are the lines j and columns i of this one's grid. Collective."""
         take = Pick(self.grid, grid, j, i)
         found = {name: take(values.ravel()).reshape(grid.box) for name, values in self.values.items()}
         take.destroy()
-        return FaceFactors(grid, found, self.again)
+        return FaceFactors(grid, found, self.law)
 
     def film(self, problem: LubricationProblem) -> LubricationProblem:
         """The film with these factors."""

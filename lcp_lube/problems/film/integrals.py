@@ -45,7 +45,7 @@ class LineIntegrals:
     ----------
     film : h(x, y) in m for arrays that broadcast. points : x of two points and more, ascending, m. edges : x of the film's
         jumps and kinks, m; those outside are not heeded. fine : the points are ends of panels that need no halving.
-    oil : mu/mu_0 and rho_0/rho at places (`oil_along`), by which h^-2 and h^-3 are multiplied where they are integrated.
+    along : mu/mu_0 and rho_0/rho at places (`oil_along`), by which h^-2 and h^-3 are multiplied where they are integrated.
 
     Attributes
     ----------
@@ -63,9 +63,9 @@ class LineIntegrals:
         points: Array,
         edges: Iterable[float] = (),
         fine: bool = False,
-        oil: Callable[[Array], Array] | None = None,
+        along: Callable[[Array], Array] | None = None,
     ):
-        self.film, self.points, self.oil = film, points, oil
+        self.film, self.points, self.along = film, points, along
         self.known: dict[tuple[float, ...], Any] = {}  # `known.known_of` by what else it needs
         self.spans: tuple[Any, ...] | None = None  # between supplies (`known.Span`)
         self.ring: tuple[float, float] | None = None  # where a turn begins, and its length, m
@@ -73,7 +73,7 @@ class LineIntegrals:
         self.ends, h = (points, None) if fine else self._panels(self.edges)
         self.at_gauss = _gauss_points(self.ends[:-1], self.ends[1:])  # shape (panels, 8)
         self.h = self.film_at(self.at_gauss) if h is None else h
-        self.thicker, self.swollen = self.oil_at(self.at_gauss)
+        self.thicker, self.swollen = self.along_at(self.at_gauss)
         self.first = np.searchsorted(self.ends, points)  # the panel behind each point
         self._of_panels = self._integrals(self.ends[:-1], self.ends[1:], self.h, self.thicker, self.swollen)
         self.parts = np.add.reduceat(self._of_panels, self.first[:-1], axis=1)
@@ -82,13 +82,13 @@ class LineIntegrals:
         """h at places of the line, m."""
         return np.broadcast_to(self.film(x, np.zeros(1)), x.shape)
 
-    def oil_at(self, x: Array) -> Any:
+    def along_at(self, x: Array) -> Any:
         """mu/mu_0 and rho_0/rho at places of the line."""
-        return (1.0, 1.0) if self.oil is None else self.oil(x)
+        return (1.0, 1.0) if self.along is None else self.along(x)
 
     def carries(self, x: Array) -> Array:
         """What a wall drags through places where the film is full, over its speed: h rho/rho_0, m."""
-        return self.film_at(x) / self.oil_at(x)[1]  # type: ignore[no-any-return]
+        return self.film_at(x) / self.along_at(x)[1]  # type: ignore[no-any-return]
 
     def _panels(self, edges: Array) -> tuple[Array, Array | None]:
         """Ends of the panels, each point among them, to the bit; and the film at their Gauss points, if that is known by then.
@@ -185,7 +185,7 @@ class LineIntegrals:
         inside = x > a  # at an end nothing is added: the film beyond is not asked for
         a, x = a[inside], x[inside]
         within = _gauss_points(a, x)
-        at[:, inside] += self._integrals(a, x, self.film_at(within), *self.oil_at(within))
+        at[:, inside] += self._integrals(a, x, self.film_at(within), *self.along_at(within))
         return at
 
     @property

@@ -94,7 +94,7 @@ class Line:
     @property
     def friction(self) -> float:
         """Integral of mu U (1 - r)/h + (h/2) p', N/m: of 4 mu U/h - 3 mu Q/(rho h^2) where full, mu Q/h^2 in cavities."""
-        if self.law.barus or self.integrals.oil is not None:
+        if self.law.barus or self.integrals.along is not None:
             h, full = self.integrals.h, self.full[self.integrals.interval, None]
             shear = np.where(full, 4.0 * self.U - 3.0 * self.Q * self.integrals.swollen / h, self.Q / h) * self._thicker / h
             return float(self.mu * np.sum(self.integrals.weigh(shear)))
@@ -224,7 +224,7 @@ def solve_line(
     k, x_f = k[apart], x_f[apart]
     points = np.insert(x, k + 1, x_f)
     whole = np.insert(~dry, k + 1, True)
-    found = LineIntegrals(line.film, points, fine=True, oil=line.oil)
+    found = LineIntegrals(line.film, points, fine=True, along=line.along)
     found.ring = line.ring
     return Line(found, np.insert(p, k + 1, 0.0), whole, mu, U, Q, r_in > 0.0, law)
 

@@ -121,7 +121,7 @@ class Settling:
             mixed = made - sum(share * (made - one) for share, (one, _) in zip(shares, before, strict=True))
         self._before, self._fronts = [*before[-MEMORY:], (made, off)], fronts
         ends = np.union1d(self._bare.ends, fronts)
-        self.line = LineIntegrals(self._bare.film, ends, fine=True, oil=Along(at.ends, mixed))
+        self.line = LineIntegrals(self._bare.film, ends, fine=True, along=Along(at.ends, mixed))
         self.line.ring = self._bare.ring
 
 

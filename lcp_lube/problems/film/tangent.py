@@ -127,28 +127,28 @@ class Giving(Effect):
 
     def linearised(self, by: FaceFactors, cells: Cells, h: Array) -> FaceFactors:
         """A film's factors with what its cells store linearised at their pressure."""
-        p, stored = cells["pressure"], by.values["stored"].ravel()
         thick = 1.0 + cells.get("lift", 0.0) / h
-        q, slope = self.law.reduced(p), self.law.density_slope(p) * thick + cells.get("density", 1.0) * self.walls
-        gives, left = slope * self.law.viscosity(p), stored - LEAST_KEPT * np.minimum(stored, 1.0)  # dp/dq = mu(p)/mu
-        gives = np.minimum(gives, np.divide(left, q, out=np.full_like(q, np.inf), where=q > 0.0))
-        found = {"stored": stored - gives * q, "gives": gives}
-        values = by.values | {name: a.reshape(by.grid.box) for name, a in found.items()}
-        return replace(by, values=values, again=self.at if self.alone else None)
-
-    def at(self, film: LubricationProblem, q: Array) -> FaceFactors:
-        """Those of a rigid film's cells and faces at q (p_unit), where density alone gives way. Collective."""
-        p = self.law.pressure(q * film.p_unit)
-        sides = [float(self.law.density(self.law.pressure(np.array(side)))) for side in film.p_sides]
-        cells = {"density": self.law.density(p), "pressure": p}
-        return replace(self, walls=np.zeros(1)).linearised(factors(film, cells, sides), cells, film.scheme.h.ravel())
+        slope = self.law.density_slope(cells["pressure"]) * thick + cells.get("density", 1.0) * self.walls
+        return replace(_linearised(self.law, by, cells["pressure"], slope), law=self.law if self.alone else None)
 
 
-def renew(problem: LubricationProblem, p: Array) -> None:
-    """Give a problem the coefficients that follow from another pressure (p_unit). Collective."""
-    rigid = problem.factors.rigid
-    by = problem.factors.again(rigid, p)
-    problem.scheme, problem.factors = scaled(rigid, by, held=problem.held).scheme, replace(by, rigid=rigid, at=p)
+def _linearised(law: Law, by: FaceFactors, p: Array, slope: Array) -> FaceFactors:
+    """slope : by how much more of the rigid film a full cell stores for 1 Pa more, at p, 1/Pa."""
+    stored, q = by.values["stored"].ravel(), law.reduced(p)
+    gives, left = slope * law.viscosity(p), stored - LEAST_KEPT * np.minimum(stored, 1.0)  # dp/dq = mu(p)/mu
+    gives = np.minimum(gives, np.divide(left, q, out=np.full_like(q, np.inf), where=q > 0.0))
+    found = {"stored": stored - gives * q, "gives": gives}
+    return replace(by, values=by.values | {name: a.reshape(by.grid.box) for name, a in found.items()})
+
+
+def renew(problem: LubricationProblem, q: Array) -> None:
+    """Give a problem whose density follows by a law the coefficients at another q (p_unit, `fluid`). Collective."""
+    rigid, law = problem.factors.rigid, problem.factors.law
+    p = law.pressure(q * rigid.p_unit)
+    sides = [float(law.density(law.pressure(np.array(side)))) for side in rigid.p_sides]
+    by = _linearised(law, factors(rigid, {"density": law.density(p)}, sides), p, law.density_slope(p))
+    problem.scheme = scaled(rigid, by, held=problem.held).scheme
+    problem.factors = replace(by, law=law, rigid=rigid, at=q)
 
 
 def renewed(problem: Any, law: Law, p: Array | None) -> Cells | None:

@@ -59,7 +59,7 @@ def renewed(level: Level, problem: LubricationProblem, follow: Any) -> None:
 
     follow : supplies whose pressures do likewise (`following.Following`), if any. Collective.
     """
-    if problem.factors is None or problem.factors.again is None:
+    if problem.factors is None or problem.factors.law is None:
         return
     fields = loops.pressure_and_void(own(level, problem.grid, level.z), problem.scheme, problem.grid)
     renew(problem, fields["p"])
