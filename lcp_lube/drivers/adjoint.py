@@ -208,9 +208,14 @@ class Adjoint:
 
 
 def scale_of(scene: Scene, key: str, problem: LubricationProblem, p: Array, found: bool = False) -> float:
-    """The size of a number, of one that is zero what its change is small against; p : the film's, Pa above p_c. Collective.
+    """As `size_of`, and a guess where that knows nothing. Collective."""
+    return size_of(scene, key, problem, p, found) or GUESS
 
-    found : it was found, and may be zero but for rounding.
+
+def size_of(scene: Scene, key: str, problem: LubricationProblem, p: Array, found: bool = False) -> float | None:
+    """The size of a number, of one that is zero what its change is small against; None where the film has nothing like it.
+
+    p : the film's, Pa above p_c. found : it was found, and may be zero but for rounding. Collective.
     """
     value = abs(values_of(scene)[key])
     if value and not found:
@@ -219,8 +224,8 @@ def scale_of(scene: Scene, key: str, problem: LubricationProblem, p: Array, foun
     unit = units.get(key, units.get(key.rpartition(".")[0], ""))
     p_max = max(problem.reduce.max(p), *map(abs, problem.p_sides)) or problem.p_unit
     thinnest = problem.reduce.min(problem.scheme.h)
-    small = {"Pa": p_max, "1/Pa": 1.0 / p_max, "m": thinnest, "rad": thinnest / max(problem.grid.lengths)}.get(unit, GUESS)
-    return value if value > ROUNDED * small else small
+    small = {"Pa": p_max, "1/Pa": 1.0 / p_max, "m": thinnest, "rad": thinnest / max(problem.grid.lengths)}.get(unit)
+    return value if value > ROUNDED * (small or GUESS) else small
 
 
 def conditions_of(scene: Scene, solution: Solution) -> tuple[list[str], dict[str, float]]:

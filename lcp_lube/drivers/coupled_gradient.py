@@ -27,7 +27,7 @@ from ..problems.film.turned import TurnedProblem
 from ..problems.solution import Solution
 from ..scenes.scene import Scene
 from ..scenes.values import values_of, with_values
-from .adjoint import GUESS, conditions_of, scale_of
+from .adjoint import GUESS, conditions_of, size_of
 from .ask import Ask
 from .coefficients import placed
 from .coupled_response import CoupledResponse
@@ -231,9 +231,9 @@ class CoupledGradient(CoupledResponse):
 
         No other is made larger: where nearly all of a film is cavitated its level hardly changes the equations, and they bend.
         """
-        scale = scale_of(self.scene, key, self.loop.base, self.p * self.loop.base.p_unit, key in self.found)
-        d = STEP * scale
-        if a or scale != GUESS:
+        size = size_of(self.scene, key, self.loop.base, self.p * self.loop.base.p_unit, key in self.found)
+        d = STEP * (size or GUESS)
+        if a or size is not None:
             return d
         with suppress(InputError):  # so large a value is not allowed
             here = self._beside(key, 0.0)[0]
