@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ..base.crew import FEWEST, crew
 from .grid import Grid, Places, Polar
 
-STRIP, LARGEST = 16_384, 65_536  # points: of the strips of a small grid; and of a large one, which has PARTS at least
+STRIP, LARGEST = 16_384, 262_144  # points: of the strips of a small grid; and of a large one, which has PARTS at least
 PARTS = 24  # several for each of a few threads, so that none waits long for the last strip
 MANY = 250_000  # points of a grid from which compiled loops over its strips are worth being loaded
 

@@ -13,6 +13,7 @@ from lcp_lube.problems.certificate import Certificate, certificate_tol
 from lcp_lube.problems.film.cell_loops import loop_misfits
 from lcp_lube.problems.film.certify import cell_misfits, misfits
 from lcp_lube.problems.film.flows import friction
+from lcp_lube.problems.film.strip import frames
 
 
 @pytest.fixture(scope="module")
@@ -166,12 +167,25 @@ def one_by_one(p, r, k_W, k_E, k_S, k_N, b_C, b_W, c, held, p_max, above):
     return [*sums, worst, gap]
 
 
-@pytest.mark.parametrize("look", [cell_misfits, loop_misfits])
+def by_loops(p, r, k_W, k_E, k_S, k_N, b_C, b_W, c, held, p_max, above):
+    """`cell_loops.loop_misfits`, by a line and some columns at a time, of conductances of cells that have the same faces."""
+    kx, ky, framed = frames(k_W, k_E, k_S, k_N, c)
+    found = [
+        loop_misfits(p[j : j + 3], r[j : j + 3], kx, ky, b_C[j : j + 1], b_W[j : j + 1], framed, p_max, above, j, *columns)
+        for j in range(len(c))
+        for columns in ((0, 4), (4, 10))
+    ]
+    sums, most = (np.array(part) for part in zip(*found, strict=True))
+    return sums.sum(axis=0), most.max(axis=0)
+
+
+@pytest.mark.parametrize("look", [cell_misfits, by_loops])
 def test_arrays_and_loops_measure_what_each_cell_does(look):
     random = np.random.default_rng(3)
     p, r = random.uniform(0, 1e3, (2, 9, 12))
     r[r < 500] = 0.0
-    scheme = random.uniform(1e-3, 1, (4, 7, 10))
+    kx, ky = random.uniform(1e-3, 1, (7, 11)), random.uniform(1e-3, 1, (8, 10))
+    scheme = (kx[:, :-1], kx[:, 1:], ky[:-1], ky[1:])
     carried, c = -random.uniform(0, 1, (2, 7, 10)), random.uniform(-1, 1, (7, 10))
     masks = (np.zeros((0, 0), dtype=bool), random.uniform(0, 1, (7, 10)) < 0.2)
     for p_max, above, held in product((1e3, 1e-3, 0.0), (0.0, 1.0), masks if look is cell_misfits else masks[:1]):

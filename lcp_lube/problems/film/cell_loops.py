@@ -3,7 +3,6 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...base.compiled import kernel, piece
 from ...base.parallel import Array
@@ -22,13 +21,13 @@ misfit, face, lengths = piece(cell_misfit), piece(face_drag), piece(linear)
 
 @piece
 def misfit_at(
-    p: Array, r: Array, k_W: Array, k_E: Array, k_S: Array, k_N: Array, b_C: Array, b_W: Array, c: Array,
-    p_max: float, above: float, j: int, i: int,
+    p: Array, r: Array, kx: Array, ky: Array, b_C: Array, b_W: Array, c: Array,
+    p_max: float, above: float, j: int, m: int, i: int,
 ) -> Any:  # fmt: skip
-    """`certify.cell_misfit` of a cell; p and r have a frame of neighbours."""
+    """`certify.cell_misfit` of a cell; p, r, kx, ky and c have frames."""
     return misfit(
-        choose, p[j + 1, i + 1], p[j + 1, i], p[j + 1, i + 2], p[j, i + 1], p[j + 2, i + 1], r[j + 1, i + 1],
-        r[j + 1, i], k_W[j, i], k_E[j, i], k_S[j, i], k_N[j, i], b_C[j, i], b_W[j, i], c[j, i], p_max, above,
+        choose, p[j + 1, i + 1], p[j + 1, i], p[j + 1, i + 2], p[j, i + 1], p[j + 2, i + 1], r[j + 1, i + 1], r[j + 1, i],
+        kx[m, i + 1], kx[m, i + 2], ky[m, i + 1], ky[m + 1, i + 1], b_C[j, i], b_W[j, i], c[m, i + 1], p_max, above,
     )  # fmt: skip
 
 
@@ -36,32 +35,35 @@ def misfit_at(
 def loop_misfits(
     p: Array,
     r: Array,
-    k_W: Array,
-    k_E: Array,
-    k_S: Array,
-    k_N: Array,
+    kx: Array,
+    ky: Array,
     b_C: Array,
     b_W: Array,
     c: Array,
-    held: NDArray[np.bool_],
     p_max: float,
     above: float,
+    row: int,
+    first: int,
+    last: int,
 ) -> tuple[Array, Array]:
-    """`certify.cell_misfits` of cells that are not held."""
-    ny, nx = c.shape
-    sums, most, here = np.zeros((6, nx)), np.zeros((2, nx)), np.zeros((2, nx))  # column by column: vector instructions
-    for j in range(ny):  # a loop over sums and one over extremes: of both at once the compiler makes no vector instructions
-        for i in range(nx):
-            found = misfit_at(p, r, k_W, k_E, k_S, k_N, b_C, b_W, c, p_max, above, j, i)
+    """`certify.cell_misfits` of cells that are not held, in columns first to last - 1. kx, ky, c : of all lines, in their
+    frames, p, r, b_C, b_W of some; row : the first one's."""
+    ny, nx = b_C.shape[0], last - first
+    sums, most, worst = np.zeros((6, nx)), np.zeros((2, nx)), np.zeros(nx)  # column by column: vector instructions
+    for j in range(ny):
+        m, apart = row + j + 1, 0
+        for i in range(np.uint32(nx)):
+            found = misfit_at(p, r, kx, ky, b_C, b_W, c, p_max, above, j, m, i + np.uint32(first))
             for n in range(5):
                 sums[n, i] += found[n] * found[n]
             sums[5, i] += found[5]
-        for i in range(nx):
-            found = misfit_at(p, r, k_W, k_E, k_S, k_N, b_C, b_W, c, p_max, above, j, i)
-            here[0, i], here[1, i] = found[6], found[7]
-        for n in range(2):
-            for i in range(nx):
-                most[n, i] = here[n, i] if here[n, i] > most[n, i] or here[n, i] != here[n, i] else most[n, i]
+            worst[i] = found[6]
+        for i in range(np.uint32(nx)):
+            most[0, i] = worst[i] if worst[i] > most[0, i] or worst[i] != worst[i] else most[0, i]
+            apart += min(p[j + 1, i + np.uint32(first + 1)], r[j + 1, i + np.uint32(first + 1)]) != 0.0
+        for i in range(np.uint32(nx if apart else 0)):
+            gap = misfit_at(p, r, kx, ky, b_C, b_W, c, p_max, above, j, m, i + np.uint32(first))[7]
+            most[1, i] = gap if gap > most[1, i] or gap != gap else most[1, i]
     return sums.sum(axis=1), np.array([most[0].max(), most[1].max()])
 
 

@@ -14,6 +14,7 @@ from .flows import volume_unit
 from .graded import GradedJacobian, Pivots, within_reach
 from .reynolds import side_points
 from .stored import storing
+from .strip import frames
 from .supplies import pressed, supply_flows
 
 if TYPE_CHECKING:
@@ -151,22 +152,28 @@ def p_error(problem: "LubricationProblem", p: Array, r: Array) -> float:
 
 def misfits(problem: "LubricationProblem", p: Array, r: Array, p_max: float, above: float = 0.0) -> Misfits:
     """Sums and extremes over all cells. Collective."""
-    reduce, grid, nothing = problem.reduce, problem.grid, np.zeros((0, 0), dtype=bool)
-    framed, look = [ghosted(grid, field, 0.0) for field in (p, r)], cell_misfits
-    if problem.held is None and grid.size >= MANY and has_numba():
+    reduce, grid, nx, nothing = problem.reduce, problem.grid, problem.grid.box[1], np.zeros((0, 0), dtype=bool)
+    framed = [ghosted(grid, field, 0.0) for field in (p, r)]
+    many = problem.held is None and grid.size >= MANY and has_numba()
+    if many:
         from .cell_loops import loop_misfits
 
-        look = lambda *given: loop_misfits(*map(np.ascontiguousarray, given[:-3]), *given[-3:])  # type: ignore[arg-type]  # noqa: E731
+        s = problem.scheme
+        whole = frames(s.k_W, s.k_E, s.k_S, s.k_N, s.c)
     sums, most, least = np.zeros(6), np.zeros(2), np.inf
 
     def look_at(rows: slice) -> tuple[Any, list[tuple[Array, Array]]]:
         s = problem.scheme.rows(rows)
-        frames, b_C = [frame(rows) for frame in framed], s.b_C
-        owned = (s.k_W, s.k_E, s.k_S, s.k_N, b_C, s.entering, s.c, nothing if s.held is None else s.held)
+        fields, b_C, b_W = [frame(rows) for frame in framed], s.b_C, s.entering  # numbers side by side, as loops want them
+        owned = (s.k_W, s.k_E, s.k_S, s.k_N, b_C, b_W, s.c, nothing if s.held is None else s.held)
         found = []
-        for i in range(0, grid.box[1], BLOCK):
-            arrays = [*(a[:, i : i + BLOCK + 2] for a in frames), *(a[:, i : i + BLOCK] for a in owned)]
-            found.append(look(*arrays, p_max, above))  # type: ignore[arg-type, call-arg]
+        for i in range(0, nx, BLOCK):
+            if many:
+                (kx, ky, c), (own_p, own_r), columns = whole, fields, (i, min(i + BLOCK, nx))
+                found.append(loop_misfits(own_p, own_r, kx, ky, b_C, b_W, c, p_max, above, rows.start, *columns))
+                continue
+            arrays = [*(a[:, i : i + BLOCK + 2] for a in fields), *(a[:, i : i + BLOCK] for a in owned)]
+            found.append(cell_misfits(*arrays, p_max, above))  # type: ignore[arg-type, call-arg]
         return -np.max(b_C if s.storage is None else b_C + s.storage), found
 
     for low, found in each_strip(grid, look_at):  # so that what lies between is no more than the cache holds

@@ -110,8 +110,11 @@ def _drag_sum(problem: LubricationProblem, p: Array, r: Array, lever: Array | fl
     def add_up(rows: slice) -> float:
         part, s = copy(problem), problem.scheme.rows(rows)
         part.grid = places_of(grid, rows)
-        faces = sheared_faces(part, grid.x + grid.steps(0)[1:] / 2)
-        return loop_drag(*faces, s.couette_E, s.b_E, r[rows], p[rows], beyond[rows], columns, shears[rows], pulls[rows])
+        found = (*sheared_faces(part, grid.x + grid.steps(0)[1:] / 2), s.couette_E)
+        # Numbers side by side: else no vector instructions are made. Most films are the same where a, b and c ask for them.
+        lying = {id(one): np.ascontiguousarray(one) for one in found}
+        h, a, b, c, couette = (lying[id(one)] for one in found)
+        return loop_drag(h, a, b, c, couette, s.b_E, r[rows], p[rows], beyond[rows], columns, shears[rows], pulls[rows])
 
     total = sum(each_strip(grid, add_up))
     if first.any():

@@ -86,6 +86,34 @@ def dragged(void: Array, weight: Array | None, U: float) -> Array:
     return void if weight is None else (weight * U) * void
 
 
+def frames(k_W: Array, k_E: Array, k_S: Array, k_N: Array, c: Array) -> tuple[Array, Array, Array]:
+    """Conductances of all x faces, of all y faces, and c, each in a frame: as `reynolds` made them, or made here."""
+    ny, nx = k_W.shape
+    kx, ky, own = _frame((ny + 2, nx + 3), k_W, k_E), _frame((ny + 3, nx + 2), k_S, k_N), _frame((ny + 2, nx + 2), c)
+    if kx is None:
+        kx = np.zeros((ny + 2, nx + 3))
+        kx[1:-1, 1 : nx + 1], kx[1:-1, nx + 1] = k_W, k_E[:, -1]
+    if ky is None:
+        ky = np.zeros((ny + 3, nx + 2))
+        ky[1 : ny + 1, 1:-1], ky[ny + 1, 1:-1] = k_S, k_N[-1]
+    if own is None:
+        own = np.zeros((ny + 2, nx + 2))
+        own[1:-1, 1:-1] = c
+    return kx, ky, own
+
+
+def _frame(shape: tuple[int, int], a: Array, behind: Array | None = None) -> Array | None:
+    """The array with a frame whose inside is a, and b one face further; None if there is none."""
+    base = a.base
+    if not isinstance(base, np.ndarray) or base.shape != shape or base.dtype != float or not base.flags.c_contiguous:
+        return None
+    places = [base[1:, 1:], base[1:, 2:] if shape[1] > a.shape[1] + 2 else base[2:, 1:]]
+    for part, place in zip((a, behind), places, strict=True):
+        if part is not None and (part.ctypes.data, part.strides) != (place.ctypes.data, base.strides):
+            return None
+    return base
+
+
 def leaving(void: Array, last: Array | None, weight: Array | None, U: float) -> Array:
     """b_C; last: through the last face, where that is closed."""
     b_C = -void[:, 1:] if weight is None else dragged(void[:, 1:], weight, -U)

@@ -8,6 +8,7 @@ from mpi4py import MPI
 
 from ...base.parallel import Array
 from ...problems.film.lubrication import LubricationProblem
+from ...problems.film.strip import frames
 from ...problems.film.tangent import renew
 from ...problems.grid import Grid
 from ...problems.solution import Fields
@@ -85,32 +86,11 @@ def level_of(grid: Grid, k_W: Array, k_E: Array, k_S: Array, k_N: Array, c: Arra
     else:
         y0, y1, comm = grid.y_start, grid.y_end, grid.comm if split else None
     n = y1 - y0
-    kx, ky, c_frame = _frame((n + 2, nx + 3), k_W, k_E), _frame((n + 3, nx + 2), k_S, k_N), _frame((n + 2, nx + 2), c)
-    if kx is None:
-        kx = np.zeros((n + 2, nx + 3))
-        kx[1:-1, 1 : nx + 1], kx[1:-1, nx + 1] = k_W, k_E[:, -1]
-    if ky is None:
-        ky = np.zeros((n + 3, nx + 2))
-        ky[1 : n + 1, 1:-1], ky[n + 1, 1:-1] = k_S, k_N[-1]
-    if c_frame is None:
-        c_frame = np.zeros((n + 2, nx + 2))
-        c_frame[1:-1, 1:-1] = c
-    level = Level(nx, ny, y0, y1, comm, False, periodic, np.zeros((n + 2, nx + 2)), c_frame, kx, ky)
+    kx, ky, framed = frames(k_W, k_E, k_S, k_N, c)
+    level = Level(nx, ny, y0, y1, comm, False, periodic, np.zeros((n + 2, nx + 2)), framed, kx, ky)
     for a in (level.kx, level.ky):
         level.share(a)
     return level
-
-
-def _frame(shape: tuple[int, int], a: Array, behind: Array | None = None) -> Array | None:
-    """The array with a frame whose inside is a, and b one face further, as `reynolds` makes them; None if there is none."""
-    base = a.base
-    if not isinstance(base, np.ndarray) or base.shape != shape or base.dtype != float or not base.flags.c_contiguous:
-        return None
-    places = [base[1:, 1:], base[1:, 2:] if shape[1] > a.shape[1] + 2 else base[2:, 1:]]
-    for part, place in zip((a, behind), places, strict=True):
-        if part is not None and (part.ctypes.data, part.strides) != (place.ctypes.data, base.strides):
-            return None
-    return base
 
 
 def whole(grid: Grid, a: Array) -> Array:
