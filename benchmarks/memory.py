@@ -34,6 +34,7 @@ CASES: list[tuple[str, str, tuple[int, ...], int]] = [
     ("2D full light", "problem4 --method din --recipe bcgs_ilu --max-it 2", (200, 300), 1),
     ("2D full light gmres", "problem4 --method din --recipe gmres_ilu --max-it 2", (200, 300), 1),
     ("2D fas in time", "piston_skirt --set motion.t_end=0.02 --set motion.steps=6", (300, 600, 1000), 1),
+    ("2D fas, a free journal", "dynamic_journal --method fas --set motion.t_end=6e-4 --set motion.steps=3", (300, 600), 1),
     ("2D fas on 2 ranks", "problem4 --method fas", (300, 700), 2),
     ("2D cavity multigrid on 2 ranks", "problem4 --method active-set", (300, 500), 2),
     ("2D full mumps on 2 ranks", "problem4 --method din --max-it 2", (100, 200), 2),

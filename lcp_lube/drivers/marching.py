@@ -207,36 +207,36 @@ class Run:
         march, formula = self.march, self.march.formula(dt)
         self.last = self.last and replace(self.last, problem=light(self.last.problem))
         term, near = replace(march.term(formula), exact=self.rotor is not None), march.guess(dt)
-        solves: list[Solution] = []
+        solves, newest = list[list[Step]](), near  # of ten films that a free journal solves for a step one alone is kept
 
         def film_at(e: Any) -> Solution:
+            nonlocal newest
             model = self.models(t, None if e is None else [float(one) for one in e])
             self.model = replace(model, stored=term, places=march.grid.places)
             if model.sealed:
                 check_room(march.grid, self.model, t, self.scene.name)
-            last, found = self.last, solves[-1].fields if solves else near
+            last, step = self.last, TimeStep(self.scene, self.model, march.grid)
             problem, known = (last.problem, last.settings) if last is not None else (None, self.settings or self.begun)
-            step = TimeStep(self.scene, self.model, march.grid)
-            own = None if problem is not None or found is None else self._at(t, lambda: step.build(self.ask.comm))
-            start = None if found is None else Start(problem or own, found, known)  # type: ignore[arg-type]
-            solves.append(self._at(t, lambda: self.inner(step, replace(self.ask, start=start))))
+            own = None if problem is not None or newest is None else self._at(t, lambda: step.build(self.ask.comm))
+            start = None if newest is None else Start(problem or own, newest, known)  # type: ignore[arg-type]
+            solution = self._at(t, lambda: self.inner(step, replace(self.ask, start=start)))
             if own is not None:
                 own.destroy()
-            return solves[-1]
+            solves.append(solution.steps)
+            newest = solution.fields
+            return solution
 
         def stiffness(solution: Solution) -> Any:
             return self.coordinates.stiffness(TimeStep(self.scene, supplied(self.model, solution), march.grid), solution)
 
         if self.rotor is None:
-            place, why = self._at(t, lambda: self._given(t)), ""
-            solution = film_at(place)
-        else:
-            guess = self.rotor.guess(dt, march.dts)
-            if self.course is not None:
-                given = self._at(t, lambda: self.course(t))  # type: ignore[misc]
-                guess[: len(given)] = given
-            solution, place, why = self.rotor.settle(t, formula, guess, film_at, stiffness)
-        return solution, place, why, [one.steps for one in solves]
+            place = self._at(t, lambda: self._given(t))
+            return film_at(place), place, "", solves
+        guess = self.rotor.guess(dt, march.dts)
+        if self.course is not None:
+            given = self._at(t, lambda: self.course(t))  # type: ignore[misc]
+            guess[: len(given)] = given
+        return *self.rotor.settle(t, formula, guess, film_at, stiffness), solves
 
     def _keep(self, solution: Solution, solves: list[list[Step]]) -> None:
         """Note what a step was, and hold it in place of the one before."""

@@ -41,6 +41,7 @@ MEASURED: dict[tuple[str, str, str], tuple[float, float]] = {
     ("lubrication 1D", "full", "light"): (750, 0),
     ("lubrication 2D", "", ""): (70, 0),
     ("lubrication 2D moving", "", ""): (200, 0),
+    ("lubrication 2D free", "", ""): (1100, 0),  # most of it the basis of its stiffness
     ("lubrication 2D", "cavity", "multigrid"): (780, 0),
     ("lubrication 2D", "reduced", "multigrid"): (1040, 0),
     ("lubrication 2D", "reduced", "umfpack"): (410, 82),
@@ -165,7 +166,8 @@ def bytes_needed(facts: Facts, plan: Plan) -> float | None:
 
     An inner solver that was not measured counts as the most expensive one of the same system.
     """
-    points, kind = facts.size, f"{facts.kind} {facts.dim}D{' moving' if facts.moving and not plan.system else ''}"
+    also = "" if plan.system or not facts.moving else " free" if facts.free else " moving"
+    points, kind = facts.size, f"{facts.kind} {facts.dim}D{also}"
     if facts.dense:
         return DENSE * points**2 * (facts.ranks if plan.recipe == "redundant_lu" else 1)
     options = PETSc.Options().getAll()

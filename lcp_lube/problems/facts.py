@@ -16,7 +16,7 @@ class Facts:
     periodic : whether the domain closes in x, and in y.
     dense : whether the Jacobian is a dense matrix.
     held : whether supplies hold cells inside at their pressures.
-    moving : whether the film's cells store liquid: a time step.
+    moving : whether cells store liquid: a time step. free : whether what moves answers to the film by its stiffness.
     spread : points of the whole film whose fields a part's answer becomes; 0: it is the whole one.
     """
 
@@ -27,6 +27,7 @@ class Facts:
     dense: bool = False
     held: bool = False
     moving: bool = False
+    free: bool = False
     spread: int = 0
 
     @property

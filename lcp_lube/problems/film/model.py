@@ -131,7 +131,8 @@ class Model:
         """The problem on (nx,) or (nx, ny) points, in numbers."""
         periodic = tuple(self.sides[2 * k].kind == "periodic" for k in range(len(self.lengths)))
         ranks, held = (comm or PETSc.COMM_WORLD).getSize(), bool(self.supplies)
-        return Facts("lubrication", tuple(shape), ranks, periodic, held=held, moving=self.stored is not None)
+        told = {"held": held, "moving": self.stored is not None, "free": self.stored is not None and self.stored.exact}
+        return Facts("lubrication", tuple(shape), ranks, periodic, **told)
 
     @property
     def mirrored(self) -> "Model":

@@ -21,7 +21,6 @@ from .frozen_cycles import Cycles
 # Of J' less is asked: a derivative's error is at most about lambda's relative one, and 1e-6 is promised of it.
 RTOL, TRANSPOSED, MOST = 1e-9, 2e-7, 60
 FEW = 15  # cycles in single precision
-MANY = 10  # vectors that the basis has room for at first
 DROP = 1e-5  # down to which part of its start's error a basis in single precision is trusted
 AGREES, LEAST = 1e-7, 1e-13  # l' (J z) and b' z, relative: cycles go on until they do, down to the least residual
 
@@ -98,7 +97,7 @@ class Frozen(Cycles):
         rtol, drop = TRANSPOSED if self.transposed else RTOL, DROP if self.single else 0.0
         norm, total = self.grid.reduce.norm, self.grid.comm.allreduce
         self._put(self.c[0], rest)
-        V, H = np.empty((MANY, rest.size), self.z[0].dtype), np.zeros((MOST + 2, MOST + 1))
+        V, H = np.empty((MOST + 2, rest.size), self.z[0].dtype), np.zeros((MOST + 2, MOST + 1))  # V: pages as they are written
         self.change(None, V[0])
         self.c[0][:] = 0.0
         first, y = norm(V[0]), np.zeros(0)
@@ -120,7 +119,6 @@ class Frozen(Cycles):
                     return x, False
             if self.work >= most:
                 return None
-            V = V if k + 1 < len(V) else np.concatenate([V, np.empty_like(V)])
             w = V[k + 1]
             np.negative(self.change(V[k], w), out=w)
             for _ in range(2 if k > 8 else 1):  # rounding has left long bases less orthogonal
