@@ -6,9 +6,7 @@ import sys
 import traceback
 
 from .base import petsc as petsc_start
-from .base.ranks import run_on
 from .cli.arguments import parse, parser_of_all
-from .cli.completion import complete
 from .cli.words import split
 from .errors import InputError, NotFound
 
@@ -16,6 +14,8 @@ from .errors import InputError, NotFound
 def main(argv: list[str] | None = None) -> int:
     """Run one command line; returns the exit status (0 converged, 1 not, 2 bad input, 130 interrupted)."""
     if "_ARGCOMPLETE" in os.environ:  # the shell asks what may stand here
+        from .cli.completion import complete
+
         complete(parser_of_all())
     words = sys.argv[1:] if argv is None else argv
     try:
@@ -24,6 +24,8 @@ def main(argv: list[str] | None = None) -> int:
         if args is not None:
             args.words = words  # PETSc's among them
             if (ranks := getattr(args, "ranks", None)) is not None:
+                from .base.ranks import run_on
+
                 return run_on(ranks, words)
             if (threads := getattr(args, "threads", None)) is not None:
                 if threads < 1:

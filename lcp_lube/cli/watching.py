@@ -13,7 +13,6 @@ from mpi4py import MPI
 from ..base.quantity import in_si
 from ..errors import InputError
 from ..output.files import check_target
-from ..output.frames import Frames, HistoryFile, Series
 from ..output.style import save_figure
 from ..problems.solution import Solution
 from ..scenes.moving import motion_of
@@ -39,6 +38,10 @@ class Watching:
             if found := next((f"{name} {value}" for name, value in wanted.items() if value), None):
                 raise InputError(f"{found}: scene {scene.name} does not go on in time (it has no [motion])")
             return
+        from tqdm import tqdm  # here: few scenes go on in time
+
+        from ..output.frames import Frames, HistoryFile, Series
+
         self.gif, self.boundary = gif, args.boundary
         self.times = _times(args.times, self.table.t_end, GIF if gif else FILES)
         self.args_times = tuple(self.times) if args.times or series or gif else ()
@@ -49,8 +52,6 @@ class Watching:
         self.series = [Series(path, args.boundary) for path in series]
         self.frames = Frames() if self.picture is not None else None
         quiet = None if comm.rank == 0 else True
-        from tqdm import tqdm  # here: few scenes go on in time
-
         self._bar: Any = tqdm(total=self.table.t_end, unit="s", disable=quiet, file=sys.stderr, bar_format=BAR)
         self._done = 0
 

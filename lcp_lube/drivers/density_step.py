@@ -25,9 +25,8 @@ from ..problems.solution import Fields, Outcome, Solution, Step
 from ..scenes.scene import Solvable
 from ..solvers.relaxation import relaxation
 from .ask import Ask
-from .frozen import Frozen
+from .frozen import Frozen, settled
 from .linearised import Linear
-from .settled import settled
 from .sources import SWEEPS, Sources, z_of
 
 WHY = "density: Newton's method on each step as a whole, the law linearised exactly"

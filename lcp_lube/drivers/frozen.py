@@ -1,4 +1,4 @@
-"""Films with their coefficients held: what the loop of effects solves, and what is linearised about its answer."""
+"""Films with their coefficients held: what the loop of effects solves until they count as found, and what it linearises."""
 
 from copy import copy
 from dataclasses import dataclass, replace
@@ -9,13 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from ..problems.certificate import certificate_tol
 from ..problems.facts import Facts
 from ..problems.film.effects import FaceFactors
 from ..problems.film.fluid import Law
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
+from ..problems.film.stored import Stored
 from ..problems.grid import EVEN
 from ..scenes.scene import Derived
+from .ask import Ask
+
+SETTLED = 0.1  # of eps1: relative change of the coefficients
+IN_TIME = (1e-2, 0.1, 5e-5)  # the same in a time step: of what it changes, of the square of its part in them, and at most
 
 
 @dataclass(frozen=True)
@@ -63,3 +69,18 @@ class Frozen(Derived):
     def factored(self, problem: Any, j: NDArray[np.int64], i: NDArray[np.int64]) -> Any:
         problem.coefficients_for = None  # which faces at round edges make, and effects do not
         return problem if self.by is None else self.by.on(problem.grid, j, i).film(problem)
+
+
+def settled(ask: Ask, stored: Stored | None, moved: float, reach: float = np.inf) -> float:
+    """Relative change of the coefficients at which they count as found: by the eps1 asked for, not by a method's own.
+
+    In a time step, which is expected to change effects of a size `reach` by `moved`, as far as its formula's error makes sense
+    of it: a part of that change, or where effects are small, of the square of moved/reach, which is that error's size. Nothing
+    is lost by it, as what cells store has the very density that flows.
+    """
+    eps1 = ask.stopping_for((1e-8, 1e-8)).eps1
+    given = ask.stopping is not None and not ask.options.get("rest")
+    if stored is None or stored.exact or given:
+        return SETTLED * eps1
+    part = max(IN_TIME[0] * moved, IN_TIME[1] * (moved / reach) ** 2 if reach else 0.0)
+    return max(SETTLED * eps1, min(part, IN_TIME[2], certificate_tol(eps1)))

@@ -20,8 +20,7 @@ from ..scenes.scene import Solvable
 from .ask import Ask, Start
 from .chain import added
 from .compose import Inner
-from .frozen import Frozen
-from .settled import settled
+from .frozen import Frozen, settled
 
 MOST_SOLVES, LONG = 100, 300  # films; and while the least change has fallen to a tenth within as many as
 PATIENCE = 50  # these; two cycles
