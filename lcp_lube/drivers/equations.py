@@ -77,15 +77,15 @@ class Equations:
         film = Frozen(film, self.law) if self.law else film
         self.film, self.model = film, film.constant if self.law else model
         places = None if near is None or near.grid.even else followed(near.grid, near.model, self.model)
-        self._lent = type(solved) is LubricationProblem and not (self.turned or self.law or solved.held)
-        if self._lent:
+        self.lent = type(solved) is LubricationProblem and not (self.turned or self.law or solved.held)
+        if self.lent:
             self.constant: LubricationProblem = solved
         elif near is None or places is None:
             self.constant = film.build(comm)
         else:
             self.constant = replace(self.model, places=places).build(near.grid.shape, comm)
         self._at: tuple[Any, ...] = (None,)  # p, the constant film, and what the fluid makes of it there
-        if dry is not None and self.constant.coefficients_for is not None and not self._lent:
+        if dry is not None and self.constant.coefficients_for is not None and not self.lent:
             self.constant = self.constant.revised(dry)
         self.grid: Grid = self.constant.grid
         if pressures and (held := self.constant.held) is not None:
@@ -216,7 +216,7 @@ class Equations:
         return out
 
     def destroy(self) -> None:
-        if not self._lent:
+        if not self.lent:
             self.constant.destroy()
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from ..base.parallel import Array
 from ..errors import InputError
 from ..problems.film.effects import (
+    CHANNELS,
     Answer,
     Cells,
     Compressible,
@@ -93,7 +94,11 @@ class FirstOrder:
             self.cells.setdefault("viscosity", np.ones(self.h.size))
         self.law = self._physics(self.kept)[0]
         self.solved = {name: self.cells[name] for name in solved.cells if name in self.cells}
-        self._film(self.solved)
+        if eq.lent and not CHANNELS.keys() & solved.cells.keys():
+            eq.constant = film = solved.with_scheme(solved.scheme, solved.mu)
+            film.oil = None  # numbers are the discrete film's
+        else:
+            self._film(self.solved)
         self.at = Answer(eq.constant, self.p, self.r, self.cells, self.law, self.base, rough=True)
         names = [name for name in dict.fromkeys([quantity, *found.conditions]) if name not in found.found]
         self.numbers = numbers = eq.numbers(self.p, self.r, FORCES if FORCES.issuperset(names) else None)
@@ -199,7 +204,8 @@ class FirstOrder:
         cells = self._moved(d, STEP)
         if not self._only_pressures(cells):
             return (self._lagrangians(cells, STEP) - self._start) / STEP
-        before = self._factors({key: self.cells[key] for key in d if key in self.solved}, 0.0).values
+        solved = {key: self.cells[key] for key in d if key in self.solved}
+        before = self._factors(solved, 0.0).values if solved else dict.fromkeys(self._flows, 1.0)
         by, dot = self._factors({key: cells[key] for key in d}, STEP).values, self.base.reduce.dot
         G = sum(flow * ((by[name] - before[name]) / before[name]) for name, flow in self._flows.items()).ravel()  # type: ignore[union-attr]
         return np.array([-dot(one, G) / STEP for one in self.lambdas.values()])

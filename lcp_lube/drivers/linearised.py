@@ -86,7 +86,7 @@ class Linear:
 
     @cached_property
     def _factors(self) -> Krylov:
-        return self._factored(self.J)
+        return self._factored(self.J, "full" if self.entries is not None else "reduced")  # that is: an M-matrix
 
     def _by_matrix(self, nu: float, rows: Sequence[Any]) -> list[Any]:
         assert self.M is not None  # for the type checker
@@ -107,10 +107,10 @@ class Linear:
             obj.destroy()
         return [z[:n] + 1j * z[n:] for z in found]
 
-    def _factored(self, mat: PETSc.Mat) -> Krylov:
+    def _factored(self, mat: PETSc.Mat, system: str = "full") -> Krylov:
         grid = self.problem.grid
-        facts = Facts(self.problem.kind, grid.shape, grid.comm.size)
-        with recipe(default_recipe(facts, "full", large=False)[0]):
+        facts = Facts(self.problem.kind, grid.shape, grid.comm.size, grid.periodic)
+        with recipe(default_recipe(facts, system, large=False)[0]):
             krylov = Krylov(mat)
             krylov.set_up()
         return krylov

@@ -26,7 +26,7 @@ class Carried:
     q : out of a cell's west, east, south and north face. free : cells whose temperature is unknown (the others lie in
         grooves). inside : whether a cell's west, east, south and north neighbour is such a one.
     dissipation : of each cell; sheared : the part of it that the wall drags.
-    power : what drag and pumps put in, as the film's own numbers have it.
+    power : what drag and pumps put in, as the film's own numbers have it; NaN where it was not asked for.
     area : of the cells, m2 (1D: m).
     turns : through the west and east face both ways: what the wall drags out of a part of a cell that is full, and pressure
         drives back into it, m3/s.
@@ -59,8 +59,8 @@ def holders(at: Answer) -> list[Any]:
     return [*getattr(at.problem, "columns", []), *((held.owner == k).ravel() for k in range(count))]
 
 
-def carried(at: Answer) -> Carried:
-    """Flows, dissipation and power of an answer. Collective."""
+def carried(at: Answer, told: bool = True) -> Carried:
+    """Flows, dissipation and, where it is to be told, power of an answer. Collective."""
     problem, grid = at.problem, at.grid
     s: Any = problem.scheme
     box, dy = grid.box, grid.spacing[1] if grid.dim == 2 else 1.0
@@ -91,25 +91,24 @@ def carried(at: Answer) -> Carried:
     if problem.contact is not None:
         carrying = problem.contact.p_a.reshape(box) * areas(problem) * grid.stretch(grid.y)
         by_wall = by_wall + abs(problem.U) * problem.contact.friction * carrying
-    power_shear = float(problem.reduce.sum(np.where(free, by_wall, 0.0)))
     pressures = problem.reduce.sum(np.sum(k, axis=0)) * problem.reduce.max(np.abs(at.p)) ** 2  # what they could turn into heat
     if not problem.U and not problem.reduce.sum(np.abs(heat)) > NOTHING * pressures:
         heat = np.zeros(box)  # rounding
-    push = float(problem.reduce.sum(np.where(free, drag * (beside[1] - p), 0.0)))
-    west, *_ = sides(grid)
-    first_west = (west | ~other_free[0]) & free
-    push += float(problem.reduce.sum(np.where(first_west, -dragged[0] * (p - beside[0]), 0.0)))
-    # No oil is lost: the pumps' work may be counted from any level of pressure, best from one that is among theirs.
-    pumped, least = 0.0, min((a for a in open_pressures(problem) if a is not None), default=0.0)
-    for flow, near, is_free in zip(q, beside, other_free, strict=True):
-        pumped -= float(problem.reduce.sum(np.where(free & ~is_free, flow * (near - least), 0.0)))
-    area = grid.cell * point_weights(grid).reshape(box)
-    stays = was = np.zeros(box)
+    area, stays, was = grid.cell * point_weights(grid).reshape(box), np.zeros(box), np.zeros(box)
     if problem.stored is not None:
         stays = np.where(free, unit * s.storage * (1.0 - r), 0.0)
-        pumped -= float(problem.reduce.sum(np.where(free, p - least, 0.0) * (stays - unit * s.kept)))
         was = np.where(free, area * problem.stored.on(grid, problem.stored.carried), 0.0)
-    heat, power = np.where(free, heat + by_wall, 0.0), power_shear + push + pumped
+    heat, power = np.where(free, heat + by_wall, 0.0), np.nan
+    if told:
+        # No oil is lost: the pumps' work may be counted from any level of pressure, best from one that is among theirs.
+        least = min((a for a in open_pressures(problem) if a is not None), default=0.0)
+        first_west = (sides(grid)[0] | ~other_free[0]) & free
+        work = np.where(free, by_wall + drag * (beside[1] - p), 0.0) - np.where(first_west, dragged[0] * (p - beside[0]), 0.0)
+        for flow, near, is_free in zip(q, beside, other_free, strict=True):
+            work -= np.where(free & ~is_free, flow * (near - least), 0.0)
+        if problem.stored is not None:
+            work -= np.where(free, p - least, 0.0) * (stays - unit * s.kept)
+        power = float(problem.reduce.sum(work))
     return Carried(q, free, other_free, heat, power, area, sheared, turns, stays, was)
 
 

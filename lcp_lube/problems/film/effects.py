@@ -180,13 +180,12 @@ class FaceFactors:
 def framed_by(grid: Grid, values: Array, at_sides: Sequence[float] | None = None) -> Array:
     """Owned values with their neighbours'; beyond an open side the side's value, where given, else their own. Collective."""
     out = grid.ghosted(values)
-    own = out[1:-1, 1:-1].copy()
+    own = out[1:-1, 1:-1]
     rim = (out[1:-1, :1], out[1:-1, -1:], out[:1, 1:-1], out[-1:, 1:-1])
     edge = (own[:, :1], own[:, -1:], own[:1], own[-1:])
-    for k, (view, inner, side) in enumerate(zip(rim, edge, sides(grid), strict=True)):
-        outside = np.isnan(view)
-        beyond = at_sides[k] if at_sides is not None and side.any() else inner
-        view[outside] = np.broadcast_to(beyond, view.shape)[outside]
+    at_side = (None,) * 4 if at_sides is None else [side.any() for side in sides(grid)]
+    for k, (view, inner) in enumerate(zip(rim, edge, strict=True)):
+        np.copyto(view, at_sides[k] if at_side[k] else inner, where=np.isnan(view))  # type: ignore[index]
     return out
 
 

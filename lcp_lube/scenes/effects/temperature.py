@@ -119,7 +119,7 @@ class Heat(Effect):
         from ...problems.film.energy import fresh_flow, heated
 
         table, reduce, law = self.table, at.problem.reduce, self.law
-        flow, rho_c, box = carried(at), table.rho * table.specific_heat, at.grid.box
+        flow, rho_c, box = carried(at, told=False), table.rho * table.specific_heat, at.grid.box
         coldest = table.T_in + min(self.wall, 0.0)  # heat arises only: an iterate that is colder is no film's
         old = at.cells["warmth"] * self.mu
         if table.model == "effective":
