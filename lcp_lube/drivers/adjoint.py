@@ -29,7 +29,7 @@ from .coefficients import placed
 from .equations import MISFIT, Equations, cavity_of, check_film, fields_of, right_side, unknowns
 from .halved import Halved
 from .linearised import Linear
-from .near_films import NearFilms
+from .near_films import OTHER, NearFilms, plain
 from .pad_coordinates import bearing_of
 
 CANCELLED = 1e-10  # of its parts: what lambda errs by may make so much of a sum that is none
@@ -43,14 +43,14 @@ SUPPLY = "supply.{}.p"  # the key of a supply's pressure, Pa above p_c
 class Adjoint:
     """A solution with what its derivatives need: equations, adjoints of quantities and of the conditions that were met.
 
-    Collective, as all of its methods.
+    Collective, as all of its methods. both : adjoints of either side (`other_side`), where points are about to change, or tie.
 
     Raises
     ------
     InputError : no film, no converged solution, a quantity without a derivative.
     """
 
-    def __init__(self, scene: Scene, solution: Solution, quantities: Sequence[str], flip: bool = False):
+    def __init__(self, scene: Scene, solution: Solution, quantities: Sequence[str], both: bool = False):
         if not solution.converged:
             raise InputError(f"{scene.name}: {solution.outcome.sentence}: no solution, no derivatives")
         left_out = solution.settings.get("model", {}).get("left_out", {})
@@ -81,15 +81,19 @@ class Adjoint:
             self.numbers = eq.numbers(p, r)
         parts = {name: eq.partials(self.numbers, name) for name in names}
         self.cavity, switching = cavity_of(eq, p, r)
-        if flip:
-            self.cavity = self.cavity ^ switching
         self.switching = int(eq.grid.reduce.sum(switching.astype(float)))
         needed = list(dict.fromkeys(part for weights in parts.values() for part in weights))
-        slopes = {part: eq.slope(p, r, part, last=flip) for part in needed}
+        slopes = {part: eq.slope(p, r, part) for part in needed}
         self.ties = {name: sum(slopes[part].ties for part in weights) for name, weights in parts.items()}
-        rows = [right_side(slopes, weights, self.cavity) for weights in parts.values()]
-        self.lambdas = dict(zip(parts, self._solve(rows), strict=True))
-        self.parts = parts
+        rows = {name: right_side(slopes, weights, self.cavity) for name, weights in parts.items()}
+        some = [name for name in parts if both and (self.switching or self.ties[name])]
+        last = slopes | {part: eq.slope(p, r, part, last=True) for part in needed if part == "p_max" and some}
+        changed = self.cavity ^ switching
+        more = {name + OTHER: right_side(last, parts[name], changed) for name in some}
+        self.parts, self.lambdas = parts | {name + OTHER: parts[name] for name in some}, dict[str, Array]()
+        sets = [(rows, self.cavity), (more, changed)] if self.switching and some else [(rows | more, self.cavity)]
+        for of, cavity in sets:  # those with one J together
+            self.lambdas |= zip(of, self._solve(list(of.values()), cavity), strict=True)
         self.flow_unit = eq.problem(p).scheme.flow_unit
 
     @cached_property
@@ -113,19 +117,19 @@ class Adjoint:
         found = self.near.lagrangians(self.scene)
         return self._here if found is None else found
 
-    def _solve(self, rows: list[Array]) -> list[Array]:
+    def _solve(self, rows: list[Array], cavity: Any) -> list[Array]:
         eq, law, p = self.equations, self.equations.law, self.p
         free = eq.constant.held is None and eq.held is None
         if law and free and not law.dowson_higginson:  # J's rows by q are those of a constant fluid
-            rows, p, law = [np.where(self.cavity, 1.0, law.viscosity(p)) * row for row in rows], law.reduced(p), None
+            rows, p, law = [np.where(cavity, 1.0, law.viscosity(p)) * row for row in rows], law.reduced(p), None
         problem = eq.constant if law is None else eq.problem(p)
         if law is None and free and not eq.turned and self.reported.grid.size > self._least and self._reduction == "mirror":
-            linear: Linear | Halved = Halved(problem, self.cavity, eq.film, least=self._least)
+            linear: Linear | Halved = Halved(problem, cavity, eq.film, least=self._least)
         else:
             entries = None if law is None else eq.tangent(p, self.r).entries(problem.scheme)
-            linear = Linear(problem, self.cavity, entries, eq.held, least=self._least)
+            linear = Linear(problem, cavity, entries, eq.held, least=self._least)
         try:
-            return linear.solve_transposed(rows, unknowns(self.cavity, p, self.r, eq.constant.p_unit))
+            return linear.solve_transposed(rows, unknowns(cavity, p, self.r, eq.constant.p_unit))
         finally:
             linear.destroy()
 
@@ -147,7 +151,7 @@ class Adjoint:
             numbers = self.numbers if same else eq.numbers(self.p, self.r, wanted, self.numbers)
             report = eq.report(numbers)
             G = eq.scaled(self.p, self.r, self.flow_unit)
-            return np.array([report[name] - eq.grid.reduce.dot(one, G) for name, one in self.lambdas.items()])
+            return np.array([report[plain(name)] - eq.grid.reduce.dot(one, G) for name, one in self.lambdas.items()])
         finally:
             if eq is not self.equations:
                 eq.destroy()
@@ -207,6 +211,11 @@ class Adjoint:
         self.equations.destroy()
 
 
+def other_side(of: dict[str, float]) -> dict[str, float]:
+    """Of something by quantity that of the other side, where it differs."""
+    return {name: of.get(name + OTHER, value) for name, value in of.items() if name == plain(name)}
+
+
 def scale_of(scene: Scene, key: str, problem: LubricationProblem, p: Array, found: bool = False) -> float:
     """As `size_of`, and a guess where that knows nothing. Collective."""
     return size_of(scene, key, problem, p, found) or GUESS
@@ -253,9 +262,10 @@ class Implicit:
     by_found: dict[str, Array]  # L_v
 
     @classmethod
-    def of(cls, adjoint: Any) -> "Implicit":
-        """Raises InputError where the conditions do not depend on what was found."""
+    def of(cls, adjoint: Any, other: bool = False) -> "Implicit":
+        """other : of `other_side`. Raises InputError where the conditions do not depend on what was found."""
         slopes = [adjoint.slopes(key)[0] for key in adjoint.found]
+        slopes = [other_side(one) for one in slopes] if other else slopes
         conditions = list(adjoint.conditions)
         C_v = np.array([[one[name] for one in slopes] for name in conditions]).reshape(len(conditions), len(slopes))
         C_v += np.diag(~C_v.any(axis=0) & ~C_v.any(axis=1))  # pads that idle keep their tilts: any will do
@@ -263,7 +273,7 @@ class Implicit:
             inverse = np.linalg.inv(C_v)
         except np.linalg.LinAlgError:
             raise InputError(f"{', '.join(conditions)} do not depend on {', '.join(adjoint.found)}: no derivatives") from None
-        by_found = {name: np.array([one[name] for one in slopes]) for name in adjoint.lambdas}
+        by_found = {name: np.array([one[name] for one in slopes]) for name in (slopes[0] if slopes else ())}
         return cls(adjoint.found, conditions, inverse, by_found)
 
     def weights(self, quantity: str) -> dict[str, float]:

@@ -22,7 +22,7 @@ from ..scenes.moving import motion_of
 from ..scenes.scene import Scene
 from ..scenes.tilting import TiltingPadScene
 from ..scenes.values import key_of, values_of
-from .adjoint import Adjoint, Implicit
+from .adjoint import Adjoint, Implicit, other_side
 from .coefficients import placed, scene_of
 from .coupled_gradient import CoupledGradient
 from .equations import check_film
@@ -30,6 +30,7 @@ from .film_gradient import FilmGradient
 from .march_course import Trace, check_march
 from .march_film_gradient import MarchFilm
 from .march_gradient import MarchGradient
+from .near_films import plain
 from .transposed import CoupledFilm
 
 BY_STEPS = "no derivative on this grid: it changes by steps, whose mean slope is another over other widths"
@@ -111,12 +112,13 @@ def gradients(
     ------
     InputError : a quantity without a derivative, a key that is no number, a solution that is none, a scene without a film.
     """
-    first = _gradients(scene, solution, quantities, keys, trace=trace)
-    if motion_of(scene) is not None or not any(one.switching for one in first):
+    first, *more = _gradients(scene, solution, quantities, keys, trace=trace)
+    if motion_of(scene) is None and not more and any(one.switching for one in first):
+        more = _gradients(scene, solution, quantities, keys, flip=True)
+    if not more:
         return first
-    other = _gradients(scene, solution, quantities, keys, flip=True)
     out = []
-    for one, two in zip(first, other, strict=True):
+    for one, two in zip(first, more[0], strict=True):
         scale = max((abs(value) for value in map(one.elasticity.get, one.gradient) if value), default=1.0)
         gaps = [abs((one.elasticity[key] or 0.0) - (two.elasticity[key] or 0.0)) / scale for key in one.gradient]
         out.append(Gradient(**{**one.__dict__, "switching_gap": max(gaps, default=0.0)}))
@@ -162,11 +164,18 @@ def _coupled(scene: Any) -> bool:
 
 
 def _adjoint(
-    scene: Scene, solution: Solution, quantities: Sequence[str], flip: bool = False, trace: Trace | None = None
+    scene: Scene,
+    solution: Solution,
+    quantities: Sequence[str],
+    flip: bool = False,
+    trace: Trace | None = None,
+    both: bool = False,
 ) -> Any:
     if motion_of(scene) is not None:
         return MarchGradient(scene, solution, quantities, trace)
-    return (CoupledGradient if _coupled(scene) else Adjoint)(scene, solution, quantities, flip)
+    if _coupled(scene):
+        return CoupledGradient(scene, solution, quantities, flip)
+    return Adjoint(scene, solution, quantities, both)
 
 
 def _gradients(
@@ -176,15 +185,15 @@ def _gradients(
     keys: Sequence[str] | None,
     flip: bool = False,
     trace: Trace | None = None,
-) -> list[Gradient]:
-    adjoint = _adjoint(scene, solution, quantities, flip, trace)
+) -> list[list[Gradient]]:
+    """And those of the other side, where it is another's and an `Adjoint`'s."""
+    adjoint = _adjoint(scene, solution, quantities, flip, trace, both=True)
     try:
-        values = values_of(adjoint.scene)
         balance = solution.settings.get("balance")
         if keys is not None:
             asked = ["balance.load" if balance and key == "balance.load" else key_of(adjoint.scene, key) for key in keys]
         else:
-            asked = [*(["balance.load"] if balance else []), *values]
+            asked = [*(["balance.load"] if balance else []), *values_of(adjoint.scene)]
         slopes: dict[str, dict[str, float]] = {}
         jumps: dict[str, dict[str, float]] = {}
         held: dict[str, str] = {}
@@ -200,19 +209,35 @@ def _gradients(
                     slopes[key], jumps[key] = adjoint.slopes(key)
                 except InputError as error:
                     held[key] = str(error)
-        implicit = Implicit.of(adjoint)
-        out = []
-        report = adjoint.report
-        for name in quantities:
-            value = adjoint.value(name) if name in adjoint.found else report[name]
-            found = {key: implicit.total(name, key, slope) for key, slope in slopes.items()}
-            of = {**values, **({"balance.load": balance["load"]} if balance else {})}
-            none = {key: BY_STEPS for key, slope in found.items() if math.isnan(slope)}
-            found = {key: slope for key, slope in found.items() if key not in none}
-            elasticity = {key: slope * of[key] / value if value and of[key] else None for key, slope in found.items()}
-            sides = {key: jump[name] for key, jump in jumps.items() if jump.get(name) and key in found}
-            switching = adjoint.switching + adjoint.ties.get(name, 0)
-            out.append(Gradient(name, value, found, elasticity, held | none, sides, switching))
+        out = [_told(adjoint, quantities, slopes, jumps, held, balance)]
+        if any(plain(name) != name for name in adjoint.lambdas):
+            slopes, jumps = ({key: other_side(of) for key, of in one.items()} for one in (slopes, jumps))
+            out.append(_told(adjoint, quantities, slopes, jumps, held, balance, other=True))
         return out
     finally:
         adjoint.destroy()
+
+
+def _told(
+    adjoint: Any,
+    quantities: Sequence[str],
+    slopes: dict[str, dict[str, float]],
+    jumps: dict[str, dict[str, float]],
+    held: dict[str, str],
+    balance: Any,
+    other: bool = False,
+) -> list[Gradient]:
+    """Of every quantity, from dL/da by key."""
+    implicit, report, values = Implicit.of(adjoint, other), adjoint.report, values_of(adjoint.scene)
+    out = []
+    for name in quantities:
+        value = adjoint.value(name) if name in adjoint.found else report[name]
+        found = {key: implicit.total(name, key, slope) for key, slope in slopes.items()}
+        of = {**values, **({"balance.load": balance["load"]} if balance else {})}
+        none = {key: BY_STEPS for key, slope in found.items() if math.isnan(slope)}
+        found = {key: slope for key, slope in found.items() if key not in none}
+        elasticity = {key: slope * of[key] / value if value and of[key] else None for key, slope in found.items()}
+        sides = {key: jump[name] for key, jump in jumps.items() if jump.get(name) and key in found}
+        switching = adjoint.switching + adjoint.ties.get(name, 0)
+        out.append(Gradient(name, value, found, elasticity, held | none, sides, switching))
+    return out

@@ -29,6 +29,7 @@ from ..scenes.scene import Scene
 from .equations import DRAGS, FLIPPED, Equations, followed
 from .turned import Mirrored
 
+OTHER = "'"  # after a quantity: with the points that are about to change, or that tie, counted to the other side
 FLOWS = [f"flow_{side}" for side in SIDES]
 FREE = {"gap", "mu", "U", "p_unit", "p_c", "sides", "exact", "extras", "shaft", "levers", "law"}  # what may differ
 FREE |= {"lengths", "polar", "places"}  # where its lines of points lie
@@ -118,7 +119,7 @@ class NearFilms:
         same = (eq._p_sides, eq.constant.p_c) == (p_sides, near.p_c) and grid is eq.grid
         same = same and _same((own.shaft, own.levers), (near.shaft, near.levers))
         report = lean.report((self._told if same else self._totals(near)) | {name: float(a) for name, a in numbers.items()})
-        return np.array([report[name] for name in self.lambdas]) - G / eq.constant.scheme.flow_unit
+        return np.array([report[name] for name in map(plain, self.lambdas)]) - G / eq.constant.scheme.flow_unit
 
     def _sums(self, gap: Any, law: Law, grid: Grid, p_sides: tuple[float, ...]) -> Array | None:
         at_sides = law.dowson_higginson or (law.barus and self.drags)  # whether what faces there count depends on the pressure
@@ -141,6 +142,11 @@ class NearFilms:
         sides = [(side.kind, side.r) for side in model.sides] == [(side.kind, side.r) for side in own.sides]
         rest = all(_same(getattr(model, one.name), getattr(own, one.name)) for one in fields(Model) if one.name not in FREE)
         return sides and rest and not getattr(model.gap, "rims", ())
+
+
+def plain(name: str) -> str:
+    """A quantity, whichever side its adjoint is of."""
+    return name.removesuffix(OTHER)
 
 
 def _same(a: Any, b: Any) -> bool:
