@@ -82,18 +82,18 @@ class Adjoint:
         parts = {name: eq.partials(self.numbers, name) for name in names}
         self.cavity, switching = cavity_of(eq, p, r)
         self.switching = int(eq.grid.reduce.sum(switching.astype(float)))
-        needed = list(dict.fromkeys(part for weights in parts.values() for part in weights))
-        slopes = {part: eq.slope(p, r, part) for part in needed}
+        slopes = {part: eq.slope(p, r, part) for part in dict.fromkeys(part for weights in parts.values() for part in weights)}
         self.ties = {name: sum(slopes[part].ties for part in weights) for name, weights in parts.items()}
         rows = {name: right_side(slopes, weights, self.cavity) for name, weights in parts.items()}
         some = [name for name in parts if both and (self.switching or self.ties[name])]
-        last = slopes | {part: eq.slope(p, r, part, last=True) for part in needed if part == "p_max" and some}
-        changed = self.cavity ^ switching
+        last = slopes | {part: eq.slope(p, r, part, last=True) for part in slopes if part == "p_max" and some}
+        changed, report = self.cavity ^ switching, eq.report(self.numbers)
         more = {name + OTHER: right_side(last, parts[name], changed) for name in some}
         self.parts, self.lambdas = parts | {name + OTHER: parts[name] for name in some}, dict[str, Array]()
         sets = [(rows, self.cavity), (more, changed)] if self.switching and some else [(rows | more, self.cavity)]
         for of, cavity in sets:  # those with one J together
-            self.lambdas |= zip(of, self._solve(list(of.values()), cavity), strict=True)
+            sizes = [abs(report[plain(name)]) if plain(name) in quantities else math.inf for name in of]
+            self.lambdas |= zip(of, self._solve(list(of.values()), cavity, sizes), strict=True)
         self.flow_unit = eq.problem(p).scheme.flow_unit
 
     @cached_property
@@ -117,7 +117,7 @@ class Adjoint:
         found = self.near.lagrangians(self.scene)
         return self._here if found is None else found
 
-    def _solve(self, rows: list[Array], cavity: Any) -> list[Array]:
+    def _solve(self, rows: list[Array], cavity: Any, sizes: list[float]) -> list[Array]:
         eq, law, p = self.equations, self.equations.law, self.p
         free = eq.constant.held is None and eq.held is None
         if law and free and not law.dowson_higginson:  # J's rows by q are those of a constant fluid
@@ -129,7 +129,7 @@ class Adjoint:
             entries = None if law is None else eq.tangent(p, self.r).entries(problem.scheme)
             linear = Linear(problem, cavity, entries, eq.held, least=self._least)
         try:
-            return linear.solve_transposed(rows, unknowns(cavity, p, self.r, eq.constant.p_unit))
+            return linear.solve_transposed(rows, unknowns(cavity, p, self.r, eq.constant.p_unit), sizes)
         finally:
             linear.destroy()
 

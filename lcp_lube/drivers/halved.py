@@ -78,8 +78,12 @@ class Halved:
     def solve(self, rows: Sequence[Array]) -> list[Array]:
         return self._solved(lambda linear, some, _: linear.solve(some), rows)
 
-    def solve_transposed(self, rows: Sequence[Array], z: Array) -> list[Array]:
-        return self._solved(lambda linear, some, on: linear.solve_transposed(some, on(z)), rows)
+    def solve_transposed(self, rows: Sequence[Array], z: Array, sizes: Sequence[float] = ()) -> list[Array]:
+        def ask(linear: Linear, some: list[Any], on: Callable[[Any], Any]) -> list[Any]:
+            share = 1.0 if linear.problem is self.problem else 0.5
+            return linear.solve_transposed(some, on(z), [share * size for size in sizes])
+
+        return self._solved(ask, rows)
 
     def at(self, nu: float, rows: Sequence[Any], stored: bool = True) -> list[Any]:
         return self._solved(lambda linear, some, _: linear.at(nu, some, stored), rows)

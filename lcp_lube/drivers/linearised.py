@@ -57,9 +57,11 @@ class Linear:
         found = self.frozen and self.frozen.solve(rows)
         return found or [self._solve(self._factors, self.J, b) for b in rows]
 
-    def solve_transposed(self, rows: Sequence[Array], z: Array) -> list[Array]:
-        """J'^-1 b for each b; z : the solution, p where the film is full and -r where it is not. Collective."""
-        found = self.frozen and self.frozen.solve(rows, transposed=True, z=z)
+    def solve_transposed(self, rows: Sequence[Array], z: Array, sizes: Sequence[float] = ()) -> list[Array]:
+        """J'^-1 b for each b; z : the solution, p where the film is full and -r where it is not. Collective.
+
+        sizes : of the quantities, which may be small against the terms of b' z; default as large."""
+        found = self.frozen and self.frozen.solve(rows, transposed=True, z=z, sizes=sizes)
         return found or [self._solve(self._factors, self.J, b, transposed=True) for b in rows]
 
     def at(self, nu: float, rows: Sequence[Any], stored: bool = True) -> list[Any]:

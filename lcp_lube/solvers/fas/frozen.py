@@ -23,28 +23,41 @@ RTOL, TRANSPOSED, MOST = 1e-9, 2e-7, 60
 FEW = 15  # cycles in single precision
 DROP = 1e-5  # down to which part of its start's error a basis in single precision is trusted
 AGREES, LEAST = 1e-7, 1e-13  # l' (J z) and b' z, relative: cycles go on until they do, down to the least residual
+FINEST = 1e-4  # a quantity that is a small part of the sizes of b' z asks for as much less of both: down to this part
 
 
 class Frozen(Cycles):
     """Solves with J, J + i nu M or J' of one problem. Collective, as its methods."""
 
-    def solve(self, rows: Sequence[Array], transposed: bool = False, nu: float = 0.0, z: Array | None = None) -> Any:
+    def solve(
+        self,
+        rows: Sequence[Array],
+        transposed: bool = False,
+        nu: float = 0.0,
+        z: Array | None = None,
+        sizes: Sequence[float] = (),
+    ) -> Any:
         """(J + i nu M)^-1 b, complex, or J^-1 b, J'^-1 b for each b; None where cycles stall. Collective.
 
         z : of J', the solution, p where the film is full and -r where it is not, by which its answers are checked.
+        sizes : of the quantities b' z, which may be small against what they are made of; default as large.
         """
         if nu and self.stored is None:
             return None
         found: list[Array] = []
         for start in range(0, len(rows), 1 if nu else 2):
             some = np.array([rows[start].real, rows[start].imag] if nu else rows[start : start + 2])
-            answers = self._pair(some, transposed, nu, z)
+            answers = self._pair(some, transposed, nu, z, sizes[start : start + 2])
             if answers is None:
                 return None
             found += [answers] if nu else list(answers)
         return found
 
-    def _pair(self, b: Array, transposed: bool, nu: float, z: Array | None) -> Any:
+    def _pair(self, b: Array, transposed: bool, nu: float, z: Array | None, sizes: Sequence[float]) -> Any:
+        self._keen = 1.0
+        if z is not None and sizes:
+            parts = [self.grid.reduce.dot(np.abs(row), np.abs(z)) for row in b]
+            self._keen = min(min(1.0, max(size / (part or 1.0), FINEST)) for size, part in zip(sizes, parts, strict=True))
         given, over = self.held, self._over
         self.of(len(b), transposed, nu, single=transposed)
         scale: Any = np.where(self.cavity, self.leaves + (1j * nu * self.stored if nu else 0.0), 1.0)  # type: ignore[operator]
@@ -94,7 +107,7 @@ class Frozen(Cycles):
 
         In single precision it is at best so good that a part DROP of the start's error is left.
         """
-        rtol, drop = TRANSPOSED if self.transposed else RTOL, DROP if self.single else 0.0
+        rtol, drop = self._keen * TRANSPOSED if self.transposed else RTOL, DROP if self.single else 0.0
         norm, total = self.grid.reduce.norm, self.grid.comm.allreduce
         self._put(self.c[0], rest)
         V, H = np.empty((MOST + 2, rest.size), self.z[0].dtype), np.zeros((MOST + 2, MOST + 1))  # V: pages as they are written
@@ -137,4 +150,7 @@ class Frozen(Cycles):
     def _agree(self, found: Array, b: Array, z: Array) -> bool:
         """Whether x' (J z) = b' z, each."""
         dot, rest = self.grid.reduce.dot, b + self._rest(found, self.free[0]).reshape(b.shape)
-        return all(abs(dot(left, z)) <= AGREES * dot(np.abs(asked), np.abs(z)) for left, asked in zip(rest, b, strict=True))
+        return all(
+            abs(dot(left, z)) <= self._keen * AGREES * dot(np.abs(asked), np.abs(z))
+            for left, asked in zip(rest, b, strict=True)
+        )
