@@ -273,7 +273,7 @@ class Implicit:
             inverse = np.linalg.inv(C_v)
         except np.linalg.LinAlgError:
             raise InputError(f"{', '.join(conditions)} do not depend on {', '.join(adjoint.found)}: no derivatives") from None
-        by_found = {name: np.array([one[name] for one in slopes]) for name in (slopes[0] if slopes else ())}
+        by_found = {name: np.array([one[name] for one in slopes]) for name in map(plain, adjoint.lambdas)}
         return cls(adjoint.found, conditions, inverse, by_found)
 
     def weights(self, quantity: str) -> dict[str, float]:
