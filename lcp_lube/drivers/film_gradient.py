@@ -23,8 +23,8 @@ from ..problems.film.turned import TurnedProblem
 from ..problems.film.weighed import Weighed, can
 from ..problems.grid import Grid
 from ..registry import SMALL
-from .adjoint import Implicit
 from .equations import DRAGS, FLIPPED
+from .implicit import Implicit
 
 STEP = 1e-30  # relative: complex steps have no differences whose digits could cancel
 

@@ -34,9 +34,10 @@ from ..problems.film.forces import weights
 from ..problems.solution import Solution
 from ..scenes.effects.named import FLUID, named, without
 from ..scenes.values import values_of
-from .adjoint import Adjoint, Implicit, conditions_of
+from .adjoint import Adjoint, conditions_of
 from .coefficients import placed
 from .equations import Equations, cavity_of, fields_of, right_side, unknowns
+from .implicit import Implicit
 from .linearised import Linear
 from .turned import Mirrored
 

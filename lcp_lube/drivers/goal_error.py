@@ -20,7 +20,8 @@ from ..problems.film.turned import TurnedProblem
 from ..problems.solution import Solution
 from ..problems.transfer import Transfer
 from ..scenes.scene import Scene
-from .adjoint import Adjoint, Implicit
+from .adjoint import Adjoint
+from .implicit import Implicit
 
 BISECTIONS = 60  # more than a double has digits: the interval is then one number
 SECOND = 4.0 / 3.0  # error over the difference from half the spacing, where it is of second order

@@ -23,10 +23,10 @@ from ..errors import NotFound
 from ..problems.film.slopes import slope
 from ..problems.film.views import LiftedFilm
 from ..problems.grid import Grid
-from .adjoint import Implicit
 from .coupled_gradient import CoupledGradient
 from .coupled_response import krylov
 from .film_gradient import per_area
+from .implicit import Implicit
 from .tape import Tape
 
 STEP = 1e-6  # of a field: neighbours' differences see it some hundred times as large
