@@ -252,16 +252,16 @@ def bisect(f: Callable[[Array], Array], a: Array, b: Array, ends: tuple[Array, A
     if not np.size(a):
         return b
     few = np.size(a) < 256
-    even, near = (np.arange(1, 8) / 8.0, 4.0 ** -np.arange(2.0, 14.0)) if few else (np.array([0.5]), np.zeros(0))
+    even, near = (np.arange(1, 8) / 8.0, 4.0 ** -np.arange(2.0, 21.0)) if few else (np.array([0.5]), np.zeros(0))
     column = (-1, *[1] * np.ndim(a))
     even, around = even.reshape(column), np.concatenate([-near, 0.0 * near[:1], near]).reshape(column)
     f_a, f_b = ends or (np.ones_like(a), -np.ones_like(b))
     for _ in range(60):
+        if not (np.nextafter(a, b) < b).any():
+            break
         with np.errstate(all="ignore"):
             chord = np.fmax(np.fmin(f_a / (f_a - f_b), 1.0), 0.0)
         inside = np.minimum(np.maximum(a + (b - a) * np.concatenate([even + 0.0 * chord, chord + around]), a), b)
-        if not ((a < inside) & (inside < b)).any():
-            break
         inside.sort(axis=0)
         values = f(inside)
         x, f_x = (np.concatenate([left[None], of, right[None]]) for left, of, right in ((a, inside, b), (f_a, values, f_b)))

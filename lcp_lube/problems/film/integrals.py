@@ -183,9 +183,10 @@ class LineIntegrals:
         k = np.clip(np.searchsorted(self.ends, x, side="right") - 1, 0, self.ends.size - 1)
         a, at = self.ends[k], np.array(self._sums[:, k])
         inside = x > a  # at an end nothing is added: the film beyond is not asked for
-        a, x = a[inside], x[inside]
-        within = _gauss_points(a, x)
-        at[:, inside] += self._integrals(a, x, self.film_at(within), *self.along_at(within))
+        if inside.any():
+            a, x = a[inside], x[inside]
+            within = _gauss_points(a, x)
+            at[:, inside] += self._integrals(a, x, self.film_at(within), *self.along_at(within))
         return at
 
     @property
