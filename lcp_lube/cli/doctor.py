@@ -22,6 +22,7 @@ from .. import __version__
 from ..api import solve
 from ..base.progress import Line
 from ..base.together import all_come
+from ..output.console import say
 from ..output.table import table
 from ..registry import PACKAGE
 from ..scenes.scene import load_scene
@@ -51,8 +52,7 @@ def run(args: argparse.Namespace) -> int:
     report["self_check"] = checks = self_checks()
     report["ok"] = ok = all(check["passed"] for check in checks)
     report["advice"] = advice(report)
-    if MPI.COMM_WORLD.rank == 0:
-        print(json.dumps(report) if args.json else text_of(report), flush=True)
+    say(json.dumps(report) if args.json else text_of(report))
     return 0 if ok else 1
 
 

@@ -2,18 +2,15 @@
 
 import argparse
 import json
-import sys
 from collections.abc import Callable
 from functools import partial
 from importlib import import_module
 from typing import Any
 
-from mpi4py import MPI
-
 from ..base.options import check_unread
 from ..base.progress import Line
 from ..errors import InputError, nearest
-from ..output.console import coloured, say
+from ..output.console import coloured, note, say
 from ..output.results import as_dict, finite, summary
 from ..output.table import table as text_table
 from ..problems.solution import Step
@@ -47,8 +44,8 @@ def run_solve(args: argparse.Namespace) -> int:
     def monitor(k: int, step: Step) -> None:
         if k == 1:
             check_unread()
-        if args.monitor and MPI.COMM_WORLD.rank == 0:
-            print(monitor_line(k, step), file=sys.stderr, flush=True)
+        if args.monitor:
+            note(monitor_line(k, step))
 
     try:
         with Line() as line:
@@ -58,12 +55,11 @@ def run_solve(args: argparse.Namespace) -> int:
         watching.close()
     try:
         check_unread()
-        if args.explain and MPI.COMM_WORLD.rank == 0:
-            print("\n".join(solution.settings["why"]), file=sys.stderr, flush=True)
+        if args.explain:
+            note("\n".join(solution.settings["why"]))
         data = as_dict(solution)
-        if MPI.COMM_WORLD.rank == 0:
-            for doubt in data["warnings"]:
-                print(f"lcp-lube: warning: {doubt}", file=sys.stderr, flush=True)
+        for doubt in data["warnings"]:
+            note(f"lcp-lube: warning: {doubt}")
         say(json.dumps(finite(data)) if args.json else coloured(summary(data), data["outcome"], data["converged"]))
         writers: list[Callable[[], None]] = [partial(files.save, solution, path, args.boundary) for path in outputs]
         if args.plot:

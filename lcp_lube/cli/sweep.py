@@ -20,7 +20,7 @@ from ..api import solve
 from ..base.options import check_unread
 from ..base.resumable import ResumableCsv
 from ..errors import InputError
-from ..output.console import say
+from ..output.console import note, say
 from ..output.results import as_dict
 from ..output.rows import flat
 from ..problems.solution import Outcome, Solution, Step
@@ -182,7 +182,6 @@ def run(args: argparse.Namespace) -> int:
         writer.writerows(rows)
         say(text.getvalue().rstrip("\n"))
     failed = sum(row["outcome"] != Outcome.CONVERGED for row in rows)
-    if MPI.COMM_WORLD.rank == 0:
-        steps = sum(int(row.get("iterations") or 0) for row in rows)
-        print(f"sweep: {len(rows)} points, {failed} failed, {steps} iterations", file=sys.stderr, flush=True)
+    steps = sum(int(row.get("iterations") or 0) for row in rows)
+    note(f"sweep: {len(rows)} points, {failed} failed, {steps} iterations")
     return 1 if failed else 0

@@ -8,11 +8,11 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
 from ..api import solve
 from ..base.options import check_unread
 from ..base.progress import Line, Progress
+from ..output.console import say
 from ..output.results import finite
 from ..output.table import table as rows_of
 from ..scenes.scene import load_scene
@@ -137,10 +137,6 @@ def run(args: argparse.Namespace) -> int:
     """The command; exit status 1 if a case fails. Collective."""
     verdicts = verify(quick_cases() if args.quick else CASES)
     passed = all(verdict.passed for verdict in verdicts)
-    if MPI.COMM_WORLD.rank == 0:
-        if args.json:
-            cases = [verdict.as_dict() for verdict in verdicts]
-            print(json.dumps(finite({"passed": passed, "cases": cases})), flush=True)
-        else:
-            print(table(verdicts), flush=True)
+    record = {"passed": passed, "cases": [verdict.as_dict() for verdict in verdicts]}
+    say(json.dumps(finite(record)) if args.json else table(verdicts))
     return 0 if passed else 1

@@ -1,4 +1,4 @@
-"""Text for people, on standard output."""
+"""Text for people: answers on standard output, what is said beside them on standard error."""
 
 import os
 import sys
@@ -23,6 +23,12 @@ def say(text: str) -> None:
         except OSError as error:
             sys.stdout = open(os.devnull, "w")  # noqa: SIM115  (else Python tries to flush it once more at its end)
             raise InputError(f"standard output: {error.strerror}") from None
+
+
+def note(text: str) -> None:
+    """Print on rank 0, on standard error."""
+    if MPI.COMM_WORLD.rank == 0:
+        print(text, file=sys.stderr, flush=True)
 
 
 def coloured(text: str, word: str, good: bool) -> str:

@@ -16,7 +16,7 @@ from ..errors import InputError
 from .faults import models_of, tags_of
 from .scene import family_of, load_scene, read_scene
 from .units import SUFFIXES, Measured, stem
-from .written import toml_value
+from .written import toml_value, with_files
 
 WIDTH = 110
 LIMITS = {"exclusiveMinimum": "> {:g}", "minimum": ">= {:g}", "exclusiveMaximum": "< {:g}", "maximum": "<= {:g}"}
@@ -65,9 +65,8 @@ def template(source: str, folder: Path = Path()) -> str:
     scene = load_scene(source)  # nothing is copied that does not hold
     model = family_of(source, scene.family)
     data = {"family": scene.family, **data}
-    for part in data.get("film", []) if isinstance(data.get("film"), list) else [data.get("film")]:
-        if isinstance(part, dict) and "file" in part:
-            part["file"] = os.path.relpath(path.parent / part["file"], folder)
+    for part in with_files(data):
+        part["file"] = os.path.relpath(path.parent / part["file"], folder)
     line = path.read_text(encoding="utf-8").partition("\n")[0]
     head = [line.lstrip("# ") if line.startswith("#") else f"{name}: {_sentence(model)}"]
     head += textwrap.wrap(_sentence(model), WIDTH) if line.startswith("#") else []
@@ -128,16 +127,16 @@ def _inner(field: FieldInfo, model: type[BaseModel], name: str, given: Any) -> l
     text = f"# {field.description}" if field.description else f"# {_sentence(model)}"
     if get_origin(field.annotation) is list:
         tables = given if isinstance(given, list) else [{}]
-        body = [_table(model, table, f"{name}.") for table in tables]
-        if given is None:
-            body = [[line if line.startswith("#") or not line else f"# {line}" for line in lines] for lines in body]
-        return [text, *(line for lines in body for line in (f"{'# ' * (given is None)}[[{name}]]", *lines))]
+        body = [line for table in tables for line in (f"[[{name}]]", *_table(model, table, f"{name}."))]
+        return [text, *(_commented(body) if given is None else body)]
     lines = _table(model, given if isinstance(given, dict) else {}, f"{name}.")
     needed = field.default is None or any(inner.is_required() for inner in model.model_fields.values())
-    if given is None and needed:
-        lines = [line if line.startswith("#") or not line else f"# {line}" for line in lines]
-        return [text, f"# [{name}]", *lines]
-    return [text, f"[{name}]", *lines]
+    lines = [f"[{name}]", *lines]
+    return [text, *(_commented(lines) if given is None and needed else lines)]
+
+
+def _commented(lines: list[str]) -> list[str]:
+    return [line if line.startswith("#") or not line else f"# {line}" for line in lines]
 
 
 def _parts(models: list[type[BaseModel]], name: str, given: Any) -> list[str]:

@@ -13,10 +13,15 @@ def toml_of(scene: Scene) -> str:
         mode="json", by_alias=True, exclude_unset=True, exclude_none=True, exclude={"name", *scene._follows}
     )
     data = {"family": scene.family, **data}
-    for part in data.get("film", []) if isinstance(data.get("film"), list) else [data.get("film")]:
-        if isinstance(part, dict) and "file" in part:
-            part["file"] = str(((scene._folder or Path()) / part["file"]).resolve())
+    for part in with_files(data):
+        part["file"] = str(((scene._folder or Path()) / part["file"]).resolve())
     return "\n".join([f"# made from {scene.name or scene.family}", *_lines(data, "")]) + "\n"
+
+
+def with_files(data: dict[str, Any]) -> list[dict[str, Any]]:
+    """The shapes of a scene's film that name a file."""
+    film = data.get("film")
+    return [part for part in (film if isinstance(film, list) else [film]) if isinstance(part, dict) and "file" in part]
 
 
 def _lines(table: dict[str, Any], name: str) -> list[str]:

@@ -1,14 +1,13 @@
 """`lcp-lube explore`: numbers of a scene as sliders on a local page, and answers to what the page asks until Ctrl-C."""
 
 import argparse
-import sys
 import webbrowser
 
 from mpi4py import MPI
 
 from ...base.options import check_unread
 from ...errors import InputError
-from ...output.console import say
+from ...output.console import note, say
 from ..asked import ask_of, scene_of
 from .answers import Answers
 from .server import Server
@@ -33,5 +32,5 @@ def run(args: argparse.Namespace) -> int:
                 webbrowser.open(server.address)
             server.serve()
     except KeyboardInterrupt:
-        print("lcp-lube: the page has ended", file=sys.stderr, flush=True)
+        note("lcp-lube: the page has ended")
     return 0
