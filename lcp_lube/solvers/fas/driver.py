@@ -223,8 +223,7 @@ class Fas(Cycles):
             level.z[level.held] = level.given
 
     def _solve_coarsest(self, k: int) -> None:
-        level = self._levels[k]
-        self._correction = 0.0
+        level, self._correction = self._levels[k], 0.0
         if not self._tools.solve(level):
             for s in range(2):
                 self._relax(level, max(COARSEST_SWEEPS, 2 * level.nx, 2 * level.ny) // 2, s == 1)
@@ -269,10 +268,11 @@ class Fas(Cycles):
         """Sweeps near the fronts; in a time step, in which these have moved by some cells, twice as many twice as far."""
         front, width = ((1 if level.carry is None else 2) * n for n in (self.options.front, self.options.width))
         # What lies beyond a periodic side, or is another rank's, must be new every sweep or two: else fronts across it wander.
-        ring, parts = level.periodic[0], front if level.periodic[1] else (front + 1) // 2 if level.split else 1
+        ring, often = level.periodic[0], level is self._levels[0] or level.carry is not None or level.held is not None
+        parts = front if level.periodic[1] else (front + 1) // 2 if level.split else 1
         for n, count in enumerate(front // parts + (n < front % parts) for n in range(parts)):
-            arrays, kinds = (level.z, level.kx, level.ky, level.c), (level.carry, level.held, level.slips)
-            level.work += self._loops.relax_front(*arrays, count, width, *kinds, ring, n + 1 < parts)
+            how = (count, width, level.carry, level.held, level.slips, ring, n + 1 < parts, often)
+            level.work += self._loops.relax_front(level.z, level.kx, level.ky, level.c, *how)
             level.share(level.z)
 
     def _relax(self, level: Any, sweeps: int, down: bool) -> None:

@@ -90,6 +90,7 @@ def relax_front(
     slips: NDArray[np.bool_] | None,
     ring: bool,
     more: bool,
+    often: bool,
     thread: int,
     threads: int,
     done: Array | None,
@@ -100,8 +101,9 @@ def relax_front(
     held : points that are left out; slips : those of them about which points are swept as they are at fronts; ring : the
     ends of a line are neighbours, and kept so; more : further sweeps follow, once other ranks have heard of these.
 
-    Where fronts are rare, and strips of twice or WIDER times the width take in less than a tenth of the points, it is these,
-    swept twice as often. Only in steady films without supplies the sweeps overrelax, and strips are more than twice as wide.
+    Where fronts are rare, and strips of twice or WIDER times the width take in less than a tenth of the points, it is these;
+    often : swept twice as often then. Only in steady films without supplies the sweeps overrelax, and strips are more than
+    twice as wide.
 
     done, near : of large grids, which are divided into blocks of lines: every second one first, then those between, so that no
     two neighbours are at work at once. How often each block has been swept, and its points in both strips; thread : the one of
@@ -114,7 +116,7 @@ def relax_front(
     blocks = 1 if done is None else done.shape[0]
     spans, at, own = spans_of_blocks(seen, wider * width, ring, thread, threads, blocks)
     looks, points = 1, together(own, thread, threads, done, near, 1)
-    if points <= 0.5 * wider * rare:
+    if often and points <= 0.5 * wider * rare:
         count *= 2
     if points > rare:
         width *= 2 if points <= 0.5 * wider * rare else 1
