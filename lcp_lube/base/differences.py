@@ -50,14 +50,18 @@ def differences(f: Callable[[float], Array], a: float, scale: float, sizes: Arra
         value = np.abs(np.nan_to_num(at(0.0))) + SLIGHT * sizes  # type: ignore[arg-type]
         return chord, none & (np.abs(chord) * scale > SLIGHT * value)
 
-    def told(slope: Array, kinks: Array) -> tuple[Array, Array]:
-        if wary:
-            chords = np.array([slope, *(_chord(at, width * CHORD * scale) + 0.0 * slope for width in WIDTHS)])
-            apart, most = np.ptp(chords, axis=0), np.abs(chords).max(axis=0)
-            none = (apart > APART * most) & (apart * scale > SLIGHT * np.abs(at(0.0)) + 1e-9 * sizes)  # type: ignore[arg-type]
-            slope, kinks = np.where(none, np.nan, slope), np.where(none, np.inf, kinks)
-        return slope, kinks
+    def by_steps(slopes: list[Array]) -> Array:
+        """Where slopes differ too much to be those of one derivative."""
+        apart, most = np.ptp(slopes, axis=0), np.abs(slopes).max(axis=0)
+        return (apart > APART * most) & (apart * scale > SLIGHT * np.abs(at(0.0)) + 1e-9 * sizes)  # type: ignore[no-any-return, arg-type]
 
+    def told(slope: Array, kinks: Array) -> tuple[Array, Array]:
+        none = by_steps([slope, *chords]) if chords else np.zeros(sizes.shape, dtype=bool)
+        return np.where(none, np.nan, slope), np.where(none, np.inf, kinks)
+
+    chords = [_chord(at, width * CHORD * scale) + np.zeros_like(sizes) for width in WIDTHS] if wary else []
+    if chords and by_steps(chords).all():  # before more is looked at
+        return np.full_like(sizes, np.nan), np.full_like(sizes, np.inf)
     d = QUICK * scale
     low, high, here = at(-d), at(d), at(0.0)
     if low is None and high is None:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.differences import differences
+from ..base.differences import QUICK, differences
 from ..base.parallel import Array
 from ..errors import InputError
 from ..problems.film.edges import oblique
@@ -26,7 +26,7 @@ from .coefficients import placed
 from .equations import MISFIT, Equations, cavity_of, check_film, fields_of, right_side, unknowns
 from .halved import Halved
 from .linearised import Linear
-from .near_films import OTHER, NearFilms, plain
+from .near_films import OTHER, NearFilms, plain, same
 from .pad_coordinates import bearing_of
 
 ROUNDED = 1e-8  # of what is small of what was found: a 0 that rounding has moved, the attitude of pads about the load
@@ -53,6 +53,8 @@ class Adjoint:
         scene = without(scene, left_out) if left_out else scene
         check_film(scene)
         self.scene, self.reported = placed(scene, solution), solution.problem
+        if getattr(scene, "p_unit", 0.0) is None:  # which follows from looks at the film, in every scene near by
+            self.scene = self.scene.model_copy(update={"p_unit": self.scene.model.p_unit})  # type: ignore[attr-defined]
         self.p, self.r = fields_of(solution)
         self.pressures = [float(P) for P in solution.settings.get("supply_pressures", ())]
         solved: Any = getattr(solution.problem, "moving", solution.problem)
@@ -181,8 +183,20 @@ class Adjoint:
                 quick[0] = found is not None
                 return self.lagrangians(scene) if found is None else found
 
-            slope, jump = differences(near, value, scale, sizes, oblique(self.equations.model.gap))
+            slope, jump = differences(near, value, scale, sizes, self._by_steps(key, value + QUICK * scale))
         return dict(zip(names, slope, strict=True)), dict(zip(names, jump, strict=True))
+
+    def _by_steps(self, key: str, near: float) -> bool:
+        """Whether the film may change by steps with a number: edges across the lines of points, which it can move."""
+        gap: Any = self.equations.model.gap
+        if not oblique(gap):
+            return False
+        try:
+            other: Any = with_values(self.scene, {key: near})
+        except InputError:
+            return True
+        lawful = bool(other.model.law) is bool(self.equations.law)  # no faces at round edges are made anew for a fluid's law
+        return not (lawful and same(gap, other.model.gap) and other.model.lengths == self.equations.model.lengths)
 
     @property
     def _supplies(self) -> list[str]:

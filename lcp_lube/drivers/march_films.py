@@ -21,7 +21,7 @@ from ..problems.film.stored import mean_film
 from ..problems.film.views import MirroredFilm, Travelling
 from ..problems.strips import MANY
 from .march_course import Course
-from .near_films import FREE, _same
+from .near_films import FREE, same
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ def _at_once(course: Course, places: Array) -> Array:
     """The films of all steps at places, a row each, where the wall's way is all that time changes; else none."""
     steps, U = course.trace.steps, course.film(1).U * (-1.0 if course.turned else 1.0)
     first, last = (course.models(steps[n].t, course.place(n + 1)).gap for n in (0, -1))
-    if course.place(1) is not None or jumps_of(first, "x") or not _same(_carried(first, U * steps[-1].t), last):
+    if course.place(1) is not None or jumps_of(first, "x") or not same(_carried(first, U * steps[-1].t), last):
         return np.zeros((0, 0))
     blocks = np.array_split(U * np.array([step.t for step in steps])[:, None], 1 + len(steps) * places.size // MANY)
     films = [(Around(_carried(first, way), course.grid), (way.size, places.size)) for way in blocks]
@@ -136,7 +136,7 @@ class MarchFilms:
     def sums(self, course: Course) -> Array | None:
         """Of each quantity; None where it is not that of another film, fluid or wall on as many points."""
         model, own = course.film(1), self.model
-        rest = all(_same(getattr(model, one.name), getattr(own, one.name)) for one in fields(Model) if one.name not in FREE)
+        rest = all(same(getattr(model, one.name), getattr(own, one.name)) for one in fields(Model) if one.name not in FREE)
         alike = [(side.kind, side.r) for side in model.sides] == [(side.kind, side.r) for side in own.sides]
         if not (rest and alike and self.can(course)):
             return None
@@ -154,7 +154,7 @@ class MarchFilms:
     def _terms(self, course: Course, films: Films) -> list[Array]:
         model, grid, scheme = course.film(1), course.grid, self.model.scheme
         law, k = model.law or Law(), films.C / (6.0 * model.mu * grid.steps(0))
-        pressed = (self._pressed if _same(model.law, self.model.law) else self._by(law)) * k
+        pressed = (self._pressed if same(model.law, self.model.law) else self._by(law)) * k
         for end, side, p_side in zip((0, -1), sides(grid), model.p_sides, strict=False):
             if side.any():
                 pressed[:, :, end] -= float(law.reduced(np.array(p_side))) * self.w[:, :, end] * k[:, end]
@@ -167,7 +167,7 @@ class MarchFilms:
         """Time changes them by the wall's way and the journal's place alone: the same at three times, they are so always."""
         last, grid = len(self.course.trace.steps), self.course.grid
         still = course.table == self.course.table and course.grid.lengths == grid.lengths and course.grid.even == grid.even
-        if still and grid.even and all(_same(course.film(n).gap, self.course.film(n).gap) for n in (0, 1, last)):
+        if still and grid.even and all(same(course.film(n).gap, self.course.film(n).gap) for n in (0, 1, last)):
             return self._own
         return films_of(course)
 

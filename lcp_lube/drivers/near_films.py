@@ -116,16 +116,16 @@ class NearFilms:
         near.mu, near.U, near.p_c, near.p_sides = model.mu, model.U, model.p_c, p_sides  # type: ignore[assignment]
         near.shaft, near.extras, near.film, lean.constant = model.shaft, model.extras, model.film, near
         near.levers, own = model.levers, self.model
-        same = (eq._p_sides, eq.constant.p_c) == (p_sides, near.p_c) and grid is eq.grid
-        same = same and _same((own.shaft, own.levers), (near.shaft, near.levers))
-        report = lean.report((self._told if same else self._totals(near)) | {name: float(a) for name, a in numbers.items()})
+        held = (eq._p_sides, eq.constant.p_c) == (p_sides, near.p_c) and grid is eq.grid
+        held = held and same((own.shaft, own.levers), (near.shaft, near.levers))
+        report = lean.report((self._told if held else self._totals(near)) | {name: float(a) for name, a in numbers.items()})
         return np.array([report[name] for name in map(plain, self.lambdas)]) - G / eq.constant.scheme.flow_unit
 
     def _sums(self, gap: Any, law: Law, grid: Grid, p_sides: tuple[float, ...]) -> Array | None:
         at_sides = law.dowson_higginson or (law.barus and self.drags)  # whether what faces there count depends on the pressure
         if law != self._law or (at_sides and p_sides != self.equations._p_sides):
             return self._by_faces(law, p_sides).sums(gap, grid)
-        if grid is self.equations.grid and _same(gap, self.model.gap):
+        if grid is self.equations.grid and same(gap, self.model.gap):
             return self._here
         return self._own.sums(gap, grid)
 
@@ -140,7 +140,7 @@ class NearFilms:
     def _alike(self, model: Model) -> bool:
         own = self.model
         sides = [(side.kind, side.r) for side in model.sides] == [(side.kind, side.r) for side in own.sides]
-        rest = all(_same(getattr(model, one.name), getattr(own, one.name)) for one in fields(Model) if one.name not in FREE)
+        rest = all(same(getattr(model, one.name), getattr(own, one.name)) for one in fields(Model) if one.name not in FREE)
         return sides and rest and not getattr(model.gap, "rims", ())
 
 
@@ -149,7 +149,7 @@ def plain(name: str) -> str:
     return name.removesuffix(OTHER)
 
 
-def _same(a: Any, b: Any) -> bool:
+def same(a: Any, b: Any) -> bool:
     """Whether two things are equal as far as they can tell."""
     try:
         return bool(a is b or a == b)
