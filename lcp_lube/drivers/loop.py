@@ -167,9 +167,10 @@ class Loop:
         p = self.law.pressure(near.fields["p"] * near.problem.p_unit)
         with np.errstate(all="ignore"):
             self.answer = answer(self.base, self.law, cells, self.by(cells), p, near.fields["r"], self.p_sides)
-            found, self.answer = self.made(), None
+            new, self.answer = self.vector(found := self.made()), None
+        if not np.isfinite(self.base.reduce.sum(new)):  # a step may point beyond a law's largest pressure
+            return cells
         if known is not None:
-            new = self.vector(found)
             self.moved = self.base.reduce.max(np.abs(new - self.vector(cells)))
             self.reach = self.base.reduce.max(np.abs(new - self.vector(neutral(self.effects, self.h.size))))
         return found

@@ -204,6 +204,13 @@ def test_a_step_begins_from_full_films_as_they_are():
     assert own.fields["p"] == pytest.approx(exact.fields["p"], rel=1e-4)
 
 
+def test_a_step_that_points_beyond_the_laws_largest_pressure_begins_elsewhere():
+    line = PLATES | {"L": 0.026, "U": 6.0, "n": 479, "film": {"shape": "journal", "c": 6.3e-5, "eccentricity": 0.84}}
+    line |= {"fluid": {"mu": 0.008, "p_supply": 4e4, "barus": 1.8e-7, "density": "dowson-higginson"}, "p_unit": None}
+    line |= {"sides": {"west": {"p": 0.0, "r": 0.17}, "east": 7e5}, "supply": [{"x": [0.0167, 0.02], "flow": 3.7e-5}]}
+    march({name: it for name, it in line.items() if it is not None} | {"motion": {"t_end": 1.3e-3, "steps": 5, "fill": 0.63}})
+
+
 def test_a_supply_foreseen_without_pressure_finds_one():
     source = {"x": [3.3e-3, 4.6e-3], "y": [3.2e-4, 1.75e-3], "restrictor": "orifice", "p_s": 4.4e5, "K": 1.8e-10}
     part = RING | {"L": 6.7e-3, "width": 6.3e-3, "U": -1.3, "nx": 17, "ny": 3, "fluid": {"mu": 8.2e-3, "p_supply": 4.5e4}}
