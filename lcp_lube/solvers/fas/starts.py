@@ -39,9 +39,10 @@ def interpolate(
             west_shares(kx, m, harmonic, w)
         for s in (1, 0):  # p last: its rows are used below
             sign = 1.0 - 2.0 * s
-            for line, out in ((row, south), (last, north)):
+            for n in range(1 + last - row):
+                out = north if n else south
                 for k in range(size):
-                    part[k] = max(sign * coarse[line, k], 0.0)
+                    part[k] = max(sign * coarse[row + n, k], 0.0)
                 interpolate_row(part, w, by_x, out)
                 if by_x and s == 0 and is_smooth:
                     smooth_row(part, kx, m, sides[0], sides[1], out)
@@ -51,19 +52,23 @@ def interpolate(
                 flows[s] = south
         if last > row and rows >= 4 and is_smooth:
             r, wa, wb, wc, wd = cubic(row, rows)
-            for k in range(size):
+            for k in range(np.uint32(size)):
+                a, b, c, d = coarse[r, k], coarse[r + 1, k], coarse[r + 2, k], coarse[r + 3, k]
+                p = (wa * a + wb * b) + (wc * c + wd * d)
+                part[k] = (p if min(min(a, b), min(c, d)) > 0.0 else np.nan) - 0.5 * (coarse[row, k] + coarse[last, k])
+            for k in range(size if r == 0 or r + 4 == rows else 0):  # beside sides
                 i = min(step * k, nx)
                 first, final = r == 0 and sides[2] and ky[1, i] > 0.0, r + 4 == rows and sides[3] and ky[top, i] > 0.0
                 a, b, c, d = coarse[r, k], coarse[r + 1, k], coarse[r + 2, k], coarse[r + 3, k]
                 full = (a > 0.0 or first) and b > 0.0 and c > 0.0 and (d > 0.0 or final)
                 p = (wa * a + wb * b) + (wc * c + wd * d) if full else np.nan
-                # Beyond a side p does not vary along it.
-                part[k] = 0.0 if sides[0] and (k == 0 or k == size - 1) else p - 0.5 * (coarse[row, k] + coarse[last, k])
+                part[k] = p - 0.5 * (coarse[row, k] + coarse[last, k])
+            if sides[0]:  # beyond a side p does not vary along it
+                part[0], part[size - 1] = 0.0, 0.0
             interpolate_row(part, w, by_x, bend)
             for i in range(1, nx + 1):
                 p = 0.5 * (south[i] + north[i]) + bend[i]
-                if p > 0.0:
-                    flows[0, i] = p
+                flows[0, i] = p if p > 0.0 else flows[0, i]
         for i in range(1, nx + 1):
             p, q = flows[0, i], flows[1, i]
             z[m, i] = p if p * (kx[m, i] + kx[m, i + 1] + ky[m, i] + ky[m + 1, i]) > q else -q
@@ -85,7 +90,14 @@ def smooth_row(coarse: Array, kx: Array, m: int, west: bool, east: bool, out: Ar
     """The pressures of a line between two coarse points where the film is full and smooth. west, east : as `sides`."""
     n, last = coarse.size, kx.shape[1] - 2
     west, east = west and kx[m, 1] > 0.0, east and kx[m, last] > 0.0
-    for k in range(min(out.size // 2, n - 1) if n >= 4 else 0):
+    count = min(out.size // 2, n - 1) if n >= 4 else 0
+    for k in range(np.uint32(2), np.uint32(max(min(n - 3, count), 2))):
+        a, b, c, d = coarse[k - 1], coarse[k], coarse[k + 1], coarse[k + 2]
+        p = (-0.0625 * a + 0.5625 * b) + (0.5625 * c - 0.0625 * d)
+        out[2 * k + 1] = p if min(min(a, b), min(min(c, d), p)) > 0.0 else out[2 * k + 1]
+    for k in range(count):
+        if 2 <= k < n - 3:
+            continue
         r, wa, wb, wc, wd = cubic(k, n)
         a, b, c, d = coarse[r], coarse[r + 1], coarse[r + 2], coarse[r + 3]
         p = (wa * a + wb * b) + (wc * c + wd * d)
