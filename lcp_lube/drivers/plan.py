@@ -13,8 +13,9 @@ from ..registry import DEFAULT_METHOD, METHODS, SMALL, SMALL_BOX
 from .ask import Ask
 
 # Points up to which a film in 2D is solved directly in less time than it takes to load multigrid's compiled loops, and right to
-# the last digits at any film ratio. The rule looks at the points alone, not at what the process has loaded: a scene is always
-# solved in the same way.
+# the last digits at any film ratio: a process's first solve takes 0.06 to 0.08 s of it, by multigrid 0.55 s. The rule looks at
+# the points alone, not at what the process has loaded: a scene is always solved in the same way. Programs that go on say
+# `direct_below=0`: of films of nine shapes with 7 to 99 points a side multigrid then takes 0.4 to 1 of the direct solve's time.
 FEW = 10_000
 SMALL_RING = 200_000  # points up to which the active set's system is solved directly in a film that is periodic along the flow
 DIN_ONLY = {"r0", "mu", "conditions"}  # flags that only an interior method has a use for
