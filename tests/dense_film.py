@@ -9,12 +9,14 @@ solution, which is unique; where steps cycle, they start again from the package'
 
 from dataclasses import dataclass
 from decimal import Decimal, localcontext
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 
+from lcp_lube.problems.film.edges import jumps_of
 from lcp_lube.problems.film.graded import whole
 
 LONG = np.longdouble
@@ -152,7 +154,7 @@ def discretise(scene: Any) -> tuple[Faces, int, np.ndarray]:
     kinds = [side.kind for side in model.sides]
     p_side = [side.p if side.kind == "open" else 0.0 for side in model.sides]
     mu, U, scheme = model.mu, model.U, model.scheme
-    jumps = getattr(model.gap, "jumps", lambda axis: ())
+    jumps = partial(jumps_of, model.gap)
     # Where lines lie is a choice; U < 0: counted from the inlet, as the last bit of x decides which side of a jump is meant.
     chosen_x, chosen_y = (model if U >= 0 else model.mirrored).lines(shape)
     inlet, outlet = kinds[:2] if U >= 0 else kinds[1::-1]

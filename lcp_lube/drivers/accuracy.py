@@ -99,7 +99,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     shape = finer(first, meshes, rung, unit)
     solution: Solution | None = None
     before: Solution | None = None
-    told = Values(line, pairs)
+    told = Values(line, pairs, ALGEBRAIC * tol)
     levels: list[dict[str, Any]] = []
     times: dict[str, float] = {}
     # A program that goes on loads multigrid's loops once; for one run they pay where its last grid will be one for multigrid

@@ -9,7 +9,6 @@ import numpy as np
 
 from ..errors import InputError
 from ..problems.certificate import Certificate
-from ..problems.film.edges import jumps_of
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.grid import EVEN
@@ -290,7 +289,7 @@ def iterations_of(steps: Iterable[Step]) -> int:
 def first_film(scene: Any, models: Any, place: Any) -> Model:
     """The film at t = 0, on whose grid the march goes on."""
     first, later = (models(t, place) for t in (0.0, SOME * scene.motion.t_end))
-    if any(set(jumps_of(first.gap, axis)) != set(jumps_of(later.gap, axis)) for axis in "xy"):
+    if any(set(first.edges_along(axis)) != set(later.edges_along(axis)) for axis in "xy"[: len(first.lengths)]):
         first = replace(first, places=EVEN)  # its edges move: no line of points can lie on them
     return first  # type: ignore[no-any-return]
 

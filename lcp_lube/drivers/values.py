@@ -29,18 +29,18 @@ class Values:
     Parameters
     ----------
     line : whether the film is known by quadrature (`estimate.is_known`). pairs : whether an integral of the pressure is
-        estimated from each two grids (`estimate.of_pair`).
+        estimated from each two grids (`estimate.of_pair`). least : relative error that the solves may leave on any grid.
 
     Attributes
     ----------
     line : a problem and its fields that have the numbers of a line that is known; None of other films.
     """
 
-    def __init__(self, line: bool, pairs: bool):
+    def __init__(self, line: bool, pairs: bool, least: float):
         self.line: tuple[LubricationProblem, Fields] | None = None
         self._known: Mapping[str, float] | None = None  # all numbers of it
         self.quantity, self.best = "", Estimate(np.nan, inf)
-        self._is_line, self._pairs = line, pairs
+        self._is_line, self._pairs, self._least = line, pairs, least
         self._grids: list[Solution | Mapping[str, float]] = []  # those before the last, or their numbers
         self._last: Mapping[str, float] = {}  # numbers of the last one, once they are told
         self._own: list[float] = []  # of the quantity
@@ -82,10 +82,9 @@ class Values:
         if not isfinite(by_load) or (name not in INTEGRALS and len(values) > 2):
             return of_all
         pair = of_pair(values, self._misplaced, self._sizes, by_load if name in INTEGRALS else by_all, name, self._other)
-        if not isfinite(of_all.error):
-            return pair
         weight = max(0.5 ** (len(values) - 2), LEAST_PAIR)
-        return replace(pair, error=pair.error**weight * min(of_all.error, pair.error) ** (1.0 - weight))
+        error = pair.error**weight * min(of_all.error, pair.error) ** (1.0 - weight)
+        return replace(pair, error=max(error, self._least * abs(value)))
 
     def _truth(self, name: str) -> float:
         """A number of a line that is known; NaN where there is none. Collective."""

@@ -201,3 +201,17 @@ def test_order_over_places_of_an_edge():
     assert (worst <= 3.0 * np.median(errors, axis=0) + 1e-4).all()
     assert (np.log2(mean[0] / mean[2]) / 2 > [1.8, 1.5, 1.0]).all()
     assert worst[2, 0] < 1e-3 and worst[2, 1] < 1e-3
+
+
+@pytest.mark.parametrize("U", [1.0, -1.0])
+def test_a_line_on_every_kink(U):
+    """Where ramps begin and end, along and across the flow; and the same film the other way round."""
+    ramps = [("x", [2.23, 5.1]), ("y", [3.07, 8.9]), ("y", [0.0, 10.0])]
+    film = [{"shape": "constant", "h_um": 2.0}]
+    film += [{"shape": "linear", "h_start_um": 1.0, "h_end_um": 0.0, "along": axis, "between_mm": ends} for axis, ends in ramps]
+    data = {"family": "bearing", "dimension": 2, "L_mm": 10, "width_mm": 10, "U": U, "n": 23, "film": film}
+    scene = load_scene({**data, "fluid": {"mu": 0.02, "p_supply": 1e5}})
+    model = scene.model if U > 0 else scene.model.mirrored  # type: ignore[attr-defined]
+    for line, places in zip(model.lines((23, 23)), ([2.23e-3, 5.1e-3], [3.07e-3, 8.9e-3]), strict=True):
+        places = 0.01 - np.array(places) if U < 0 and places[0] == 2.23e-3 else np.array(places)
+        assert np.abs(line[:, None] - places).min(axis=0).max() < 1e-12

@@ -35,9 +35,18 @@ def marks_of(film: Any) -> tuple[float, ...]:
 
 
 def jumps_of(film: Any, axis: str) -> tuple[float, ...]:
-    """x or y (m) of the straight lines across which a film jumps, as far as it tells."""
-    tell = getattr(film, "jumps", None)
-    return () if tell is None else tuple(tell(axis))
+    """x or y (m) of the straight lines across which a film jumps, as far as it, or its parts, tell."""
+    return _told(film, "jumps", axis)
+
+
+def kinks_of(film: Any, axis: str) -> tuple[float, ...]:
+    """x or y (m) of the straight lines across which a film's slope jumps, as far as it, or its parts, tell."""
+    return _told(film, "kinks", axis)
+
+
+def _told(film: Any, name: str, axis: str) -> tuple[float, ...]:
+    tell = getattr(film, name, None)
+    return tuple(tell(axis)) if tell else tuple(t for part in getattr(film, "parts", ()) for t in _told(part, name, axis))
 
 
 def oblique(film: Any) -> bool:

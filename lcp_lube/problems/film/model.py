@@ -12,7 +12,7 @@ from ...base.parallel import Array
 from ...errors import InputError
 from ..facts import Facts
 from ..grid import EVEN, Grid, Places, Polar, some_places
-from .edges import jumps_of
+from .edges import jumps_of, kinks_of
 from .effects import Effect
 from .exact import ExactSolution
 from .fluid import Law
@@ -158,9 +158,10 @@ class Model:
         return x, y
 
     def edges_along(self, axis: str) -> list[float]:
-        """x or y (m) of the straight lines at which the film, a supply or a groove ends."""
+        """x or y (m) of the straight lines at which the film, its slope, a supply or a groove jumps or ends."""
         ends = self._groove_edges if axis == "x" else []
-        return [*jumps_of(self.gap, axis), *(t for one in self.supplies for t in one.region.edges(axis)), *ends]
+        kinks = [t for t in kinks_of(self.gap, axis) if 0.0 < t < self.lengths["xy".index(axis)]]
+        return [*jumps_of(self.gap, axis), *kinks, *(t for one in self.supplies for t in one.region.edges(axis)), *ends]
 
     @property
     def _groove_edges(self) -> list[float]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...base.parallel import Array
-from .edges import jumps_of, level, marks_of
+from .edges import level, marks_of
 
 Shape = Callable[[Array, Array], Array]
 EDGE = 1e-12  # relative: a point so near an edge is on it, whatever its coordinate's rounding; edges belong to the recess
@@ -53,6 +53,10 @@ class Along:
         extrema = {"linear": 1.0, "parabola": 2.0, "sinusoid": 2.0 * self.waves}[self.course]
         parts = np.append(np.arange(np.ceil(extrema)) / extrema, 1.0)
         return tuple(self.start + (self.end - self.start) * parts)
+
+    def kinks(self, axis: str) -> tuple[float, ...]:
+        """x or y (m) of the lines at which it ends."""
+        return (self.start, self.end) if axis == self.axis else ()
 
     @property
     def level(self) -> bool:
@@ -244,10 +248,6 @@ class Sum:
     def smooth_between(self) -> bool:
         """Whether the film's jumps and kinks are known, which an exact solution needs."""
         return self.floor is None and all(hasattr(part, "breakpoints") for part in self.parts)
-
-    def jumps(self, axis: str) -> tuple[float, ...]:
-        """x or y (m) of the straight lines across which the film jumps."""
-        return tuple(t for part in self.parts for t in jumps_of(part, axis))
 
     @property
     def level(self) -> bool:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from ...base.parallel import Array
 from ..grid import Grid
-from .edges import jumps_of, level, marks_of
+from .edges import jumps_of, kinks_of, level, marks_of
 
 
 @dataclass(frozen=True)
@@ -33,6 +33,11 @@ class View:
     def jumps(self, axis: str) -> tuple[float, ...]:
         """x or y (m) of the straight lines across which it jumps."""
         found = jumps_of(self.film, axis)
+        return tuple(sorted(map(self.back, found))) if axis == "x" else found
+
+    def kinks(self, axis: str) -> tuple[float, ...]:
+        """x or y (m) of the straight lines across which its slope jumps."""
+        found = kinks_of(self.film, axis)
         return tuple(sorted(map(self.back, found))) if axis == "x" else found
 
     @property
