@@ -18,7 +18,7 @@ from ..problems.film.model import Model
 from ..problems.film.stored import Stored
 from ..problems.grid import EVEN
 from ..scenes.scene import Derived
-from .ask import Ask
+from .ask import Ask, Start
 
 SETTLED = 0.1  # of eps1: relative change of the coefficients
 IN_TIME = (1e-2, 0.1, 5e-5)  # the same in a time step: of what it changes, of the square of its part in them, and at most
@@ -84,3 +84,16 @@ def settled(ask: Ask, stored: Stored | None, moved: float, reach: float = np.inf
         return SETTLED * eps1
     part = max(IN_TIME[0] * moved, IN_TIME[1] * (moved / reach) ** 2 if reach else 0.0)
     return max(SETTLED * eps1, min(part, IN_TIME[2], certificate_tol(eps1)))
+
+
+def lent(near: Any, shape: tuple[int, ...]) -> LubricationProblem | None:
+    """The rigid film of a start whose effects were looked at, on this grid, which is taken over."""
+    if not isinstance(near, Start) or near.made is None or near.problem.grid.shape != shape:
+        return None
+    found: Any = near.problem
+    rigid = found if found.plain else found.rigid
+    if type(rigid) is not LubricationProblem or rigid.coefficients_for is not None:
+        return None
+    base = copy(rigid)
+    base.exact, base.rigid, found.shares_grid = None, None, True
+    return base

@@ -1,7 +1,6 @@
 """The loop of `coupling`: a film with its coefficients held, and Anderson's method for the fields that these come from."""
 
 from collections.abc import Callable
-from copy import copy
 from dataclasses import replace
 from typing import Any
 
@@ -12,7 +11,6 @@ from ..base.parallel import Array
 from ..errors import InputError
 from ..problems.film.effects import Answer, Cells, Compressible, Effect, FaceFactors, answer, factors, neutral
 from ..problems.film.fluid import Law
-from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.tangent import WIDEST, Giving, closed, filled, lift_of, logarithm, renewed
 from ..problems.solution import Solution
@@ -20,14 +18,13 @@ from ..scenes.scene import Solvable
 from .ask import Ask, Start
 from .chain import added
 from .compose import Inner
-from .frozen import Frozen, settled
+from .frozen import Frozen, lent, settled
 
 MOST_SOLVES, LONG = 100, 300  # films; and while the least change has fallen to a tenth within as many as
 PATIENCE = 50  # these; two cycles
 MEMORY = 30  # answers that Anderson's method combines; -coupling_snes_anderson_m changes it
 CYCLE = 25  # steps after which it begins anew: its least squares see no changes 1e-8 of the largest that they remember
 FEW, NEAR, AWAY = 1, 0.3, 30.0  # answers combined while a coefficient changes by more than NEAR; AWAY: times the least change
-WARMER = 1.0  # of log(viscosity): where a second start is
 FIRST = 8  # films from which on films between soft walls that are not NEAR yet are solved with their walls at once
 LONGEST = 1.0  # relative change of a coefficient in one step, before answers are combined
 LEAST_LIFT = -0.9  # of the rigid film, of an iterate
@@ -49,7 +46,7 @@ class Loop:
             raise InputError(f"{scene.name}: scheme = {self.model.scheme}: {what} needs scheme = face")
         self.frozen = Frozen(scene, self.law, None, all(effect.even for effect in self.effects))
         try:
-            self.base = self._lent() or self.frozen.build(ask.comm)
+            self.base = lent(ask.start, scene.shape) or self.frozen.build(ask.comm)
         except InputError as error:
             raise InputError(f"{scene.name}: {error}") from None
         self.frozen = replace(self.frozen, base=self.base)
@@ -71,24 +68,12 @@ class Loop:
         self.own: Array | None = None  # the vector that the last film has taken in place of that it was given
         self.left: dict[str, float] = {}  # of a film's balances, where that went into what its cells store
         self.beyond = False  # whether no pressure carries the last film's flow
+        self.endless = ""  # why no pressure carries it, by an effect that makes viscosity grow without bound
         self.start: Solution | Start | None = ask.start
         self.begun = self.last = np.zeros(0)  # the vectors of fields that the loop began with, and of the last film's
         self.told: list[str] = []  # how it went on where Anderson's method did not settle
         self.log: list[Array] = []  # what the effects have made of each film's answer
         self.given: list[Array] = []  # those that were found before, by an earlier run say: they are taken instead of films
-
-    def _lent(self) -> LubricationProblem | None:
-        """The rigid film of a start whose effects were looked at, from which its grid is taken over."""
-        near: Any = self.ask.start
-        if not isinstance(near, Start) or near.made is None or near.problem.grid.shape != self.scene.shape:
-            return None
-        found: Any = near.problem
-        rigid = found if found.plain else found.rigid
-        if type(rigid) is not LubricationProblem or rigid.coefficients_for is not None:
-            return None
-        base = copy(rigid)
-        base.exact, base.rigid, found.shares_grid = None, None, True
-        return base
 
     def vector(self, cells: Cells) -> Array:
         """Fields as one vector, in which equal steps are equal relative changes of coefficients."""
@@ -197,7 +182,13 @@ class Loop:
         walls, whose film drags what it has, go on by Newton's methods from the best fields. What is left in the end are these.
         watch : called after every film.
         """
-        from .nonlinear import by_films, by_half_steps, steps  # here, and below: films without effects have no loop
+        from .nonlinear import (
+            beyond,
+            by_films,
+            by_half_steps,
+            steps,
+            warmer,
+        )  # here, and below: films without effects have no loop
 
         x = PETSc.Vec().createMPI((len(self.names) * self.h.size, None), comm=self.base.grid.petsc_comm)
         x.setArray(begin)
@@ -207,10 +198,10 @@ class Loop:
         mark = (np.inf, 0)  # a least change, and the films after which it was found
         steady = self.model.stored is None
         wait = FIRST if steady and "lift" in self.names else np.inf
-        warm = self._warmer(begin) if steady and "warmth" in self.names else None
+        warm = warmer(self, begin) if steady and "warmth" in self.names else None
 
         def ends() -> bool:
-            return self.solves >= (LONG if self.solves - mark[1] < PATIENCE else MOST_SOLVES)
+            return bool(self.endless) or self.solves >= (LONG if self.solves - mark[1] < PATIENCE else MOST_SOLVES)
 
         def residual(snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
             nonlocal best, last, least, mark
@@ -274,6 +265,8 @@ class Loop:
             self.change = np.nan_to_num(self.change, nan=np.inf)
         if not self.found and least[0] < self.change:
             self.change = self.off(least[1], watch)[0]
+        if steady and not (self.found or self.endless) and np.isfinite(self.change):
+            self.endless = beyond(self)
         x.destroy()
 
     def off(self, x: Array, watch: Callable[[], None]) -> tuple[float, Array]:
@@ -283,11 +276,6 @@ class Loop:
             off = x - found
         return self.base.reduce.max(np.abs(off)), off
 
-    def _warmer(self, x: Array) -> Array:
-        """These fields, with warmer oil."""
-        parts = zip(self.names, self.split(x), strict=True)
-        return np.concatenate([part - WARMER * (name in ("viscosity", "warmth")) for name, part in parts])
-
     def _found(self, x: Array, watch: Callable[[], None]) -> Array:
         """The vector of what the effects make of the film with these fields; NaN, which ends the loop, if it has no answer."""
         if len(self.log) < len(self.given):
@@ -295,6 +283,9 @@ class Loop:
             self.solves += 1
             return self.log[-1]
         with np.errstate(all="ignore"):
-            self.log.append(self.vector(self.made()) if self.film(self.cells(x)) else np.full_like(x, np.nan))
+            has = self.film(self.cells(x))
+            self.log.append(self.vector(self.made()) if has else np.full_like(x, np.nan))
+        if has and self.solves == len(self.effects) == 1 and not self.base.reduce.max(np.abs(x)):
+            self.endless = getattr(self.effects[0], "beyond", lambda at: "")(self.answer)
         watch()
         return self.log[-1]

@@ -7,9 +7,11 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..base.parallel import Array
+from ..problems.film.effects import neutral
 from .loop import LONG
 
 PATIENT = 150  # half steps in which the least change has to halve
+WARMER = 1.0  # of log(viscosity): where a second start is
 VAIN = 100  # films of Newton's method in which the change has to halve
 NEWTON = {"snes_mf": "", "snes_linesearch_type": "bt", "mat_mffd_err": 1e-6, "snes_ksp_ew": "", "ksp_max_it": 60}
 NEWTON |= {"ksp_gmres_restart": 60, "snes_max_linear_solve_fail": LONG}  # what 60 products give of a step is taken
@@ -86,3 +88,26 @@ def by_half_steps(loop: Any, least: tuple[float, Array], watch: Callable[[], Non
         x = x - 0.5 * np.clip(off, -1.0, 1.0)
     loop.change = np.nan_to_num(loop.change, nan=np.inf)
     return least
+
+
+def warmer(loop: Any, x: Array) -> Array:
+    """These fields, with warmer oil."""
+    parts = zip(loop.names, loop.split(x), strict=True)
+    return np.concatenate([part - WARMER * (name in ("viscosity", "warmth")) for name, part in parts])
+
+
+def beyond(loop: Any) -> str:
+    """Why no pressure carries the flow, by a film without each effect that may make viscosity grow without bound; the loop's
+    last answer stays. Collective."""
+    kept, reason = loop.answer, ""
+    for effect in loop.effects:
+        if hasattr(effect, "beyond") and kept is not None and not reason:
+            out = neutral(loop.effects, loop.h.size)
+            for other in loop.effects:
+                if other is not effect:
+                    other.apply(kept, out)
+            if loop.film(out):
+                reason, loop.answer = effect.beyond(loop.answer), kept
+            else:
+                loop.again(False)
+    return reason

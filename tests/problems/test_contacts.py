@@ -4,6 +4,7 @@ from math import exp, pi, sqrt
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 from lcp_lube import InputError, load_scene, solve
 from lcp_lube.problems.grid import Grid
@@ -93,6 +94,22 @@ def test_roelands():
     assert by_alpha / constant - 1 == pytest.approx(by_barus / constant - 1, rel=0.06)
     with solve({**WEDGE, "viscosity": {"factor": "1"}}, model="full") as s:
         assert s.load == pytest.approx(constant, rel=1e-9)
+
+
+@pytest.mark.parametrize("U, more", [(1.9, {}), (2.0, {}), (3.0, {"fluid": {"mu": 0.1, "density": "dowson-higginson"}})])
+def test_beyond_roelands_law(U, more):
+    """Int dp/(mu/mu_0) ends at 48.2 MPa for z = 0.6, mu_0 = 0.1; the film of constant viscosity has 25 U MPa, as found by
+    quadrature and by the wedge's formula. Alone that is an outcome after one film."""
+    a, z, P = np.log(0.1) + 9.67, 0.6, 1.96e8
+    most = quad(lambda p: np.exp(-a * np.expm1(z * np.log1p(p / P))), 0.0, 20 * P)[0]
+    film = [{"shape": "linear", "h_start": 2e-5, "h_end": 1e-5}]
+    pad = {"family": "bearing", "L": 0.1, "U": U, "n": 199, "fluid": {"mu": 0.1}, "film": film, "roelands": {"z": z}, **more}
+    with solve(pad, model="full") as s:
+        assert s.converged == (most > 25e6 * U)
+        if not s.converged:
+            alone = s.outcome.name == "NO_SOLUTION" and s.settings["details"]["fluid_solves"] == 1
+            assert alone == (not more) and "viscosity grows without bound by Roelands' law" in s.message
+            assert f"{most:.3g} Pa" in s.message
 
 
 def test_asperities_between_plates():

@@ -63,6 +63,7 @@ class Effect:
     channels : what it may change. even : whether what it makes of an answer that is symmetric in y is so too. local : whether
     what it makes at a place is made of what the answer has there. carried : of a field that the oil carries along in time, by
     its equation: its name among those that are told, and the level from which it is counted; None: its law is local in time.
+    What makes viscosity grow without bound has `beyond(at)`: why no pressure carries the flow of a film without it, or "".
     """
 
     channels: ClassVar[tuple[str, ...]] = ("viscosity",)

@@ -11,6 +11,7 @@ from math import exp, log
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
+from numpy.polynomial.laguerre import laggauss
 from pydantic import Field
 
 from ...errors import InputError
@@ -21,6 +22,7 @@ from ..units import measured
 from .table import EffectTable
 
 LARGEST = 60.0  # of the exponent, of an iterate
+NODES, LEAST_Z = 32, 0.02  # of a quadrature that is exact for powers 1/z - 1 of up to 63
 
 
 class RoelandsTable(EffectTable):
@@ -54,3 +56,19 @@ class Roelands(Effect):
         at_p_c = np.log(at.base.mu * out["viscosity"]) + ROELANDS_MU
         growth = np.expm1(self.z * np.log1p(np.maximum(at.p, 0.0) / ROELANDS_P))
         out["viscosity"] *= np.exp(np.minimum(np.maximum(at_p_c, 0.0) * growth, LARGEST))
+
+    def beyond(self, at: Answer) -> str:
+        """With p = P ((1 + s/a)^(1/z) - 1), s the exponent, a = log(mu_T) + 9.67: Int exp(-s) dp/ds ds is finite. By the
+        thinnest oil, whose is the largest."""
+        a = log(at.base.mu * at.problem.reduce.min(at.cells["viscosity"])) + ROELANDS_MU
+        if not (a > 0.0 and self.z > LEAST_Z):
+            return ""
+        s, weights = laggauss(NODES)
+        most = ROELANDS_P / (self.z * a) * float(weights @ (1.0 + s / a) ** (1.0 / self.z - 1.0))
+        needed = at.problem.reduce.max(at.p)
+        if needed < most:
+            return ""
+        return (
+            f"no pressure carries the flow: viscosity grows without bound by Roelands' law (z = {self.z:.3g}), which reaches "
+            f"what needs less than {most:.3g} Pa with the viscosity at p_c, and this film needs {needed:.3g} Pa with it"
+        )
