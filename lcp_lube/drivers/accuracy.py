@@ -32,6 +32,7 @@ FEW_KNOWN = 128  # points of the first grid of a line whose number is known: no 
 FEW_PAIRS = 200  # of a film whose load is estimated from each two grids: these are solved by elimination
 ALGEBRAIC = 1e-3  # ||F|| relative to the tolerance: with many small cavities it leaves up to 60 times itself in a load
 ALLOWED = (1e-10, 0.5)  # tolerances
+FIRST = 1e-2  # the same of a first grid that tells nothing by itself
 SOON = 3e-3  # a tolerance below which most films in 2D end on grids for multigrid
 WHOLE = {True: 100_000, False: 1500}  # points up to which looking for symmetries costs what it saves, by multigrid or directly
 HOPELESS = 1_000_000  # points on which an estimate that has not come down is taken to stay up
@@ -211,7 +212,8 @@ def _stopping(ask: Ask, tol: float, before: Solution | None) -> Stopping | Mappi
         return given
     if before is not None and (before.problem.kind != "lubrication" or any(before.problem.grid.periodic)):
         return given  # what feeds a ring is a small part of what goes round: its balance needs digits
-    return {"eps1": float(np.clip(ALGEBRAIC * tol, 1e-12, 1e-4)), "eps2": inf, **(given or {})}
+    part = ALGEBRAIC if before is not None else FIRST
+    return {"eps1": float(np.clip(part * tol, 1e-12, 1e-4)), "eps2": inf, **(given or {})}
 
 
 def _start(before: Solution | None, points: int) -> Solution | None:
