@@ -8,8 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lcp_lube import load_scene, solve
+from lcp_lube.problems.film.edges import Around
 from lcp_lube.problems.film.lines import UNEVEN, on_edges
 from lcp_lube.problems.film.lubrication import LubricationProblem
+from lcp_lube.problems.film.reynolds import coefficients
 from lcp_lube.problems.grid import OFFSET, Grid
 from lcp_lube.problems.transfer import Transfer
 
@@ -215,3 +217,15 @@ def test_a_line_on_every_kink(U):
     for line, places in zip(model.lines((23, 23)), ([2.23e-3, 5.1e-3], [3.07e-3, 8.9e-3]), strict=True):
         places = 0.01 - np.array(places) if U < 0 and places[0] == 2.23e-3 else np.array(places)
         assert np.abs(line[:, None] - places).min(axis=0).max() < 1e-12
+
+
+def test_a_seam_is_an_edge_where_the_films_ends_differ():
+    """The face across it has the two films there in series; where they are alike it is a face as any other."""
+    ends = (("periodic", "periodic"), ("open", "open"))
+    with_seam, without = (lambda x, y: 1.0 + (x > 0.5) + 0.0 * y), (lambda x, y: 2.0 + np.cos(2.0 * np.pi * x) + 0.0 * y)
+    grid = Grid((8, 3), (1.0, 1.0), ends=ends)
+    data = {"mu": 1.0 / 6.0, "U": 1.0, "scheme": "face", "p_sides": (0.0,) * 4, "p_unit": 1.0}
+    box = coefficients(grid, with_seam, **data)
+    np.testing.assert_allclose(box.k_W[:, 0] * grid.steps(0)[0], 1.0 / (0.5 / 8.0 + 0.5), rtol=1e-6)  # half of it each
+    assert len(Around(with_seam, grid).edges(0)) == 2 and not Around(without, grid).edges(0)
+    grid.destroy()

@@ -23,6 +23,8 @@ from ..grid import Grid
 
 GAUSS = (0.5 - 0.5 / np.sqrt(3.0), 0.5 + 0.5 / np.sqrt(3.0))
 MARGIN = 1e-9  # of a spacing: an edge so near a point, or a face's end, is on it
+SEAM, SAME = 1e-12, 1e-9  # of a ring: how far before its end it is looked at; and by what its ends may differ where it closes
+LOOKS = 65  # places along a seam
 
 
 def marks_of(film: Any) -> tuple[float, ...]:
@@ -94,6 +96,22 @@ class Around:
         around = k < self.grid.dim and self.grid.periodic[k]
         return [t + m * self.grid.lengths[k] for t in found for m in (-1, 0, 1)] if around else found
 
+    def edges(self, side: int) -> Sequence[float]:
+        """Its edges in x (side 0) or y, m; round a ring the seam is one too where the film's ends differ."""
+        found = self.jumps("xy"[side])
+        if not (turn := self.period(side)):
+            return found
+        grid, start = self.grid, self.grid.origin[side]
+        places = np.linspace(0.0, 1.0, LOOKS)[:, None]  # on any grid and rank the same ones
+        other = grid.origin[1 - side] + grid.lengths[1 - side] * places if grid.dim == 2 else np.zeros((1, 1))
+        ends = np.array([[[start]], [[start + turn * (1.0 - SEAM)]]])
+        a, b = (self(at, other) if side == 0 else self(other.T, at) for at in ends)
+        return [*found, start, start + turn] if np.max(np.abs(b - a)) > SAME * np.max(np.abs(a)) else found
+
+    def period(self, side: int) -> float:
+        """Length of a side that is a ring, m; 0 of another."""
+        return self.grid.lengths[side] if side < self.grid.dim and self.grid.periodic[side] else 0.0
+
     @property
     def level(self) -> bool:
         return level(self.film)
@@ -122,7 +140,7 @@ def face_film(
         which cells end, shape (2, lines).
     jumps, jumps_across : t and s of the film's edges, m. period : round a ring, whose last point lies before the first.
     """
-    columns, pieces = _pieces(nodes[0], np.where(nodes[1] < nodes[0], nodes[1] + period, nodes[1]), jumps)
+    columns, pieces = edges_inside(nodes[0], nodes[1], jumps, period)
 
     def along(s: Array) -> tuple[Array, Array]:
         h = np.broadcast_to(film(faces[None, :], s[:, None]), (s.size, faces.size))
@@ -139,7 +157,7 @@ def face_film(
         return cubes, films
 
     cubes, films = along(lines)
-    rows, strips = _pieces(lines - 0.5 * steps[0], lines + 0.5 * steps[1], jumps_across)
+    rows, strips = edges_inside(lines - 0.5 * steps[0], lines + 0.5 * steps[1], jumps_across)
     if rows.size:
         cubes[rows] = films[rows] = 0.0
         for a, b in pairwise(strips):
@@ -158,18 +176,20 @@ def strips(
     steps : distances before and behind each line, shape (2, lines).
     Returns the numbers of the lines, the films, and the strips' shares of a cell's width, shape (strips, such lines, 1).
     """
-    rows, ends = _pieces(lines - 0.5 * steps[0], lines + 0.5 * steps[1], jumps)
+    rows, ends = edges_inside(lines - 0.5 * steps[0], lines + 0.5 * steps[1], jumps)
     parts = list(pairwise(ends))
     shares = np.array([(b - a) / (0.5 * (steps[0] + steps[1])[rows]) for a, b in parts])
     films = [np.broadcast_to(film(x[None, :], 0.5 * (a + b)[:, None]), (rows.size, x.size)) for a, b in parts]
     return rows, np.array(films), shares[..., None]
 
 
-def _pieces(start: Array, end: Array, jumps: Sequence[float]) -> tuple[NDArray[np.int64], Array]:
+def edges_inside(start: Array, end: Array, jumps: Sequence[float], period: float = 0.0) -> tuple[NDArray[np.int64], Array]:
     """Numbers of the intervals with jumps inside, and their ends with the jumps in between, one row a place.
 
     Shape (most jumps in an interval + 2, intervals with jumps); intervals with fewer of them have pieces of no length.
+    period : round a ring, of which the last interval ends where the first one begins.
     """
+    end = np.where(end < start, end + period, end)
     places = np.unique(np.asarray(jumps, dtype=float))
     margin = MARGIN * (end - start)
     first = np.searchsorted(places, start + margin)

@@ -6,24 +6,19 @@ puts -2 dx weight h on r's diagonal and 2 dx (old - weight h) to c. -B gains a p
 family as the steady problem, and what holds for that one holds for it.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...base.parallel import Array
 from ..grid import Grid
 from ..transfer import Pick, numbers
-from .edges import GAUSS, Around, _pieces
+from .edges import GAUSS, Around, edges_inside
 
 if TYPE_CHECKING:
     from .lubrication import LubricationProblem
-
-
-SEAM, SAME = 1e-12, 1e-9  # of a ring: how far before its end it is looked at; and by what its ends may differ where it closes
 
 
 @dataclass(frozen=True)
@@ -91,10 +86,11 @@ def mean_film(grid: Grid, film: Any) -> Array:
     """
     film = Around(film, grid)
     h = np.array(np.broadcast_to(film(grid.x, grid.y), grid.box), dtype=float)
-    jumps = [_jumps(film, side) for side in range(grid.dim)]
+    jumps = [film.edges(side) for side in range(grid.dim)]
     if not any(jumps):
         return h
-    columns, pieces = _cut(grid, 0, jumps[0])
+    faces = [grid.nodes_and_faces(side)[1] for side in range(grid.dim)]
+    columns, pieces = edges_inside(faces[0][:-1], faces[0][1:], jumps[0], film.period(0))
 
     def along(y: Array) -> Array:
         values = np.array(np.broadcast_to(film(grid.x, y[:, None]), (y.size, grid.box[1])))
@@ -109,25 +105,7 @@ def mean_film(grid: Grid, film: Any) -> Array:
 
     h = along(grid.y[:, 0])
     if grid.dim == 2:
-        rows, strips = _cut(grid, 1, jumps[1])
+        rows, strips = edges_inside(faces[1][:-1], faces[1][1:], jumps[1], film.period(1))
         if rows.size:
             h[rows] = sum(((b - a) / (strips[-1] - strips[0]))[:, None] * along(0.5 * (a + b)) for a, b in pairwise(strips))
     return h
-
-
-def _jumps(film: Around, side: int) -> Sequence[float]:
-    """Edges in x (side 0) or y; round a ring the seam is one too where the film's ends differ."""
-    grid, found = film.grid, film.jumps("xy"[side])
-    if not grid.periodic[side]:
-        return found
-    start, turn = grid.origin[side], grid.lengths[side]
-    ends = np.array([[start], [start + turn * (1.0 - SEAM)]])
-    a, b = (film(at, grid.y[:, :1]) if side == 0 else film(grid.x[:1], at) for at in ends[:, None])
-    return [*found, start + turn] if np.max(np.abs(b - a), initial=0.0) > SAME * np.max(a, initial=0.0) else found
-
-
-def _cut(grid: Grid, side: int, jumps: Sequence[float]) -> tuple[NDArray[np.int64], Array]:
-    """`_pieces` of the owned cells in x (side 0) or y; round a ring the last face is the first one."""
-    faces = grid.nodes_and_faces(side)[1]
-    ends = np.where(faces[1:] > faces[:-1], faces[1:], faces[1:] + grid.lengths[side] * grid.periodic[side])
-    return _pieces(faces[:-1], ends, jumps)

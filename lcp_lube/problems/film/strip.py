@@ -7,7 +7,7 @@ import numpy as np
 
 from ...base.parallel import Array
 from ..grid import Grid
-from .edges import Around, face_film, jumps_of, pairs
+from .edges import Around, face_film, pairs
 from .integrals import LineIntegrals
 from .rims import rims_across_x, rims_across_y
 
@@ -29,7 +29,7 @@ def coefficients_of(
     x_share, y_share = grid.widths(0), line_weights(grid)
     x_nodes, x_faces = grid.nodes_and_faces(0)
     x, y = x_nodes[None, 1:-1], grid.y
-    period = [length if around else 0.0 for length, around in zip(grid.lengths, grid.periodic, strict=True)]
+    period = film.period(0), film.period(1)
     h_x, h_face = (film(at[None, :], y) for at in (x_nodes, x_faces))  # one line, where all are the same
 
     def cubes(at_faces: Array, at_nodes: Array) -> Array:
@@ -39,7 +39,7 @@ def coefficients_of(
         nodal = at_nodes * at_nodes * at_nodes
         return 0.5 * (nodal[:-1] + nodal[1:])
 
-    x_jumps, y_jumps = ((), ()) if mean_cubes else (jumps_of(film, axis) for axis in "xy")
+    x_jumps, y_jumps = ((), ()) if mean_cubes else map(film.edges, range(2))
     across = grid.steps(1) if grid.dim == 2 else np.ones(2)
     if integrals is not None:
         own = slice(grid.x_start, grid.x_end + 1)
