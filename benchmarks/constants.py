@@ -56,7 +56,7 @@ SWEEPS = (
     Sweep("solvers.active_set", "RESCUE_SWEEPS", (4, 16, 64), CAVITY),
     Sweep("solvers.fas.levels", "STRONG", (2.0, 4.0, 8.0, 16.0, 64.0, 1e9), FAS, LONG),
     Sweep("solvers.fas.levels", "FEWEST", (2, 3, 7), FAS),
-    Sweep("solvers.fas.cycles", "COARSEST_SWEEPS", (10, 40, 160), FAS, HARD, ("solvers.fas.driver",)),
+    Sweep("solvers.fas.cycles", "COARSEST_SWEEPS", (10, 40, 160), FAS, HARD, ("solvers.fas.film_cycles",)),
 )
 
 
