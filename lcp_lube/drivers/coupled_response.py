@@ -11,7 +11,6 @@ film's own Jacobian at fixed coefficients for a preconditioner. Pressures behind
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -32,6 +31,7 @@ from .ask import Ask
 from .line_forces import OfLine, line_forces, stiffness_of
 from .linearised import Linear, following
 from .loop import Loop
+from .response import near
 from .supplies import Fed
 
 STEP = 1e-4  # of differences: their error is its square
@@ -59,6 +59,7 @@ class CoupledResponse(OfLine):
         if self.free:
             scene = Fed(scene, tuple(Supply(one.region, one.p) for one in self.supplies))
         self.loop = loop = Loop(scene, Ask(comm=comm), None)  # type: ignore[arg-type]
+        loop.base = loop.base if problem.dry is None else loop.base.revised(problem.dry)
         base, self.n, self.unit = loop.base, grid.local_size, loop.base.scheme.flow_unit
         columns = np.logical_or.reduce(base.columns) if isinstance(base, GroovedProblem) else np.zeros(self.n, dtype=bool)
         held = problem.held.mask.ravel() if problem.held is not None else False
@@ -76,12 +77,12 @@ class CoupledResponse(OfLine):
         self._forward, forces = [], []
         told = bool(gaps) and known_of(problem) is not None
         for k, (gap, e) in enumerate(zip(gaps, steps, strict=True)):
-            pair = [replace(model, gap=gap(side * e)).build(grid.shape, comm, grid) for side in (1.0, -1.0)]
+            pair = [near(model, gap(side * e), base) for side in (1.0, -1.0)]
             self._forward.append(_slopes([self._system(np.zeros(self.n), self.x, other) for other in pair], 2.0 * e))
             for other in pair:
                 other.destroy()
             e *= OF_LINE
-            beside = [replace(model, gap=gap(side * e)).build(grid.shape, comm, grid) for side in (1.0, -1.0)] if told else []
+            beside = [near(model, gap(side * e), base) for side in (1.0, -1.0)] if told else []
             for other in beside:
                 other.oil, other.p_sides, other.held = problem.oil, problem.p_sides, problem.held  # pressures, not their q
                 forces.append(line_forces(other, changes))

@@ -46,7 +46,10 @@ class Moved(View):
     change_: Change
     e: float
     first: float
-    rims = ()  # faces at round edges stay as they are
+
+    @property
+    def rims(self) -> tuple[Any, ...]:
+        return tuple(getattr(self.film, "rims", ()))
 
     def change(self, x: ArrayLike, y: ArrayLike | None = None) -> Array:
         """dh/de."""
@@ -54,6 +57,12 @@ class Moved(View):
 
     def __call__(self, x: ArrayLike, y: ArrayLike | None = None, /) -> Array:
         return self.film(x, y) + self.e * self.change(x, y)
+
+
+def near(model: Model, gap: Any, problem: LubricationProblem) -> LubricationProblem:
+    """A problem's film near by on its grid, with faces at round edges made for the same cavities. Collective."""
+    other = replace(model, gap=gap).build(problem.grid.shape, problem.grid.petsc_comm, problem.grid)
+    return other if problem.dry is None or other.coefficients_for is None else other.revised(problem.dry)
 
 
 class Response(OfLine):
@@ -149,13 +158,11 @@ class Response(OfLine):
         Couette and stored terms in h), whose third derivative the step makes small; and the step."""
         size = self.problem.reduce.max(np.abs(moved.change(self.problem.grid.x, self.problem.grid.y)))
         step = STEP * self.problem.reduce.min(self.problem.scheme.h) / (size or 1.0)
-        values, grid = [], self.problem.grid
+        values = []
         for part in (1.0, -1.0):
-            other = replace(self.model, gap=replace(moved, e=part * step)).build(grid.shape, grid.petsc_comm, grid)
+            other = near(self.model, replace(moved, e=part * step), self.problem)
             if self.problem.factors is not None:
                 other = self.problem.factors.film(other)
-            if self.problem.dry is not None and other.coefficients_for is not None:
-                other = other.revised(self.problem.dry)
             balance = other.balance(self.p, self.r)
             raw = balance if other.held is None else other.face_flows(self.p, self.r)
             values.append(np.stack([balance, raw]) * (other.scheme.flow_unit / self.problem.scheme.flow_unit))

@@ -81,6 +81,19 @@ def test_stiffness_is_what_solves_differ_by(changes):
     assert turn.T @ K @ turn == pytest.approx(found.K, abs=1e-6 * np.abs(K).max())
 
 
+@pytest.mark.parametrize("barus", [0.0, 1e-8])
+def test_stiffness_of_a_pad_with_round_dimples(barus):
+    """Their faces are made for the cavities, of the film that is displaced too, and of a fluid with a law as of one without."""
+    scene = load_scene("dimpled_pad", {"nx": 41, "ny": 31, "film.2.form": "round", "fluid.barus": barus})
+    solution = solve(scene)
+    assert solution.problem.dry is not None and solution.problem.dry.any()
+    thin = solve(load_scene(scene, {"fluid.barus": 1e-16}))
+    other = solve(load_scene(scene, {"fluid.barus": 0.0}))
+    assert thin.quantities["load"] == pytest.approx(other.quantities["load"], rel=1e-7)
+    (found,) = coefficients(scene, solution)
+    assert found.K[0, 0] == pytest.approx(-solution.gradient("load", "h_offset")["h_offset"], rel=1e-6)
+
+
 def test_what_finite_frequency_changes():
     """Nothing where the cavity ends in a groove; where the film forms again inside, the void that is stored counts."""
     two = load_scene("two_groove_journal", **SMALL)
