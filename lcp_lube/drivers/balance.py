@@ -148,8 +148,9 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     steep: float | None = None  # slope of log W at what was found
     times: dict[str, float] = {}
     for shape in shapes:
-        search = Search(unknown.low, unknown.high, slope)
-        tol = table.tol if shape == shapes[-1] else max(table.tol, COARSE_TOL)
+        last = shape == shapes[-1]
+        search = Search(unknown.low, unknown.high, slope, least=Search.least if last else 1e-2 * COARSE_TOL)
+        tol = table.tol if last else max(table.tol, COARSE_TOL)
 
         def solve_at(t: float, near: Any, shape: tuple[int, ...] = shape) -> tuple[Solution, Callable[[float], float | None]]:
             trial = as_scene(scene, {unknown.key: unknown.to_value(t)}).with_shape(shape).model_copy(update={"balance": None})

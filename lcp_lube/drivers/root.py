@@ -21,12 +21,14 @@ class Search:
     ----------
     slope : that of g, to begin with: its sign says where g should grow.
     explore : where secant steps lead nowhere, look elsewhere.
+    least : width of a bracket, relative to t or 1, in which g jumps.
     """
 
     low: float
     high: float
     slope: float
     explore: bool = True
+    least: float = 1e-14
     points: list[tuple[float, float]] = field(default_factory=list)  # t, g(t), in the order of their evaluation
     slopes: dict[float, float] = field(default_factory=dict)  # of g where they are known, by t
     left: set[float] = field(default_factory=set)  # where g could not be evaluated: t
@@ -77,7 +79,7 @@ class Search:
             target = 0.5 * (t + target) if target in self.left else target
             return self._elsewhere() if self._known(target) or len(self.points) + len(self.left) >= PATIENCE else target
         a, b = bracket
-        if b - a <= 1e-14 * max(abs(a), abs(b), 1.0):
+        if b - a <= self.least * max(abs(a), abs(b), 1.0):
             return None
         slow = len(self.widths) > 3 and self.widths[-1] > 0.5 * self.widths[-4]
         return t + step if a < t + step < b and not slow else 0.5 * (a + b)
