@@ -168,11 +168,6 @@ def discretise(scene: Any) -> tuple[Faces, int, np.ndarray]:
         else Line(*map(np.array, ([0.0] * 3, [0.0] * 2, [1.0] * 2, [0.0], [1.0])))
     )
     around = kinds[0] == "periodic", plane and kinds[2] == "periodic"
-    jx, jy = (
-        [t + k * length for t in jumps(axis) for k in ((-1, 0, 1) if ring else (0,))]
-        for axis, ring, length in zip("xy", around, (*model.lengths, 0.0), strict=False)
-    )
-
     def film(x: Any, y: Any) -> np.ndarray:
         x, y = np.atleast_1d(x), np.atleast_1d(y)
         x, y = (
@@ -181,6 +176,17 @@ def discretise(scene: Any) -> tuple[Faces, int, np.ndarray]:
         )
         return np.broadcast_to(model.gap(x[None, :], y[:, None]), (y.size, x.size))
 
+    def edges(axis: int) -> list[float]:
+        """The film's, and where a ring's ends differ the seam, as often as a face or cell may meet them."""
+        length, found = (*model.lengths, 0.0)[axis], list(jumps("xy"[axis]))
+        if not around[axis]:
+            return found
+        beside = np.linspace(0.0, (*model.lengths, 0.0)[1 - axis], 65)
+        first, last = (film(*((t, beside) if axis == 0 else (beside, t))).ravel() for t in (0.0, (1 - 1e-12) * length))
+        found += [0.0] if np.max(np.abs(last - first)) > 1e-9 * np.max(np.abs(first)) else []
+        return [t + k * length for t in found for k in (-1, 0, 1)]
+
+    jx, jy = edges(0), edges(1) if plane else []
     at_points, at_x_faces = film(x.points, y.points[1:-1]), film(x.faces, y.points[1:-1])
     faces = Faces(*([] for _ in range(10)))
     dead = np.zeros(nx * ny, dtype=bool)
