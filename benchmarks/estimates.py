@@ -4,9 +4,9 @@ python benchmarks/estimates.py 888 40            # seed and number of films
 python benchmarks/estimates.py 777 60 strange    # of films unlike those that the constants were taken from
 
 Each film is solved with 10 to 16 points a side and on grids of twice the points, below 300 a side; from the third grid on, up
-to 140 a side, the best value and its error (drivers/estimate.py) are compared with the limit of the finest grids. The last
-lines are of runs with --accuracy 10 to 0.1 % that end on no more: of their estimates, and of their points over those of the
-one grid from which on all are as good as was asked for (geometric mean).
+to 140 a side, the best value and its error (drivers/accuracy/estimate.py) are compared with the limit of the finest grids. The
+last lines are of runs with --accuracy 10 to 0.1 % that end on no more: of their estimates, and of their points over those of
+the one grid from which on all are as good as was asked for (geometric mean).
 """
 
 import sys
@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from lcp_lube import InputError, load_scene, solve
-from lcp_lube.drivers.estimate import Estimate, estimate, misplaced_film
-from lcp_lube.drivers.rungs import finer
+from lcp_lube.drivers.accuracy.estimate import Estimate, estimate, misplaced_film
+from lcp_lube.drivers.accuracy.rungs import finer
 
 FINEST, TOLD = 300, 140  # points a side
 NAMES = ("load", "p_max", "friction", "cavitated_area")

@@ -25,8 +25,8 @@ from scipy.optimize import brentq
 
 from lcp_lube import solve
 from lcp_lube.base.resumable import ResumableCsv
-from lcp_lube.drivers.adjoint import Adjoint
-from lcp_lube.drivers.film_gradient import FilmGradient, areas
+from lcp_lube.drivers.derivatives.adjoint import Adjoint
+from lcp_lube.drivers.derivatives.film_gradient import FilmGradient, areas
 from lcp_lube.scenes.bearing import BearingScene
 
 L, H, DEEPEST, VOLUME, RADIUS = 10e-3, 2e-6, 4e-6, 0.2, 0.25e-3

@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 
 from lcp_lube import load_scene, solve
-from lcp_lube.drivers.adjoint import Adjoint
-from lcp_lube.drivers.film_gradient import FilmGradient
-from lcp_lube.drivers.gradient import gradients
-from lcp_lube.drivers.march_course import Trace
+from lcp_lube.drivers.derivatives.adjoint import Adjoint
+from lcp_lube.drivers.derivatives.film_gradient import FilmGradient
+from lcp_lube.drivers.derivatives.gradient import gradients
+from lcp_lube.drivers.marches.march_course import Trace
 from lcp_lube.scenes.moving import motion_of
 
 CASES = ["problem4:255", "problem4:511", "problem4:1023", "dimpled_pad:255", "dimpled_pad:511", "dimpled_pad:1023"]

@@ -168,6 +168,7 @@ def discretise(scene: Any) -> tuple[Faces, int, np.ndarray]:
         else Line(*map(np.array, ([0.0] * 3, [0.0] * 2, [1.0] * 2, [0.0], [1.0])))
     )
     around = kinds[0] == "periodic", plane and kinds[2] == "periodic"
+
     def film(x: Any, y: Any) -> np.ndarray:
         x, y = np.atleast_1d(x), np.atleast_1d(y)
         x, y = (

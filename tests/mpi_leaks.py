@@ -13,7 +13,7 @@ from petsc4py import PETSc  # noqa: E402
 
 from lcp_lube import Complementarity, load_scene, solve  # noqa: E402
 from lcp_lube.base.owned import collect  # noqa: E402
-from lcp_lube.drivers.coefficients import coefficients  # noqa: E402
+from lcp_lube.drivers.motions.coefficients import coefficients  # noqa: E402
 from lcp_lube.registry import METHODS  # noqa: E402
 
 SCENES = {

@@ -6,8 +6,8 @@ from typing import Any
 from mpi4py import MPI
 
 from lcp_lube import InputError, load_scene, solve
-from lcp_lube.drivers.coefficients import coefficients
-from lcp_lube.drivers.response import Response
+from lcp_lube.drivers.motions.coefficients import coefficients
+from lcp_lube.drivers.motions.response import Response
 
 SCENES = {
     "tilting_pad_journal": {"nx": 60, "ny": 3, "balance.tol": 1e-10},

@@ -10,7 +10,7 @@ import matplotlib as mpl
 import numpy as np
 
 from lcp_lube import load_scene, solve
-from lcp_lube.drivers.coefficients import coefficients
+from lcp_lube.drivers.motions.coefficients import coefficients
 from lcp_lube.output.style import BLUE, GREY, RED, STYLE, new_figure
 
 PICTURES = Path(__file__).parent.parent / "docs" / "pictures"

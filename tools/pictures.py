@@ -87,7 +87,7 @@ GROUPS: dict[str, Group] = {
             *["sensitivity", "dimpled_pad", "--nx", "79", "--ny", "79", "--errors", "docs/pictures/grid_error.png"],
         ],
         "docs/pictures/grid_error.png",
-        ["lcp_lube/output/style.py", "lcp_lube/drivers/goal_error.py", "lcp_lube/scenes/dimpled_pad.toml"],
+        ["lcp_lube/output/style.py", "lcp_lube/drivers/derivatives/goal_error.py", "lcp_lube/scenes/dimpled_pad.toml"],
     ),
     "dynamics": Group(["tools/dynamics_pictures.py"], "docs/pictures/stored_void.png", ["tools/dynamics_pictures.py"]),
     "explorer": Group(

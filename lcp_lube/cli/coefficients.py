@@ -12,7 +12,7 @@ from ..api import solve
 from ..base.files import write_text
 from ..base.options import check_unread
 from ..base.progress import Line
-from ..drivers.coefficients import Coefficients, check_film, check_frequencies, coefficients, placed, stability
+from ..drivers.motions.coefficients import Coefficients, check_film, check_frequencies, coefficients, placed, stability
 from ..errors import InputError, NotFound
 from ..output.console import say
 from ..output.files import check_target

@@ -8,7 +8,7 @@ from typing import Any
 from ..base.files import write_text
 from ..base.options import check_unread
 from ..base.progress import Line
-from ..drivers.gradient import check
+from ..drivers.derivatives.gradient import check
 from ..errors import InputError
 from ..output.console import say
 from ..output.results import finite

@@ -10,9 +10,9 @@ from ..api import solve
 from ..base.options import check_unread
 from ..base.progress import Line
 from ..drivers.ask import Ask
-from ..drivers.goal_error import finer_shape, goal_error
-from ..drivers.gradient import Gradient, check, film_fields, gradients
-from ..drivers.march_course import Trace
+from ..drivers.derivatives.goal_error import finer_shape, goal_error
+from ..drivers.derivatives.gradient import Gradient, check, film_fields, gradients
+from ..drivers.marches.march_course import Trace
 from ..errors import InputError
 from ..output import files, sensitivity
 from ..output.console import say

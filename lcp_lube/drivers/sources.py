@@ -18,7 +18,7 @@ from ..problems.film.flows import volume_unit
 from ..problems.film.fluid import Law
 from ..problems.film.sources import balanced
 from ..problems.film.supplies import Supply, supply_flows
-from .linearised import Feed, Linear
+from .motions.linearised import Feed, Linear
 
 CONSTANT = Law()
 SWEEPS = 16  # of a step's film, once some steps have not put its signs right

@@ -29,7 +29,7 @@ from ..scenes.scene import Derived, Solvable
 from .ask import Ask
 from .chain import Chain
 from .compose import Inner
-from .linearised import Feed, Linear
+from .motions.linearised import Feed, Linear
 
 MOST_SOLVES = 40  # the end of a search that goes round: of drawn films with dense fluids those that were found took up to 11
 TOLERANCE = 1e-10  # of the largest flow: by how much what a source gives may differ from what the film takes
@@ -78,7 +78,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     model: Model = scene.model  # type: ignore[attr-defined]
     supplies = model.supplies
     if model.stored is not None:
-        from . import supply_step  # here: of marches alone
+        from .marches import supply_step  # here: of marches alone
 
         if (by_steps := supply_step.solve(scene, ask, inner)) is not None:
             return by_steps

@@ -18,7 +18,7 @@ from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.supplies import Supply
 from ..problems.solution import Enclosure, Fields
 from ..solvers.enclosure import RESERVE, UNIT, Band, concluded, conditions
-from .linearised import Feed, Linear
+from .motions.linearised import Feed, Linear
 
 WIDER, TRIES = 2.0, 12  # bands of the pressures are widened so much, so often, until their signs are shown
 ROOM = 1.5  # times what the balances need by the linear film

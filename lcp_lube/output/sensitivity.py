@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from ..base.parallel import Array
-from ..drivers.goal_error import GoalError
-from ..drivers.gradient import Gradient
-from ..drivers.march_gradient import MEAN
+from ..drivers.derivatives.goal_error import GoalError
+from ..drivers.derivatives.gradient import Gradient
+from ..drivers.derivatives.march_gradient import MEAN
 from ..problems.solution import Solution
 from ..scenes.values import unit_of as key_unit
 from .files import gather, thinning

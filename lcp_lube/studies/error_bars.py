@@ -8,10 +8,10 @@ import numpy as np
 
 from ..api import solve
 from ..base.quantity import in_si
-from ..drivers.adjoint import Adjoint
 from ..drivers.ask import Ask
-from ..drivers.gradient import Gradient
-from ..drivers.march_gradient import means
+from ..drivers.derivatives.adjoint import Adjoint
+from ..drivers.derivatives.gradient import Gradient
+from ..drivers.derivatives.march_gradient import means
 from ..errors import InputError
 from ..problems.solution import Solution
 from ..scenes.changes import flat

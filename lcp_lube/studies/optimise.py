@@ -22,8 +22,8 @@ from ..base.progress import duration
 from ..base.quantity import quantity as read
 from ..base.resumable import ResumableCsv
 from ..drivers.ask import Ask
-from ..drivers.gradient import gradients
-from ..drivers.march_course import Trace
+from ..drivers.derivatives.gradient import gradients
+from ..drivers.marches.march_course import Trace
 from ..errors import InputError
 from ..problems.solution import Solution
 from ..scenes.moving import motion_of

@@ -17,7 +17,7 @@ from mpi4py import MPI
 from ..api import solve
 from ..base.progress import Line
 from ..base.resumable import ResumableCsv, Row
-from ..drivers.decision import total_work
+from ..drivers.effects.decision import total_work
 from ..output.console import say
 from ..output.style import Figure
 from ..registry import RUNGS

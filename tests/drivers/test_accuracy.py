@@ -8,8 +8,8 @@ import pytest
 from films import FilmScene, L, Pieces, random_films
 
 from lcp_lube.api import solve
-from lcp_lube.drivers.estimate import estimate, is_known, known_line, misplaced_film, of_pair
-from lcp_lube.drivers.rungs import finer, first_shape, round_ring, rungs_up
+from lcp_lube.drivers.accuracy.estimate import estimate, is_known, known_line, misplaced_film, of_pair
+from lcp_lube.drivers.accuracy.rungs import finer, first_shape, round_ring, rungs_up
 from lcp_lube.errors import InputError
 from lcp_lube.problems.solution import Outcome
 from lcp_lube.registry import scene_names

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lcp_lube import load_scene, solve
-from lcp_lube.drivers.balance import MOST_SOLVES, carried
-from lcp_lube.drivers.root import Search
+from lcp_lube.drivers.loads.balance import MOST_SOLVES, carried
+from lcp_lube.drivers.loads.root import Search
 from lcp_lube.errors import InputError
 from lcp_lube.problems.solution import Outcome
 from lcp_lube.scenes.bearing import BearingScene

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from lcp_lube import InputError, load_scene, solve
-from lcp_lube.drivers import linearised, response
-from lcp_lube.drivers.coefficients import coefficients, stability
+from lcp_lube.drivers.motions import linearised, response
+from lcp_lube.drivers.motions.coefficients import coefficients, stability
 from lcp_lube.registry import PACKAGE
 from lcp_lube.solvers.fas.frozen import Frozen
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from lcp_lube import load_scene, solve
-from lcp_lube.drivers.coupled_gradient import CoupledGradient
-from lcp_lube.drivers.film_gradient import areas
-from lcp_lube.drivers.gradient import film_fields, gradients
-from lcp_lube.drivers.transposed import CoupledFilm
+from lcp_lube.drivers.derivatives.coupled_gradient import CoupledGradient
+from lcp_lube.drivers.derivatives.film_gradient import areas
+from lcp_lube.drivers.derivatives.gradient import film_fields, gradients
+from lcp_lube.drivers.derivatives.transposed import CoupledFilm
 from lcp_lube.problems.film.views import LiftedFilm
 from lcp_lube.scenes.effects.named import without
 from lcp_lube.scenes.values import values_of, with_values

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lcp_lube import load_scene, solve
-from lcp_lube.drivers.coefficients import coefficients
+from lcp_lube.drivers.motions.coefficients import coefficients
 
 PAD = {"family": "bearing", "L": 0.1, "U": 4.0, "n": 40, "fluid": {"mu": 0.05}}
 PAD["film"] = [{"shape": "linear", "h_start": 4e-5, "h_end": 2e-5}]

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from lcp_lube import InputError, load_scene, solve
-from lcp_lube.drivers.decision import sentence
-from lcp_lube.drivers.look import FREE, PART, coarse_shape, first_shape
+from lcp_lube.drivers.effects.decision import sentence
+from lcp_lube.drivers.effects.look import FREE, PART, coarse_shape, first_shape
 
 SLIDER = {"shape": "linear", "h_start": 4e-5, "h_end": 2e-5}
 PAD = {"family": "bearing", "L": 0.1, "U": 5.0, "n": 999, "fluid": {"mu": 0.02, "p_supply": 1e5}, "film": [SLIDER]}

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from lcp_lube import load_scene, solve
-from lcp_lube.drivers.coefficients import coefficients, motions_of, stability
-from lcp_lube.drivers.response import Response
+from lcp_lube.drivers.motions.coefficients import coefficients, motions_of, stability
+from lcp_lube.drivers.motions.response import Response
 from lcp_lube.registry import PACKAGE
 
 FOLDERS = (PACKAGE / "published", PACKAGE.parent / "benchmarks" / "published")

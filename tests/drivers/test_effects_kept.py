@@ -9,7 +9,7 @@ from lcp_lube import load_scene, solve
 from lcp_lube.drivers import direct
 from lcp_lube.drivers.ask import Ask
 from lcp_lube.drivers.checkpoint import Checkpointer
-from lcp_lube.drivers.frozen import Frozen
+from lcp_lube.drivers.effects.frozen import Frozen
 from lcp_lube.errors import InputError
 from lcp_lube.problems.film.effects import factors
 from lcp_lube.problems.film.fluid import Law

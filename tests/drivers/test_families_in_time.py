@@ -8,7 +8,7 @@ from marches import WEDGE, taken_up
 from test_motion import march
 
 from lcp_lube import InputError, load_scene, solve
-from lcp_lube.drivers.coefficients import coefficients
+from lcp_lube.drivers.motions.coefficients import coefficients
 
 PADS = {"nx": 60, "ny": 5, "pivots_deg": [60.0, 180.0, 300.0], "balance": None}  # three: their cost is by pads, not by points
 WAYS = {

@@ -10,12 +10,14 @@ import pytest
 from lcp_lube import InputError, load_scene, solve
 from lcp_lube.cli.arguments import parse
 from lcp_lube.cli.main import run
-from lcp_lube.drivers import adjoint as adjoint_module
-from lcp_lube.drivers import attitude, linearised, supplies
-from lcp_lube.drivers.adjoint import Adjoint
-from lcp_lube.drivers.film_gradient import FilmGradient, areas
-from lcp_lube.drivers.goal_error import finer_shape, goal_error
-from lcp_lube.drivers.gradient import gradients
+from lcp_lube.drivers import supplies
+from lcp_lube.drivers.derivatives import adjoint as adjoint_module
+from lcp_lube.drivers.derivatives.adjoint import Adjoint
+from lcp_lube.drivers.derivatives.film_gradient import FilmGradient, areas
+from lcp_lube.drivers.derivatives.goal_error import finer_shape, goal_error
+from lcp_lube.drivers.derivatives.gradient import gradients
+from lcp_lube.drivers.loads import attitude
+from lcp_lube.drivers.motions import linearised
 from lcp_lube.problems.film.known import known_fields
 from lcp_lube.scenes.values import key_of, values_of, with_values
 

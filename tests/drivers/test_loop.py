@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from lcp_lube import solve
-from lcp_lube.drivers import loop, nonlinear
-from lcp_lube.drivers.coupled_newton import CoupledNewton
+from lcp_lube.drivers.effects import loop, nonlinear
+from lcp_lube.drivers.effects.coupled_newton import CoupledNewton
 
 FILM = [{"shape": "linear", "h_start": 4e-5, "h_end": 2e-5}]
 SOFT = {"family": "bearing", "L": 0.1, "U": 5.0, "n": 24, "fluid": {"mu": 0.02, "p_supply": 1e5}, "film": FILM}

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from lcp_lube import solve
-from lcp_lube.drivers import march_films, rotor, supplies
-from lcp_lube.drivers.film_gradient import areas
-from lcp_lube.drivers.gradient import check, film_fields, gradients
-from lcp_lube.drivers.march_course import Course, Trace
-from lcp_lube.drivers.march_gradient import MarchGradient, means
+from lcp_lube.drivers import supplies
+from lcp_lube.drivers.derivatives import march_films
+from lcp_lube.drivers.derivatives.film_gradient import areas
+from lcp_lube.drivers.derivatives.gradient import check, film_fields, gradients
+from lcp_lube.drivers.derivatives.march_gradient import MarchGradient, means
+from lcp_lube.drivers.marches import rotor
+from lcp_lube.drivers.marches.march_course import Course, Trace
 from lcp_lube.errors import InputError
 from lcp_lube.problems.film.views import LiftedFilm
 from lcp_lube.scenes.scene import load_scene

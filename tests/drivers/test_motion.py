@@ -295,7 +295,7 @@ def history(path):
 # The command line in a process that sends itself a signal when it has taken some steps: no clock, no waiting.
 SIGNALLED = """
 import os, sys
-from lcp_lube.drivers.march_file import MarchFile
+from lcp_lube.drivers.marches.march_file import MarchFile
 after = MarchFile.after
 def then(self, run):
     if len(run.history) == {steps}:

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from lcp_lube import load_scene, solve
-from lcp_lube.drivers import film_part, supply_step
-from lcp_lube.drivers.loop import Loop
+from lcp_lube.drivers import film_part
+from lcp_lube.drivers.effects.loop import Loop
+from lcp_lube.drivers.marches import supply_step
 from lcp_lube.problems.film.fluid import Law
 from lcp_lube.solvers.fas.driver import Fas
 

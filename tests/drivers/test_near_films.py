@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from lcp_lube import solve
-from lcp_lube.drivers import adjoint as adjoint_module
-from lcp_lube.drivers import film_gradient, near_films
-from lcp_lube.drivers.adjoint import Adjoint
-from lcp_lube.drivers.film_gradient import FilmGradient
+from lcp_lube.drivers.derivatives import adjoint as adjoint_module
+from lcp_lube.drivers.derivatives import film_gradient, near_films
+from lcp_lube.drivers.derivatives.adjoint import Adjoint
+from lcp_lube.drivers.derivatives.film_gradient import FilmGradient
 from lcp_lube.problems.film.flows import SIDES
 from lcp_lube.scenes.scene import load_scene
 from lcp_lube.scenes.values import values_of, with_values

@@ -8,8 +8,8 @@ import pytest
 
 from lcp_lube import InputError, load_scene, solve
 from lcp_lube.drivers.ask import Ask
-from lcp_lube.drivers.coefficients import coefficients
-from lcp_lube.drivers.pad_coordinates import JournalPads, ThrustPads
+from lcp_lube.drivers.loads.pad_coordinates import JournalPads, ThrustPads
+from lcp_lube.drivers.motions.coefficients import coefficients
 
 SMALL = {"nx": 90, "ny": 5}  # whole meshes from pivot to pivot, and in a pad
 FLAT = {"nx": 29, "ny": 15}

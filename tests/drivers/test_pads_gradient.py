@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from lcp_lube import load_scene, solve
-from lcp_lube.drivers.coefficients import placed
-from lcp_lube.drivers.film_gradient import FilmGradient, areas
-from lcp_lube.drivers.gradient import Adjoint, gradients
+from lcp_lube.drivers.derivatives.film_gradient import FilmGradient, areas
+from lcp_lube.drivers.derivatives.gradient import Adjoint, gradients
+from lcp_lube.drivers.motions.coefficients import placed
 from lcp_lube.scenes.values import values_of, with_values
 
 TIGHT = {"eps1": 1e-11, "max_it": 200}

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from lcp_lube import load_scene, solve
-from lcp_lube.drivers.position import touching
+from lcp_lube.drivers.loads.position import touching
 from lcp_lube.problems.solution import Outcome
 
 SMALL = {"nx": 144, "ny": 11}

@@ -15,7 +15,7 @@ from petsc4py import PETSc
 
 import lcp_lube
 from lcp_lube import InputError, Solution, load_scene, solve
-from lcp_lube.drivers.film_gradient import areas
+from lcp_lube.drivers.derivatives.film_gradient import areas
 from lcp_lube.output.results import as_dict, summary
 from lcp_lube.problems.film.lubrication import LubricationProblem
 from lcp_lube.registry import SCENE_DIR, scene_names

@@ -215,7 +215,7 @@ def test_band():
 @pytest.mark.parametrize("effects", [{}, {"elastic": {"compliance": 2e-13}, "nx": 32, "ny": 7}])
 def test_stiffness_of_a_hybrid_bearing_against_differences(effects):
     """K with the pressures behind restrictors following, and effects, against two solves with the journal displaced."""
-    from lcp_lube.drivers.coefficients import coefficients
+    from lcp_lube.drivers.motions.coefficients import coefficients
 
     recess = {"extent_deg": 50.0, "length_mm": 30, "restrictor": "capillary", "K": 3e-11, "p_s": 5e6}
     tables = [{**recess, "angle_deg": angle} for angle in (45.0, 135.0, 225.0, 315.0)]

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lcp_lube import InputError, load_scene, solve
-from lcp_lube.drivers.coefficients import coefficients
+from lcp_lube.drivers.motions.coefficients import coefficients
 
 SMALL = {"nx": 72, "ny": 9}
 AT = {**SMALL, "attitude_deg": 50.0}

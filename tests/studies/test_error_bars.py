@@ -6,7 +6,7 @@ import pytest
 
 from lcp_lube import InputError, load_scene, solve
 from lcp_lube.drivers.ask import Ask
-from lcp_lube.drivers.gradient import gradients
+from lcp_lube.drivers.derivatives.gradient import gradients
 from lcp_lube.studies.error_bars import deviations, first_order, monte_carlo
 
 

@@ -11,20 +11,20 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from ..base.progress import of_ladder
-from ..errors import InputError, nearest
-from ..problems.film.model import Model
-from ..problems.grid import OFFSET
-from ..problems.solution import Outcome, Solution
-from ..registry import ELIMINATED, METHODS
-from ..scenes.scene import Solvable
-from ..solvers.newton import Stopping
-from .ask import Ask
-from .chain import added
-from .compose import Inner
+from ...base.progress import of_ladder
+from ...errors import InputError, nearest
+from ...problems.film.model import Model
+from ...problems.grid import OFFSET
+from ...problems.solution import Outcome, Solution
+from ...registry import ELIMINATED, METHODS
+from ...scenes.scene import Solvable
+from ...solvers.newton import Stopping
+from ..ask import Ask
+from ..chain import added
+from ..compose import Inner
+from ..memory import DENSE, available
+from ..plan import FEW, SMALL
 from .estimate import INTEGRALS, given_film, is_known, scalars
-from .memory import DENSE, available
-from .plan import FEW, SMALL
 from .rungs import ASYMPTOTIC, finer, first_shape, round_ring, rungs_up
 from .values import Values, carried, sought
 

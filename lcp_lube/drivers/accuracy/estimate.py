@@ -34,14 +34,14 @@ from typing import Any
 
 import numpy as np
 
-from ..problems.film.edges import jumps_of, level
-from ..problems.film.integrals import line_integrals
-from ..problems.film.lubrication import LubricationProblem
-from ..problems.film.model import Model
-from ..problems.film.turned import TurnedProblem
-from ..problems.solution import Fields, Problem
-from ..scenes.moving import motion_of
-from ..scenes.scene import Solvable
+from ...problems.film.edges import jumps_of, level
+from ...problems.film.integrals import line_integrals
+from ...problems.film.lubrication import LubricationProblem
+from ...problems.film.model import Model
+from ...problems.film.turned import TurnedProblem
+from ...problems.solution import Fields, Problem
+from ...scenes.moving import motion_of
+from ...scenes.scene import Solvable
 
 MOVED, PART = 1.1, 0.75  # factor of n, and what is added of a correction
 NOISY = {
@@ -192,7 +192,7 @@ def is_known(scene: Solvable) -> bool:
         return False
     if (model.law or model.effects) and not (model.scheme == "face" and all(effect.local for effect in model.effects)):
         return False
-    from ..problems.film.known import KINDS  # here: of lines alone
+    from ...problems.film.known import KINDS  # here: of lines alone
 
     return {side.kind for side in model.sides[:2]} <= KINDS
 
@@ -208,7 +208,7 @@ def known_line(problem: Problem) -> tuple[LubricationProblem, Fields] | None:
     if isinstance(line, TurnedProblem):
         solved = line.moving = copy(line.moving)
     solved.integrals = solved.integrals or line_integrals(solved.grid, solved.film, checked=True)
-    from ..problems.film.known import known_fields  # here: of lines alone
+    from ...problems.film.known import known_fields  # here: of lines alone
 
     fields = known_fields(line)
     return None if fields is None else (line, fields)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 from math import ceil, lcm, log2, prod
 
-from ..scenes.scene import Solvable
+from ...scenes.scene import Solvable
 
 COARSEST = {1: 12, 2: 4}  # points a side at least on the first grid
 FEW = {1: 12, 2: 100}  # points of the first grid at least: coarser ones cost as much, and tell less

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from ..base.parallel import Array
-from ..problems.film.forces import of_line, totals
-from ..problems.film.lubrication import LubricationProblem
-from ..problems.film.strip import stream_weights
-from ..problems.film.turned import TurnedProblem
-from ..problems.solution import Fields, Problem, Solution
-from ..problems.transfer import interpolated
+from ...base.parallel import Array
+from ...problems.film.forces import of_line, totals
+from ...problems.film.lubrication import LubricationProblem
+from ...problems.film.strip import stream_weights
+from ...problems.film.turned import TurnedProblem
+from ...problems.solution import Fields, Problem, Solution
+from ...problems.transfer import interpolated
 from .estimate import INTEGRALS, QUADRATURE, Estimate, estimate, follow, known_line, misplaced_film, of_pair, scalars
 
 LEAST_PAIR = 0.25  # weight of the estimate of two grids beside that of all: in the exponent, halved by each grid more
@@ -136,7 +136,7 @@ def carried(problem: Problem, fields: Fields | None, quantity: str) -> float | N
 def _integral(problem: LubricationProblem, p_pa: Array | None, quantity: str) -> float:
     """One of INTEGRALS, as `forces` has it; p_pa : None as in `carried`. Collective."""
     names = ("force_x", "force_y") if quantity == "load" and problem.shaft is not None else (quantity,)
-    from ..problems.film.known import known_of  # here: of runs to an accuracy alone
+    from ...problems.film.known import known_of  # here: of runs to an accuracy alone
 
     known = known_of(problem)
     if p_pa is None:

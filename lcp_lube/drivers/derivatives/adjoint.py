@@ -11,23 +11,23 @@ from typing import Any
 
 import numpy as np
 
-from ..base.differences import QUICK, differences
-from ..base.parallel import Array
-from ..errors import InputError
-from ..problems.film.edges import oblique
-from ..problems.film.lubrication import LubricationProblem
-from ..problems.solution import Solution
-from ..registry import SMALL
-from ..scenes.effects.named import without
-from ..scenes.grooved import GroovedJournalScene
-from ..scenes.scene import Scene
-from ..scenes.values import values_of, with_values
-from .coefficients import placed
+from ...base.differences import QUICK, differences
+from ...base.parallel import Array
+from ...errors import InputError
+from ...problems.film.edges import oblique
+from ...problems.film.lubrication import LubricationProblem
+from ...problems.solution import Solution
+from ...registry import SMALL
+from ...scenes.effects.named import without
+from ...scenes.grooved import GroovedJournalScene
+from ...scenes.scene import Scene
+from ...scenes.values import values_of, with_values
+from ..loads.pad_coordinates import bearing_of
+from ..motions.coefficients import placed
+from ..motions.halved import Halved
+from ..motions.linearised import Linear
 from .equations import MISFIT, Equations, cavity_of, check_film, fields_of, right_side, unknowns
-from .halved import Halved
-from .linearised import Linear
 from .near_films import OTHER, NearFilms, plain, same
-from .pad_coordinates import bearing_of
 
 ROUNDED = 1e-8  # of what is small of what was found: a 0 that rounding has moved, the attitude of pads about the load
 FEWER = 2_000  # points from which multigrid solves for an answer that multigrid gave: its loops are loaded

@@ -16,24 +16,24 @@ from typing import Any
 
 import numpy as np
 
-from ..base.differences import APART, CHORD, KINK, SLIGHT, WIDTHS
-from ..base.parallel import Array
-from ..errors import InputError, nearest
-from ..problems.film.edges import oblique
-from ..problems.film.forces import PIVOT, totals
-from ..problems.film.grooves import GroovedProblem
-from ..problems.film.supplies import Supply, supply_flows
-from ..problems.film.turned import TurnedProblem
-from ..problems.solution import Solution
-from ..scenes.scene import Scene
-from ..scenes.values import values_of, with_values
+from ...base.differences import APART, CHORD, KINK, SLIGHT, WIDTHS
+from ...base.parallel import Array
+from ...errors import InputError, nearest
+from ...problems.film.edges import oblique
+from ...problems.film.forces import PIVOT, totals
+from ...problems.film.grooves import GroovedProblem
+from ...problems.film.supplies import Supply, supply_flows
+from ...problems.film.turned import TurnedProblem
+from ...problems.solution import Solution
+from ...scenes.scene import Scene
+from ...scenes.values import values_of, with_values
+from ..ask import Ask
+from ..effects.loop import Loop
+from ..motions.coefficients import placed
+from ..motions.coupled_response import CoupledResponse
+from ..supplies import Fed
+from ..turned import Mirrored
 from .adjoint import GUESS, conditions_of, size_of
-from .ask import Ask
-from .coefficients import placed
-from .coupled_response import CoupledResponse
-from .loop import Loop
-from .supplies import Fed
-from .turned import Mirrored
 
 STEP = 1e-4  # of a number, relative, and of the fields
 LARGER, ROUNDING = 10, 1e-14  # powers of ten by which a step from zero may grow; of a number: a smaller change of it is none

@@ -13,25 +13,25 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from ..base.parallel import Array
-from ..errors import InputError, nearest
-from ..problems.film import slopes
-from ..problems.film.cavity import about_to_change, cavitated
-from ..problems.film.forces import attitude, totals, weights
-from ..problems.film.grooves import GroovedProblem
-from ..problems.film.known import known_fields, known_of
-from ..problems.film.lubrication import LubricationProblem
-from ..problems.film.model import Model
-from ..problems.film.tangent import Tangent, effective, tangent
-from ..problems.film.turned import TurnedProblem
-from ..problems.grid import Grid, Places
-from ..problems.solution import Fields, Solution
-from ..registry import DRIVERS
-from ..scenes.moving import motion_of
-from ..scenes.scene import Scene
-from .ask import Ask
-from .frozen import Frozen
-from .turned import Mirrored
+from ...base.parallel import Array
+from ...errors import InputError, nearest
+from ...problems.film import slopes
+from ...problems.film.cavity import about_to_change, cavitated
+from ...problems.film.forces import attitude, totals, weights
+from ...problems.film.grooves import GroovedProblem
+from ...problems.film.known import known_fields, known_of
+from ...problems.film.lubrication import LubricationProblem
+from ...problems.film.model import Model
+from ...problems.film.tangent import Tangent, effective, tangent
+from ...problems.film.turned import TurnedProblem
+from ...problems.grid import Grid, Places
+from ...problems.solution import Fields, Solution
+from ...registry import DRIVERS
+from ...scenes.moving import motion_of
+from ...scenes.scene import Scene
+from ..ask import Ask
+from ..effects.frozen import Frozen
+from ..turned import Mirrored
 
 FLIPPED = {"flow_west": "flow_east", "flow_east": "flow_west"}
 # What is found around a film that derivatives know of; of what is coupled, a fluid's law alone.

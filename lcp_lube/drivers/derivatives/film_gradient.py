@@ -12,17 +12,17 @@ from typing import Any
 
 import numpy as np
 
-from ..base.parallel import Array
-from ..problems.film.flows import drag, volume_unit
-from ..problems.film.lubrication import LubricationProblem
-from ..problems.film.reynolds import BoxScheme, sides
-from ..problems.film.slopes import giving
-from ..problems.film.strip import line_weights
-from ..problems.film.tangent import effective
-from ..problems.film.turned import TurnedProblem
-from ..problems.film.weighed import Weighed, can
-from ..problems.grid import Grid
-from ..registry import SMALL
+from ...base.parallel import Array
+from ...problems.film.flows import drag, volume_unit
+from ...problems.film.lubrication import LubricationProblem
+from ...problems.film.reynolds import BoxScheme, sides
+from ...problems.film.slopes import giving
+from ...problems.film.strip import line_weights
+from ...problems.film.tangent import effective
+from ...problems.film.turned import TurnedProblem
+from ...problems.film.weighed import Weighed, can
+from ...problems.grid import Grid
+from ...registry import SMALL
 from .equations import DRAGS, FLIPPED
 from .implicit import Implicit
 

@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from ..base.parallel import Array, Reduce
-from ..errors import InputError
-from ..problems.film.turned import TurnedProblem
-from ..problems.solution import Solution
-from ..problems.transfer import Transfer
-from ..scenes.scene import Scene
+from ...base.parallel import Array, Reduce
+from ...errors import InputError
+from ...problems.film.turned import TurnedProblem
+from ...problems.solution import Solution
+from ...problems.transfer import Transfer
+from ...scenes.scene import Scene
 from .adjoint import Adjoint
 from .implicit import Implicit
 

@@ -14,21 +14,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..base.parallel import Array
-from ..errors import InputError
-from ..problems.solution import Solution
-from ..scenes.grooved import GroovedJournalScene
-from ..scenes.moving import motion_of
-from ..scenes.scene import Scene
-from ..scenes.tilting import TiltingPadScene
-from ..scenes.values import key_of, values_of
+from ...base.parallel import Array
+from ...errors import InputError
+from ...problems.solution import Solution
+from ...scenes.grooved import GroovedJournalScene
+from ...scenes.moving import motion_of
+from ...scenes.scene import Scene
+from ...scenes.tilting import TiltingPadScene
+from ...scenes.values import key_of, values_of
+from ..marches.march_course import Trace, check_march
+from ..motions.coefficients import placed, scene_of
 from .adjoint import Adjoint
-from .coefficients import placed, scene_of
 from .coupled_gradient import CoupledGradient
 from .equations import check_film
 from .film_gradient import FilmGradient
 from .implicit import Implicit, other_side
-from .march_course import Trace, check_march
 from .march_film_gradient import MarchFilm
 from .march_gradient import MarchGradient
 from .near_films import plain

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ..base.parallel import Array
-from ..errors import InputError
+from ...base.parallel import Array
+from ...errors import InputError
 from .near_films import OTHER, plain
 
 CANCELLED = 1e-10  # of its parts: what lambda errs by may make so much of a sum that is none

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.parallel import Array
+from ...base.parallel import Array
 from .equations import Equations
 from .film_gradient import FilmGradient, per_area
 from .march_gradient import MarchGradient

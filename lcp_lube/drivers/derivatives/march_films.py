@@ -11,16 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from ..base.parallel import Array
-from ..problems.film.edges import Around, face_film, jumps_of, pairs
-from ..problems.film.fluid import Law
-from ..problems.film.model import Model
-from ..problems.film.reynolds import sides
-from ..problems.film.shapes import Sum
-from ..problems.film.stored import mean_film
-from ..problems.film.views import MirroredFilm, Travelling
-from ..problems.strips import MANY
-from .march_course import Course
+from ...base.parallel import Array
+from ...problems.film.edges import Around, face_film, jumps_of, pairs
+from ...problems.film.fluid import Law
+from ...problems.film.model import Model
+from ...problems.film.reynolds import sides
+from ...problems.film.shapes import Sum
+from ...problems.film.stored import mean_film
+from ...problems.film.views import MirroredFilm, Travelling
+from ...problems.strips import MANY
+from ..marches.march_course import Course
 from .near_films import FREE, same
 
 

@@ -18,22 +18,22 @@ from typing import Any
 
 import numpy as np
 
-from ..base.differences import differences
-from ..base.parallel import Array
-from ..errors import InputError
-from ..problems.film.edges import oblique
-from ..problems.film.flows import point_weights, volume_unit
-from ..problems.film.slopes import giving
-from ..problems.film.stored import mean_film
-from ..problems.solution import Solution
-from ..scenes.scene import Scene
-from ..scenes.values import values_of, with_values
+from ...base.differences import differences
+from ...base.parallel import Array
+from ...errors import InputError
+from ...problems.film.edges import oblique
+from ...problems.film.flows import point_weights, volume_unit
+from ...problems.film.slopes import giving
+from ...problems.film.stored import mean_film
+from ...problems.solution import Solution
+from ...scenes.scene import Scene
+from ...scenes.values import values_of, with_values
+from ..ask import Ask
+from ..compose import solve
+from ..marches.march_course import Course, Trace, check_march
+from ..motions.linearised import Linear
 from .adjoint import scale_of
-from .ask import Ask
-from .compose import solve
 from .equations import MISFIT, Equations, cavity_of, right_side, unknowns
-from .linearised import Linear
-from .march_course import Course, Trace, check_march
 from .march_films import MarchFilms
 
 MEAN = "mean_"  # of a quantity: its mean over the march, of the steps' ends

@@ -13,21 +13,21 @@ from typing import Any
 
 import numpy as np
 
-from ..base.parallel import Array
-from ..problems.film import forces
-from ..problems.film.by_faces import ByFaces
-from ..problems.film.flows import SIDES
-from ..problems.film.fluid import Law
-from ..problems.film.lubrication import LubricationProblem
-from ..problems.film.model import Model
-from ..problems.film.quantities import largest_pressure
-from ..problems.film.weighed import can
-from ..problems.grid import Grid
-from ..problems.strips import moved
-from ..registry import SMALL
-from ..scenes.scene import Scene
+from ...base.parallel import Array
+from ...problems.film import forces
+from ...problems.film.by_faces import ByFaces
+from ...problems.film.flows import SIDES
+from ...problems.film.fluid import Law
+from ...problems.film.lubrication import LubricationProblem
+from ...problems.film.model import Model
+from ...problems.film.quantities import largest_pressure
+from ...problems.film.weighed import can
+from ...problems.grid import Grid
+from ...problems.strips import moved
+from ...registry import SMALL
+from ...scenes.scene import Scene
+from ..turned import Mirrored
 from .equations import DRAGS, FLIPPED, Equations, followed
-from .turned import Mirrored
 
 OTHER = "'"  # after a quantity: with the points that are about to change, or that tie, counted to the other side
 FLOWS = [f"flow_{side}" for side in SIDES]

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.parallel import Array, Reduce
+from ...base.parallel import Array, Reduce
 
 TIE = 1e-9  # relative: points so near the largest one share its part
 

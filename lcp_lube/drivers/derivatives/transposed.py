@@ -18,13 +18,13 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from ..base.parallel import Array
-from ..errors import NotFound
-from ..problems.film.slopes import slope
-from ..problems.film.views import LiftedFilm
-from ..problems.grid import Grid
+from ...base.parallel import Array
+from ...errors import NotFound
+from ...problems.film.slopes import slope
+from ...problems.film.views import LiftedFilm
+from ...problems.grid import Grid
+from ..motions.coupled_response import krylov
 from .coupled_gradient import CoupledGradient
-from .coupled_response import krylov
 from .film_gradient import per_area
 from .implicit import Implicit
 from .tape import Tape

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ..base.parallel import Array
-from .coupled_response import Changes, CoupledResponse
+from ...base.parallel import Array
+from ..motions.coupled_response import Changes, CoupledResponse
 
 PRODUCTS = 1000  # with the system's derivative, from one film's answer on
 LONGEST, SHORTEST = 3.0, 1e-3  # change of a field by a step; part of a step

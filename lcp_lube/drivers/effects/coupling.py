@@ -17,17 +17,17 @@ from typing import Any
 
 import numpy as np
 
-from ..problems.film.effects import Cells, neutral
-from ..problems.film.fluid import Law
-from ..problems.film.model import Model
-from ..problems.solution import Enclosure, Fields, Outcome, Solution
-from ..problems.transfer import Transfer
-from ..scenes.scene import Solvable
-from ..solvers.enclosure import bounds_of
-from .ask import Ask, Start
-from .compose import Inner
+from ...problems.film.effects import Cells, neutral
+from ...problems.film.fluid import Law
+from ...problems.film.model import Model
+from ...problems.solution import Enclosure, Fields, Outcome, Solution
+from ...problems.transfer import Transfer
+from ...scenes.scene import Solvable
+from ...solvers.enclosure import bounds_of
+from ..ask import Ask, Start
+from ..compose import Inner
+from ..levels import level_shapes
 from .coupling_file import CouplingFile
-from .levels import level_shapes
 from .loop import Loop
 
 ROUNDED = 2.0**-50  # relative error of p made of q, at most

@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from ..base.parallel import Array
-from ..errors import InputError
-from ..problems.solution import Step
-from ..scenes.effects.named import named
-from . import checkpoint_file
-from .ask import Ask, Start
-from .checkpoint import CHOICES, Checkpoint, Checkpointer, load, scene_record
+from ...base.parallel import Array
+from ...errors import InputError
+from ...problems.solution import Step
+from ...scenes.effects.named import named
+from .. import checkpoint_file
+from ..ask import Ask, Start
+from ..checkpoint import CHOICES, Checkpoint, Checkpointer, load, scene_record
 from .loop import Loop
 
 NUMBERS = ("solves", "work")

@@ -13,12 +13,12 @@ counts, in parts of the largest value.
 from dataclasses import replace
 from time import perf_counter
 
-from ..errors import InputError
-from ..problems.solution import Solution
-from ..scenes.effects.named import check_names, named, sentence
-from ..scenes.scene import Scene, Solvable
-from .ask import Ask
-from .compose import Inner
+from ...errors import InputError
+from ...problems.solution import Solution
+from ...scenes.effects.named import check_names, named, sentence
+from ...scenes.scene import Scene, Solvable
+from ..ask import Ask
+from ..compose import Inner
 
 
 def applies(scene: Solvable, ask: Ask) -> bool:

@@ -16,18 +16,18 @@ from typing import Any
 
 import numpy as np
 
-from ..base.parallel import Array
-from ..problems.film.effects import Answer, FaceFactors, answer, factors
-from ..problems.film.fluid import Law
-from ..problems.film.model import Model
-from ..problems.film.tangent import Tangent, tangent
-from ..problems.solution import Fields, Outcome, Solution, Step
-from ..scenes.scene import Solvable
-from ..solvers.relaxation import relaxation
-from .ask import Ask
+from ...base.parallel import Array
+from ...problems.film.effects import Answer, FaceFactors, answer, factors
+from ...problems.film.fluid import Law
+from ...problems.film.model import Model
+from ...problems.film.tangent import Tangent, tangent
+from ...problems.solution import Fields, Outcome, Solution, Step
+from ...scenes.scene import Solvable
+from ...solvers.relaxation import relaxation
+from ..ask import Ask
+from ..motions.linearised import Linear
+from ..sources import SWEEPS, Sources, z_of
 from .frozen import Frozen, settled
-from .linearised import Linear
-from .sources import SWEEPS, Sources, z_of
 
 WHY = "density: Newton's method on each step as a whole, the law linearised exactly"
 IN_VAIN = 8  # steps that do not halve what is left, after which `coupling` takes over

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from ..base.parallel import Array
-from ..errors import InputError
-from ..problems.film.effects import (
+from ...base.parallel import Array
+from ...errors import InputError
+from ...problems.film.effects import (
     CHANNELS,
     Answer,
     Cells,
@@ -29,17 +29,17 @@ from ..problems.film.effects import (
     framed_by,
     neutral,
 )
-from ..problems.film.fluid import Law
-from ..problems.film.forces import weights
-from ..problems.solution import Solution
-from ..scenes.effects.named import FLUID, named, without
-from ..scenes.values import values_of
-from .adjoint import Adjoint, conditions_of
-from .coefficients import placed
-from .equations import Equations, cavity_of, fields_of, right_side, unknowns
-from .implicit import Implicit
-from .linearised import Linear
-from .turned import Mirrored
+from ...problems.film.fluid import Law
+from ...problems.film.forces import weights
+from ...problems.solution import Solution
+from ...scenes.effects.named import FLUID, named, without
+from ...scenes.values import values_of
+from ..derivatives.adjoint import Adjoint, conditions_of
+from ..derivatives.equations import Equations, cavity_of, fields_of, right_side, unknowns
+from ..derivatives.implicit import Implicit
+from ..motions.coefficients import placed
+from ..motions.linearised import Linear
+from ..turned import Mirrored
 
 STEP = 1e-4  # of an effect: its derivative is a difference of two values of L
 THINNEST = -0.9  # of the rigid film, of a lift

@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from ..problems.certificate import certificate_tol
-from ..problems.facts import Facts
-from ..problems.film.effects import FaceFactors
-from ..problems.film.fluid import Law
-from ..problems.film.lubrication import LubricationProblem
-from ..problems.film.model import Model
-from ..problems.film.stored import Stored
-from ..problems.grid import EVEN
-from ..scenes.scene import Derived
-from .ask import Ask, Start
+from ...problems.certificate import certificate_tol
+from ...problems.facts import Facts
+from ...problems.film.effects import FaceFactors
+from ...problems.film.fluid import Law
+from ...problems.film.lubrication import LubricationProblem
+from ...problems.film.model import Model
+from ...problems.film.stored import Stored
+from ...problems.grid import EVEN
+from ...scenes.scene import Derived
+from ..ask import Ask, Start
 
 SETTLED = 0.1  # of eps1: relative change of the coefficients
 IN_TIME = (1e-2, 0.1, 5e-5)  # the same in a time step: of what it changes, of the square of its part in them, and at most

@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
-from ..problems.solution import Solution
-from ..registry import RUNGS, SMALL
-from ..scenes.effects.named import named, without
-from ..scenes.moving import motion_of
-from .accuracy import DEFAULT_QUANTITY, WHOLE, find_value
-from .ask import Ask, Start
-from .compose import Inner
+from ...errors import InputError
+from ...problems.solution import Solution
+from ...registry import RUNGS, SMALL
+from ...scenes.effects.named import named, without
+from ...scenes.moving import motion_of
+from ..accuracy.accuracy import DEFAULT_QUANTITY, WHOLE, find_value
+from ..ask import Ask, Start
+from ..compose import Inner
 from .coupling import NESTED_ABOVE
 from .decision import total_work
 from .first_order import FirstOrder

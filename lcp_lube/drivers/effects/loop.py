@@ -7,17 +7,17 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from ..base.parallel import Array
-from ..errors import InputError
-from ..problems.film.effects import Answer, Cells, Compressible, Effect, FaceFactors, answer, factors, neutral
-from ..problems.film.fluid import Law
-from ..problems.film.model import Model
-from ..problems.film.tangent import WIDEST, Giving, closed, filled, lift_of, logarithm, renewed
-from ..problems.solution import Solution
-from ..scenes.scene import Solvable
-from .ask import Ask, Start
-from .chain import added
-from .compose import Inner
+from ...base.parallel import Array
+from ...errors import InputError
+from ...problems.film.effects import Answer, Cells, Compressible, Effect, FaceFactors, answer, factors, neutral
+from ...problems.film.fluid import Law
+from ...problems.film.model import Model
+from ...problems.film.tangent import WIDEST, Giving, closed, filled, lift_of, logarithm, renewed
+from ...problems.solution import Solution
+from ...scenes.scene import Solvable
+from ..ask import Ask, Start
+from ..chain import added
+from ..compose import Inner
 from .frozen import Frozen, lent, settled
 
 MOST_SOLVES, LONG = 100, 300  # films; and while the least change has fallen to a tenth within as many as
@@ -184,13 +184,13 @@ class Loop:
         walls, whose film drags what it has, go on by Newton's methods from the best fields. What is left in the end are these.
         watch : called after every film.
         """
-        from .nonlinear import (
+        from .nonlinear import (  # here, and below: films without effects have no loop
             beyond,
             by_films,
             by_half_steps,
             steps,
             warmer,
-        )  # here, and below: films without effects have no loop
+        )
 
         x = PETSc.Vec().createMPI((len(self.names) * self.h.size, None), comm=self.base.grid.petsc_comm)
         x.setArray(begin)

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from ..base.parallel import Array
-from ..problems.film.effects import neutral
+from ...base.parallel import Array
+from ...problems.film.effects import neutral
 from .loop import LONG
 
 PATIENT = 150  # half steps in which the least change has to halve

@@ -8,13 +8,13 @@ import math
 from collections.abc import Callable
 from itertools import pairwise
 
-from ..problems.solution import Outcome, Solution
-from ..scenes.grooved import GroovedJournalScene
-from ..scenes.moving import motion_of
-from ..scenes.scene import Solvable
-from .ask import Ask
-from .chain import Chain
-from .compose import Inner
+from ...problems.solution import Outcome, Solution
+from ...scenes.grooved import GroovedJournalScene
+from ...scenes.moving import motion_of
+from ...scenes.scene import Solvable
+from ..ask import Ask
+from ..chain import Chain
+from ..compose import Inner
 from .root import Search
 
 MOST_SOLVES, MOST_BETWEEN = 12, 20  # ends of searches that go round; by secants, then within a bracket

@@ -14,19 +14,19 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, NotFound
-from ..problems.film.integrals import thinnest
-from ..problems.film.turned import TurnedProblem
-from ..problems.solution import Outcome, Solution
-from ..scenes.balance import BalanceTable
-from ..scenes.moving import film_of
-from ..scenes.scene import Scene, Solvable, as_scene
-from .ask import Ask
-from .chain import added
-from .compose import Inner
-from .levels import level_shapes
+from ...errors import InputError, NotFound
+from ...problems.film.integrals import thinnest
+from ...problems.film.turned import TurnedProblem
+from ...problems.solution import Outcome, Solution
+from ...scenes.balance import BalanceTable
+from ...scenes.moving import film_of
+from ...scenes.scene import Scene, Solvable, as_scene
+from ..ask import Ask
+from ..chain import added
+from ..compose import Inner
+from ..levels import level_shapes
+from ..turned import Mirrored
 from .root import Search
-from .turned import Mirrored
 
 MOST_SOLVES = 30  # on a grid
 RANGE = {"eccentricity": 1e4, "h_offset": 100.0}  # unless one is given: of e/(1 - e) about 1, of the film about the scene's
@@ -185,8 +185,8 @@ def exact_slope(scene: Any, solution: Solution, unknown: Variable, t: float, W: 
     model, turning = film_of(scene), getattr(scene, "turning", None)
     if model is None or (model.effects and turning is None):
         return None
-    from ..scenes.thrust import ThrustScene  # here, as above
-    from .coefficients import coefficients
+    from ...scenes.thrust import ThrustScene  # here, as above
+    from ..motions.coefficients import coefficients
 
     key = unknown.key.rpartition(".")[2]
     if key == "eccentricity" and turning is not None and turning.widest is not None and model.U >= 0:

@@ -9,17 +9,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.parallel import Array
-from ..problems.film.forces import PIVOT, totals
-from ..problems.film.lubrication import LubricationProblem
-from ..problems.film.model import Model
-from ..problems.solution import Fields, Solution
-from ..scenes.scene import Scene, Solvable
-from ..scenes.thrust import ThrustScene
-from ..scenes.tilting import TiltingPadScene
-from .grooves import SideBySide, SolvedFilm, films_of
-from .impedance import displacements, held, level
-from .response import Change, Response
+from ...base.parallel import Array
+from ...problems.film.forces import PIVOT, totals
+from ...problems.film.lubrication import LubricationProblem
+from ...problems.film.model import Model
+from ...problems.solution import Fields, Solution
+from ...scenes.scene import Scene, Solvable
+from ...scenes.thrust import ThrustScene
+from ...scenes.tilting import TiltingPadScene
+from ..grooves import SideBySide, SolvedFilm, films_of
+from ..motions.impedance import displacements, held, level
+from ..motions.response import Change, Response
 
 FEWEST = 8  # points of a coarse grid along a pad
 MOMENTS = 1e-8  # of the load times the lever, about a pivot

@@ -16,15 +16,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.parallel import Array
-from ..problems.solution import Outcome, Solution
-from ..scenes.moving import motion_of
-from ..scenes.scene import Scene, Solvable
-from .ask import Ask
-from .chain import Chain
-from .compose import Inner
-from .impedance import stiffness
-from .levels import halved
+from ...base.parallel import Array
+from ...problems.solution import Outcome, Solution
+from ...scenes.moving import motion_of
+from ...scenes.scene import Scene, Solvable
+from ..ask import Ask
+from ..chain import Chain
+from ..compose import Inner
+from ..levels import halved
+from ..motions.impedance import stiffness
 from .pad_coordinates import Bearing, Films, FilmWithModes, bearing_of
 
 MOST_SOLVES = 80  # on a grid: the end of a search that goes round: pads without preload, which idle, took up to 65

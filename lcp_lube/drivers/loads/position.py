@@ -15,20 +15,20 @@ from typing import Any
 
 import numpy as np
 
-from ..base.parallel import Array
-from ..errors import NotFound
-from ..problems.film.turning import Turning
-from ..problems.solution import Outcome, Solution
-from ..scenes.effects.named import named, without
-from ..scenes.grooved import GroovedJournalScene
-from ..scenes.scene import Solvable
-from .ask import Ask
+from ...base.parallel import Array
+from ...errors import NotFound
+from ...problems.film.turning import Turning
+from ...problems.solution import Outcome, Solution
+from ...scenes.effects.named import named, without
+from ...scenes.grooved import GroovedJournalScene
+from ...scenes.scene import Solvable
+from ..ask import Ask
+from ..chain import Chain
+from ..compose import Inner
+from ..levels import halved
+from ..motions.coefficients import by_film, motions_of, placed
+from ..motions.impedance import stiffness
 from .attitude import half_film_attitude
-from .chain import Chain
-from .coefficients import by_film, motions_of, placed
-from .compose import Inner
-from .impedance import stiffness
-from .levels import halved
 from .winding import places
 
 MOST_SOLVES = 25  # on a grid

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..base.parallel import Array
+from ...base.parallel import Array
 
 AROUND = np.linspace(-math.pi, math.pi, 12, endpoint=False)
 WITHIN, OUTER, BEYOND, OUTMOST = -1.0, 2.5, 2.5, 6.5  # rings in t: from; to at least, beyond where closed forms see it, at most

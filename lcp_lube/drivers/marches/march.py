@@ -10,16 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from ..base.parallel import Array
-from ..problems.film.cavity import cavity_sign
-from ..problems.film.flows import point_weights
-from ..problems.film.grooves import GroovedProblem
-from ..problems.film.lubrication import LubricationProblem
-from ..problems.film.stored import Stored
-from ..problems.film.supplies import supply_flows
-from ..problems.film.turned import TurnedProblem
-from ..problems.grid import Grid
-from ..problems.solution import Fields
+from ...base.parallel import Array
+from ...problems.film.cavity import cavity_sign
+from ...problems.film.flows import point_weights
+from ...problems.film.grooves import GroovedProblem
+from ...problems.film.lubrication import LubricationProblem
+from ...problems.film.stored import Stored
+from ...problems.film.supplies import supply_flows
+from ...problems.film.turned import TurnedProblem
+from ...problems.grid import Grid
+from ...problems.solution import Fields
 
 LONGEST, SHORTEST, SAFETY = 1.5, 0.2, 0.9  # a step in parts of the one before
 ROUNDED = 2.0**-48  # of what the film could hold: an error of sums of contents that is rounding

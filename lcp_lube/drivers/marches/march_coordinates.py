@@ -5,22 +5,22 @@ from typing import Any
 
 import numpy as np
 
-from ..base.parallel import Array
-from ..errors import InputError
-from ..problems.film.forces import PIVOT, totals
-from ..problems.film.grooves import GroovedProblem
-from ..problems.solution import Solution
-from ..scenes.motion import Course, MotionTable
-from ..scenes.scene import as_scene
-from ..scenes.thrust import ThrustScene
-from ..scenes.tilting import TiltingPadScene
-from . import pads
-from .ask import Ask
-from .compose import Inner
-from .grooves import SideBySide, SolvedFilm, films_of
-from .impedance import displacements, level, stiffness
-from .pad_coordinates import FilmWithModes, JournalPads, ThrustPads
-from .response import Change
+from ...base.parallel import Array
+from ...errors import InputError
+from ...problems.film.forces import PIVOT, totals
+from ...problems.film.grooves import GroovedProblem
+from ...problems.solution import Solution
+from ...scenes.motion import Course, MotionTable
+from ...scenes.scene import as_scene
+from ...scenes.thrust import ThrustScene
+from ...scenes.tilting import TiltingPadScene
+from ..ask import Ask
+from ..compose import Inner
+from ..grooves import SideBySide, SolvedFilm, films_of
+from ..loads import pads
+from ..loads.pad_coordinates import FilmWithModes, JournalPads, ThrustPads
+from ..motions.impedance import displacements, level, stiffness
+from ..motions.response import Change
 from .step import TimeStep
 
 

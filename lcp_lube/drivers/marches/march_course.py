@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from ..base.parallel import Array
-from ..errors import InputError
-from ..problems.film.flows import point_weights
-from ..problems.film.forces import PIVOT
-from ..problems.film.stored import Stored, mean_film
-from ..problems.film.turned import TurnedProblem
-from ..problems.grid import Grid
-from ..scenes.scene import Scene
-from .equations import Equations, followed
+from ...base.parallel import Array
+from ...errors import InputError
+from ...problems.film.flows import point_weights
+from ...problems.film.forces import PIVOT
+from ...problems.film.stored import Stored, mean_film
+from ...problems.film.turned import TurnedProblem
+from ...problems.grid import Grid
+from ...scenes.scene import Scene
+from ..derivatives.equations import Equations, followed
 from .march import Formula, March
 from .march_coordinates import Coordinates
 from .marching import Moment, first_film

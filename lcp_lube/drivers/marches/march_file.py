@@ -4,13 +4,13 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
-from ..problems.certificate import Certificate
-from ..problems.grid import Grid
-from ..problems.solution import Step
-from . import checkpoint_file
-from .ask import Ask
-from .checkpoint import Checkpointer, load, scene_record
+from ...errors import InputError
+from ...problems.certificate import Certificate
+from ...problems.grid import Grid
+from ...problems.solution import Step
+from .. import checkpoint_file
+from ..ask import Ask
+from ..checkpoint import Checkpointer, load, scene_record
 
 NUMBERS = ("t", "dts", "volumes", "flowed", "stored", "moved", "rates", "warming", "lapse")  # of a `March`
 ARRAYS = ("contents", "carried", "full")

@@ -7,24 +7,24 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
-from ..problems.certificate import Certificate
-from ..problems.film.lubrication import LubricationProblem
-from ..problems.film.model import Model
-from ..problems.grid import EVEN
-from ..problems.solution import Outcome, Solution, Step
-from ..scenes.motion import MotionTable
-from ..scenes.moving import motion_of
-from .ask import Ask, Start, light
-from .coefficients import supplied
-from .compose import Inner
+from ...errors import InputError
+from ...problems.certificate import Certificate
+from ...problems.film.lubrication import LubricationProblem
+from ...problems.film.model import Model
+from ...problems.grid import EVEN
+from ...problems.solution import Outcome, Solution, Step
+from ...scenes.motion import MotionTable
+from ...scenes.moving import motion_of
+from ..ask import Ask, Start, light
+from ..compose import Inner
+from ..motions.coefficients import supplied
+from ..plan import plan
+from ..supplies import check_backflow
 from .march import March
 from .march_coordinates import Coordinates
 from .march_file import MarchFile
-from .plan import plan
 from .rotor import Rotor
 from .step import TimeStep, carried, check_content, check_room, contents
-from .supplies import check_backflow
 
 SOME = 0.37  # of t_end: when edges are looked at that may have moved
 FIRST = 1e-3  # of t_end: the first step, where an error estimate says how long the others are

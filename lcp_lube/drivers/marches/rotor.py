@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from ..base.parallel import Array
-from ..errors import InputError
-from ..problems.solution import Solution
+from ...base.parallel import Array
+from ...errors import InputError
+from ...problems.solution import Solution
 from .march import Formula
 from .march_coordinates import Coordinates
 

@@ -6,15 +6,15 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from ..base.parallel import Array
-from ..errors import InputError
-from ..problems.film.flows import point_weights
-from ..problems.film.lubrication import LubricationProblem
-from ..problems.film.model import Model
-from ..problems.film.stored import mean_film
-from ..problems.grid import Grid
-from ..problems.solution import Fields
-from ..scenes.scene import Derived
+from ...base.parallel import Array
+from ...errors import InputError
+from ...problems.film.flows import point_weights
+from ...problems.film.lubrication import LubricationProblem
+from ...problems.film.model import Model
+from ...problems.film.stored import mean_film
+from ...problems.grid import Grid
+from ...problems.solution import Fields
+from ...scenes.scene import Derived
 
 LEAST_ROOM = 1e-9  # of a sealed film, for void
 FULLEST = 1.0 + 1e-5  # void fraction beyond which a cell's content is negative, by more than a cycle may leave

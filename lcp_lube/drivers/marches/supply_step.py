@@ -13,18 +13,19 @@ from typing import Any
 
 import numpy as np
 
-from ..base.parallel import Array
-from ..problems.film.model import Model
-from ..problems.grid import Grid
-from ..problems.solution import Outcome, Solution, Step
-from ..problems.transfer import Pick, numbers
-from ..scenes.scene import Solvable
-from ..solvers.relaxation import relaxation
-from . import coupling, film_part, symmetry
-from .ask import Ask
-from .compose import Inner
-from .frozen import Frozen
-from .sources import CONSTANT, SWEEPS, Sources, z_of
+from ...base.parallel import Array
+from ...problems.film.model import Model
+from ...problems.grid import Grid
+from ...problems.solution import Outcome, Solution, Step
+from ...problems.transfer import Pick, numbers
+from ...scenes.scene import Solvable
+from ...solvers.relaxation import relaxation
+from .. import film_part, symmetry
+from ..ask import Ask
+from ..compose import Inner
+from ..effects import coupling
+from ..effects.frozen import Frozen
+from ..sources import CONSTANT, SWEEPS, Sources, z_of
 
 WHY = "supplies: their pressures are unknowns of each step beside the film's"
 MOST = 12  # steps, after which `supplies` takes over

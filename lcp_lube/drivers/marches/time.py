@@ -7,12 +7,12 @@ a run is taken up from.
 from dataclasses import replace
 from typing import Any
 
-from ..errors import InputError
-from ..problems.solution import Outcome, Solution
-from ..scenes.moving import motion_of
-from ..scenes.scene import Solvable
-from .ask import Ask
-from .compose import Inner
+from ...errors import InputError
+from ...problems.solution import Outcome, Solution
+from ...scenes.moving import motion_of
+from ...scenes.scene import Solvable
+from ..ask import Ask
+from ..compose import Inner
 from .marching import Run, iterations_of
 
 

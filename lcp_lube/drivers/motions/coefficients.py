@@ -12,27 +12,27 @@ from typing import Any
 
 import numpy as np
 
-from ..base.parallel import Array
-from ..errors import InputError
-from ..problems.film.forces import totals
-from ..problems.film.grooves import GroovedProblem
-from ..problems.film.known import known_of
-from ..problems.film.lubrication import LubricationProblem
-from ..problems.film.model import Model
-from ..problems.film.turned import TurnedProblem
-from ..problems.film.turning import Turning
-from ..problems.solution import Fields, Solution
-from ..scenes.effects.named import without
-from ..scenes.moving import film_of, motion_of
-from ..scenes.scene import Scene, Solvable
-from ..scenes.thrust import ThrustScene
-from ..scenes.tilting import TiltingPadScene
+from ...base.parallel import Array
+from ...errors import InputError
+from ...problems.film.forces import totals
+from ...problems.film.grooves import GroovedProblem
+from ...problems.film.known import known_of
+from ...problems.film.lubrication import LubricationProblem
+from ...problems.film.model import Model
+from ...problems.film.turned import TurnedProblem
+from ...problems.film.turning import Turning
+from ...problems.solution import Fields, Solution
+from ...scenes.effects.named import without
+from ...scenes.moving import film_of, motion_of
+from ...scenes.scene import Scene, Solvable
+from ...scenes.thrust import ThrustScene
+from ...scenes.tilting import TiltingPadScene
+from ..grooves import SolvedFilm, films_of
+from ..loads.pad_coordinates import Bearing, JournalPads, ThrustPads, bearing_of
+from ..turned import Mirrored
 from .coupled_response import CoupledResponse
-from .grooves import SolvedFilm, films_of
 from .impedance import displacements, impedance, level, stiffness
-from .pad_coordinates import Bearing, JournalPads, ThrustPads, bearing_of
 from .response import Change, Moved, Response
-from .turned import Mirrored
 
 FASTEST = 1e100  # rad/s: beyond it a factorisation overflows, and K and C are long those of void that has no time to change
 JOURNAL, TILTED, FLAT = ("x", "y"), ("x", "y", "tilt", "tilt_across"), ("z",)  # names of the motions

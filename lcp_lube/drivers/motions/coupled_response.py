@@ -17,22 +17,22 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from ..base.parallel import Array
-from ..errors import NotFound
-from ..problems.film.cavity import about_to_change, cavity_sign
-from ..problems.film.contact import areas
-from ..problems.film.effects import Answer, answer, factors
-from ..problems.film.flows import point_weights
-from ..problems.film.grooves import GroovedProblem
-from ..problems.film.known import known_of
-from ..problems.film.supplies import Supply, supply_flows
-from ..problems.solution import Solution
-from .ask import Ask
+from ...base.parallel import Array
+from ...errors import NotFound
+from ...problems.film.cavity import about_to_change, cavity_sign
+from ...problems.film.contact import areas
+from ...problems.film.effects import Answer, answer, factors
+from ...problems.film.flows import point_weights
+from ...problems.film.grooves import GroovedProblem
+from ...problems.film.known import known_of
+from ...problems.film.supplies import Supply, supply_flows
+from ...problems.solution import Solution
+from ..ask import Ask
+from ..effects.loop import Loop
+from ..supplies import Fed
 from .line_forces import OfLine, line_forces, stiffness_of
 from .linearised import Linear, following
-from .loop import Loop
 from .response import near
-from .supplies import Fed
 
 STEP = 1e-4  # of differences: their error is its square
 OF_LINE = 0.1  # of it, where a line's numbers are taken: they have all digits, and thick oils bend them

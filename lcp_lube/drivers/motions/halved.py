@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from ..base.parallel import Array
-from ..problems.film.lubrication import LubricationProblem
-from ..problems.film.reynolds import sides
-from ..problems.transfer import Pick, numbers
-from ..scenes.scene import Solvable
-from .film_part import Part
+from ...base.parallel import Array
+from ...problems.film.lubrication import LubricationProblem
+from ...problems.film.reynolds import sides
+from ...problems.transfer import Pick, numbers
+from ...scenes.scene import Solvable
+from ..film_part import Part
 from .linearised import Linear
 
 EVEN = 1e-9  # relative difference that rounding leaves between both halves of what is symmetric

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from ..base.parallel import Array
-from ..problems.film.effects import factors
-from ..problems.film.fluid import Law
-from ..problems.film.turning import Turning
-from ..problems.solution import Solution
+from ...base.parallel import Array
+from ...problems.film.effects import factors
+from ...problems.film.fluid import Law
+from ...problems.film.turning import Turning
+from ...problems.solution import Solution
+from ..effects.frozen import Frozen
 from .coupled_response import CoupledResponse
-from .frozen import Frozen
 from .response import Change, Response
 
 

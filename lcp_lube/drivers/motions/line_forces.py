@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from ..base.parallel import Array
-from ..problems.film.forces import antiderivative, weights
-from ..problems.film.known import known_of
-from ..problems.film.lubrication import LubricationProblem
+from ...base.parallel import Array
+from ...problems.film.forces import antiderivative, weights
+from ...problems.film.known import known_of
+from ...problems.film.lubrication import LubricationProblem
 
 TOLD = ("load", "force_x", "force_y")
 NEAR = 1e-9  # relative: by which motions may differ from sums of those that these numbers are of

@@ -8,16 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from ..base.compiled import has_numba
-from ..base.options import recipe
-from ..base.parallel import Array
-from ..linear.krylov import Krylov
-from ..problems.facts import Facts
-from ..problems.film.assembly import assemble
-from ..problems.film.flows import volume_unit
-from ..problems.film.lubrication import LubricationProblem
-from ..registry import SMALL
-from .plan import default_recipe
+from ...base.compiled import has_numba
+from ...base.options import recipe
+from ...base.parallel import Array
+from ...linear.krylov import Krylov
+from ...problems.facts import Facts
+from ...problems.film.assembly import assemble
+from ...problems.film.flows import volume_unit
+from ...problems.film.lubrication import LubricationProblem
+from ...registry import SMALL
+from ..plan import default_recipe
 
 Entries = list[tuple[int, int, Array]]
 
@@ -48,7 +48,7 @@ class Linear:
         grid, self.frozen = problem.grid, None
         apart = entries is None and not factored and (given is None or problem.held is None)
         if apart and grid.dim == 2 and grid.size > (least or SMALL) and has_numba():
-            from ..solvers.fas.frozen import Frozen  # here: numba starts with it
+            from ...solvers.fas.frozen import Frozen  # here: numba starts with it
 
             self.frozen = Frozen(problem, cavity, M, given)
 

@@ -19,18 +19,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.parallel import Array
-from ..problems.film.cavity import cavity_sign
-from ..problems.film.flows import point_weights
-from ..problems.film.known import known_of
-from ..problems.film.lubrication import LubricationProblem
-from ..problems.film.model import Model
-from ..problems.film.stored import Stored
-from ..problems.film.supplies import supply_flows
-from ..problems.film.views import View
-from ..problems.solution import Fields
-from ..registry import SMALL
-from ..scenes.scene import Solvable
+from ...base.parallel import Array
+from ...problems.film.cavity import cavity_sign
+from ...problems.film.flows import point_weights
+from ...problems.film.known import known_of
+from ...problems.film.lubrication import LubricationProblem
+from ...problems.film.model import Model
+from ...problems.film.stored import Stored
+from ...problems.film.supplies import supply_flows
+from ...problems.film.views import View
+from ...problems.solution import Fields
+from ...registry import SMALL
+from ...scenes.scene import Solvable
 from .halved import Halved
 from .line_forces import OfLine, line_forces, stiffness_of
 from .linearised import Feed, Linear

@@ -1,0 +1,1 @@
+"""Places and values at which films carry what is asked of them."""

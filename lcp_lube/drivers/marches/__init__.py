@@ -1,0 +1,1 @@
+"""Films in time: their steps, what moves in them, what a run is taken up from."""

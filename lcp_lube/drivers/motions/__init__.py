@@ -1,0 +1,1 @@
+"""How films answer to small motions of their walls: stiffness and damping."""
