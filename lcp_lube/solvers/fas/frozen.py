@@ -110,7 +110,7 @@ class Frozen(Cycles):
         rtol, drop = self._keen * TRANSPOSED if self.transposed else RTOL, DROP if self.single else 0.0
         norm, total = self.grid.reduce.norm, self.grid.comm.allreduce
         self._put(self.c[0], rest)
-        V, H = np.empty((MOST + 2, rest.size), self.z[0].dtype), np.zeros((MOST + 2, MOST + 1))  # V: pages as they are written
+        V, H = np.zeros((MOST + 2, rest.size), self.z[0].dtype), np.zeros((MOST + 2, MOST + 1))  # V: small pages, as written
         self.change(None, V[0])
         self.c[0][:] = 0.0
         first, y = norm(V[0]), np.zeros(0)
