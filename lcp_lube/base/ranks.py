@@ -15,6 +15,11 @@ ROOT = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
 QUIET = {"OMPI_MCA_orte_execute_quiet": "1", "PRTE_MCA_prte_execute_quiet": "1"}  # our exit status is no fault to be explained
 
 
+def cores() -> int:
+    """Of this machine, those that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 def run_on(ranks: int, words: list[str]) -> int:
     """Run this command line, without --ranks, on so many ranks; returns its exit status.
 
@@ -22,9 +27,8 @@ def run_on(ranks: int, words: list[str]) -> int:
     ------
     InputError : fewer than 1; inside an MPI job already; no mpiexec; more ranks than this machine has cores.
     """
-    cores = len(os.sched_getaffinity(0))
-    if not 1 <= ranks <= cores:
-        raise InputError(f"--ranks {ranks}: from 1 to {cores}, the cores of this machine, are allowed")
+    if not 1 <= ranks <= cores():
+        raise InputError(f"--ranks {ranks}: from 1 to {cores()}, the cores of this machine, are allowed")
     if launched():
         raise InputError("--ranks: this is an MPI job already; its ranks are mpiexec's to say")
     command = [sys.executable, "-m", "lcp_lube", *_without(words)]

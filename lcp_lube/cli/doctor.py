@@ -21,6 +21,7 @@ from petsc4py import PETSc
 from .. import __version__
 from ..api import solve
 from ..base.progress import Line
+from ..base.ranks import cores
 from ..base.together import all_come
 from ..output.console import say
 from ..output.table import table
@@ -73,7 +74,7 @@ def inspect() -> dict[str, Any]:
         "mpi": re.split(r"[,\n]", MPI.Get_library_version().strip("\0 "))[0].strip(),
         "mpiexec": shutil.which("mpiexec"),
         "ranks": MPI.COMM_WORLD.size,
-        "cores": len(os.sched_getaffinity(0)),
+        "cores": cores(),
         "omp_num_threads": os.environ.get("OMP_NUM_THREADS"),
         "memory_gb": round(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 1e9, 1),
     }

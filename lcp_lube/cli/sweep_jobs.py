@@ -14,6 +14,7 @@ from typing import Any
 from mpi4py import MPI
 
 from ..base.petsc import launched
+from ..base.ranks import cores
 from ..errors import InputError
 from ..registry import PACKAGE
 
@@ -36,7 +37,7 @@ def jobs_for(asked: int | None, chains: int, sizes: Sequence[int]) -> int:
         return min(asked, chains)
     if launched() or sum(sizes) < WORTH or max(sizes) > HEAVY:
         return 1
-    return min(len(os.sched_getaffinity(0)), chains)
+    return min(cores(), chains)
 
 
 def serve(rows_of: Callable[[Sequence[int]], Iterable[tuple[int, Row]]]) -> None:
