@@ -74,7 +74,7 @@ def _crew(number: int, process: int) -> Crew:
 
 
 def threads() -> int:
-    """As many as were asked for; else 1: on two cores two gain nothing to a fifth, and lose on a busy machine.
+    """As many as were asked for; else 1: two gain on the grids of large films alone, and lose on a busy machine.
 
     Raises
     ------

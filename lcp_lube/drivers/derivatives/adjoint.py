@@ -195,8 +195,7 @@ class Adjoint:
             other: Any = with_values(self.scene, {key: near})
         except InputError:
             return True
-        lawful = bool(other.model.law) is bool(self.equations.law)  # no faces at round edges are made anew for a fluid's law
-        return not (lawful and same(gap, other.model.gap) and other.model.lengths == self.equations.model.lengths)
+        return not (same(gap, other.model.gap) and other.model.lengths == self.equations.model.lengths)
 
     @property
     def _supplies(self) -> list[str]:

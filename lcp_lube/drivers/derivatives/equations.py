@@ -85,8 +85,7 @@ class Equations:
         else:
             self.constant = replace(self.model, places=places).build(near.grid.shape, comm)
         self._at: tuple[Any, ...] = (None,)  # p, the constant film, and what the fluid makes of it there
-        if dry is not None and self.constant.coefficients_for is not None and not self.lent:
-            self.constant = self.constant.revised(dry)
+        self.constant = self.constant if self.lent else self.constant.revised(dry)
         self.grid: Grid = self.constant.grid
         if pressures and (held := self.constant.held) is not None:
             q = [float(self.law.reduced(np.array(P))) if self.law else P for P in pressures]

@@ -59,7 +59,7 @@ class CoupledResponse(OfLine):
         if self.free:
             scene = Fed(scene, tuple(Supply(one.region, one.p) for one in self.supplies))
         self.loop = loop = Loop(scene, Ask(comm=comm), None)  # type: ignore[arg-type]
-        loop.base = loop.base if problem.dry is None else loop.base.revised(problem.dry)
+        loop.base = loop.base.revised(problem.dry)
         base, self.n, self.unit = loop.base, grid.local_size, loop.base.scheme.flow_unit
         columns = np.logical_or.reduce(base.columns) if isinstance(base, GroovedProblem) else np.zeros(self.n, dtype=bool)
         held = problem.held.mask.ravel() if problem.held is not None else False

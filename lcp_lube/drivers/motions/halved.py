@@ -32,7 +32,7 @@ class Halved:
         j, i = numbers(half.grid)
         self._take, self._spread = Pick(grid, half.grid, j, i), Pick(half.grid, grid, *part.places(grid))
         self._beyond = Pick(grid, half.grid, grid.shape[1] - 1 - j, i)
-        self.half = half if problem.dry is None or half.coefficients_for is None else half.revised(self._take(problem.dry))
+        self.half = half.revised(None if problem.dry is None else self._take(problem.dry))
         self._share = np.broadcast_to(np.where(sides(half.grid, ("mirror",))[3], 0.5, 1.0), half.grid.box).ravel()
         of_half = None if M is None else self._share * self._take(M)
         self._small = Linear(self.half, self._take(cavity.astype(float)) > 0.5, M=of_half, least=least)

@@ -61,8 +61,7 @@ class Moved(View):
 
 def near(model: Model, gap: Any, problem: LubricationProblem) -> LubricationProblem:
     """A problem's film near by on its grid, with faces at round edges made for the same cavities. Collective."""
-    other = replace(model, gap=gap).build(problem.grid.shape, problem.grid.petsc_comm, problem.grid)
-    return other if problem.dry is None or other.coefficients_for is None else other.revised(problem.dry)
+    return replace(model, gap=gap).build(problem.grid.shape, problem.grid.petsc_comm, problem.grid).revised(problem.dry)
 
 
 class Response(OfLine):

@@ -254,9 +254,10 @@ class LubricationProblem:
         root = np.sqrt(z * z + 4.0 * m) if interior else np.abs(z)
         return {"p": 0.5 * P * (root + z), "r": 0.5 * R * (root - z)}
 
-    def revised(self, dry: Array) -> "LubricationProblem":
-        """The same film with the faces that round edges cut (`rims`) made for these points, 1 where cavitated. Collective."""
-        assert self.coefficients_for is not None
+    def revised(self, dry: Array | None) -> "LubricationProblem":
+        """The film with faces at round edges (`rims`), if any, made for these points, if any: 1 where cavitated. Collective."""
+        if dry is None or self.coefficients_for is None:
+            return self
         (other := copy(self)).dry, other.scheme = dry, self.coefficients_for(cavity=dry)
         return other
 
@@ -268,8 +269,7 @@ class LubricationProblem:
         held: Held | None = None,
     ) -> Self:
         """The problem on the same grid with other coefficients; mu : viscosity at the east faces, Pa s."""
-        other = copy(self)
-        other.scheme, other.mu, other.exact = scheme, mu, None  # type: ignore[assignment]
+        (other := copy(self)).scheme, other.mu, other.exact = scheme, mu, None  # type: ignore[assignment]
         other.p_sides, other.held = p_sides or self.p_sides, held or self.held
         other.__dict__ |= dict.fromkeys(("coefficients_for", "factors", "contact", "tangent", "rigid"), None)
         other.__dict__ |= {name: {} for name in ("more", "more_fields", "more_measures", "cells")} | {"plain": False}
