@@ -161,6 +161,30 @@ def test_a_wall_that_moves_the_other_way_is_the_mirror_image():
     assert there.load == pytest.approx(back.load, rel=1e-9)
 
 
+def test_a_film_without_oil_loses_none():
+    """No oil comes in past a closed side: what roundings leave of it is not a share of what was lost."""
+    film = [
+        {"shape": "journal", "c": 1.6540255867445064e-06, "eccentricity": 0.7249977073788991},
+        {"shape": "formula", "h": "3.308e-07*(1+sin(56.8*x))"},
+        {"shape": "step", "height": 2.576e-06, "at": 0.01745},
+    ]
+    empty = march(
+        {
+            "family": "bearing",
+            "L": 0.0216,
+            "U": 0.488,
+            "n": 40,
+            "fluid": {"mu": 0.078, "p_supply": 0.0},
+            "film": film,
+            "sides": {"west": "closed", "east": 0.0},
+            "elastic": {"compliance": 6.287e-16},
+            "asperity": {"sigma": 7.78e-07, "E_reduced": 1e8},
+            "motion": {"t_end": 0.197, "steps": 2, "set": {"h_offset": "4.96e-07*(1-cos(135.4*t))"}},
+        }
+    )
+    assert empty.cavitated_fraction == 1.0 and empty.mass_defect_run < 1e-4
+
+
 def test_the_symmetric_half_is_the_whole():
     scene = WEDGE | SIDES["mirror"]
     half, whole = march(scene), solve(load_scene(scene), reduction=False)

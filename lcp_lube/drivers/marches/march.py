@@ -23,6 +23,7 @@ from ...problems.solution import Fields
 
 LONGEST, SHORTEST, SAFETY = 1.5, 0.2, 0.9  # a step in parts of the one before
 ROUNDED = 2.0**-48  # of what the film could hold: an error of sums of contents that is rounding
+SCARCE = 1e-9  # likewise: a film with less oil has lost all but its roundings
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ class March:
     t, dts : the time, and the lengths of the last steps; contents : h (1 - r) of the last times, m; fields, full : theirs, and
         which cells were full; carried : contents times temperatures, m K, if any. All of them with the newest first.
     volumes : sums of contents, 2 dx m2; flowed, stored, moved : of the whole run, in time: what came in, what was stored, and
-        the larger of all that passed and all that was stored.
+        the larger of all that passed and all that was stored; whole : what a full film holds, 2 dx m2.
     """
 
     grid: Grid
@@ -63,6 +64,7 @@ class March:
     flowed: float = 0.0
     stored: float = 0.0
     moved: float = 0.0
+    whole: float = 0.0
     rates: float = 0.0  # largest so far: what drives the film, 2 dx sums
     warming: float = 0.0  # likewise, of what is carried
     curved: bool = False  # whether `guess` knows three steps
@@ -146,8 +148,8 @@ class March:
         volume, scheme = self._sum(contents), problem.scheme
         due = (formula.old(self.volumes) + into) / formula.weight
         assert scheme.storage is not None  # as a time step has
-        whole = scheme.flow_unit * self.grid.reduce.sum(np.abs(scheme.storage)) / formula.weight
-        if volume > 0.0 and 0.0 < abs(due - volume) <= ROUNDED * whole:
+        self.whole = scheme.flow_unit * self.grid.reduce.sum(np.abs(scheme.storage)) / formula.weight
+        if volume > 0.0 and 0.0 < abs(due - volume) <= ROUNDED * self.whole:
             return contents * (due / volume), due
         return contents, volume
 
@@ -156,7 +158,7 @@ class March:
         """What was lost or made in the whole run, in parts of what passed or was stored."""
         lost = abs(self.flowed - self.stored)
         held = 1e-3 * max(map(abs, self.volumes), default=0.0)  # of a film that hardly moves
-        return lost / max(self.moved, held) if lost else 0.0
+        return lost / max(self.moved, held, SCARCE * self.whole) if lost else 0.0
 
     def error(self, dt: float, problem: LubricationProblem, contents: Array, carried: Array | None = None) -> float | None:
         """Estimated relative error of the rates d/dt h (1 - r) of a step not yet accepted; None before there are enough.

@@ -120,7 +120,8 @@ class Settling:
             shares = np.linalg.lstsq(steps @ steps.T, steps @ off.ravel(), rcond=1e-14)[0]
             mixed = made - sum(share * (made - one) for share, (one, _) in zip(shares, before, strict=True))
         self._before, self._fronts = [*before[-MEMORY:], (made, off)], fronts
-        ends = np.union1d(self._bare.ends, fronts)
+        end = at.points[-1]  # a front at a side, but for rounding, is no point of its own: its cell would hold nothing
+        ends = np.union1d(self._bare.ends, fronts[np.minimum(fronts, end - fronts) > 1e-12 * end])
         self.line = LineIntegrals(self._bare.film, ends, fine=True, along=Along(at.ends, mixed))
         self.line.ring = self._bare.ring
 
