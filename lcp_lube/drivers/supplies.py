@@ -102,6 +102,8 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     chain = Chain(replace(ask, certify=False, reduction=ask.reduction and not ask.certify), inner)  # one band, at the end
     resting, least, enough = 0, np.inf, ENOUGH if known_before else TOLERANCE
     together = False  # film and pressures
+    moved: Any = None  # the last step, and from where
+    beside: Any = 0.0  # what effects add to the matrix
     for count in range(1, MOST_SOLVES + 1):
         held = tuple(Supply(one.region, float(p)) for one, p in zip(supplies, P, strict=True))
         if together:
@@ -123,6 +125,11 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
             break
         slopes, answers = _slopes(problem, solution.fields, free)
         matrix = misfit[free, 2:] * slopes + np.diag(misfit[free, 1])
+        if model.effects:  # the film's coefficients follow as well: by what the last step has changed (Broyden)
+            if moved is not None:
+                by, before, was = moved
+                beside = beside + np.outer(misfit[free, 0] - before - was @ by, by / (by @ by))
+            matrix = matrix + beside
         steep = np.abs(misfit[free, 0]) / np.maximum(P[free], model.p_unit * 1e-3)
         flat = np.diag(matrix) <= DEAF * steep  # a film that is nowhere full hears nothing of P: ten times as much
         matrix += np.diag(np.where(flat, steep / 9.0 - np.diag(matrix), 0.0))
@@ -138,6 +145,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
             break
         together = follow and count == 1 and solution.settings["method"] == "fas"
         by, P[free] = new_P - P[free], new_P
+        moved = (by, misfit[free, 0], matrix) if by.any() else None
         if model.stored is not None or follow:
             z = solution.fields["p"] - solution.fields["r"] + by @ np.array(answers)
             z = np.where(problem.held.mask.ravel(), np.append(P / problem.p_unit, 0.0)[problem.held.owner.ravel()], z)

@@ -12,6 +12,7 @@ from .loop import LONG
 
 PATIENT = 150  # half steps in which the least change has to halve
 WARMER = 1.0  # of log(viscosity): where a second start is
+LONGER, LONGEST = 1.2, 0.5
 VAIN = 100  # films of Newton's method in which the change has to halve
 NEWTON = {"snes_mf": "", "snes_linesearch_type": "bt", "mat_mffd_err": 1e-6, "snes_ksp_ew": "", "ksp_max_it": 60}
 NEWTON |= {"ksp_gmres_restart": 60, "snes_max_linear_solve_fail": LONG}  # what 60 products give of a step is taken
@@ -75,17 +76,19 @@ def by_films(loop: Any, x: PETSc.Vec, least: tuple[float, Array], watch: Callabl
 def by_half_steps(loop: Any, least: tuple[float, Array], watch: Callable[[], None]) -> tuple[float, Array]:
     """The best fields of half steps from film to film, which go on where old ones would mislead. Collective.
 
-    Where little oil flows, what warms it lasts for many films, and fields change by little for long before they settle.
+    Where little oil flows, what warms it lasts for many films, and fields change by little for long before they settle; where
+    warmer oil turns its flow round, a full step throws it far beyond. A field's part of its step gets shorter where it turns.
     """
     loop.told.append(f"from film {loop.solves + 1} on by half steps")
-    x, mark = least[1], (np.inf, loop.solves)
+    x, mark, part, before = least[1], (np.inf, loop.solves), np.full_like(least[1], 0.5), 0.0 * least[1]
     while loop.solves - mark[1] < PATIENT:
         loop.change, off = loop.off(x, watch)
         least = min(least, (loop.change, x), key=lambda one: one[0])
         if loop.found or not np.isfinite(loop.change):
             break
         mark = (least[0], loop.solves) if least[0] <= 0.5 * mark[0] else mark
-        x = x - 0.5 * np.clip(off, -1.0, 1.0)
+        part = np.where(off * before < 0.0, 0.5 * part, np.minimum(LONGER * part, LONGEST))
+        x, before = x - part * np.clip(off, -1.0, 1.0), off
     loop.change = np.nan_to_num(loop.change, nan=np.inf)
     return least
 

@@ -16,7 +16,7 @@ from .reynolds import sides
 from .strip import line_weights
 
 NOTHING = 1e-18  # of what pressures could turn into heat: the square of what a solve may leave of them
-LEVEL = 1e-15  # of the largest pressure: a drop by less is rounding where no wall moves
+LEVEL = 1e-15  # of the largest pressure: a drop by less is rounding where no wall moves, and what it drives anywhere
 
 
 @dataclass(frozen=True)
@@ -31,6 +31,7 @@ class Carried:
     turns : through the west and east face both ways: what the wall drags out of a part of a cell that is full, and pressure
         drives back into it, m3/s.
     held, kept : of a time step: liquid of a cell over the step's length, m3/s, and what it held before times T, K m3/s.
+    rounding : of all that pressure drives, m3/s.
     """
 
     q: tuple[Array, Array, Array, Array]
@@ -43,6 +44,7 @@ class Carried:
     turns: tuple[Array, Array]
     held: Array
     kept: Array
+    rounding: float
 
     @cached_property
     def both_ways(self) -> tuple[list[Array], list[Array]]:
@@ -70,7 +72,8 @@ def carried(at: Answer, told: bool = True) -> Carried:
     p, r = at.p.reshape(box), at.r.reshape(box)
     beside = around(framed_by(grid, at.p, problem.p_sides))
     k = [unit * a / problem.p_unit for a in (s.k_W, s.k_E, s.k_S, s.k_N)]
-    flat = 0.0 if problem.U else LEVEL * problem.reduce.max(np.abs(p))
+    largest = problem.reduce.max(np.abs(p))
+    flat = 0.0 if problem.U else LEVEL * largest
     pushed = [np.where(np.abs(p - b) > flat, a * (p - b), 0.0) for a, b in zip(k, beside, strict=True)]  # out of the cell
     void_W = grid.ghosted(at.r, outside=0.0)[1:-1, :-2]
     dragged = [-unit * (s.couette_W - s.b_W * void_W), unit * (s.couette_E + s.b_E * r)]
@@ -91,8 +94,8 @@ def carried(at: Answer, told: bool = True) -> Carried:
     if problem.contact is not None:
         carrying = problem.contact.p_a.reshape(box) * areas(problem) * grid.stretch(grid.y)
         by_wall = by_wall + abs(problem.U) * problem.contact.friction * carrying
-    pressures = problem.reduce.sum(np.sum(k, axis=0)) * problem.reduce.max(np.abs(at.p)) ** 2  # what they could turn into heat
-    if not problem.U and not problem.reduce.sum(np.abs(heat)) > NOTHING * pressures:
+    drives = problem.reduce.sum(np.sum(k, axis=0)) * largest
+    if not problem.U and not problem.reduce.sum(np.abs(heat)) > NOTHING * drives * largest:  # of what it could turn into heat
         heat = np.zeros(box)  # rounding
     area, stays, was = grid.cell * point_weights(grid).reshape(box), np.zeros(box), np.zeros(box)
     if problem.stored is not None:
@@ -109,7 +112,7 @@ def carried(at: Answer, told: bool = True) -> Carried:
         if problem.stored is not None:
             work -= np.where(free, p - least, 0.0) * (stays - unit * s.kept)
         power = float(problem.reduce.sum(work))
-    return Carried(q, free, other_free, heat, power, area, sheared, turns, stays, was)
+    return Carried(q, free, other_free, heat, power, area, sheared, turns, stays, was, LEVEL * drives)
 
 
 def _shear(at: Answer, dy: float, other_free: list[Any]) -> tuple[Array, Array]:

@@ -83,8 +83,8 @@ def heated(
         entries.append((dj, di, np.where(still, 0.0, -rho_c * a * near)))
     solver = reduce.through(transport := _Transport(assemble(grid, entries), at.memory))
     heat = np.where(still, 0.0, flow.dissipation + np.where(free, more, 0.0) + H * wall + rho_c * flow.kept).ravel()
-    left = reduce.sum(np.where(free & still & ~dry, np.maximum(flow.dissipation, 0.0), 0.0))
-    nowhere = left > STILL * reduce.sum(np.abs(flow.dissipation))  # heat that no liquid carries away
+    arises = np.abs(flow.sheared if at.problem.U else flow.dissipation)  # by a wall everywhere, however thin the oil gets
+    nowhere = reduce.sum(np.where(free & still & ~dry, arises, 0.0)) > STILL * reduce.sum(arises)  # no liquid carries it away
     try:
         theta, residual = solver(heat)
         theta = np.full_like(theta, np.inf) if nowhere else theta
@@ -137,7 +137,8 @@ def fresh_flow(at: Answer, flow: Carried, carry_over: float | None) -> float:
     reduce = at.problem.reduce
     mixers = _mixers(at, flow, carry_over)
     away = reduce.sum(_over_edge(flow))
-    return float(away - sum(share * reduce.sum(into) for _, into, share in mixers))
+    fresh = float(away - sum(share * reduce.sum(into) for _, into, share in mixers))
+    return fresh if abs(fresh) > flow.rounding else 0.0
 
 
 def _over_edge(flow: Carried) -> Array:
