@@ -408,10 +408,20 @@ def test_a_film_that_carries_nothing_ends_early_and_says_so():
         assert found.converged or (found.outcome == "accuracy_not_reached" and "rounding" in found.message)
 
 
-@pytest.mark.parametrize("scheme", ["face", "upwind"])
-def test_a_line_in_which_nothing_happens_ends_early_and_says_so(scheme):
-    data = {"family": "bearing", "dimension": 1, "L": 0.004, "U": 18.0, "n": 2, "scheme": scheme, "fluid": {"mu": 0.03}}
-    with solve({**data, "film": [{"shape": "constant", "h": 2e-5}]}, accuracy=1e-2) as found:
+RING_AT_REST = {
+    "U": -1.06,
+    "n": 3,
+    "scheme": "face",
+    "fluid": {"mu": 1.5e-3, "density": "dowson-higginson"},
+    "sides": {"west": "periodic", "east": "periodic"},
+    "supply": [{"x": [0.0023, 0.0025], "restrictor": "orifice", "p_s": 7e5, "K": 5e-9, "backflow": True}],
+}
+
+
+@pytest.mark.parametrize("more", [{"scheme": "face"}, {"scheme": "upwind"}, RING_AT_REST], ids=["face", "upwind", "ring"])
+def test_a_line_in_which_nothing_happens_ends_early_and_says_so(more):
+    data = {"family": "bearing", "dimension": 1, "L": 0.004, "U": 18.0, "n": 2, "fluid": {"mu": 0.03}}
+    with solve({**data, "film": [{"shape": "constant", "h": 2e-5}], **more}, accuracy=1e-2) as found:
         assert abs(found.load) < 1e-9
         assert len(found.levels) == 2
         assert found.outcome == "accuracy_not_reached"

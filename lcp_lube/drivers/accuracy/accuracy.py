@@ -142,7 +142,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         ask.tell("accuracy", f"{quantity} to {best.relative:.0e}", of_ladder(seconds, best.relative, tol, 2.0 ** len(shape)))
         times = added(times, solution.times)
         end = _end(estimates, values, tol, problem.grid.size)
-        rounding = _rounding(problem) if pairs or (line and quantity in INTEGRALS) else 0.0
+        rounding = _rounding(solution) if problem.kind == "lubrication" and quantity in INTEGRALS else 0.0
         if not end and len(values) > 1 and max(map(abs, values)) <= rounding:
             noise = f"below {rounding:.0e} N, which is rounding beside what wall and sides could carry"
             end = f"it is {noise if rounding else 0}"
@@ -198,11 +198,17 @@ def _end(estimates: Sequence[float], values: Sequence[float], tol: float, points
     return ""
 
 
-def _rounding(problem: Any) -> float:
-    """What rounding of the flows may make of an integral of the pressure, N: all that some films carry. Collective."""
+def _rounding(solution: Solution) -> float:
+    """What rounding of the flows may make of an integral of the pressure, N: all that some films carry. Collective.
+
+    A line's oil settles with its pressures, which leaves some more.
+    """
+    problem: Any = solution.problem
     mu, least = float(np.max(problem.mu)), problem.reduce.min(problem.scheme.h.ravel())
     wall = 6.0 * mu * abs(problem.U) * problem.grid.lengths[0] / least**2
-    return 30.0 * np.finfo(float).eps * max(wall, *problem.p_sides) * prod(problem.grid.lengths)
+    inside = problem.reduce.largest(solution.fields["p"])  # a supply may hold more than the sides do
+    share = 1e-13 if problem.grid.dim == 1 else 30.0 * np.finfo(float).eps
+    return float(share * max(wall, inside, *problem.p_sides) * prod(problem.grid.lengths))
 
 
 def _stopping(ask: Ask, tol: float, before: Solution | None) -> Stopping | Mapping[str, Any] | None:
