@@ -36,6 +36,7 @@ TOLERANCE = 1e-10  # of the largest flow: by how much what a source gives may di
 DIGITS, ENOUGH = 1e-7, 1e-4  # steps of such parts of the largest pressure may be rounding; the misfit that may be left then
 PATIENCE, GIVE_UP = 2, 8  # such steps that do not halve the misfit, before one that is left is enough; or given up
 DEAF = 1e-9  # of the slope that would end the misfit within P: a flow that follows P less does so by rounding
+LIKELY = 20.0  # times a film's slope, or a part of it: what coefficients that follow make of it
 FIRST = 0.5  # part of p_s behind a restrictor, to begin with
 
 
@@ -103,7 +104,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     resting, least, enough = 0, np.inf, ENOUGH if known_before else TOLERANCE
     together = False  # film and pressures
     moved: Any = None  # the last step, and from where
-    beside: Any = 0.0  # what effects add to the matrix
+    beside: Any = 0.0  # what effects add to the slopes
     for count in range(1, MOST_SOLVES + 1):
         held = tuple(Supply(one.region, float(p)) for one, p in zip(supplies, P, strict=True))
         if together:
@@ -124,12 +125,13 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         if np.max(off) <= TOLERANCE or starved.any() or count == MOST_SOLVES or known_before:
             break
         slopes, answers = _slopes(problem, solution.fields, free)
+        if moved is not None:  # the film's coefficients follow as well: what the last step has changed (Broyden's slopes)
+            by, before, was = moved
+            secant = slopes + beside + np.outer(flows[free] - before - was @ by, by / (by @ by))
+            likely = np.diag(slopes) / LIKELY < np.diag(secant)
+            likely &= np.diag(secant) < LIKELY * np.diag(slopes)
+            slopes, beside = (secant, secant - slopes) if likely.all() else (slopes, 0.0)
         matrix = misfit[free, 2:] * slopes + np.diag(misfit[free, 1])
-        if model.effects:  # the film's coefficients follow as well: by what the last step has changed (Broyden)
-            if moved is not None:
-                by, before, was = moved
-                beside = beside + np.outer(misfit[free, 0] - before - was @ by, by / (by @ by))
-            matrix = matrix + beside
         steep = np.abs(misfit[free, 0]) / np.maximum(P[free], model.p_unit * 1e-3)
         flat = np.diag(matrix) <= DEAF * steep  # a film that is nowhere full hears nothing of P: ten times as much
         matrix += np.diag(np.where(flat, steep / 9.0 - np.diag(matrix), 0.0))
@@ -145,7 +147,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
             break
         together = follow and count == 1 and solution.settings["method"] == "fas"
         by, P[free] = new_P - P[free], new_P
-        moved = (by, misfit[free, 0], matrix) if by.any() else None
+        moved = (by, flows[free], slopes) if model.effects and by.any() else None
         if model.stored is not None or follow:
             z = solution.fields["p"] - solution.fields["r"] + by @ np.array(answers)
             z = np.where(problem.held.mask.ravel(), np.append(P / problem.p_unit, 0.0)[problem.held.owner.ravel()], z)

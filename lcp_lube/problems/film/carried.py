@@ -11,7 +11,7 @@ from .cavity import cavity_sign
 from .contact import areas
 from .effects import Answer, around, framed_by
 from .flows import linear, point_weights, sheared_faces, volume_unit
-from .forces import open_pressures
+from .forces import ambient
 from .reynolds import sides
 from .strip import line_weights
 
@@ -104,7 +104,7 @@ def carried(at: Answer, told: bool = True) -> Carried:
     heat, power = np.where(free, heat + by_wall, 0.0), np.nan
     if told:
         # No oil is lost: the pumps' work may be counted from any level of pressure, best from one that is among theirs.
-        least = min((a for a in open_pressures(problem) if a is not None), default=0.0)
+        least = ambient(problem)
         first_west = (sides(grid)[0] | ~other_free[0]) & free
         work = np.where(free, by_wall + drag * (beside[1] - p), 0.0) - np.where(first_west, dragged[0] * (p - beside[0]), 0.0)
         for flow, near, is_free in zip(q, beside, other_free, strict=True):
