@@ -11,7 +11,7 @@ from ...base.compiled import kernel, piece
 from ...base.parallel import Array
 from .fronts import relax_pairs
 from .held import free_spans
-from .kernels import balance_row
+from .kernels import balance_at
 
 MOST_STEPS = 60  # sets of full cells; what has not settled is left to the cycles at the best of them
 MOST_SINGULAR = 8  # steps without a solution, for signs may pass through a closed line of void
@@ -76,12 +76,11 @@ def residual_square(
     z: Array, kx: Array, ky: Array, c: Array, carry: Array | None = None, held: NDArray[np.bool_] | None = None
 ) -> float:
     """||c - G(z)||^2 of the points that are free."""
-    G, total = np.zeros(z.shape[1]), 0.0
+    total = 0.0
     for m in range(1, z.shape[0] - 1):
-        balance_row(z, kx, ky, m, G, carry)
         for i in range(1, z.shape[1] - 1):
             if held is None or not held[m, i]:
-                total += (c[m, i] - G[i]) ** 2
+                total += (c[m, i] - balance_at(z, kx, ky, m, i, carry)) ** 2
     return total
 
 
@@ -118,15 +117,13 @@ def newton_step(
         for i in range(1, nx + 1):
             s, f = (i - 1, m - 1) if by_columns else (m - 1, i - 1)
             at[m, i] = place(s, slow, ring) * fast + f
-    G = np.zeros(nx + 2)
     for m in range(1, ny + 1):
-        balance_row(z, kx, ky, m, G, carry)
         for i in range(1, nx + 1):
             here, full = at[m, i], z[m, i] > 0.0
             if held is not None and held[m, i]:
                 J[here, b] = 1.0
                 continue
-            d[here] = c[m, i] - G[i]
+            d[here] = c[m, i] - balance_at(z, kx, ky, m, i, carry)
             k_W, k_E, k_S, k_N = kx[m, i], kx[m, i + 1], ky[m, i], ky[m + 1, i]
             J[here, b] += k_W + k_E + k_S + k_N + (0.0 if carry is None else carry[1, m, i]) if full else 1.0
             if i < nx or ring_x:

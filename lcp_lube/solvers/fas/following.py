@@ -19,7 +19,7 @@ from ...problems.film.sources import balanced
 from ...problems.film.supplies import Held, Supply, supply_flows
 from ...problems.solution import Fields
 from . import levels as tools
-from .kernels import balance_row
+from .kernels import balance_at
 
 LEAST = 0.5  # of a pressure, in one step
 STEP = 1e-3  # of a pressure, by which the coarsest grid's answer to it is found
@@ -168,13 +168,11 @@ def _at(problem: LubricationProblem, own: dict[int, float]) -> list[Supply]:
 @kernel
 def sums(z: Array, kx: Array, ky: Array, owner: Array, carry: Array | None, n: int) -> Array:
     """Of G over the points of each supply."""
-    out, G = np.zeros(n), np.zeros(z.shape[1])
+    out = np.zeros(n)
     for m in range(1, z.shape[0] - 1):
-        if owner[m, 1:-1].any():
-            balance_row(z, kx, ky, m, G, carry)
-            for i in range(1, z.shape[1] - 1):
-                if owner[m, i] > 0:
-                    out[int(owner[m, i]) - 1] += G[i]
+        for i in range(1, z.shape[1] - 1):
+            if owner[m, i] > 0:
+                out[int(owner[m, i]) - 1] += balance_at(z, kx, ky, m, i, carry)
     return out
 
 

@@ -17,7 +17,7 @@ from ...base.compiled import kernel, piece
 from ...base.parallel import Array
 from . import transfer
 from .front_points import without
-from .kernels import balance_row, relax
+from .kernels import balance_at, relax
 
 if TYPE_CHECKING:
     from .levels import Level
@@ -116,10 +116,7 @@ def sweep(
 @kernel
 def settle_rows(z: Array, kx: Array, ky: Array, c: Array, held: NDArray[np.bool_], carry: Array | None) -> None:
     """c = G(z) at the held points."""
-    G = np.zeros(z.shape[1])
     for m in range(1, z.shape[0] - 1):
-        if held[m, 1:-1].any():
-            balance_row(z, kx, ky, m, G, carry)
-            for i in range(1, z.shape[1] - 1):
-                if held[m, i]:
-                    c[m, i] = G[i]
+        for i in range(1, z.shape[1] - 1):
+            if held[m, i]:
+                c[m, i] = balance_at(z, kx, ky, m, i, carry)

@@ -159,31 +159,27 @@ def relax(z: Array, kx: Array, ky: Array, c: Array, m: int, start: int, end: int
 
 
 @piece
-def balance_row(z: Array, kx: Array, ky: Array, m: int, out: Array, carry: Array | None = None) -> None:
-    """G of the points of row m into out[1:-1]."""
-    for i in range(1, z.shape[1] - 1):
-        k_W, k_E, k_S, k_N = kx[m, i], kx[m, i + 1], ky[m, i], ky[m + 1, i]
-        west, here = z[m, i - 1], z[m, i]
-        p = max(here, 0.0)
-        # Differences of pressures, which are exact where these hardly differ: in a deep pocket the terms themselves drown all.
-        out[i] = (
-            (k_W * (p - max(west, 0.0)) + k_E * (p - max(z[m, i + 1], 0.0)))
-            + (k_S * (p - max(z[m - 1, i], 0.0)) + k_N * (p - max(z[m + 1, i], 0.0)))
-        ) + (min(here, 0.0) - (min(west, 0.0) if carry is None else carry[0, m, i - 1] * min(west, 0.0)))
-        if carry is not None:
-            out[i] += carry[1, m, i] * p
+def balance_at(z: Array, kx: Array, ky: Array, m: int, i: int, carry: Array | None) -> float:
+    """G of a point; loops over columns that are unsigned become vector instructions, and go over what they need once."""
+    k_W, k_E, k_S, k_N = kx[m, i], kx[m, i + 1], ky[m, i], ky[m + 1, i]
+    west, here = z[m, i - np.uint32(1)], z[m, i]
+    p = max(here, 0.0)
+    # Differences of pressures, which are exact where these hardly differ: in a deep pocket the terms themselves drown all.
+    out = (
+        (k_W * (p - max(west, 0.0)) + k_E * (p - max(z[m, i + 1], 0.0)))
+        + (k_S * (p - max(z[m - 1, i], 0.0)) + k_N * (p - max(z[m + 1, i], 0.0)))
+    ) + (min(here, 0.0) - (min(west, 0.0) if carry is None else carry[0, m, i - np.uint32(1)] * min(west, 0.0)))
+    return out if carry is None else out + carry[1, m, i] * p
 
 
 @kernel
 def norms(z: Array, kx: Array, ky: Array, c: Array, carry: Array | None, start: int, end: int) -> tuple[float, float]:
     """Sums of squares over rows start to end - 1: of the residual c - G, and of the size of its largest terms."""
     nx = z.shape[1] - 2
-    G, residual, terms = np.zeros(nx + 2), np.zeros(nx + 2), np.zeros(nx + 2)  # sums column by column: vector instructions
+    residual, terms = np.zeros(nx + 2), np.zeros(nx + 2)  # sums column by column: vector instructions
     for m in range(start, end):
-        balance_row(z, kx, ky, m, G, carry)
-        for i in range(1, nx + 1):
-            residual[i] += (c[m, i] - G[i]) ** 2
-        for i in range(1, nx + 1):
+        for i in range(np.uint32(1), np.uint32(nx + 1)):
+            residual[i] += (c[m, i] - balance_at(z, kx, ky, m, i, carry)) ** 2
             diagonal = kx[m, i] + kx[m, i + 1] + ky[m, i] + ky[m + 1, i]
             terms[i] += (abs(c[m, i]) + max(diagonal * z[m, i], -z[m, i])) ** 2
     return residual.sum(), terms.sum()
@@ -192,11 +188,9 @@ def norms(z: Array, kx: Array, ky: Array, c: Array, carry: Array | None, start: 
 @kernel
 def add_balance(z: Array, kx: Array, ky: Array, c: Array, carry: Array | None, start: int, end: int) -> None:
     """c += G(z) in rows start to end - 1: then z solves the equations of which c held the residual."""
-    G = np.zeros(z.shape[1])
     for m in range(start, end):
-        balance_row(z, kx, ky, m, G, carry)
-        for i in range(1, z.shape[1] - 1):
-            c[m, i] += G[i]
+        for i in range(np.uint32(1), np.uint32(z.shape[1] - 1)):
+            c[m, i] += balance_at(z, kx, ky, m, i, carry)
 
 
 @kernel

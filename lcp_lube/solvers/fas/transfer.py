@@ -5,7 +5,7 @@ import numpy as np
 from ...base.compiled import kernel, piece
 from ...base.parallel import Array
 from .fronts import reforms
-from .kernels import balance_row
+from .kernels import balance_at
 
 
 @piece
@@ -51,13 +51,8 @@ def restrict(
     first, last = (2 * (start - 1 + y0 // 2) - y0 + 1, 2 * (end - 1 + y0 // 2) - y0 + 1) if by_y else (start, end - 1)
     r, w, coarse, south = np.zeros(nx + 2), np.zeros(n_coarse + 1), np.zeros(n_coarse + 2), np.zeros(n_coarse + 2)
     for m in range(max(first, 1), min(last, ny) + 1):
-        if residual:
-            balance_row(z, kx, ky, m, r, carry)
-            for i in range(1, nx + 1):
-                r[i] = c[m, i] - r[i]
-        else:
-            for i in range(1, nx + 1):
-                r[i] = c[m, i]
+        for i in range(np.uint32(1), np.uint32(nx + 1)):
+            r[i] = c[m, i] - balance_at(z, kx, ky, m, i, carry) if residual else c[m, i]
         if by_x:
             west_shares(kx, m, harmonic, w)
         restrict_row(r, w, by_x, wrap, coarse)
