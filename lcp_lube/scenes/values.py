@@ -38,7 +38,7 @@ def _collect(value: Any, path: str, found: dict[str, float]) -> None:
 
 
 def key_of(scene: Scene, text: str) -> str:
-    """The key of `values_of` that a text means; its table may be left out where that leaves one.
+    """The key of `values_of` that a text means; its table, or which one of several, may be left out where that leaves one.
 
     Raises
     ------
@@ -47,7 +47,7 @@ def key_of(scene: Scene, text: str) -> str:
     known = values_of(scene)
     if text in known:
         return text
-    ends = [key for key in known if key.endswith(f".{text}") or _numbered(scene, key) == text]
+    ends = [key for key in known if key.endswith(f".{text}") or text in (_numbered(scene, key), _of_any(key))]
     if len(ends) == 1:
         return ends[0]
     words = text.split(".")
@@ -75,6 +75,12 @@ def unit_of(scene: Scene, key: str) -> str:
     """SI unit of a number of `values_of`; empty if it has none."""
     units, name = scene.data_units(), _numbered(scene, key)
     return units.get(name, units.get(name.rpartition(".")[0], ""))
+
+
+def _of_any(key: str) -> str:
+    """film.depth for film.pocket.depth."""
+    table, _, rest = key.partition(".")
+    return f"{table}.{rest.partition('.')[2]}"
 
 
 def _numbered(scene: Scene, key: str) -> str:

@@ -285,7 +285,7 @@ def test_cells_about_to_change_are_counted():
 
 def test_keys():
     scene = load_scene("pocketed_pad")
-    assert key_of(scene, "film.2.depth") == key_of(scene, "depth") == "film.pocket.depth"
+    assert key_of(scene, "film.2.depth") == key_of(scene, "film.depth") == key_of(scene, "depth") == "film.pocket.depth"
     moved = with_values(scene, {"film.pocket.x.1": 2.5e-3, "film.pocket.x.2": 5.5e-3, "fluid.mu": 0.02})
     assert moved.film[1].x == (2.5e-3, 5.5e-3) and moved.fluid.mu == 0.02
     for text, message in (
