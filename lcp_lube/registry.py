@@ -260,6 +260,7 @@ DRIVERS: dict[str, Entry] = {
     "attitude": Entry("lcp_lube.drivers.loads.attitude", "the attitude that follows from the load's direction", JOURNALS),
     "time": Entry("lcp_lube.drivers.marches.time", "step by step, where the film moves", table="motion"),
     "turned": Entry("lcp_lube.drivers.turned", "a wall that moves to smaller x, by the mirror image"),
+    "rims": Entry("lcp_lube.drivers.rims", "films with round edges, once more with faces made for their cavities"),
     "supplies": Entry("lcp_lube.drivers.supplies", "pressures of supplies behind restrictors, or of given flow"),
     "warm": Entry("lcp_lube.drivers.warm", "from a neighbour's answer, or anew where that leads nowhere"),
     "coupling": Entry("lcp_lube.drivers.effects.coupling", "effects: coefficients that depend on the answer, in one loop"),

@@ -11,7 +11,6 @@ from ..base.stages import Stages
 from ..problems.box import BoxProblem
 from ..problems.certificate import Certificate
 from ..problems.facts import Facts
-from ..problems.film.cavity import cavitated
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Enclosure, Fields, Outcome, Problem, Solution, Step
 from ..registry import METHODS
@@ -19,7 +18,7 @@ from ..scenes.scene import Solvable
 from ..solvers.enclosure import enclose
 from ..solvers.job import Job
 from ..solvers.method import Method
-from ..solvers.newton import Stopping, iterate
+from ..solvers.newton import Stopping
 from . import memory
 from .ask import Ask, Start
 from .checkpoint import CHOICES, Checkpoint, Checkpointer, load, scene_record
@@ -68,7 +67,6 @@ def solve(scene: Solvable, ask: Ask, inner: Inner | None = None) -> Solution:
         estimate = memory.check(facts, chosen, problem.grid.comm, ask.memory_check, held)
         run.grids(ask.start)
     run.take_over()
-    problem = run.revise()
     outcome, message = run.outcome, run.message
     certificate = run.certificate or ask.certify_by(problem, run.fields, run.stopping.eps1)
     enclosure = run.enclose(problem) if ask.certify and isinstance(problem, LubricationProblem) else None
@@ -200,36 +198,6 @@ class Run:
         start = self.problem.prolong(coarse.problem, coarse.fields, False) if coarse.converged else None
         coarse.destroy()
         return start
-
-    def revise(self) -> Problem:
-        """Of a film with round edges: solve once more, from the answer on, with their faces made for its cavities (`rims`).
-
-        The problem whose answer stands: the first one where there are no cavities, or the second solve fails.
-        """
-        first = self.problem
-        if not isinstance(first, LubricationProblem) or first.coefficients_for is None or self.outcome is not Outcome.CONVERGED:
-            return first
-        dry = cavitated(first.reduce, self.fields["p"], self.fields["r"]).astype(float)
-        if not first.reduce.max(dry) > 0:
-            return first
-        self.certificate = None
-        again = first.revised(dry)
-        entry, chosen = METHODS[self.method].of(again.kind), self.method == self.chosen.method
-        start, options = None if entry.interior else self.fields, self.options if chosen else {}
-        with recipe(self.chosen.recipe if chosen else self._rescue_solver(self.method)[1]), self.stages("revision"):
-            method = entry.load()(Job(again, self.stages, self.system, options, self.stopping, start))
-            try:
-                outcome, _, steps = iterate(method, self.stopping, None, [])
-                fields = method.fields
-            finally:
-                method.destroy()
-        if outcome is not Outcome.CONVERGED or not again.certify(fields, self.stopping.eps1).holds:
-            again.free_matrices()
-            return first
-        first.free_matrices()
-        self.problem, self.fields, self.steps = again, fields, [*self.steps, *steps]
-        self.details = {**self.details, "revised": int(again.reduce.sum(dry))}
-        return again
 
     def _plan(self, method: str, nested: bool | None = None) -> Plan:
         """As if this method had been asked for, and nothing else."""

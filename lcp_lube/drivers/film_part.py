@@ -162,7 +162,7 @@ def part_of(scene: Solvable, problem: Problem) -> Part | None:
     pressures = {side.p for side in model.sides[: 2 * grid.dim] if side.kind == "open"}
     if _at_rest(model):
         return Part(scene, "constant")
-    rims = problem.coefficients_for is not None  # faces see round edges that no point or middle of a face may lie in
+    rims = model.cut  # faces see round edges that no point or middle of a face may lie in
     still = model.stored is None and not model.supplies and not west.r and "closed" not in (west.kind, east.kind) and not rims
     if len(pressures) == 1 and still and _is_constant(problem):
         return Part(scene, "constant")

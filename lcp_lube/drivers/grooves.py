@@ -136,9 +136,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
             done[k] = inner(films[k][1], replace(ask, start=starts.get(k)))
     for start in starts.values():
         start.problem.destroy()
-    fields, dry = _spread(ring, films, {k: (one.problem, one.fields) for k, one in done.items()}, comm)
-    if ring.reduce.max(dry) > 0:
-        ring = ring.revised(dry)  # type: ignore[assignment]
+    fields = _spread(ring, films, {k: (one.problem, one.fields) for k, one in done.items()}, comm)
     first = {k: (one.outcome, one.message, one.steps, one.settings, one.times) for k, one in done.items()}
     told = sorted({k: one for part in comm.allgather(first) for k, one in part.items()}.items())
     band = _band(ring, films, fields, done, comm) if ask.certify else None
@@ -174,7 +172,7 @@ def _band(ring: Any, films: Films, fields: Fields, done: dict[int, Solution], co
     if missing:
         return Enclosure(False, f"film {missing[0][0] + 1} of {len(films)} between grooves: {missing[0][1]}")
     lower, upper = (
-        _spread(ring, films, {k: (done[k].problem, getattr(band, end)) for k, band in mine.items()}, comm)[0]
+        _spread(ring, films, {k: (done[k].problem, getattr(band, end)) for k, band in mine.items()}, comm)
         for end in ("lower", "upper")
     )
     bounds = bounds_of(ring, fields, lower, upper)
@@ -207,19 +205,15 @@ def _taken(
     return {k: (at[k], dict(zip(fields, part, strict=True))) for k, part in zip(mine, parts, strict=True)}
 
 
-def _spread(ring: GroovedProblem, films: Films, done: dict[int, tuple[Any, Fields]], comm: MPI.Comm) -> tuple[Fields, Array]:
-    """The ring's fields from its films and grooves, and which of its points a film took to be cavitated. Collective."""
+def _spread(ring: GroovedProblem, films: Films, done: dict[int, tuple[Any, Fields]], comm: MPI.Comm) -> Fields:
+    """The ring's fields from its films and grooves. Collective."""
     j, i = (one.ravel() for one in np.broadcast_arrays(*numbers(ring.grid)))
     which, column = np.full(j.size, -1), np.zeros(j.size, dtype=np.int64)
     for k, (pad, _) in enumerate(films):
         at = (i - pad.first) % ring.grid.shape[0]
         which, column = np.where(at < pad.n, k, which), np.where(at < pad.n, at, column)
-    have = []
-    for k, (problem, found) in done.items():
-        dry = getattr(problem, "dry", None)
-        fields = (found["p"], found["r"], dry if dry is not None else np.zeros(problem.grid.local_size))
-        have.append((k, problem.grid, np.array(fields)))
-    p, r, dry = fetch(comm, have, which, j, column)
+    have = [(k, problem.grid, np.array([found["p"], found["r"]])) for k, (problem, found) in done.items()]
+    p, r = fetch(comm, have, which, j, column)
     for inside, groove in zip(ring.columns, ring.grooves, strict=True):
         p[inside] = groove.p / ring.p_unit
-    return {"p": p, "r": r}, dry
+    return {"p": p, "r": r}

@@ -120,7 +120,7 @@ class _Whole:
     """The whole problem, and the fields that a part's answer spreads out to; for several answers, the last one's."""
 
     def __init__(self, part: Part, problem: Any):
-        self.problem, self._first, self._part = problem, problem, part
+        self.problem, self._part = problem, part
         self.fields: Fields = {}
         self._seen: Fields = {}
         self._found: Certificate
@@ -128,10 +128,8 @@ class _Whole:
     def certify(self, small: Any, fields: Fields, eps1: float) -> Certificate:
         """Of the part's fields by the whole problem's data, once for the same ones. Collective."""
         if self._seen is not fields:
-            spread = Pick(small.grid, self._first.grid, *self._part.places(self._first.grid))
+            spread = Pick(small.grid, self.problem.grid, *self._part.places(self.problem.grid))
             self._seen, self.fields = fields, {name: spread(values) for name, values in fields.items()}
-            if (dry := getattr(small, "dry", None)) is not None:
-                self.problem = self._first.revised(spread(dry))
             if (held := getattr(small, "held", None)) is not None:  # pressures of supplies may have followed
                 pairs = zip(self.problem.held.supplies, held.supplies, strict=True)
                 self.problem.hold_at([replace(one, p=found.p) for one, found in pairs])

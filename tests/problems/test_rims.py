@@ -62,6 +62,28 @@ def test_a_full_film_is_left_as_it_is():
     solution.destroy()
 
 
+SUPPLY = {"shape": "hole", "at": [1e-5, 1e-5], "diameter": 1e-6, "restrictor": "capillary", "K": 1e-30, "p_s": 2e5}
+TINY = {
+    "law": {"fluid.barus": 1e-25},
+    "shear": {"shear": {"law": "eyring", "tau_0": 1e15}},
+    "heat": {"temperature": {"model": "energy", "T_in": 300.0, "beta": 1e-12}},
+    "roughness": {"roughness": {"sigma": 1e-13}, "U": -1.0},
+    "supply": {"supply": [SUPPLY]},
+    "time": {"motion": {"t_end": 1e-8, "steps": 2}, "shear": {"law": "eyring", "tau_0": 1e15}},
+}
+
+
+@pytest.mark.parametrize("name", TINY)
+def test_what_has_no_effect_changes_no_load(name):
+    """Faces are made for the cavities whatever acts on the film: next to nothing leaves the load as it is without."""
+    changes = {"film.dimples.columns": 2, "film.dimples.rows": 1, "film.dimples.size_mm": 4.0, "fluid.p_supply": 2e4}
+    plain, other = pad(25, **changes, U=TINY[name].get("U", 1.0)), pad(25, **changes, **TINY[name])
+    with solve(plain) as one, solve(other, model="full") as two:
+        assert two.converged and one.settings["details"]["revised"] > 20
+        assert two.numbers["load"] == pytest.approx(one.numbers["load"], rel=1e-8)
+        assert two.numbers["friction"] == pytest.approx(one.numbers["friction"], rel=1e-8)
+
+
 @settings(max_examples=15, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.floats(0.1, 1e3), st.sampled_from([-1.0, 0.03, 1.0, 50.0]))
 def test_coefficients_keep_the_form_for_any_cavities(seed, depth_um, U):

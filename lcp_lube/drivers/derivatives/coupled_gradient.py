@@ -250,6 +250,7 @@ class CoupledGradient(CoupledResponse):
             held = zip(scene.model.supplies, self.supplies, strict=True)
             scene = Fed(scene, tuple(Supply(one.region, known.p) for one, known in held))
         loop = Loop(scene, Ask(comm=self.loop.base.grid.petsc_comm), None)  # type: ignore[arg-type]
+        loop.base = loop.base.revised(self.loop.base.dry)
         try:
             if loop.base.grid.shape != self.loop.base.grid.shape or loop.names != self.loop.names:
                 raise InputError("the grid or the effects are others beside this value")

@@ -35,8 +35,8 @@ from ..turned import Mirrored
 
 FLIPPED = {"flow_west": "flow_east", "flow_east": "flow_west"}
 # What is found around a film that derivatives know of; of what is coupled, a fluid's law alone.
-THROUGH = {"decision", "accuracy", "anew", "pads", "balance", "position", "attitude", "turned", "supplies", "warm", "coupling"}
-THROUGH |= {"grooves", "symmetry", "direct"}
+THROUGH = {"decision", "accuracy", "anew", "pads", "balance", "position", "attitude", "turned", "rims", "supplies", "warm"}
+THROUGH |= {"coupling", "grooves", "symmetry", "direct"}
 DRAGS = ("friction", "friction_torque")
 MISFIT = "supply_misfit_"  # by which a supply's source and film disagree, 0 at the solution
 STEP = 1e-3  # relative, of the numbers that another one is made of: five values give its derivatives to rounding

@@ -79,8 +79,9 @@ class FirstOrder:
         pressures = [float(P) for P in solution.settings.get("supply_pressures", ())]
         self.scene = placed(self.scene, solution)
         bare = without(self.scene, named(scene))
+        solved: Any = getattr(solution.problem, "moving", solution.problem)
         own = getattr(solution.problem, "rigid", None) or (None if self.kept else solution.problem)  # solved without effects
-        self.equations = eq = Equations(bare, grid.petsc_comm, pressures, solved=own)
+        self.equations = eq = Equations(bare, grid.petsc_comm, pressures, dry=solved.dry, solved=own)
         self.base, (self.p, self.r) = eq.constant, fields_of(solution)
         self.h = self.base.scheme.h.ravel()
         model = (Mirrored(self.scene) if eq.turned else self.scene).model
@@ -89,7 +90,6 @@ class FirstOrder:
         every = self._physics(named(scene))[1]
         if any(getattr(effect, "even_lines", False) for effect in every) and not self.base.grid.even:
             raise InputError(f"scene {scene.name}: an effect of it needs even lines")
-        solved: Any = getattr(solution.problem, "moving", solution.problem)
         self.cells = {**neutral(every, self.h.size), **solved.cells}
         if "barus" in named(scene):
             self.cells.setdefault("viscosity", np.ones(self.h.size))

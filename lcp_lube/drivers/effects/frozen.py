@@ -61,20 +61,12 @@ class Frozen(Derived):
     def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
         problem = self.constant.build(self.shape, comm) if self.base is None else copy(self.base)
         problem.shares_grid = problem.shares_grid or self.base is not None
-        self._keep(problem)
         if problem.held is not None and self.law.barus:
             problem.held = replace(problem.held, law=self.law)
         return problem if self.by is None else self.by.film(problem)
 
     def factored(self, problem: Any, j: NDArray[np.int64], i: NDArray[np.int64]) -> Any:
-        self._keep(problem)
         return problem if self.by is None else self.by.on(problem.grid, j, i).film(problem)
-
-    def _keep(self, problem: Any) -> None:
-        """Of a film in q alone its round edges make faces for its cavities; of effects what is certified is another problem."""
-        model: Model = self.whole.model
-        if self.by is not None or model.effects or model.dense:
-            problem.coefficients_for = None
 
 
 def settled(ask: Ask, stored: Stored | None, moved: float, reach: float = np.inf) -> float:

@@ -133,8 +133,6 @@ class Loop:
         self.beyond = bool(b) and not self.base.reduce.max(b * q) < 1.0
         if self.beyond and {"viscosity", "lift"} & set(self.names):  # of an iterate: hotter oil, softer walls may carry it
             q = np.minimum(q, STEEPEST / b)
-        if not self.names:
-            self.base = self.base.revised(new.problem.dry)  # type: ignore[attr-defined]
         p, problem, fields = self.law.pressure(q), new.problem, new.fields
         by, own = filled(plain, by, q), renewed(problem, self.law, None if new.took_over else p)
         self.own = None if own is None else self.vector(own)

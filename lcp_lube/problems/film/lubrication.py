@@ -78,8 +78,8 @@ class LubricationProblem:
         self.grid, self.reduce, self.scheme, self.film = grid, grid.reduce, scheme, film
         self.mu, self.U, self.p_unit, self.p_sides, self.p_c = mu, U, p_unit, p_sides, p_c
         self.exact, self.shaft, self.r_in, self.held, self.integrals = exact, shaft, r_in, held, integrals
-        self.coefficients_for: Callable[..., BoxScheme] | None = None  # of a film with rims: by which points are cavitated
-        self.dry: Array | None = None  # the points for which they have been made, 1 or 0; None: no revision yet
+        self.coefficients_for: Callable[[Array], tuple[BoxScheme, Any]] | None = None  # of a film with rims, by its cavities
+        self.dry: Array | None = None  # the points for which they have been made, 1 or 0; None: those of a full film
         self.extras: Callable[[dict[str, Any]], dict[str, Any]] | None = None
         self.more: dict[str, Any] = {}  # numbers and fields (values, unit) of what is solved beside p and r
         self.more_fields: dict[str, tuple[Array, str]] = {}
@@ -258,7 +258,7 @@ class LubricationProblem:
         """The film with faces at round edges (`rims`), if any, made for these points, if any: 1 where cavitated. Collective."""
         if dry is None or self.coefficients_for is None:
             return self
-        (other := copy(self)).dry, other.scheme = dry, self.coefficients_for(cavity=dry)
+        (other := copy(self)).dry, other.scheme = dry, pressed(self.coefficients_for(dry)[0], self.held, self.p_unit)
         return other
 
     def with_scheme(

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,7 @@ from .integrals import LineIntegrals, line_integrals
 from .lines import SAME, on_edges, stretches
 from .lubrication import LubricationProblem
 from .reynolds import BoxScheme, Film, box_scheme, coefficients
-from .stored import Stored
+from .stored import Dry, Stored
 from .supplies import Held, Supply, hold, owners
 from .turned import TurnedProblem
 from .turning import Shaft
@@ -81,6 +80,7 @@ class Model:
     places: Places | None = None  # of the lines of points; None: on the film's straight edges, if it has any
     effects: tuple[Effect, ...] = ()  # what else makes its coefficients depend on the answer; `build` leaves them out
     stored: Stored | None = None  # by the cells, in a time step
+    dry: Dry | None = None  # the cavities for which faces that round edges cut are made; None: a full film's
     in_time: bool = False  # what its cells store goes on: then it may be sealed
     extras: Callable[[dict[str, Any]], dict[str, Any]] | None = None  # the bearing's own numbers, made of the film's
 
@@ -117,6 +117,12 @@ class Model:
     def dense(self) -> bool:
         """Whether the density follows the pressure."""
         return self.law is not None and self.law.dowson_higginson
+
+    @property
+    def cut(self) -> bool:
+        """Whether round edges cut faces that are made for cavities (`rims`)."""
+        known = self.scheme == "face" and not self.mean_cubes and len(self.lengths) == 2
+        return known and bool(getattr(self.gap, "rims", ()))
 
     @property
     def film(self) -> Film:
@@ -208,9 +214,12 @@ class Model:
 
             owner = np.concatenate(grid.comm.allgather(owners(grid, self.supplies).ravel()))
             integrals.part(supplied(integrals, grid, self.supplies, owner))
-        scheme_for = partial(box_scheme, grid, self.gap, **self._data, integrals=integrals)
-        scheme = scheme_for()
-        scheme, held = self._held(grid, scheme, integrals)
+
+        def scheme_for(cavity: Array | None) -> tuple[BoxScheme, Held | None]:
+            return self._held(grid, box_scheme(grid, self.gap, **self._data, integrals=integrals, cavity=cavity), integrals)
+
+        dry = None if self.dry is None else self.dry.on(grid)
+        scheme, held = scheme_for(dry)
         problem = kind(
             grid,
             scheme,
@@ -231,8 +240,8 @@ class Model:
         problem.tops = self.scheme == "face" and problem.edged
         if isinstance(problem, GroovedProblem):
             problem.grooves = self.grooves
-        if getattr(self.gap, "rims", ()) and not self.supplies and self.law is None:
-            problem.coefficients_for = scheme_for
+        if self.cut:
+            problem.coefficients_for, problem.dry = scheme_for, dry
         return problem
 
     @property
@@ -277,8 +286,9 @@ class Model:
             sides = (Side(p=pad.west), Side(p=pad.east), *self.sides[2:])
             gap = FromHere(self.gap, float(pad.around[0]), self.lengths[0])
             stored = self.stored.starting(pad.first) if self.stored else None
+            dry = self.dry.starting(pad.first) if self.dry else None
             even = np.allclose(np.diff(x), x[-1] / (pad.n + 1), rtol=SAME, atol=0.0)
             changed: dict[str, Any] = {"grooves": (), "levers": (), "places": (None if even else x[1:-1], y), "stored": stored}
-            film = replace(self, lengths=lengths, sides=sides, gap=gap, exact=None, **changed)
+            film = replace(self, lengths=lengths, sides=sides, gap=gap, exact=None, dry=dry, **changed)
             films.append((pad, film))
         return films

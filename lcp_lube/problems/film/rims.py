@@ -5,7 +5,7 @@ crosses it. That is right where the film is full. Where a dimple is cavitated it
 ends: only the film before it resists, and carries, and what lies behind would be a length that varies with the rim's place in
 the cell, an error of first order. A fixed coefficient cannot know; the answer does. So a problem with such faces is solved, its
 cavities are looked at, and it is solved once more, from the answer on, with the cut faces made for them
-(`LubricationProblem.revised`). Either problem is of the one form, with positive conductances that both cells share and Couette
+(`drivers.rims`). Either problem is of the one form, with positive conductances that both cells share and Couette
 flows that leave one cell and enter the next: its solution is unique, and certificate and bands hold as ever (docs/accuracy.md).
 """
 

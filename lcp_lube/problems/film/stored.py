@@ -47,13 +47,7 @@ class Stored:
     def on(self, grid: Grid, values: Array | None = None) -> Array:
         """`old`, or other values there, at the owned points of the film's own grid, shape `grid.box`. Collective."""
         values = self.old if values is None else values
-        if grid is self.grid:
-            return values.reshape(grid.box)
-        j, i = numbers(grid)
-        take = Pick(self.grid, grid, j, (self.first + self.step * i) % self.grid.shape[0])
-        found = take(values)
-        take.destroy()
-        return found.reshape(grid.box)
+        return (values if grid is self.grid else _of_part(self.grid, values, grid, self.first, self.step)).reshape(grid.box)
 
     def terms(self, grid: Grid, film: Any, share: Array, b_C: Array, c: Array) -> dict[str, Array]:
         """What it makes of a scheme; share : twice the area that a row of the balance has for each m of film."""
@@ -68,6 +62,32 @@ class Stored:
     def starting(self, first: int) -> "Stored":
         """Of the part that begins at this column."""
         return replace(self, first=self.first + self.step * first)
+
+
+@dataclass(frozen=True)
+class Dry:
+    """Which points of a film are cavitated, 1 or 0 at this rank's ones of its grid; a part begins at its column `first`."""
+
+    values: Array
+    grid: Grid
+    first: int = 0
+
+    def on(self, grid: Grid) -> Array:
+        """At the owned points of a part's own grid. Collective."""
+        return _of_part(self.grid, self.values, grid, self.first)
+
+    def starting(self, first: int) -> "Dry":
+        """Of the part that begins at this column."""
+        return replace(self, first=self.first + first)
+
+
+def _of_part(whole: Grid, values: Array, grid: Grid, first: int, step: int = 1) -> Array:
+    """Values at the points of a film's part, whose lines are the film's first ones. Collective."""
+    j, i = numbers(grid)
+    take = Pick(whole, grid, j, (first + step * i) % whole.shape[0])
+    found = take(values)
+    take.destroy()
+    return found
 
 
 def storing(problem: "LubricationProblem", p: Array, r: Array) -> float:

@@ -9,7 +9,6 @@ from ...base.parallel import Array
 from ..grid import Grid
 from .edges import Around, face_film, pairs
 from .integrals import LineIntegrals
-from .rims import rims_across_x, rims_across_y
 
 
 def coefficients_of(
@@ -49,6 +48,8 @@ def coefficients_of(
     else:
         cubes_x = cubes(h_face.T, h_x.T).T
     if rims:
+        from .rims import rims_across_x, rims_across_y  # here: few films have round edges
+
         cubes_x, h_face = rims_across_x(grid, film, rims, cavity, cubes_x, h_face, period[0])
     m = grid.stretch(y)
     k_x, k_y = k * cubes_x / dx * (y_share / m), np.zeros((ny + 1, nx))

@@ -245,9 +245,9 @@ def _meet(a: Region, b: Region) -> bool:
     return max(dx - (1.0 - MARGIN) * (a.half_x + b.half_x), dy - (1.0 - MARGIN) * (a.half_y + b.half_y)) < 0.0
 
 
-def pressed(scheme: BoxScheme, held: Held, p_unit: float) -> BoxScheme:
+def pressed(scheme: BoxScheme, held: Held | None, p_unit: float) -> BoxScheme:
     """The scheme with the supplies' pressures in c."""
-    return scheme.changed(c=np.where(held.mask, scheme.diagonal * held.pressures(p_unit), scheme.c))
+    return scheme if held is None else scheme.changed(c=np.where(held.mask, scheme.diagonal * held.pressures(p_unit), scheme.c))
 
 
 def _nearest(grid: Grid, place: tuple[float, float]) -> NDArray[np.bool_]:

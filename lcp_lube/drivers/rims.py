@@ -1,0 +1,76 @@
+"""Films with round edges: solved, and solved once more with the faces that these cut made for the cavities found.
+
+Whatever acts on the film, its supplies and effects settle both times, on faces that are held: those of a full film first, and
+then those of its cavities (`problems/film/rims`). So each of the two is one discrete problem, with its certificate and its
+derivatives, nothing goes round in circles, and what an effect changes goes to nothing with the effect.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from petsc4py import PETSc
+
+from ..problems.facts import Facts
+from ..problems.film.cavity import cavitated
+from ..problems.film.lubrication import LubricationProblem
+from ..problems.film.model import Model
+from ..problems.film.stored import Dry
+from ..problems.solution import Solution
+from ..scenes.moving import film_of
+from ..scenes.scene import Derived, Solvable
+from .ask import Ask
+from .chain import added
+from .compose import Inner
+
+LAST = ("method", "took_over", "system", "recipe", "ksp_type", "pc_type", "supply_pressures")  # settings of the second solve
+
+
+@dataclass(frozen=True)
+class Revised(Derived):
+    """A scene with the faces that round edges cut made for these cavities, on its own grid."""
+
+    dry: Dry
+
+    @property
+    def model(self) -> Model:
+        return replace(self.whole.model, dry=self.dry)
+
+    def with_shape(self, shape: tuple[int, ...]) -> Any:
+        return self.whole.with_shape(shape)
+
+    def facts(self, comm: PETSc.Comm | None = None) -> Facts:
+        return self.whole.facts(comm)
+
+    def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
+        return self.model.build(self.shape, comm, getattr(self.whole, "grid", None))
+
+
+def applies(scene: Solvable, ask: Ask) -> bool:
+    """Whether the scene is a film whose round edges cut faces."""
+    model = film_of(scene)
+    return model is not None and model.cut and model.dry is None
+
+
+def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
+    """The second solution; the first where nothing is cavitated, or where there is no second one. Collective."""
+    first = inner(scene, replace(ask, certify=False))
+    problem: Any = first.problem
+    if not first.converged:
+        return first
+    dry = cavitated(problem.reduce, first.fields["p"], first.fields["r"]).astype(float)
+    count = int(problem.reduce.sum(dry))
+    again = replace(ask, start=first, nested=False, monitor=None, checkpoint=None, resume=None)
+    second = inner(Revised(scene, Dry(dry, problem.grid)) if count else scene, again) if count or ask.certify else first
+    if second is first:
+        return first
+    settings = first.settings | {name: second.settings[name] for name in LAST if name in second.settings}
+    if not second.converged:
+        first.because(f"faces at round edges are those of a full film: {second.message}")
+        second.destroy()
+        return first
+    details, more = settings["details"], second.settings["details"]
+    sums = {name: details[name] + more[name] for name in ("fluid_solves", "coupling_work") if name in more}
+    settings["details"] = {**details, **sums, **({"revised": count} if count else {})}
+    times, steps = added(first.times, second.times), [*first.steps, *second.steps]
+    first.destroy()
+    return replace(second, settings=settings, times=times, steps=steps, levels=first.levels)
