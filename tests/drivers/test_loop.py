@@ -132,3 +132,14 @@ def test_oil_that_does_not_flow_off_is_told_soon(model, n, shape, data):
     with solve(hot_line(n, shape, **data, temperature={"model": model, "beta": 0.047}), model="full") as s:
         assert s.outcome == "no_solution" and "get ever hotter" in s.message
         assert s.settings["details"]["fluid_solves"] < 30
+
+
+def test_oil_in_a_supply_from_which_nothing_leaves_is_what_arrives():
+    """Whatever rounding makes of the flow behind it, up to a closed end."""
+    data = hot_line(147, {"shape": "linear", "h_start": 1.15e-5, "h_end": 1.45e-5}, L=0.219, U=3.9e-5, fluid={"mu": 0.3})
+    data |= {"sides": {"west": 5.1e6, "east": "closed"}, "supply": [{"x": [0.156, 0.178], "p": 1.33e6}]}
+    data["temperature"] = {"beta": 0.0228, "T_in": 348.0, "exchange": 644.0, "T_wall": 345.0}
+    with solve(data, model="full") as s:
+        assert s.converged and s.settings["details"]["fluid_solves"] < 10
+        inside = s.problem.held.mask.ravel()
+        assert np.all(np.abs(s.problem.more_fields["T"][0][inside] - 345.0) < 0.01)

@@ -128,7 +128,8 @@ def _mixers(at: Answer, flow: Carried, carry_over: float | None) -> list[tuple[A
     out = []
     for away, into, share in found:
         arriving, going = reduce.sum(away), reduce.sum(into)
-        out.append((away, into, min(share * arriving / going, 1.0) if going > 0 else 0.0))
+        goes_on = share * (arriving if arriving > flow.rounding else 0.0)
+        out.append((away, into, goes_on / max(goes_on, going, SAME)))  # all where nothing leaves, but for rounding
     return out
 
 
