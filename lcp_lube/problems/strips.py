@@ -10,7 +10,7 @@ from ..base.crew import FEWEST, crew
 from .grid import Grid, Places, Polar
 
 STRIP, LARGEST = 16_384, 262_144  # points: of the strips of a small grid; and of a large one, which has PARTS at least
-PARTS = 24  # several for each of a few threads, so that none waits long for the last strip
+PARTS = 8  # as many for each of two threads or four; each costs Python some 1 ms in a whole run
 MANY = 250_000  # points of a grid from which compiled loops over its strips are worth being loaded
 
 

@@ -170,13 +170,16 @@ def one_by_one(p, r, k_W, k_E, k_S, k_N, b_C, b_W, c, held, p_max, above):
 def by_loops(p, r, k_W, k_E, k_S, k_N, b_C, b_W, c, held, p_max, above):
     """`cell_loops.loop_misfits`, by a line and some columns at a time, of conductances of cells that have the same faces."""
     kx, ky, framed = frames(k_W, k_E, k_S, k_N, c)
+    carried = [
+        lambda j, b=b, at=at: (2.0 * b[j : j + 1], 0, np.full(1, 0.5), b[j : j + 1, at]) for b, at in ((b_C, -1), (b_W, 0))
+    ]
     found = [
-        loop_misfits(p[j : j + 3], r[j : j + 3], kx, ky, b_C[j : j + 1], b_W[j : j + 1], framed, p_max, above, j, *columns)
+        loop_misfits(p[j : j + 3], r[j : j + 3], kx, ky, *(one(j) for one in carried), framed, p_max, above, j, *columns)
         for j in range(len(c))
         for columns in ((0, 4), (4, 10))
     ]
-    sums, most = (np.array(part) for part in zip(*found, strict=True))
-    return sums.sum(axis=0), most.max(axis=0)
+    sums, most, least = (np.array(part) for part in zip(*found, strict=True))
+    return sums.sum(axis=0), most.max(axis=0), least.min()
 
 
 @pytest.mark.parametrize("look", [cell_misfits, by_loops])
@@ -190,11 +193,13 @@ def test_arrays_and_loops_measure_what_each_cell_does(look):
     masks = (np.zeros((0, 0), dtype=bool), random.uniform(0, 1, (7, 10)) < 0.2)
     for p_max, above, held in product((1e3, 1e-3, 0.0), (0.0, 1.0), masks if look is cell_misfits else masks[:1]):
         cells = one_by_one(p, r, *scheme, *carried, c, held, p_max, above)
-        np.testing.assert_allclose(np.concatenate(look(p, r, *scheme, *carried, c, held, p_max, above)), cells, rtol=1e-10)
+        *found, least = look(p, r, *scheme, *carried, c, held, p_max, above)
+        np.testing.assert_allclose(np.concatenate(found), cells, rtol=1e-10)
+        assert least == -carried[0].max()
         assert min(cells[-2:]) > 0
     for field in (p, r):
         field[4, 5] = np.nan
-        sums, (_, gap) = look(p, r, *scheme, *carried, c, masks[0], 1e3, 0.0)
+        sums, (_, gap), _ = look(p, r, *scheme, *carried, c, masks[0], 1e3, 0.0)
         assert np.isnan(sums[2]) and np.isnan(gap)
         field[4, 5] = 0.0
 

@@ -20,14 +20,22 @@ misfit, face, lengths = piece(cell_misfit), piece(face_drag), piece(linear)
 
 
 @piece
+def carried(voids: tuple[Array, int, Array, Array], j: int, out: Array) -> None:
+    """b_C or b_W of a line, `strip.by_lines`, but for the column that is its own."""
+    array, shift, lines, _ = voids
+    for i in range(np.uint32(out.size)):
+        out[i] = lines[j] * array[j, i + np.uint32(shift)]
+
+
+@piece
 def misfit_at(
     p: Array, r: Array, kx: Array, ky: Array, b_C: Array, b_W: Array, c: Array,
     p_max: float, above: float, j: int, m: int, i: int,
 ) -> Any:  # fmt: skip
-    """`certify.cell_misfit` of a cell; p, r, kx, ky and c have frames."""
+    """`certify.cell_misfit` of a cell; p, r, kx, ky and c have frames, b_C and b_W are the line's."""
     return misfit(
         choose, p[j + 1, i + 1], p[j + 1, i], p[j + 1, i + 2], p[j, i + 1], p[j + 2, i + 1], r[j + 1, i + 1], r[j + 1, i],
-        kx[m, i + 1], kx[m, i + 2], ky[m, i + 1], ky[m + 1, i + 1], b_C[j, i], b_W[j, i], c[m, i + 1], p_max, above,
+        kx[m, i + 1], kx[m, i + 2], ky[m, i + 1], ky[m + 1, i + 1], b_C[i], b_W[i], c[m, i + 1], p_max, above,
     )  # fmt: skip
 
 
@@ -37,21 +45,27 @@ def loop_misfits(
     r: Array,
     kx: Array,
     ky: Array,
-    b_C: Array,
-    b_W: Array,
+    leaving: tuple[Array, int, Array, Array],
+    entering: tuple[Array, int, Array, Array],
     c: Array,
     p_max: float,
     above: float,
     row: int,
     first: int,
     last: int,
-) -> tuple[Array, Array]:
+) -> tuple[Array, Array, float]:
     """`certify.cell_misfits` of cells that are not held, in columns first to last - 1. kx, ky, c : of all lines, in their
-    frames, p, r, b_C, b_W of some; row : the first one's."""
-    ny, nx = b_C.shape[0], last - first
+    frames, p, r, b_C and b_W (`strip.by_lines`) of some; row : the first one's."""
+    ny, nx, width = p.shape[0] - 2, last - first, p.shape[1] - 2
     sums, most, worst = np.zeros((6, nx)), np.zeros((2, nx)), np.zeros(nx)  # column by column: vector instructions
+    b_C, b_W, least = np.zeros(width), np.zeros(width), np.full(width, np.inf)
     for j in range(ny):
         m, apart = row + j + 1, 0
+        carried(leaving, j, b_C)
+        carried(entering, j, b_W)
+        b_C[-1], b_W[0] = leaving[3][j], entering[3][j]
+        for i in range(np.uint32(width)):
+            least[i] = min(least[i], -b_C[i])
         for i in range(np.uint32(nx)):
             found = misfit_at(p, r, kx, ky, b_C, b_W, c, p_max, above, j, m, i + np.uint32(first))
             for n in range(5):
@@ -64,7 +78,7 @@ def loop_misfits(
         for i in range(np.uint32(nx if apart else 0)):
             gap = misfit_at(p, r, kx, ky, b_C, b_W, c, p_max, above, j, m, i + np.uint32(first))[7]
             most[1, i] = gap if gap > most[1, i] or gap != gap else most[1, i]
-    return sums.sum(axis=1), np.array([most[0].max(), most[1].max()])
+    return sums.sum(axis=1), np.array([most[0].max(), most[1].max()]), least.min()
 
 
 @kernel

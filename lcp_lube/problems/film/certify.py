@@ -14,7 +14,7 @@ from .flows import volume_unit
 from .graded import GradedJacobian, Pivots, within_reach
 from .reynolds import side_points
 from .stored import storing
-from .strip import frames
+from .strip import by_lines, frames
 from .supplies import pressed, supply_flows
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ def certify(problem: "LubricationProblem", p: Array, r: Array, eps1: float) -> C
     measures = {
         "residual": float(np.max([over_all, found.worst, *supply_defects(problem, supplied)])),
         "complementarity": found.gap,
-        "mass_defect": mass_defect(problem, p, r, supplied, found),
+        "mass_defect": mass_defect(problem, p, r, supplied, found, driven > 0.0),
     }
     if within_reach(problem.grid) and rounding_may_dominate(problem, p_max) and not slack(problem, p, r):
         measures["p_error"] = p_error(problem, p, r)
@@ -162,33 +162,33 @@ def misfits(problem: "LubricationProblem", p: Array, r: Array, p_max: float, abo
         whole = frames(s.k_W, s.k_E, s.k_S, s.k_N, s.c)
     sums, most, least = np.zeros(6), np.zeros(2), np.inf
 
-    def look_at(rows: slice) -> tuple[Any, list[tuple[Array, Array]]]:
+    def look_at(rows: slice) -> list[tuple[Any, ...]]:
         s = problem.scheme.rows(rows)
-        fields, b_C, b_W = [frame(rows) for frame in framed], s.b_C, s.entering  # numbers side by side, as loops want them
-        owned = (s.k_W, s.k_E, s.k_S, s.k_N, b_C, b_W, s.c, nothing if s.held is None else s.held)
-        found = []
-        for i in range(0, nx, BLOCK):
-            if many:
-                (kx, ky, c), (own_p, own_r), columns = whole, fields, (i, min(i + BLOCK, nx))
-                found.append(loop_misfits(own_p, own_r, kx, ky, b_C, b_W, c, p_max, above, rows.start, *columns))
-                continue
-            arrays = [*(a[:, i : i + BLOCK + 2] for a in fields), *(a[:, i : i + BLOCK] for a in owned)]
-            found.append(cell_misfits(*arrays, p_max, above))  # type: ignore[arg-type, call-arg]
-        return -np.max(b_C if s.storage is None else b_C + s.storage), found
+        fields = [frame(rows) for frame in framed]  # numbers side by side, as loops want them
+        if many:
+            kx, ky, c = whole
+            given = (*fields, kx, ky, by_lines(s, "b_C"), by_lines(s, "b_W"), c, p_max, above, rows.start)
+            found = [loop_misfits(*given, i, min(i + BLOCK, nx)) for i in range(0, nx, BLOCK)]  # type: ignore[call-arg, arg-type]
+        else:
+            owned = (s.k_W, s.k_E, s.k_S, s.k_N, s.b_C, s.entering, s.c, nothing if s.held is None else s.held)
+            parts = (
+                [*(a[:, i : i + BLOCK + 2] for a in fields), *(a[:, i : i + BLOCK] for a in owned)] for i in range(0, nx, BLOCK)
+            )
+            found = [cell_misfits(*arrays, p_max, above) for arrays in parts]  # type: ignore[arg-type, call-arg]
+        return list(found) if s.storage is None else [(*own, -np.max(s.b_C + s.storage)) for *own, _ in found]
 
-    for low, found in each_strip(grid, look_at):  # so that what lies between is no more than the cache holds
-        least = np.minimum(least, low)
-        for own, largest in found:
-            sums, most = sums + own, np.maximum(most, largest)  # NaN stays NaN
+    for found in each_strip(grid, look_at):  # so that what lies between is no more than the cache holds
+        for own, largest, low in found:
+            sums, most, least = sums + own, np.maximum(most, largest), np.minimum(least, low)  # NaN stays NaN
     *squares, inside = (reduce.sum(np.array([part])) for part in sums)
     worst, gap = (reduce.max(np.array([part])) for part in most)
     pressure, void, residual, diagonal, dragged = np.sqrt(squares).tolist()
     return Misfits(pressure, void, residual, diagonal, dragged, worst, gap, inside, reduce.min(np.array([least])))
 
 
-def cell_misfits(p: Array, r: Array, *given: Any) -> tuple[Array, Array]:
-    """Of some cells the sums of the squares of A p, B r, A p + B r - c, diag(A) p and b_C, and of diag(A) (|p| + above), and
-    the largest of `worst` and `gap`. p and r have a frame of neighbours; given : as to `cell_loops.loop_misfits`."""
+def cell_misfits(p: Array, r: Array, *given: Any) -> tuple[Array, Array, float]:
+    """Of some cells the sums of the squares of A p, B r, A p + B r - c, diag(A) p and b_C, and of diag(A) (|p| + above), the
+    largest of `worst` and `gap`, and the least -b_C. p and r have a frame; given : as to `cell_loops.loop_misfits`."""
     *owned, held, p_max, above = given
     here, void = p[1:-1, 1:-1], r[1:-1, 1:-1]
     around = (p[1:-1, :-2], p[1:-1, 2:], p[:-2, 1:-1], p[2:, 1:-1])
@@ -198,7 +198,8 @@ def cell_misfits(p: Array, r: Array, *given: Any) -> tuple[Array, Array]:
         found = cell_misfit(np.where, here, *around, void, r[1:-1, :-2], *owned, p_max, above)  # type: ignore[call-arg]
     *squared, inside, worst, gap = found
     sums = [float(np.sum(np.square(term))) for term in squared]
-    return np.array([*sums, float(np.sum(inside))]), np.array([np.max(worst, initial=0.0), np.max(gap, initial=0.0)])
+    most = np.array([np.max(worst, initial=0.0), np.max(gap, initial=0.0)])
+    return np.array([*sums, float(np.sum(inside))]), most, -np.max(owned[4])
 
 
 def cell_misfit(
@@ -245,7 +246,9 @@ def supply_defects(problem: "LubricationProblem", flows: Sequence[float]) -> lis
     ]
 
 
-def mass_defect(problem: "LubricationProblem", p: Array, r: Array, supplies: Sequence[float], found: Misfits) -> float:
+def mass_defect(
+    problem: "LubricationProblem", p: Array, r: Array, supplies: Sequence[float], found: Misfits, driven: bool
+) -> float:
     """|flow in - flow out| over the open sides, beyond what rounding makes of it, in parts of the flow. Collective.
 
     The flow is the largest of what comes in, of what the wall drags through every cross-section of the film, also if
@@ -259,8 +262,7 @@ def mass_defect(problem: "LubricationProblem", p: Array, r: Array, supplies: Seq
     supplied = [2.0 * flow / (grid.spacing[1] if grid.dim == 2 else 1.0) for flow in supplies]
     net = abs(west - east + south - north + sum(supplied) - storing(problem, p, r))
     inflow = max(west, 0.0) + max(-east, 0.0) + max(south, 0.0) + max(-north, 0.0) + sum(max(q, 0.0) for q in supplied)
-    driven = reduce.norm(s.c) > 0  # or else p = 0, and p_unit measures what is left of it
-    own, above = p.reshape(grid.box), 0.0 if driven else 1.0
+    own, above = p.reshape(grid.box), 0.0 if driven else 1.0  # without c p = 0, and p_unit measures what is left of it
     dragged = s.flow_unit * (found.least if problem.U else 0.0) * (grid.shape[1] if grid.dim == 2 else 1)
     pressed = 0.0
     for k, points, side in zip((s.k_W, s.k_E, s.k_S, s.k_N), side_points(grid), problem.p_sides, strict=True):

@@ -1,6 +1,7 @@
 """The box scheme's coefficients on some lines of a grid, and those of the void, which are not stored (`reynolds`)."""
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -141,3 +142,16 @@ def entering_at(row: Any, i: Any, void: Array, first: bool, weight: Array | None
     """b_W of some cells."""
     inside = dragged(void[row, i], None if weight is None else weight[row, 0], U)
     return inside if first else np.where(i == 0, 0.0, inside)
+
+
+def by_lines(scheme: Any, name: str) -> tuple[Array, int, Array, Array]:
+    """b_C or b_W for compiled loops, which make it: of an array from this column on what each line multiplies, and what stands
+    in the last column of b_C, in the first one of b_W."""
+    made, last = vars(scheme)[name], name == "b_C"
+    if not isinstance(made, partial):
+        return made, 0, np.ones(len(made)), np.ascontiguousarray(made[:, -1 if last else 0])
+    void, other, weight, U = made.args
+    lines = np.ones(len(void)) if weight is None else (weight * U)[:, 0]
+    if last:
+        return void, 1, -lines, -lines * void[:, -1] if other is None else -other
+    return void, 0, lines, lines * void[:, 0] * float(other)

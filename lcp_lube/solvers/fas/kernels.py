@@ -16,6 +16,7 @@ import numpy as np
 
 from ...base.compiled import kernel, piece
 from ...base.parallel import Array
+from ...problems.film.cell_loops import carried
 from .waiting import await_part, fetch, write
 
 
@@ -194,12 +195,15 @@ def add_balance(z: Array, kx: Array, ky: Array, c: Array, carry: Array | None, s
 
 
 @kernel
-def void(z: Array, b_C: Array, r: Array) -> None:
-    """Into r that of z, whose frame is left out."""
+def void(z: Array, leaving: tuple[Array, int, Array, Array], r: Array) -> None:
+    """Into r that of z, whose frame is left out; leaving : `strip.by_lines` of b_C."""
+    b_C = np.zeros(z.shape[1])
     for j in range(z.shape[0]):
+        carried(leaving, j, b_C)
+        b_C[-1] = leaving[3][j]
         for i in range(z.shape[1]):
             here = z[j, i]
-            r[j, i] = here / b_C[j, i] if here < 0.0 else 0.0
+            r[j, i] = here / b_C[i] if here < 0.0 else 0.0
 
 
 @kernel

@@ -11,6 +11,7 @@ import numpy as np
 from ...base.crew import FEWEST, PARTS, crew
 from ...base.parallel import Array
 from ...problems.film.reynolds import BoxScheme
+from ...problems.film.strip import by_lines
 from ...problems.grid import Grid
 from ...problems.solution import Fields
 from ...problems.strips import each_strip
@@ -102,7 +103,7 @@ def pressure_and_void(z: Array, scheme: BoxScheme, grid: Grid) -> Fields:
 def void(z: Array, scheme: BoxScheme, grid: Grid) -> Array:
     """r of the owned points."""
     r = np.empty(z.shape)
-    each_strip(grid, lambda rows: kernels.void(z[rows], scheme.rows(rows).b_C, r[rows]))
+    each_strip(grid, lambda rows: kernels.void(z[rows], by_lines(scheme.rows(rows), "b_C"), r[rows]))
     return r.ravel()
 
 
