@@ -7,7 +7,9 @@ from lcp_lube import solve
 from lcp_lube.drivers.derivatives import adjoint as adjoint_module
 from lcp_lube.drivers.derivatives import film_gradient, near_films
 from lcp_lube.drivers.derivatives.adjoint import Adjoint
+from lcp_lube.drivers.derivatives.equations import Equations, fields_of
 from lcp_lube.drivers.derivatives.film_gradient import FilmGradient
+from lcp_lube.problems.film import slopes
 from lcp_lube.problems.film.flows import SIDES
 from lcp_lube.scenes.scene import load_scene
 from lcp_lube.scenes.values import values_of, with_values
@@ -74,6 +76,22 @@ def test_the_film_s_own_derivative_is_that_of_its_arrays(monkeypatch, name):
             fields.append(FilmGradient(adjoint).field("load"))
             adjoint.destroy()
     assert fields[0] == pytest.approx(fields[1], abs=1e-12 * np.abs(fields[1]).max())
+
+
+@pytest.mark.parametrize("name", ["problem4", "upwind", "fed", "dimpled_pad", "turned", "journal", "thrust"])
+def test_drag_and_its_derivatives_in_one_pass_are_those_of_arrays(monkeypatch, name):
+    scene, names = made(name), ["friction", "friction_torque"] if name == "thrust" else ["friction"]
+    with solve(scene, reduction=False) as solution:
+        equations, (p, r) = Equations(scene), fields_of(solution)
+        arrays = [equations.slope(p, r, name) for name in names]
+        monkeypatch.setattr(slopes, "SMALL", 1)
+        passes, values = [equations.slope(p, r, name) for name in names], equations.numbers(p, r, names)
+        equations.destroy()
+    for name, one, other in zip(names, passes, arrays, strict=True):
+        assert np.isnan(other.value)
+        assert one.value == pytest.approx(values[name], rel=1e-13)
+        for a, b in ((one.p, other.p), (one.r, other.r)):
+            assert a == pytest.approx(b, abs=1e-12 * np.abs(b).max())
 
 
 def test_drag_and_flows_build_no_problem(monkeypatch):

@@ -26,7 +26,7 @@ from ..loads.pad_coordinates import bearing_of
 from ..motions.coefficients import placed
 from ..motions.halved import Halved
 from ..motions.linearised import Linear
-from .equations import MISFIT, Equations, cavity_of, check_film, fields_of, right_side, unknowns
+from .equations import DRAGS, MISFIT, Equations, cavity_of, check_film, fields_of, right_side, unknowns
 from .near_films import OTHER, NearFilms, plain, same
 
 ROUNDED = 1e-8  # of what is small of what was found: a 0 that rounding has moved, the attitude of pads about the load
@@ -74,13 +74,16 @@ class Adjoint:
         names = [name for name in [*quantities, *self.conditions] if name not in self.found]
         eq, p, r = self.equations, self.p, self.r
         lean = {*names, "force_x", "force_y"} if quantities and DIRECT.issuperset(names) else None
-        self.numbers = eq.numbers(p, r, lean)
+        drags = {name: eq.slope(p, r, name) for name in DRAGS if name in (lean or ()) and eq.grid.dim == 2}
+        known = {name: one.value for name, one in drags.items() if one.value == one.value}
+        self.numbers = eq.numbers(p, r, lean and lean.difference(known)) | known
         if lean and any(math.isnan(eq.report(self.numbers)[name]) for name in names):  # made of others too
             self.numbers = eq.numbers(p, r)
         parts = {name: eq.partials(self.numbers, name) for name in names}
         self.cavity, switching = cavity_of(eq, p, r)
         self.switching = int(eq.grid.reduce.sum(switching.astype(float)))
-        slopes = {part: eq.slope(p, r, part) for part in dict.fromkeys(part for weights in parts.values() for part in weights)}
+        made_of = dict.fromkeys(part for weights in parts.values() for part in weights)
+        slopes = {part: drags.get(part) or eq.slope(p, r, part) for part in made_of}
         self.ties = {name: sum(slopes[part].ties for part in weights) for name, weights in parts.items()}
         rows = {name: right_side(slopes, weights, self.cavity) for name, weights in parts.items()}
         some = [name for name in parts if both and (self.switching or self.ties[name])]

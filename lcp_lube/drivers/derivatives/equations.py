@@ -39,6 +39,7 @@ THROUGH = {"decision", "accuracy", "anew", "pads", "balance", "position", "attit
 THROUGH |= {"coupling", "grooves", "symmetry", "direct"}
 DRAGS = ("friction", "friction_torque")
 MISFIT = "supply_misfit_"  # by which a supply's source and film disagree, 0 at the solution
+LINES = 64  # of points that terms' sizes are looked at along
 STEP = 1e-3  # relative, of the numbers that another one is made of: five values give its derivatives to rounding
 
 
@@ -127,13 +128,12 @@ class Equations:
 
     def terms(self, p: Array, weights: Sequence[Array]) -> Array:
         """Sums of weights' sizes times those of G's terms, in its unit of flow: a measure of rounding. Collective."""
-        grid, scheme = self.grid, self.problem(p).scheme
-        p, w, out = (p / self.constant.p_unit).reshape(grid.box), [a.reshape(grid.box) for a in weights], np.zeros(len(weights))
-        some = (every := list(scheme.in_strips(grid)))[:: max(1, len(every) // 6)]  # they stand for a large film's others
-        for rows, s in some:
-            size = np.abs(s.diagonal * p[rows]) + np.abs(s.couette_W) + np.abs(s.couette_E)
-            out += [np.einsum("ji,ji->", np.abs(a[rows]), size) for a in w]
-        return np.asarray(grid.comm.allreduce(out * (len(every) / len(some))))
+        (ny, _), apart = self.grid.box, max(1, self.grid.box[0] // LINES)
+        some = slice(apart // 2, ny, apart)  # they stand for a large film's others
+        s, p, *w = self.problem(p).scheme.rows(some), *(a.reshape(self.grid.box)[some] for a in (p, *weights))
+        size = np.abs(s.diagonal * p) / self.constant.p_unit + np.abs(s.couette_W) + np.abs(s.couette_E)
+        out = np.array([np.einsum("ji,ji->", np.abs(a), size) for a in w])
+        return np.asarray(self.grid.comm.allreduce(out * (ny / len(p))))
 
     def numbers(self, p: Array, r: Array, wanted: Collection[str] | None = None, rest: Any = None) -> dict[str, float]:
         """`slopes.numbers` as the scene has them; rest : the values of those that are not wanted. Collective."""
@@ -158,7 +158,7 @@ class Equations:
         name = FLIPPED.get(name, name) if self.turned else name
         tangent = self.tangent(p, r) if "flow_" in name or (self.law and name in DRAGS) else None
         found = slopes.slope(self.problem(p), tangent, p / self.constant.p_unit, r, name, last)
-        return slopes.Slope(-found.p, -found.r) if self.turned and name in DRAGS else found
+        return slopes.Slope(-found.p, -found.r, value=-found.value) if self.turned and name in DRAGS else found
 
     def report(self, numbers: dict[str, float]) -> dict[str, float]:
         """What else is told of the film, from its `numbers`."""
@@ -285,14 +285,15 @@ def cavity_of(equations: Equations, p: Array, r: Array) -> tuple[NDArray[np.bool
 
 def unknowns(cavity: NDArray[np.bool_], p: Array, r: Array, p_unit: float) -> Array:
     """z: p (p_unit) where the film is full, -r where it is not."""
-    return np.where(cavity, -r, p / p_unit)
+    z = np.asarray(p / p_unit)
+    return np.negative(r, out=z, where=cavity)  # type: ignore[no-any-return]
 
 
 def right_side(slopes_of: Mapping[str, slopes.Slope], weights: Mapping[str, float], cavity: NDArray[np.bool_]) -> Array:
     """dQ/dz of the adjoint equation, of a number that is made of parts with these weights."""
     total: Array | None = None
     for part, w in weights.items():
-        one = np.where(cavity, -slopes_of[part].r, slopes_of[part].p)
-        one *= w
-        total = one if total is None else total + one
+        one = np.multiply(w, slopes_of[part].p)
+        np.multiply(slopes_of[part].r, -w, out=one, where=cavity)
+        total = one if total is None else np.add(total, one, out=total)
     return np.zeros(cavity.size) if total is None else total

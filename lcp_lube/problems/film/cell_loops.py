@@ -95,23 +95,34 @@ def loop_drag(
     columns: Array,
     lines: Array,
     scale: Array,
+    by_p: Array | None,
+    by_r: Array | None,
+    turn: float,
 ) -> float:
-    """Sum of `flows.face_drag` by its shares (`flows._shares`); beyond : pressures east of the last points."""
+    """Sum of `flows.face_drag` by its shares (`flows._shares`), and into by_p and by_r its derivatives; beyond : pressures
+    east of the last points. turn : 1 where that is the first point, else 0."""
     ny, nx = p.shape
     total = np.zeros(nx)
     for j in range(ny):
         for i in range(nx - 1):
-            east, push = face(
+            east, push, thick = face(
                 choose, lengths, h[j, i], resting[j, i], moving[j, i], first[j, i],
                 couette[j, i], b[j, i], r[j, i], p[j, i], p[j, i + 1],
             )  # fmt: skip
             total[i] += lines[j] * columns[i] * east + scale[j] * push
+            if by_r is not None:
+                by_r[j, i] = lines[j] * columns[i] * b[j, i] / (choose(couette[j, i] == 0.0, np.inf, couette[j, i]) * thick)
         i = nx - 1
-        east, push = face(
+        east, push, thick = face(
             choose, lengths, h[j, i], resting[j, i], moving[j, i], first[j, i],
             couette[j, i], b[j, i], r[j, i], p[j, i], beyond[j],
         )  # fmt: skip
         total[i] += lines[j] * columns[i] * east + scale[j] * push
+        if by_p is not None and by_r is not None:
+            by_r[j, i] = lines[j] * columns[i] * b[j, i] / (choose(couette[j, i] == 0.0, np.inf, couette[j, i]) * thick)
+            by_p[j, 0] = 0.5 * scale[j] * (turn * h[j, i] - h[j, 0])
+            for i in range(1, nx):
+                by_p[j, i] = 0.5 * scale[j] * (h[j, i - 1] - h[j, i])
     return total.sum()
 
 

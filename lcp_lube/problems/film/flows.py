@@ -80,8 +80,7 @@ def friction(problem: LubricationProblem, p_pa: Array, r: Array, lever: Array | 
     """
     grid, s = problem.grid, problem.scheme
     p_pa, r = p_pa.reshape(grid.box), r.reshape(grid.box)
-    # What happens in a line of one rank is its own business, but where walls ask what is cavitated, or effects have been.
-    alone = grid.comm.size == 1 and "closed" not in grid.ends[0] and problem.plain
+    alone = _alone(problem)
 
     def add_up(rows: slice) -> float:
         part = copy(problem)
@@ -90,22 +89,35 @@ def friction(problem: LubricationProblem, p_pa: Array, r: Array, lever: Array | 
         along = lever[rows] if isinstance(lever, np.ndarray) else lever
         return float(np.sum(sum(drag(part, part.scheme, p_pa[rows].ravel(), r[rows].ravel())) * along))  # type: ignore[arg-type]
 
-    if alone and grid.size >= MANY and has_numba():
-        of_film = _drag_sum(problem, p_pa, r, lever)
+    if runs(problem, MANY):
+        of_film = drag_sum(problem, p_pa, r, lever)
     else:
         of_film = sum(each_strip(grid, add_up)) if alone else add_up(slice(0, grid.box[0]))
     of_film = problem.reduce.summed(float(of_film), lambda: np.add(*drag(problem, s, p_pa.ravel(), r.ravel())) * lever)
     return of_film if problem.contact is None else of_film + problem.contact.drag(problem, lever)
 
 
-def _drag_sum(problem: LubricationProblem, p: Array, r: Array, lever: Array | float) -> float:
-    """The sum of `drag` times the lever, of a large film of one rank without walls before or behind it."""
+def _alone(problem: LubricationProblem) -> bool:
+    """Whether what happens in a line of one rank is its own business: no walls ask what is cavitated, no effects have been."""
+    return problem.grid.comm.size == 1 and "closed" not in problem.grid.ends[0] and problem.plain
+
+
+def runs(problem: LubricationProblem, least: int) -> bool:
+    """Whether `drag_sum` knows the film, and it is so large that compiled loops pay."""
+    return _alone(problem) and problem.grid.size >= least and has_numba()
+
+
+def drag_sum(
+    problem: LubricationProblem, p: Array, r: Array, lever: Array | float, unit: float = 1.0, by: Array | None = None
+) -> float:
+    """The sum of `drag` times the lever, of a film that it `runs` over. p in units of `unit` Pa; by : its derivatives by p
+    and r are written there."""
     from .cell_loops import loop_drag
 
     grid, (columns, lines, scale) = problem.grid, _shares(problem)
     first, last = sides(grid)[:2]
-    beyond = np.full(p.shape[0], problem.p_sides[1]) if last.any() else p[:, 0].copy()
-    shears, pulls = (lines * lever).ravel(), (scale * lever).ravel()
+    beyond = np.full(p.shape[0], problem.p_sides[1] / unit) if last.any() else p[:, 0].copy()
+    shears, pulls = (lines * lever).ravel(), (unit * scale * lever).ravel()
 
     def add_up(rows: slice) -> float:
         part, s = copy(problem), problem.scheme.rows(rows)
@@ -114,12 +126,17 @@ def _drag_sum(problem: LubricationProblem, p: Array, r: Array, lever: Array | fl
         # Numbers side by side: else no vector instructions are made. Most films are the same where a, b and c ask for them.
         lying = {id(one): np.ascontiguousarray(one) for one in found}
         h, a, b, c, couette = (lying[id(one)] for one in found)
-        return loop_drag(h, a, b, c, couette, s.b_E, r[rows], p[rows], beyond[rows], columns, shears[rows], pulls[rows])
+        fields, of_lines = (r[rows], p[rows], beyond[rows]), (columns, shears[rows], pulls[rows])
+        into: Any = (None, None) if by is None else by[:, rows]
+        return loop_drag(h, a, b, c, couette, s.b_E, *fields, *of_lines, into[0], into[1], float(grid.periodic[0]))
 
     total = sum(each_strip(grid, add_up))
     if first.any():
-        before, push = _before_first(problem, p, 0.0)
-        total += float(np.sum(lever * (columns[0] * lines * before + scale * push)))
+        before, half = _before_first(problem, 0.0)
+        pull = half * pulls[:, None]
+        total += float(np.sum(lever * columns[0] * lines * before + pull * (p[:, :1] - problem.p_sides[0] / unit)))
+        if by is not None:
+            by[0][:, :1] += pull
     return total
 
 
@@ -137,12 +154,12 @@ def line_shares(grid: Grid) -> tuple[Array, Array]:
     return lines, scale
 
 
-def _before_first(problem: LubricationProblem, p: Array, lifted: complex) -> tuple[Array, Array]:
-    """`face_drag` of the faces before the first points, as parts of the faces behind these."""
+def _before_first(problem: LubricationProblem, lifted: complex) -> tuple[Array, Array]:
+    """`face_drag` of the faces before the first points, as parts of the faces behind these; of the pull half the film."""
     grid = problem.grid
     before, behind = grid.steps(0)[:2]
     h, resting, moving, _ = sheared_faces(problem, grid.x[:, :1] - before / 2, lifted)
-    return before / behind * (resting + 1.0 / moving), 0.5 * h * (p[:, :1] - problem.p_sides[0])
+    return before / behind * (resting + 1.0 / moving), 0.5 * h
 
 
 def drag(problem: LubricationProblem, scheme: BoxScheme, p_pa: Array, r: Array, lifted: complex = 0.0) -> tuple[Array, Array]:
@@ -163,12 +180,13 @@ def drag(problem: LubricationProblem, scheme: BoxScheme, p_pa: Array, r: Array, 
     if walls[1].any():
         p_east[:, -1] = p[:, -1]
     faces = sheared_faces(problem, grid.x + behind / 2, lifted)
-    east, push = face_drag(np.where, linear, *faces, s.couette_E, s.b_E, r, p, p_east)
+    east, push, _ = face_drag(np.where, linear, *faces, s.couette_E, s.b_E, r, p, p_east)
     if walls[1].any():  # its faces have neither
         east[:, -1] = 0.0
     own, push_own = np.zeros_like(east), np.zeros_like(east[:, :1])
     if first.any():
-        own[:, :1], push_own[:] = _before_first(problem, p, lifted)
+        own[:, :1], half = _before_first(problem, lifted)
+        push_own[:] = half * (p[:, :1] - problem.p_sides[0])
     dry = cavitated(problem.reduce, p_pa, r.ravel()).reshape(grid.box) if "closed" in grid.ends[0] else None
     for at, wall, share in zip((0, -1), walls, (0.5 * before[0] / behind[0], 0.5), strict=True):
         if dry is not None and wall.any():
@@ -189,11 +207,12 @@ def linear(where: Any, liquid: Any, resting: Any, moving: Any, first: Any) -> tu
 
 def face_drag(
     where: Any, linear: Any, h: Any, resting: Any, moving: Any, first: Any, couette: Any, b: Any, r: Any, p: Any, p_east: Any
-) -> tuple[Any, Any]:
-    """Of arrays, or in `cell_loops` of one face: what shears it per mu U (1/m), and the pull of the pressure (N/m)."""
+) -> tuple[Any, Any, Any]:
+    """Of arrays, or in `cell_loops` of one face: what shears it per mu U (1/m), the pull of the pressure (N/m), and by what
+    the liquid counts in the first (m)."""
     liquid = 1.0 + b * r / where(couette == 0.0, np.inf, couette)
     a, b_liquid = linear(where, liquid, resting, moving, first)
-    return a + liquid / b_liquid, 0.5 * h * (p_east - p)
+    return a + liquid / b_liquid, 0.5 * h * (p_east - p), b_liquid
 
 
 def beside(grid: Grid, p: Array) -> Array:

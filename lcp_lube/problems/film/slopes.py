@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.parallel import Array
+from ...registry import SMALL
 from .cavity import cavity_sign
 from .effects import around
-from .flows import SIDES, friction, linear, point_weights, sheared_faces, side_flows, volume_unit
+from .flows import SIDES, drag_sum, friction, linear, point_weights, runs, sheared_faces, side_flows, volume_unit
 from .forces import totals, weights
 from .grooves import GroovedProblem
 from .lubrication import LubricationProblem
@@ -30,11 +31,13 @@ TIE = 1e-9  # relative: pressures so near the largest one are as large
 
 @dataclass(frozen=True)
 class Slope:
-    """dQ/dp, p in p_unit, and dQ/dr of a number at the owned points. ties : points that could as well have it."""
+    """dQ/dp, p in p_unit, and dQ/dr of a number at the owned points. ties : points that could as well have it. value : the
+    number itself, where one pass has both, else NaN."""
 
     p: Array
     r: Array
     ties: int = 0
+    value: float = np.nan
 
 
 def numbers(problem: LubricationProblem, p: Array, r: Array, wanted: Collection[str] | None = None) -> dict[str, float]:
@@ -101,6 +104,10 @@ def slope(problem: LubricationProblem, tangent: Tangent | None, p: Array, r: Arr
 def _friction(problem: LubricationProblem, tangent: Tangent | None, p: Array, r: Array, lever: Any) -> Slope:
     """Of `flows.drag`, term by term."""
     grid, s = problem.grid, problem.scheme
+    if runs(problem, SMALL) and (tangent is None or tangent.viscosity is None):
+        by = np.empty((2, *grid.box))
+        value = drag_sum(problem, p.reshape(grid.box), r.reshape(grid.box), lever, problem.p_unit, by)
+        return Slope(by[0].ravel(), by[1].ravel(), value=value)
     before, behind = grid.steps(0)[:-1], grid.steps(0)[1:]
     dy, unit = grid.spacing[1] if grid.dim == 2 else 1.0, problem.p_unit
     weight, rims = line_weights(grid), grid.rims(1) if grid.dim == 2 else (0.0, 0.0)

@@ -20,7 +20,7 @@ from .frozen_cycles import Cycles
 
 # Of J' less is asked: a derivative's error is at most about lambda's relative one, and 1e-6 is promised of it.
 RTOL, TRANSPOSED, MOST = 1e-9, 2e-7, 60
-FEW = 15  # cycles in single precision
+FEW, MANY = 15, 10  # cycles in single precision, and vectors of a basis that is not a long one
 DROP = 1e-5  # down to which part of its start's error a basis in single precision is trusted
 AGREES, LEAST = 1e-7, 1e-13  # l' (J z) and b' z, relative: cycles go on until they do, down to the least residual
 FINEST = 1e-4  # a quantity that is a small part of the sizes of b' z asks for as much less of both: down to this part
@@ -110,7 +110,7 @@ class Frozen(Cycles):
         rtol, drop = self._keen * TRANSPOSED if self.transposed else RTOL, DROP if self.single else 0.0
         norm, total = self.grid.reduce.norm, self.grid.comm.allreduce
         self._put(self.c[0], rest)
-        V, H = np.zeros((MOST + 2, rest.size), self.z[0].dtype), np.zeros((MOST + 2, MOST + 1))  # V: small pages, as written
+        V, H = np.zeros((MANY, rest.size), self.z[0].dtype), np.zeros((MOST + 2, MOST + 1))  # V: small pages, as written
         self.change(None, V[0])
         self.c[0][:] = 0.0
         first, y = norm(V[0]), np.zeros(0)
@@ -132,6 +132,8 @@ class Frozen(Cycles):
                     return x, False
             if self.work >= most:
                 return None
+            if k + 1 == len(V):
+                V = np.concatenate([V, np.zeros_like(V)])
             w = V[k + 1]
             np.negative(self.change(V[k], w), out=w)
             for _ in range(2 if k > 8 else 1):  # rounding has left long bases less orthogonal
