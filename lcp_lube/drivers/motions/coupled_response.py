@@ -124,7 +124,7 @@ class CoupledResponse(OfLine):
     def _system(self, z: Array, x: Array, base: Any) -> tuple[Array, Array, Array]:
         """H and x - X, one behind the other, and Q of a state; what flows out of supplies that follow, and what they hold."""
         at = self._answer(z, x, base)
-        film = at.problem
+        film, at.once = at.problem, True  # from the state's own T: what it leaves is nothing where that is the heat's
         H = film.balance(at.p / film.p_unit, at.r) * (film.scheme.flow_unit / self.unit)
         Q = self._size * at.cells.get("density", 1.0) * film.scheme.h.ravel() * (1.0 - at.r)
         self.loop.answer = at
@@ -144,7 +144,12 @@ class CoupledResponse(OfLine):
         if not size > 0.0:
             return np.zeros_like(y), np.zeros(self.n), np.zeros((2, len(self.free)))
         t = STEP / size
-        return _slopes([self._system(k * t * z, self.x + k * t * x, self.loop.base) for k in (1.0, -1.0)], 2.0 * t)
+        ends, width = self._ends(t * z, t * x)
+        return _slopes(ends, width * t)
+
+    def _ends(self, z: Array, x: Array) -> tuple[list[Changes], float]:
+        """The states whose difference tells what a small step changes, and by how many such steps they are apart."""
+        return [self._system(k * z, self.x + k * x, self.loop.base) for k in (1.0, -1.0)], 2.0
 
     def _settled(self, b: Array, own: Any, nu: float, stored: bool = True, off: Any = 0.0) -> Any:
         """The answer to b with the supplies' pressures that follow; own : what b's cause makes them give by itself, m3/s;

@@ -109,6 +109,7 @@ class Answer:
     factors: dict[str, Array] = field(default_factory=dict)
     memory: dict[Any, Any] = field(default_factory=dict)  # what an effect found, by its id
     rough: bool = False  # whether three digits of what effects make of it will do
+    once: bool = False  # whether one step of Newton's method will, from what its coefficients stand for
 
     @property
     def grid(self) -> Grid:

@@ -134,7 +134,7 @@ class Heat(Effect):
         with np.errstate(all="ignore"):
             T = np.clip(np.nan_to_num(law.T(old), nan=oils.HIGHEST), coldest, oils.HIGHEST)
         before = FOUND
-        for _ in range(NEWTON):
+        for _ in range(1 if at.once else NEWTON):
             ratio, slope = law(T) / old, (law(T + NEAR) - law(T - NEAR)) / (2.0 * NEAR * old)
             falls = np.maximum(-slope, 0.0) * flow.sheared.ravel()
             more = flow.sheared.ravel() * (ratio - 1.0) + falls * (T - table.T_in)
