@@ -189,12 +189,11 @@ def judged(scene: BearingScene, seed: int, own_faces: bool, **how_to: Any) -> Ve
         return Verdict(seed, outcome, **how)
     p, r = whole(problem.grid, solution.fields["p"] * problem.p_unit, solution.fields["r"])
     p_sides, p_unit = problem.p_sides, problem.p_unit
-    moving = getattr(problem, "moving", None)
-    if own_faces and moving is not None:  # the mirror image is what is solved
+    if own_faces and problem.moving is not problem:  # the mirror image is what is solved
         p, r = p[:, ::-1], r[:, ::-1]
     p, r = p.ravel(), r.ravel()
     how["said"] = max(solution.certificate.measures.values())
-    dense = Dense(scene, (moving or problem) if own_faces else None)
+    dense = Dense(scene, problem.moving if own_faces else None)
     solution.destroy()
     ratio = float(dense.k.max() / dense.k.min())
     try:

@@ -1,6 +1,7 @@
 """Films under a wall that moves to smaller x: the mirror image is solved, and its answer turned back."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 from petsc4py import PETSc
 
@@ -24,6 +25,12 @@ class Mirrored(Derived):
 
     def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
         return self.model.build(self.shape, comm)
+
+
+def as_solved(solution: Solution) -> Solution:
+    """The solution of what was solved: of a film that is turned round its mirror image."""
+    problem: Any = solution.problem
+    return replace(solution, problem=problem.moving, fields=problem.there(solution.fields))
 
 
 def applies(scene: Solvable, ask: Ask) -> bool:

@@ -206,7 +206,7 @@ def known_line(problem: Problem) -> tuple[LubricationProblem, Fields] | None:
         return None
     line = solved = copy(problem)
     if isinstance(line, TurnedProblem):
-        solved = line.moving = copy(line.moving)
+        solved = line.image = copy(line.image)
     solved.integrals = solved.integrals or line_integrals(solved.grid, solved.film, checked=True)
     from ...problems.film.known import known_fields  # here: of lines alone
 

@@ -7,7 +7,7 @@ solution (where something was found: `implicit`).
 import math
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -52,13 +52,12 @@ class Adjoint:
         left_out = solution.settings.get("model", {}).get("left_out", {})
         scene = without(scene, left_out) if left_out else scene
         check_film(scene)
-        self.scene, self.reported = placed(scene, solution), solution.problem
+        self.scene, self.reported = placed(scene, solution), cast(LubricationProblem, solution.problem)
         if getattr(scene, "p_unit", 0.0) is None:  # which follows from looks at the film, in every scene near by
             self.scene = self.scene.model_copy(update={"p_unit": self.scene.model.p_unit})  # type: ignore[attr-defined]
         self.p, self.r = fields_of(solution)
         self.pressures = [float(P) for P in solution.settings.get("supply_pressures", ())]
-        solved: Any = getattr(solution.problem, "moving", solution.problem)
-        self.dry = getattr(solved, "dry", None)
+        self.dry = self.reported.moving.dry
         comm = solution.problem.grid.petsc_comm
         self.equations = Equations(self.scene, comm, self.pressures, dry=self.dry, solved=solution.problem)
         if self.equations.grid.shape != solution.problem.grid.shape:

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -23,7 +23,6 @@ from ...problems.film.edges import oblique
 from ...problems.film.forces import PIVOT, totals
 from ...problems.film.grooves import GroovedProblem
 from ...problems.film.supplies import Supply, supply_flows
-from ...problems.film.turned import TurnedProblem
 from ...problems.solution import Solution
 from ...scenes.scene import Scene
 from ...scenes.values import values_of, with_values
@@ -32,7 +31,7 @@ from ..effects.loop import Loop
 from ..motions.coefficients import placed
 from ..motions.coupled_response import CoupledResponse
 from ..supplies import Fed
-from ..turned import Mirrored
+from ..turned import Mirrored, as_solved
 from .adjoint import GUESS, conditions_of, size_of
 
 STEP = 1e-4  # of a number, relative, and of the fields
@@ -61,11 +60,9 @@ class CoupledGradient(CoupledResponse):
         if not solution.converged:
             raise InputError(f"{scene.name}: {solution.outcome.sentence}: no solution, no derivatives")
         self.scene: Any = placed(scene, solution)
-        problem, seen = solution.problem, solution
-        self.turned = problem if isinstance(problem, TurnedProblem) else None
-        if self.turned is not None:  # the equations are those of the mirror image
-            seen = replace(solution, problem=self.turned.moving, fields=self.turned.there(solution.fields))
-        super().__init__(self._facing(self.scene), seen, [], flip)
+        self.reported = problem = cast(Any, solution.problem)
+        self.turned: bool = problem.moving is not problem  # the equations are those of the mirror image
+        super().__init__(self._facing(self.scene), as_solved(solution), [], flip)
         self.found, self.conditions = conditions_of(scene, solution)
         self.report = self._numbers(self.loop, 0.0 * self.p, self.x)
         for name in (*quantities, *self.conditions):
@@ -78,7 +75,7 @@ class CoupledGradient(CoupledResponse):
 
     def _facing(self, scene: Any) -> Any:
         """The scene whose wall moves to larger x."""
-        return scene if self.turned is None else Mirrored(scene)
+        return Mirrored(scene) if self.turned else scene
 
     @property
     def lambdas(self) -> dict[str, None]:
@@ -100,7 +97,7 @@ class CoupledGradient(CoupledResponse):
             at.problem.more |= effect.report(at).numbers
         fields = {"p": at.p / at.problem.p_unit, "r": at.r}
         told = at.problem.quantities(fields)
-        told = told if self.turned is None else self.turned.told(told)
+        told = self.reported.told(told) if self.turned else told
         out = {name: value for name, value in totals(at.problem, at.p).items() if name.startswith(PIVOT)}
         for name, value in told.items():
             parts = {"": value}

@@ -23,9 +23,8 @@ from ...problems.film.known import known_fields, known_of
 from ...problems.film.lubrication import LubricationProblem
 from ...problems.film.model import Model
 from ...problems.film.tangent import Tangent, effective, tangent
-from ...problems.film.turned import TurnedProblem
 from ...problems.grid import Grid, Places
-from ...problems.solution import Fields, Solution
+from ...problems.solution import Solution
 from ...registry import DRIVERS
 from ...scenes.moving import motion_of
 from ...scenes.scene import Scene
@@ -268,9 +267,7 @@ def check_film(scene: Scene) -> Model:
 def fields_of(solution: Solution) -> tuple[Array, Array]:
     """p (Pa above p_c) and r of a film's solution, in the frame of `Equations`."""
     problem: Any = solution.problem
-    fields: Fields = solution.fields
-    if isinstance(problem, TurnedProblem):
-        fields, problem = problem.there(fields), problem.moving
+    fields = problem.there(solution.fields)
     return fields["p"] * problem.p_unit, fields["r"]
 
 

@@ -271,7 +271,7 @@ class CoupledFilm:
     def field(self, quantity: str) -> Array:
         """dQ/dh at the owned points of the solution's grid, as `film_gradient.FilmGradient.field` tells."""
         total = sum(w * self._lagrangian(name) for name, w in self.implicit.weights(quantity).items())
-        return per_area(np.asarray(total), self.grid, self.gradient.turned)
+        return per_area(np.asarray(total), self.grid, self.gradient.reported)
 
     def _lagrangian(self, name: str) -> Array:
         """Of a number by the film at each point, what was found held; pressures of supplies follow."""

@@ -79,7 +79,7 @@ class FirstOrder:
         pressures = [float(P) for P in solution.settings.get("supply_pressures", ())]
         self.scene = placed(self.scene, solution)
         bare = without(self.scene, named(scene))
-        solved: Any = getattr(solution.problem, "moving", solution.problem)
+        solved = solution.problem.moving  # type: ignore[attr-defined]
         own = getattr(solution.problem, "rigid", None) or (None if self.kept else solution.problem)  # solved without effects
         self.equations = eq = Equations(bare, grid.petsc_comm, pressures, dry=solved.dry, solved=own)
         self.base, (self.p, self.r) = eq.constant, fields_of(solution)

@@ -138,8 +138,7 @@ class Look:
         if own and table is None and self.kept == self._free:
             self.solution, self.first = first, None
         elif own and self.ask.start is None:
-            solved: Any = getattr(first.problem, "moving", first.problem)
-            solved.cells = made = film.made(self.kept)
+            first.problem.moving.cells = made = film.made(self.kept)  # type: ignore[attr-defined]
             itself = None if film.found.found else made  # else the loop's first film is at another place
             self.ask = replace(self.ask, start=Start(first.problem, first.fields, self._foretold(first.settings), itself))
         film.destroy()

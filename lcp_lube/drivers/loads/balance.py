@@ -16,7 +16,6 @@ import numpy as np
 
 from ...errors import InputError, NotFound
 from ...problems.film.integrals import thinnest
-from ...problems.film.turned import TurnedProblem
 from ...problems.solution import Outcome, Solution
 from ...scenes.balance import BalanceTable
 from ...scenes.moving import film_of
@@ -25,7 +24,7 @@ from ..ask import Ask
 from ..chain import added
 from ..compose import Inner
 from ..levels import level_shapes
-from ..turned import Mirrored
+from ..turned import Mirrored, as_solved
 from .root import Search
 
 MOST_SOLVES = 30  # on a grid
@@ -198,10 +197,9 @@ def exact_slope(scene: Any, solution: Solution, unknown: Variable, t: float, W: 
             return float(one.K[0] @ move) / W
     if turning is None and (key == "h_offset" or (key == "h_min" and isinstance(scene, ThrustScene))):
         alike = 1
-        if isinstance(turned := solution.problem, TurnedProblem):
+        if model.U < 0:
             alike = scene.pads if isinstance(scene, ThrustScene) else 1
-            scene, fields = Mirrored(scene), turned.there(solution.fields)
-            solution = replace(solution, problem=turned.moving, fields=fields)
+            scene, solution = Mirrored(scene), as_solved(solution)
         with suppress(NotFound):
             (one,) = coefficients(scene, solution, damped=False)
             return -alike * float(one.K[0, 0]) * exp(t) / W

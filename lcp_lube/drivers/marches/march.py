@@ -17,7 +17,6 @@ from ...problems.film.grooves import GroovedProblem
 from ...problems.film.lubrication import LubricationProblem
 from ...problems.film.stored import Stored
 from ...problems.film.supplies import supply_flows
-from ...problems.film.turned import TurnedProblem
 from ...problems.grid import Grid
 from ...problems.solution import Fields
 
@@ -121,8 +120,8 @@ class March:
             balance = problem.scheme.flow_unit * problem.flow(p, r)
             into += [problem.reduce.sum(np.where(inside, balance, 0.0)) for inside in problem.columns]
         size = 0.5 * (self.grid.spacing[1] if self.grid.dim == 2 else 1.0)
-        moving, own = (problem.moving, problem.there(fields)) if isinstance(problem, TurnedProblem) else (problem, fields)
-        into += [flow / size for flow in supply_flows(moving, own["p"], own["r"])]
+        own = problem.there(fields)
+        into += [flow / size for flow in supply_flows(problem.moving, own["p"], own["r"])]
         contents, volume = self._rounded(formula, problem, contents, sum(into))
         if self.ends and (lapse := self._lapse(dt, contents, self.contents)) is not None:
             self.lapse = self.grid.reduce.norm(lapse) / (self.grid.reduce.norm(formula.old(self.contents)) or 1.0)

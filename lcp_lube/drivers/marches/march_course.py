@@ -11,7 +11,6 @@ from ...errors import InputError
 from ...problems.film.flows import point_weights
 from ...problems.film.forces import PIVOT
 from ...problems.film.stored import Stored, mean_film
-from ...problems.film.turned import TurnedProblem
 from ...problems.grid import Grid
 from ...scenes.scene import Scene
 from ..derivatives.equations import Equations, followed
@@ -49,12 +48,10 @@ class Trace:
         self.steps: list[Kept] = []
 
     def __call__(self, moment: Moment) -> None:
-        problem, row = moment.problem, moment.row
-        turned, problem = (problem, problem.moving) if isinstance(problem, TurnedProblem) else (None, problem)
+        problem, row = moment.problem.moving, moment.row
 
         def of(fields: Any) -> tuple[Array, Array]:
-            seen = {name: fields[name] for name in ("p", "r")}
-            seen = seen if turned is None else turned.there(seen)
+            seen = moment.problem.there({name: fields[name] for name in ("p", "r")})
             return seen["p"] * problem.p_unit, seen["r"].copy()
 
         if not self.steps and moment.before is not None:

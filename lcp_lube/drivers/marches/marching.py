@@ -132,7 +132,7 @@ class Run:
             raise InputError(f"{self.scene.name}: no steady film at t = 0: {solution.message}; motion.start = full needs none")
         full = contents(self.march.grid, model, solution.fields, solution.problem)
         self.march.begin(full, solution.fields, carried(model, full, solution.problem))
-        self.begun = {**solution.settings, "dry": getattr(getattr(solution.problem, "moving", solution.problem), "dry", None)}
+        self.begun = {**solution.settings, "dry": solution.problem.moving.dry}  # type: ignore[attr-defined]
         solution.destroy()
 
     @property

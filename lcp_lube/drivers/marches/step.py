@@ -47,8 +47,7 @@ def contents(grid: Grid, model: Model, fields: Fields | None, problem: Any = Non
     h = mean_film(grid, model.film).ravel()
     if fields is None:
         return h
-    moving = getattr(problem, "moving", None)  # of a film that is turned round
-    cells = getattr(problem, "cells", {}) if moving is None else {name: problem._here(a) for name, a in moving.cells.items()}
+    cells = {} if problem is None else problem.here(problem.moving.cells)
     return h * (1.0 - fields["r"]) * cells.get("stored", 1.0)
 
 

@@ -19,7 +19,6 @@ from ...problems.film.grooves import GroovedProblem
 from ...problems.film.known import known_of
 from ...problems.film.lubrication import LubricationProblem
 from ...problems.film.model import Model
-from ...problems.film.turned import TurnedProblem
 from ...problems.film.turning import Turning
 from ...problems.solution import Fields, Solution
 from ...scenes.effects.named import without
@@ -29,7 +28,7 @@ from ...scenes.thrust import ThrustScene
 from ...scenes.tilting import TiltingPadScene
 from ..grooves import SolvedFilm, films_of
 from ..loads.pad_coordinates import Bearing, JournalPads, ThrustPads, bearing_of
-from ..turned import Mirrored
+from ..turned import Mirrored, as_solved
 from .coupled_response import CoupledResponse
 from .impedance import displacements, impedance, level, stiffness
 from .response import Change, Moved, Response
@@ -89,10 +88,9 @@ def coefficients(
     check_frequencies(frequencies)
     model: Model = scene.model
     turning: Turning | None = getattr(scene, "turning", None)
+    if model.U < 0:  # a flat film: its mirror image answers to motions along the normal as it does
+        scene, solution = Mirrored(scene), as_solved(solution)
     ring = solution.problem
-    if isinstance(ring, TurnedProblem):  # a flat film: its mirror image answers to motions along the normal as it does
-        scene, fields, ring = Mirrored(scene), ring.there(solution.fields), ring.moving
-        solution = replace(solution, problem=ring, fields=fields)
     assert isinstance(ring, LubricationProblem)  # as a scene with a `model` has
     along = 0.0
     if turning is not None:

@@ -40,8 +40,8 @@ def side_flows(problem: LubricationProblem, p: Array, r: Array) -> dict[str, flo
     not change on the way. Along a side y = const of constant pressure, the strip between the outer faces and the side carries
     Couette flow alone, U h (1 - r)/2 of the line of points beside it; what it loses between west and east leaves by the side.
     """
-    if (moving := getattr(problem, "moving", None)) is not None:  # a TurnedProblem
-        flow = side_flows(moving, *problem.there({"p": p, "r": r}).values())  # type: ignore[attr-defined]
+    if problem.moving is not problem:
+        flow = side_flows(problem.moving, *problem.there({"p": p, "r": r}).values())
         return {**flow, "west": flow["east"], "east": flow["west"]}
     grid, s, lines = problem.grid, problem.scheme, line_weights(problem.grid)
     west, east, south, north = problem.boundary_flows(p, r)

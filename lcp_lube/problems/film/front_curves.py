@@ -30,9 +30,9 @@ def front_curves(problem: LubricationProblem, p: Array, r: Array) -> list[Array]
     ------
     InputError : no film in the plane.
     """
-    if (moving := getattr(problem, "moving", None)) is not None:  # a TurnedProblem
+    if problem.moving is not problem:
         L = problem.grid.lengths[0]
-        curves = front_curves(moving, *problem.there({"p": p, "r": r}).values())  # type: ignore[attr-defined]
+        curves = front_curves(problem.moving, *problem.there({"p": p, "r": r}).values())
         return [curve * [-1.0, 1.0] + [L, 0.0] for curve in curves]
     grid = problem.grid
     if grid.dim == 1 or problem.kind != "lubrication":

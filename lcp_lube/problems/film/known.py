@@ -274,8 +274,5 @@ def _balanced(
 
 def known_fields(problem: LubricationProblem) -> Fields | None:
     """The discrete solution where no solver is needed for it; None for the films that `known_of` leaves out. Collective."""
-    if (moving := getattr(problem, "moving", None)) is not None:  # a TurnedProblem
-        turned = known_fields(moving)
-        return None if turned is None else problem.here(turned)  # type: ignore[attr-defined, no-any-return]
-    known = known_of(problem)
-    return None if known is None else {"p": known.p_pa / problem.p_unit, "r": known.r}
+    known = known_of(problem.moving)
+    return None if known is None else problem.here({"p": known.p_pa / problem.p_unit, "r": known.r})

@@ -105,6 +105,17 @@ class LubricationProblem:
         return self.scheme.c.ravel()
 
     @property
+    def moving(self) -> "LubricationProblem":
+        """The problem that is solved: of a film that is turned round its mirror image."""
+        return self
+
+    def here(self, fields: Fields) -> Fields:
+        """Fields of `moving` as fields of the film as it stands; `there`: the other way round. Collective."""
+        return fields
+
+    there = here
+
+    @property
     def size(self) -> int:
         return self.grid.size
 

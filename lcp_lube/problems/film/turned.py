@@ -30,8 +30,7 @@ class TurnedProblem(LubricationProblem):
     """
 
     def __init__(self, moving: LubricationProblem, exact: Callable[[], ExactSolution | None] | None = None):
-        self.moving = moving
-        grid = moving.grid
+        self.image, grid = moving, moving.grid
         ends = tuple((pair[::-1] if k == 0 else pair) for k, pair in enumerate(grid.ends))
         x, y = grid.places
         places = (None if x is None else grid.lengths[0] - x[::-1], y)
@@ -63,12 +62,14 @@ class TurnedProblem(LubricationProblem):
         )
         self.more_fields = {name: (self._here(values), unit) for name, (values, unit) in moving.more_fields.items()}
 
+    @property
+    def moving(self) -> LubricationProblem:
+        return self.image
+
     def here(self, fields: Fields) -> Fields:
-        """Fields of the mirror image as fields of the film as it stands. Collective."""
         return {name: self._here(values) for name, values in fields.items()}
 
     def there(self, fields: Fields) -> Fields:
-        """The other way round. Collective."""
         return {name: self._there(values) for name, values in fields.items()}
 
     def flow(self, p: Array, r: Array) -> Array:
