@@ -223,7 +223,7 @@ SHAPES: dict[str, Entry] = {
     "wedge": Entry("lcp_lube.scenes.film:Linear", "another name of linear"),
     "parabola": Entry("lcp_lube.scenes.film:Parabola", "h_min in the middle, h_max at both ends"),
     "sinusoid": Entry("lcp_lube.scenes.film:Sinusoid", "full waves between h_max and h_min"),
-    "step": Entry("lcp_lube.scenes.film:Step", "one height before a place, another behind it"),
+    "step": Entry("lcp_lube.scenes.film:StepPart", "one height before a place, another behind it"),
     "pocket": Entry("lcp_lube.scenes.film:Pocket", "a rectangular recess"),
     "dimples": Entry("lcp_lube.scenes.film:Dimples", "an array of equal recesses: square, round, domes"),
     "herringbone": Entry("lcp_lube.scenes.film:HerringbonePart", "inclined grooves that pump towards the middle of the width"),

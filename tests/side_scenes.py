@@ -4,7 +4,7 @@ from functools import partial
 
 from lcp_lube.drivers import compose
 from lcp_lube.drivers.ask import Ask
-from lcp_lube.drivers.symmetry import family_of, solve_part
+from lcp_lube.drivers.symmetry import parts_for, solve_part
 from lcp_lube.registry import DRIVERS
 
 
@@ -13,7 +13,7 @@ def reduced_solve(scene, **how):
     ask = Ask(**how)
     direct = partial(compose.solve, level=len(DRIVERS) - 1)
     problem = scene.build(ask.comm)
-    part = family_of(scene).part_of(scene, problem)
+    part = parts_for(scene).part_of(scene, problem)
     if part is None:
         problem.destroy()
         return direct(scene, ask)

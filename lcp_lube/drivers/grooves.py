@@ -51,7 +51,7 @@ class PadFilm(Derived):
         return super().factored(problem, j, (self.first + i) % self.whole.shape[0])
 
 
-Films = list[tuple[Pad, PadFilm]]
+PadFilms = list[tuple[Pad, PadFilm]]
 Film = TypeVar("Film")
 
 
@@ -87,13 +87,13 @@ def applies(scene: Solvable, ask: Ask) -> bool:
     return bool(getattr(getattr(scene, "model", None), "grooves", ()))
 
 
-def pad_films(scene: Solvable) -> Films:
+def pad_films(scene: Solvable) -> PadFilms:
     """The films between the grooves, and where they lie."""
     model: Model = scene.model  # type: ignore[attr-defined]
     return [(pad, PadFilm(scene, film, (pad.n, *scene.shape[1:]), pad.first)) for pad, film in model.pads(scene.shape)]
 
 
-def _dealt(scene: Solvable, films: Films, comm: MPI.Comm) -> tuple[int, MPI.Comm, list[int]]:
+def _dealt(scene: Solvable, films: PadFilms, comm: MPI.Comm) -> tuple[int, MPI.Comm, list[int]]:
     """How many groups of ranks work side by side; this rank's, to be freed if there are several; its films. Collective."""
     # Factors of effects lie on the whole ring, and every rank takes part in handing them out.
     apart = not hasattr(scene, "by") and not scene.facts().moving
@@ -164,7 +164,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     ).judged()
 
 
-def _band(ring: Any, films: Films, fields: Fields, done: dict[int, Solution], comm: MPI.Comm) -> Enclosure:
+def _band(ring: Any, films: PadFilms, fields: Fields, done: dict[int, Solution], comm: MPI.Comm) -> Enclosure:
     """The ring's band from those of its films, which grooves part: each is a problem of its own. Collective."""
     mine = {k: one.enclosure or Enclosure(False, "no band: no answer") for k, one in done.items()}
     poor = {k: one.message for k, one in mine.items() if not one.certified}
@@ -180,7 +180,7 @@ def _band(ring: Any, films: Films, fields: Fields, done: dict[int, Solution], co
     return Enclosure(True, message, lower, upper, bounds)
 
 
-def _group(films: Films, groups: int) -> list[int]:
+def _group(films: PadFilms, groups: int) -> list[int]:
     """Which group solves each film: the largest first, to the group that has the least."""
     load, out = [0] * groups, [0] * len(films)
     for k in sorted(range(len(films)), key=lambda k: -films[k][0].n):
@@ -190,7 +190,7 @@ def _group(films: Films, groups: int) -> list[int]:
 
 
 def _taken(
-    ring: Grid, fields: Fields, films: Films, mine: list[int], group: PETSc.Comm | None, comm: MPI.Comm
+    ring: Grid, fields: Fields, films: PadFilms, mine: list[int], group: PETSc.Comm | None, comm: MPI.Comm
 ) -> dict[int, tuple[LubricationProblem, Fields]]:
     """The problem of each of this rank's films, and its part of a ring's fields. Collective."""
     with on_all_ranks(comm):
@@ -205,7 +205,7 @@ def _taken(
     return {k: (at[k], dict(zip(fields, part, strict=True))) for k, part in zip(mine, parts, strict=True)}
 
 
-def _spread(ring: GroovedProblem, films: Films, done: dict[int, tuple[Any, Fields]], comm: MPI.Comm) -> Fields:
+def _spread(ring: GroovedProblem, films: PadFilms, done: dict[int, tuple[Any, Fields]], comm: MPI.Comm) -> Fields:
     """The ring's fields from its films and grooves. Collective."""
     j, i = (one.ravel() for one in np.broadcast_arrays(*numbers(ring.grid)))
     which, column = np.full(j.size, -1), np.zeros(j.size, dtype=np.int64)

@@ -24,14 +24,14 @@ Part = film_part.Part | rectangle_part.Quarter
 FAMILIES = (film_part, rectangle_part)  # their UNLIKELY and NONE: why there is no part, by a few points and by all of them
 
 
-def family_of(scene: Solvable) -> Any:
+def parts_for(scene: Solvable) -> Any:
     """Where parts of this scene are looked for, if anywhere."""
     return next((family for family in FAMILIES if family.applies(scene)), None)
 
 
 def applies(scene: Solvable, ask: Ask) -> bool:
     """Whether there is something that symmetries could be looked for in."""
-    return family_of(scene) is not None
+    return parts_for(scene) is not None
 
 
 def why_not(ask: Ask) -> str:
@@ -47,7 +47,7 @@ def why_not(ask: Ask) -> str:
 
 def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     """The whole problem's solution from the least part that has it; from itself where there is none. Collective."""
-    family = family_of(scene)
+    family = parts_for(scene)
     assert family is not None  # as `applies` found
     if reason := why_not(ask) or ("" if family.promising(scene) else family.UNLIKELY):
         return _whole(inner(scene, ask), reason)
@@ -97,7 +97,7 @@ def solve_part(part: Part, problem: Problem, ask: Ask, inner: Inner) -> Solution
     if ask.start is not None:
         small = light(part.build(problem.grid.petsc_comm))
         same = ask.start.problem.grid is problem.grid
-        near = ask.start.fields if same else problem.prolong(ask.start.problem, ask.start.fields, False)  # type: ignore[arg-type]
+        near = ask.start.fields if same else problem.prolong(ask.start.problem, ask.start.fields, False)
         take = Pick(problem.grid, small.grid, *numbers(small.grid))
         start = Start(small, {name: take(values) for name, values in near.items()}, ask.start.settings)
         take.destroy()
@@ -131,8 +131,7 @@ class _Whole:
             spread = Pick(small.grid, self.problem.grid, *self._part.places(self.problem.grid))
             self._seen, self.fields = fields, {name: spread(values) for name, values in fields.items()}
             if (held := getattr(small, "held", None)) is not None:  # pressures of supplies may have followed
-                pairs = zip(self.problem.held.supplies, held.supplies, strict=True)
-                self.problem.hold_at([replace(one, p=found.p) for one, found in pairs])
+                self.problem.hold_at(self.problem.held.supplies, [one.p for one in held.supplies])
             if (by := getattr(small, "factors", None)) is not None and by.at is not None:
                 renew(self.problem, spread(by.at))
             spread.destroy()

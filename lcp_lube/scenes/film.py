@@ -104,7 +104,7 @@ class Sinusoid(Course):
         return self._course("sinusoid", self.h_min, self.h_max, extent, self.waves)
 
 
-class Step(Part):
+class StepPart(Part):
     """A step: `height` (negative: downwards) from `at` on."""
 
     shape: Literal["step"]

@@ -7,9 +7,9 @@ import pytest
 
 from lcp_lube import load_scene, solve
 from lcp_lube.drivers.derivatives.coupled_gradient import CoupledGradient
-from lcp_lube.drivers.derivatives.film_gradient import areas
 from lcp_lube.drivers.derivatives.gradient import film_fields, gradients
 from lcp_lube.drivers.derivatives.transposed import CoupledFilm
+from lcp_lube.problems.film.contact import areas
 from lcp_lube.problems.film.views import LiftedFilm
 from lcp_lube.scenes.effects.named import without
 from lcp_lube.scenes.values import values_of, with_values
@@ -132,7 +132,7 @@ def test_the_films_own_derivative(name, changes, quantities):
             keys = {"clearance": 1.0, "eccentricity": -scene.eccentricity / scene.clearance}
         for one in gradients(scene, solution, quantities, list(keys)):
             expected = sum(part * one.gradient[key] for key, part in keys.items())
-            assert fields[one.quantity].ravel() @ areas(problem.grid) == pytest.approx(expected, rel=1e-6), one.quantity
+            assert fields[one.quantity].ravel() @ areas(problem.grid).ravel() == pytest.approx(expected, rel=1e-6), one.quantity
 
 
 def test_of_a_film_with_effects_that_is_changed_here_and_there():
@@ -151,7 +151,7 @@ def test_of_a_film_with_effects_that_is_changed_here_and_there():
         film = CoupledFilm(gradient)
         for name in names:
             expected = along[name] + 0.5 * (told[0][name] - told[1][name])
-            assert np.dot(film.field(name) * areas(grid), dh) == pytest.approx(expected, rel=1e-6)
+            assert np.dot(film.field(name) * areas(grid).ravel(), dh) == pytest.approx(expected, rel=1e-6)
 
 
 def test_the_command_on_ranks_and_bad_input(cli, tmp_path):

@@ -201,7 +201,7 @@ def test_the_films_own_derivative(name):
     film = FilmGradient(adjoint)
     grid = adjoint.equations.grid
     for name, one in zip(report, gradients(scene, solution, report, ["h_offset"]), strict=True):
-        lifted = grid.reduce.dot(film.field(name), areas(grid))
+        lifted = grid.reduce.dot(film.field(name), areas(grid).ravel())
         # Of a line the number's derivative is the film's, the field's that of the equations on this grid.
         rel = 1e-8 if adjoint.equations.constant.integrals is None else 2e-2
         assert lifted == pytest.approx(one.gradient["h_offset"], rel=rel, abs=1e-9 * abs(one.value) / 1e-6)
@@ -226,7 +226,7 @@ def test_the_scaling_law(name):
     scene, solution = solved(name, **({"p_side": 0.0, "n": 60} if name == "problem4" else {}))
     adjoint = Adjoint(scene, solution, ["load"])
     field, grid = FilmGradient(adjoint).field("load"), adjoint.equations.grid
-    total = grid.reduce.sum(field * areas(grid) * solution.problem.scheme.h.ravel())
+    total = grid.reduce.sum(field * areas(grid).ravel() * solution.problem.scheme.h.ravel())
     assert total == pytest.approx(-2.0 * solution.load, rel=1e-2)
     (one,) = gradients(scene, solution, ["load"])
     keys = ["h_min", "h_max"] if name.startswith("problem") else ["psi"]

@@ -8,12 +8,12 @@ import pytest
 from lcp_lube import solve
 from lcp_lube.drivers import supplies
 from lcp_lube.drivers.derivatives import march_films
-from lcp_lube.drivers.derivatives.film_gradient import areas
 from lcp_lube.drivers.derivatives.gradient import check, film_fields, gradients
 from lcp_lube.drivers.derivatives.march_gradient import MarchGradient, means
 from lcp_lube.drivers.marches import rotor
 from lcp_lube.drivers.marches.march_course import Course, Trace
 from lcp_lube.errors import InputError
+from lcp_lube.problems.film.contact import areas
 from lcp_lube.problems.film.views import LiftedFilm
 from lcp_lube.scenes.scene import load_scene
 from lcp_lube.scenes.values import values_of, with_values
@@ -197,7 +197,7 @@ def test_the_films_own_derivative(case, monkeypatch):
             monkeypatch.setattr(type(scene), "models", lambda self: lifted)
             ends.append(marched(scene, names))
         for one, slope in zip(found, 0.5 * (ends[1] - ends[0]), strict=True):
-            parts = fields[one.quantity].ravel() * areas(grid)
+            parts = fields[one.quantity].ravel() * areas(grid).ravel()
             assert parts.sum() == pytest.approx(one.gradient["h_offset"], rel=1e-8)
             assert parts @ d == pytest.approx(slope, rel=1e-6)
 

@@ -96,7 +96,7 @@ def test_the_films_own_derivative():
         adjoint = Adjoint(scene, solution, ["p_max", "h_min"])
         film = FilmGradient(adjoint)
         grid = adjoint.equations.grid
-        lifted = {name: grid.reduce.dot(film.field(name), areas(grid)) for name in ("p_max", "h_min")}
+        lifted = {name: grid.reduce.dot(film.field(name), areas(grid).ravel()) for name in ("p_max", "h_min")}
         adjoint.destroy()
         assert lifted["h_min"] == pytest.approx(-1.0, rel=1e-8)
         assert abs(lifted["p_max"]) < 1e-8 * solution.p_max / solution.problem.scheme.h.min()

@@ -94,8 +94,8 @@ class Equations:
     def problem(self, p: Array) -> LubricationProblem:
         """The film, with its fluid's coefficients at p."""
         if self.law is not None and not (self._at[0] is p and self._at[1] is self.constant):
-            self._at = p, self.constant, effective(self.constant, self.law, p, self._p_sides)  # type: ignore[arg-type]
-        return self.constant if self.law is None else self._at[2]  # type: ignore[no-any-return]
+            self._at = p, self.constant, effective(self.constant, self.law, p, self._p_sides)
+        return self.constant if self.law is None else self._at[2]
 
     def tangent(self, p: Array, r: Array) -> Tangent:
         return tangent(self.problem(p), self.law, self.constant, p / self.constant.p_unit, r)

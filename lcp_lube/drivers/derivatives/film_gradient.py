@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 
 from ...base.parallel import Array
+from ...problems.film.contact import areas
 from ...problems.film.flows import drag, volume_unit
 from ...problems.film.lubrication import LubricationProblem
 from ...problems.film.reynolds import BoxScheme, sides
-from ...problems.film.slopes import giving
+from ...problems.film.slopes import giving_points
 from ...problems.film.strip import line_weights
 from ...problems.film.tangent import effective
 from ...problems.film.weighed import Weighed, can
@@ -28,20 +29,9 @@ from .implicit import Implicit
 STEP = 1e-30  # relative: complex steps have no differences whose digits could cancel
 
 
-def areas(grid: Grid) -> Array:
-    """What of the film stands for a point: its cell, at an open side with the half cell up to the side, m2 (1D: m)."""
-    masks, sizes = sides(grid), [grid.widths(side) for side in range(grid.dim)]
-    for side, size in enumerate(sizes):
-        for mask, rim in zip(masks[2 * side : 2 * side + 2], grid.rims(side), strict=True):
-            size = size + 0.5 * rim * mask.ravel()
-        sizes[side] = size
-    of_lines = grid.cell * grid.stretch(grid.y) * (sizes[1][:, None] if grid.dim == 2 else 1.0)
-    return np.asarray(sizes[0][None, :] * of_lines).ravel()
-
-
 def per_area(total: Array, grid: Grid, reported: Any) -> Array:
     """dQ/dh of changes at the owned points, over their areas, where the problem that is told has them."""
-    return reported.here({"h": total / areas(grid)})["h"]  # type: ignore[no-any-return]
+    return reported.here({"h": total / areas(grid).ravel()})["h"]
 
 
 class FilmGradient:
@@ -67,7 +57,7 @@ class FilmGradient:
             return slopes
         known = {name: getattr(eq.constant, name) for name in ("p_unit", "p_sides", "film")}
         changed = LubricationProblem(eq.grid, slopes, mu=1.0, U=0.0, p_c=0.0, **known)
-        return effective(changed, eq.law, self.adjoint.p, eq._p_sides).scheme  # type: ignore[arg-type]
+        return effective(changed, eq.law, self.adjoint.p, eq._p_sides).scheme
 
     def field(self, quantity: str) -> Array:
         """dQ/dh at the owned points of the solution's grid, unit of Q per m and m2 (1D: per m and m).
@@ -92,7 +82,7 @@ class FilmGradient:
         for part, weight in adjoint.parts[name].items():
             part = FLIPPED.get(part, part) if adjoint.equations.turned else part
             if part.startswith(("groove_flow_", "supply_flow_")):
-                inside = giving(adjoint.equations.constant, part)
+                inside = giving_points(adjoint.equations.constant, part)
                 rows = rows + weight * unit * inside
             elif part in DRAGS:
                 polar = self.problem.grid.polar

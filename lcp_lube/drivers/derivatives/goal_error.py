@@ -68,7 +68,7 @@ def goal_error(scene: Scene, solution: Solution, finer: Solution, quantity: str)
     ------
     InputError : a scene or a number without derivatives, a number that was found.
     """
-    finer_scene: Any = scene.with_shape(finer.problem.grid.shape)  # type: ignore[attr-defined]
+    finer_scene: Any = scene.with_shape(finer.problem.grid.shape)
     adjoint, other = Adjoint(scene, solution, [quantity]), Adjoint(finer_scene, finer, [])
     try:
         if quantity in adjoint.found:

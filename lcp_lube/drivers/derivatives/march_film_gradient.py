@@ -17,7 +17,7 @@ from .march_gradient import MarchGradient
 
 
 @dataclass(frozen=True)
-class Step:
+class StepAdjoint:
     """One film of a march as `FilmGradient` asks for it; parts : of the quantities, by the numbers that they are made of."""
 
     equations: Equations
@@ -42,7 +42,7 @@ class MarchFilm:
                 continue
             eq, weight = course.at(n), course.formula(n).weight if n else 0.0
             at = {name: gradient.lambdas[name][n] for name in names}
-            film = FilmGradient(Step(eq, kept.p, kept.r, at, gradient.parts(n, eq)))
+            film = FilmGradient(StepAdjoint(eq, kept.p, kept.r, at, gradient.parts(n, eq)))
             for name in names:
                 self.total[name] += film.lagrangian(name).ravel() - weight * size * gradient.left[name][n] / gradient.units[n]
             eq.destroy()

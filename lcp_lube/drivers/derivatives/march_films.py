@@ -25,7 +25,7 @@ from .near_films import FREE, same
 
 
 @dataclass(frozen=True)
-class Films:
+class StepFilms:
     """Of the steps, a row each: C (m3) and H (m) of the faces, the film at the points before them, and of the cells what a step
     comes to store; and what earlier ones have stored, from t = 0 on."""
 
@@ -36,7 +36,7 @@ class Films:
     kept: Array
 
 
-def films_of(course: Course) -> Films:
+def films_of(course: Course) -> StepFilms:
     """Those of a march."""
     grid = course.grid
     rows: list[tuple[Array, ...]] = []
@@ -47,7 +47,7 @@ def films_of(course: Course) -> Films:
     h: Array = _at_once(course, places)
     if h.size:
         H, before, stored = np.split(h, [faces.size, 2 * faces.size], axis=1)
-        return Films(H**3, H, before, stored, np.concatenate([kept, stored]))
+        return StepFilms(H**3, H, before, stored, np.concatenate([kept, stored]))
     for n, step in enumerate(course.trace.steps, start=1):
         model = course.models(step.t, course.place(n))
         film = Around(model.gap, grid)
@@ -61,7 +61,7 @@ def films_of(course: Course) -> Films:
         kept.append(mean_film(grid, model.film)[0] if cut else stored)
         rows.append((C, H, before, stored))
     C, H, before, stored = (np.array(one) for one in zip(*rows, strict=True))
-    return Films(C, H, before, stored, np.array(kept))
+    return StepFilms(C, H, before, stored, np.array(kept))
 
 
 def _at_once(course: Course, places: Array) -> Array:
@@ -122,7 +122,7 @@ class MarchFilms:
         return alone and steady and course.grid.dim == 1 and "closed" not in course.grid.ends[0]
 
     @cached_property
-    def _own(self) -> Films:
+    def _own(self) -> StepFilms:
         return films_of(self.course)
 
     @cached_property
@@ -151,7 +151,7 @@ class MarchFilms:
     def _here(self) -> list[Array]:
         return self._terms(self.course, self._own)
 
-    def _terms(self, course: Course, films: Films) -> list[Array]:
+    def _terms(self, course: Course, films: StepFilms) -> list[Array]:
         model, grid, scheme = course.film(1), course.grid, self.model.scheme
         law, k = model.law or Law(), films.C / (6.0 * model.mu * grid.steps(0))
         pressed = (self._pressed if same(model.law, self.model.law) else self._by(law)) * k
@@ -163,7 +163,7 @@ class MarchFilms:
         area = 2.0 * grid.spacing[0] * grid.widths(0)
         return [pressed, model.U * (wall + void), self.stored * (films.stored * area), -self.kept * (films.kept * area)]
 
-    def _films(self, course: Course) -> Films:
+    def _films(self, course: Course) -> StepFilms:
         """Time changes them by the wall's way and the journal's place alone: the same at three times, they are so always."""
         last, grid = len(self.course.trace.steps), self.course.grid
         still = course.table == self.course.table and course.grid.lengths == grid.lengths and course.grid.even == grid.even

@@ -23,7 +23,7 @@ from ...base.parallel import Array
 from ...errors import InputError
 from ...problems.film.edges import oblique
 from ...problems.film.flows import point_weights, volume_unit
-from ...problems.film.slopes import giving
+from ...problems.film.slopes import giving_points
 from ...problems.film.stored import mean_film
 from ...problems.solution import Solution
 from ...scenes.scene import Scene
@@ -142,7 +142,7 @@ class MarchGradient:
                 gives = {part: -w for part, w in parts.get(name, {}).items() if part.startswith(GIVEN)}
                 for fed, by in zip(self.fed[name][n], off, strict=True):
                     gives |= {part: gives.get(part, 0.0) + fed * w for part, w in by.items()}
-                own = sum((w * giving(problem, part) for part, w in gives.items()), np.zeros(one.size))
+                own = sum((w * giving_points(problem, part) for part, w in gives.items()), np.zeros(one.size))
                 self.left[name][n] = np.where(eq.given, volume_unit(problem) * own, one)
             size = sum(abs(w * numbers[part]) for part, w in parts.get(name, {}).items())
             self.sizes[name] += size + driven

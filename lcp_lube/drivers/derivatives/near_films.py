@@ -82,7 +82,7 @@ class NearFilms:
     @cached_property
     def _told(self) -> dict[str, float]:
         own = copy(self.equations.constant)
-        own.p_sides = self.equations._p_sides  # type: ignore[assignment]  # not as q of Barus' law
+        own.p_sides = self.equations._p_sides  # not as q of Barus' law
         return self._totals(own)
 
     def _totals(self, problem: LubricationProblem) -> dict[str, float]:
@@ -113,7 +113,7 @@ class NearFilms:
             numbers[name] = (-1.0 if eq.turned else 1.0) * (of[0] + of[2:] @ np.array(p_sides) + model.mu * shear)
         lean, near = copy(eq), copy(eq.constant)
         near.grid = grid
-        near.mu, near.U, near.p_c, near.p_sides = model.mu, model.U, model.p_c, p_sides  # type: ignore[assignment]
+        near.mu, near.U, near.p_c, near.p_sides = model.mu, model.U, model.p_c, p_sides
         near.shaft, near.extras, near.film, lean.constant = model.shaft, model.extras, model.film, near
         near.levers, own = model.levers, self.model
         held = (eq._p_sides, eq.constant.p_c) == (p_sides, near.p_c) and grid is eq.grid

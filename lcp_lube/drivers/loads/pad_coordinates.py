@@ -18,7 +18,7 @@ from ...scenes.scene import Scene, Solvable
 from ...scenes.thrust import ThrustScene
 from ...scenes.tilting import TiltingPadScene
 from ..grooves import SideBySide, SolvedFilm, films_of
-from ..motions.impedance import displacements, held, level
+from ..motions.impedance import displacements, held, rising
 from ..motions.response import Change, Response
 
 FEWEST = 8  # points of a coarse grid along a pad
@@ -46,7 +46,7 @@ class FilmWithModes:
         return out
 
 
-Films = SideBySide[FilmWithModes]
+ModeFilms = SideBySide[FilmWithModes]
 
 
 @dataclass
@@ -93,7 +93,7 @@ class JournalPads:
         return self.scene.model_copy(update={**e, "tilts": [float(tilt) for tilt in q[2:]], "balance": None})
 
     @contextmanager
-    def films(self, scene: Scene, solution: Solution) -> Iterator[Films]:
+    def films(self, scene: Scene, solution: Solution) -> Iterator[ModeFilms]:
         with films_of(held(scene, solution), solution.problem, solution.fields) as films:  # type: ignore[arg-type]
             yield replace(films, mine=[self._pad(one) for one in films.mine])  # type: ignore[misc]
 
@@ -173,9 +173,9 @@ class ThrustPads:
         return self.scene.model_copy(update={**found, "balance": None})
 
     @contextmanager
-    def films(self, scene: Scene, solution: Solution) -> Iterator[Films]:
+    def films(self, scene: Scene, solution: Solution) -> Iterator[ModeFilms]:
         assert isinstance(scene, ThrustScene) and isinstance(solution.problem, LubricationProblem)
-        modes = [level, *scene.tilt_modes]
+        modes = [rising, *scene.tilt_modes]
         film, grid = held(scene, solution), solution.problem.grid
         problem = film.build(grid.petsc_comm)
         yield SideBySide(grid.comm, grid.comm, [FilmWithModes(problem, film.model, solution.fields, modes, [0, 1, 2])])

@@ -25,7 +25,7 @@ from ..chain import Chain
 from ..compose import Inner
 from ..levels import halved
 from ..motions.impedance import stiffness
-from .pad_coordinates import Bearing, Films, FilmWithModes, bearing_of
+from .pad_coordinates import Bearing, FilmWithModes, ModeFilms, bearing_of
 
 MOST_SOLVES = 80  # on a grid: the end of a search that goes round: pads without preload, which idle, took up to 65
 FINE = 7  # points across that are halved
@@ -144,7 +144,9 @@ def _places(film: FilmWithModes) -> tuple[Array, Array]:
     return grid.with_neighbours(0)[None, :], grid.with_neighbours(1)[:, None]
 
 
-def _step(bearing: Bearing, films: Films, K: Array, off: Array, counts: Array, nudge: Array, moves: NDArray[np.bool_]) -> Array:
+def _step(
+    bearing: Bearing, films: ModeFilms, K: Array, off: Array, counts: Array, nudge: Array, moves: NDArray[np.bool_]
+) -> Array:
     """Newton's step of what moves, and the nudges, shortened where it would change a film by too much. Collective."""
     free, step = np.flatnonzero(moves), nudge.copy()
     scaled = -K[np.ix_(free, free)] * bearing.sizes[free] / counts[free, None]

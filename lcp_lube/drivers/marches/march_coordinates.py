@@ -19,7 +19,7 @@ from ..compose import Inner
 from ..grooves import SideBySide, SolvedFilm, films_of
 from ..loads import pads
 from ..loads.pad_coordinates import FilmWithModes, JournalPads, ThrustPads
-from ..motions.impedance import displacements, level, stiffness
+from ..motions.impedance import displacements, rising, stiffness
 from ..motions.response import Change
 from .step import TimeStep
 
@@ -92,13 +92,13 @@ class Coordinates:
 
     def _film(self, one: SolvedFilm) -> FilmWithModes:
         if isinstance(self.scene, TiltingPadScene) and self.pads is not None:
-            return self.pads._pad(one)  # type: ignore[no-any-return]
+            return self.pads._pad(one)
         return FilmWithModes(one.problem, one.film.model, one.fields, self._modes(one.first), (0, 1))
 
     def _modes(self, first: float) -> list[Change]:
         if self.journal:
             return displacements(self.scene.turning, first)
-        return [level, *(self.scene.tilt_modes if self.pads is not None else ())]
+        return [rising, *(self.scene.tilt_modes if self.pads is not None else ())]
 
     def forces(self, solution: Solution) -> Array:
         """What the film of a solved step does to each, N or N m. Collective."""
@@ -112,7 +112,7 @@ class Coordinates:
         problem: Any = solution.problem
 
         def of(film: FilmWithModes) -> Array:
-            return film.spread(stiffness(film.response()), self.unit.size)  # type: ignore[no-any-return]
+            return film.spread(stiffness(film.response()), self.unit.size)
 
         if isinstance(problem, GroovedProblem):
             with films_of(step, problem, solution.fields) as films:

@@ -30,7 +30,7 @@ from ..grooves import SolvedFilm, films_of
 from ..loads.pad_coordinates import Bearing, JournalPads, ThrustPads, bearing_of
 from ..turned import Mirrored, as_solved
 from .coupled_response import CoupledResponse
-from .impedance import displacements, impedance, level, stiffness
+from .impedance import displacements, impedance, rising, stiffness
 from .response import Change, Moved, Response
 
 FASTEST = 1e100  # rad/s: beyond it a factorisation overflows, and K and C are long those of void that has no time to change
@@ -54,7 +54,7 @@ class Coefficients:
 def motions_of(turning: Turning | None, tilt: bool, middle: float, along: float = 0.0) -> list[Change]:
     """dh/de of each motion; along : angle of the load, rad from where theta is counted."""
     if turning is None:
-        return [level]
+        return [rising]
     moved = displacements(turning, along=along)
     tilted: list[Change] = [lambda x, y, one=one: (y - middle) * one(x, y) for one in moved]  # type: ignore[misc]
     return [*moved, *tilted] if tilt else moved
@@ -118,7 +118,7 @@ def coefficients_of(solution: Solution, frequency: float | Sequence[float], tilt
     if not solution.converged:
         raise InputError(f"coefficients are of solutions that converged: {solution.message}")
     try:
-        frequencies = [float(nu) for nu in np.atleast_1d(frequency)]  # type: ignore[arg-type]
+        frequencies = [float(nu) for nu in np.atleast_1d(frequency)]
     except (TypeError, ValueError):
         raise InputError(f"frequency = {frequency!r}: numbers in rad/s are needed") from None
     found = coefficients(scene_of(solution), solution, frequencies, tilt)

@@ -66,7 +66,7 @@ class CoupledResponse(OfLine):
         self.columns, self.given = columns, columns | held
         self._owner = problem.held.owner.ravel() if self.free else np.zeros(0)
         self._size = 2.0 * grid.spacing[0] / self.unit * point_weights(grid)
-        self._areas = areas(base).ravel()
+        self._areas = areas(grid).ravel()
         self.place(solution.fields["p"], solution.fields["r"], loop.vector(problem.cells) if loop.names else np.zeros(0), flip)
         weight = grid.cell * base.p_unit * point_weights(grid) * np.where(self.cavity, 0.0, 1.0)
         model, least = loop.frozen.constant, STEP * base.reduce.min(base.scheme.h.ravel())

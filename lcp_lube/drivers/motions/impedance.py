@@ -17,7 +17,7 @@ from .coupled_response import CoupledResponse
 from .response import Change, Response
 
 
-def level(x: Array, y: Array) -> Array:
+def rising(x: Array, y: Array) -> Array:
     """dh of a film that is thicker everywhere, by as much."""
     return np.ones(np.broadcast_shapes(x.shape, y.shape))
 

@@ -55,7 +55,7 @@ class OfLine:
     @cached_property
     def _of_grid(self) -> Array:
         """-dF/de of the discrete equations."""
-        return self._forces(self._slow).real  # type: ignore[no-any-return]
+        return self._forces(self._slow).real
 
     def stiffness(self) -> Array:
         """-dF/de with nothing but e changed, shape (motions, motions)."""

@@ -112,7 +112,7 @@ class Response(OfLine):
         free = [one.open for one in supplies]
         self._feed = Feed(problem, self.cavity, free) if any(free) else None
         self._answers: dict[float, list[Any]] = {}
-        swept = (lambda S: S) if held is None else (lambda S: np.where(held.mask.ravel(), 0.0, S))  # type: ignore[union-attr]
+        swept = (lambda S: S) if held is None else (lambda S: np.where(held.mask.ravel(), 0.0, S))
         self._swept = [swept(S) for S in self._S]
         self._told = known_of(problem) is not None  # numbers are the film's own, not those of the fields
         self._forces_of_line: list[Array | None] = []

@@ -92,7 +92,7 @@ def carried(at: Answer, told: bool = True) -> Carried:
     by_wall, drag = _shear(at, dy, other_free)
     sheared = np.where(free, by_wall, 0.0)
     if problem.contact is not None:
-        carrying = problem.contact.p_a.reshape(box) * areas(problem) * grid.stretch(grid.y)
+        carrying = problem.contact.p_a.reshape(box) * areas(grid) * grid.stretch(grid.y)
         by_wall = by_wall + abs(problem.U) * problem.contact.friction * carrying
     drives = problem.reduce.sum(np.sum(k, axis=0)) * largest
     if not problem.U and not problem.reduce.sum(np.abs(heat)) > NOTHING * drives * largest:  # of what it could turn into heat

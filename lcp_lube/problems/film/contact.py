@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...base.parallel import Array
+from ..grid import Grid
 from .reynolds import sides
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ class Contact:
     def total(self, problem: LubricationProblem, weight: Callable[[Array, Array], Any]) -> float:
         """Integral of p_a weight(x, y), N for a weight of 1 (1D: N/m). Collective."""
         grid = problem.grid
-        found = self.p_a.reshape(grid.box) * areas(problem) * weight(grid.x, grid.y)
+        found = self.p_a.reshape(grid.box) * areas(grid) * weight(grid.x, grid.y)
         return float(problem.reduce.sum(found))
 
     def drag(self, problem: LubricationProblem, lever: Array | float = 1.0) -> float:
@@ -33,9 +34,8 @@ class Contact:
         return float(np.sign(problem.U)) * self.friction * self.total(problem, lambda x, y: lever + 0.0 * x)
 
 
-def areas(problem: LubricationProblem) -> Array:
+def areas(grid: Grid) -> Array:
     """What each owned point stands for up to the open sides, shape grid.box, m2 (1D: m)."""
-    grid = problem.grid
     west, east, south, north = sides(grid)
     first, last = grid.rims(0)
     along = grid.widths(0) + 0.5 * (first * west + last * east)

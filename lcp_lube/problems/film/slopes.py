@@ -66,7 +66,7 @@ def numbers(problem: LubricationProblem, p: Array, r: Array, wanted: Collection[
     return out
 
 
-def giving(problem: LubricationProblem, name: str) -> NDArray[np.bool_]:
+def giving_points(problem: LubricationProblem, name: str) -> NDArray[np.bool_]:
     """The owned points of the groove or supply whose flow this is."""
     which = int(name.rpartition("_")[2])
     if isinstance(problem, GroovedProblem):
@@ -98,7 +98,7 @@ def slope(problem: LubricationProblem, tangent: Tangent | None, p: Array, r: Arr
     assert tangent is not None  # as flows need it
     if name.startswith("flow_"):
         return _flow(problem, tangent, name.removeprefix("flow_"))
-    return _given(problem, tangent, giving(problem, name))
+    return _given(problem, tangent, giving_points(problem, name))
 
 
 def _friction(problem: LubricationProblem, tangent: Tangent | None, p: Array, r: Array, lever: Any) -> Slope:
