@@ -47,7 +47,7 @@ def balanced(bearing: str, attitude: str, L_over_D: float, asked_part: float, nx
     if name == "misaligned_journal":
         changes["tilt"] = 2.5e-4 / L_over_D  # half the clearance at the edges
     place = {"attitude_deg": ATTITUDE} if grooved else {}
-    e = asked_part * (touching(load_scene(name, changes), math.radians(ATTITUDE)) if grooved else 1.0)  # type: ignore[arg-type]
+    e = asked_part * (touching(load_scene(name, changes), math.radians(ATTITUDE)) if grooved else 1.0)
     there = solve(load_scene(name, {**changes, **place, "eccentricity": e}))
     load = there.problem.quantities(there.fields)["load"]
     there.destroy()
@@ -55,7 +55,7 @@ def balanced(bearing: str, attitude: str, L_over_D: float, asked_part: float, nx
     solution = solve(scene)
     found, phi = solution.settings["balance"], solution.settings.get("attitude_deg", ATTITUDE)
     solution.destroy()
-    most = touching(scene, math.radians(phi)) if grooved else 1.0  # type: ignore[arg-type]
+    most = touching(scene, math.radians(phi)) if grooved else 1.0
     row = {"eccentricity": found["value"], "part": f"{found['value'] / most:.4f}", "outcome": solution.outcome.value}
     return row | {"load_N": load, "work": f"{found['work']:.2f}", **{name: found[name] for name in ("iterations", "solves")}}
 

@@ -260,7 +260,7 @@ def small(film: str, n: int, variant: str, repeats: int) -> Values:
 
     def solves() -> None:
         for k in range(200):
-            with solve(scene, U=scene.U * (1.0 + 1e-3 * k)) as solution:  # type: ignore[attr-defined]
+            with solve(scene, U=scene.U * (1.0 + 1e-3 * k)) as solution:
                 loads.append(solution.load if variant == "with numbers" else len(solution.steps))
 
     solves()

@@ -67,7 +67,7 @@ def cycles(sizes: tuple[int, ...]) -> None:
     print(f"{'points':>8}{'lines':>9}{'cycles':>8}{'factor':>8}")
     for n in sizes:
         scene = load_scene("dimpled_pad", {"nx": n, "ny": n})
-        model = scene.model  # type: ignore[attr-defined]
+        model = scene.model
         for name, places in (("edges", model.lines((n, n))), ("even", EVEN)):
             film = PadFilm(scene, replace(model, places=places), (n, n), 0)
             solution = compose(film, Ask(method="fas"))

@@ -99,10 +99,10 @@ def preload() -> None:
     class Start(importlib.abc.MetaPathFinder, importlib.abc.Loader):
         """Starts each of the two where a new process would: at its first import."""
 
-        def find_spec(self, name, path, target=None):  # type: ignore[no-untyped-def]
+        def find_spec(self, name, path, target=None):
             return importlib.machinery.ModuleSpec(name, self) if name in ("mpi4py.MPI", "petsc4py.PETSc") else None
 
-        def exec_module(self, module) -> None:  # type: ignore[no-untyped-def]
+        def exec_module(self, module) -> None:
             if module.__name__ == "mpi4py.MPI":
                 sys.modules[module.__name__] = MPI
                 if not MPI.Is_initialized():  # PETSc may have come first

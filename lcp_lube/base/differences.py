@@ -53,7 +53,7 @@ def differences(f: Callable[[float], Array], a: float, scale: float, sizes: Arra
     def by_steps(slopes: list[Array]) -> Array:
         """Where slopes differ too much to be those of one derivative."""
         apart, most = np.ptp(slopes, axis=0), np.abs(slopes).max(axis=0)
-        return (apart > APART * most) & (apart * scale > SLIGHT * np.abs(at(0.0)) + 1e-9 * sizes)  # type: ignore[no-any-return, arg-type]
+        return (apart > APART * most) & (apart * scale > SLIGHT * np.abs(at(0.0)) + 1e-9 * sizes)  # type: ignore[arg-type]
 
     def told(slope: Array, kinks: Array) -> tuple[Array, Array]:
         none = by_steps([slope, *chords]) if chords else np.zeros(sizes.shape, dtype=bool)

@@ -100,7 +100,7 @@ class Part(Derived):
         """The discrete problem of the part. Collective."""
         model, shape = self._model()
         problem = model.build(shape, comm)
-        return self.factored(problem, *numbers(problem.grid))  # type: ignore[no-any-return]
+        return self.factored(problem, *numbers(problem.grid))
 
     def answer(self, problem: Problem) -> Fields | None:
         """The whole problem's fields, where there is nothing to solve."""

@@ -39,9 +39,9 @@ class Sources:
         self.free = np.array([one.open for one in supplies], dtype=bool)
         self.any = bool(self.free.any())
 
-    def held(self, P: Array) -> list[Supply]:
+    def held(self, P: Array) -> tuple[Supply, ...]:
         """As supplies of given pressures."""
-        return [Supply(one.region, float(p)) for one, p in zip(self.supplies, P, strict=True)]
+        return tuple(Supply(one.region, float(p)) for one, p in zip(self.supplies, P, strict=True))
 
     def foreseen(self, film: Any, p: Array) -> Array:
         """The pressures that fields have, p in the film's p_unit."""

@@ -30,6 +30,7 @@ from .ask import Ask
 from .chain import Chain
 from .compose import Inner
 from .motions.linearised import Feed, Linear
+from .sources import Sources
 
 MOST_SOLVES = 40  # the end of a search that goes round: of drawn films with dense fluids those that were found took up to 11
 TOLERANCE = 1e-10  # of the largest flow: by how much what a source gives may differ from what the film takes
@@ -87,13 +88,11 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     if shut and all(one.flow is not None for one in supplies):
         raise InputError(f"{scene.name}: supply.1.flow: no side has a pressure, and no supply one or a restrictor: no way out")
     known = ask.start.settings.get("supply_pressures") if ask.start is not None else None
-    free = np.array([one.open for one in supplies])
-    P = np.array(_first(model))
+    sources = Sources(supplies)
+    free, P = sources.free, np.array(_first(model))
     if known is not None and len(known) == len(supplies):
         near: Any = ask.start
-        P = np.array(known)
-        if model.stored is not None:
-            P = supply_step.Sources(supplies).foreseen(near.problem, near.fields["p"])
+        P = np.array(known) if model.stored is None else sources.foreseen(near.problem, near.fields["p"])
     # Nothing flows in a steady film, through its restrictor neither, whatever rounding says.
     known_before = shut and len(supplies) == 1 and model.stored is None
     P = np.array([supplies[0].p_s]) if known_before else P
@@ -106,19 +105,18 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     moved: Any = None  # the last step, and from where
     beside: Any = 0.0  # what effects add to the slopes
     for count in range(1, MOST_SOLVES + 1):
-        held = tuple(Supply(one.region, float(p)) for one, p in zip(supplies, P, strict=True))
         if together:
             solution = chain.solve(scene, ahead, rescue=False)
         if together and solution.converged:
             P = np.array([one.p for one in solution.problem.held.supplies])  # type: ignore[attr-defined]
         else:
-            solution = chain.solve(Fed(scene, held), ahead)
+            solution = chain.solve(Fed(scene, sources.held(P)), ahead)
         problem: Any = solution.problem
         if not solution.converged:
             break
         flows = np.array(supply_flows(problem, solution.fields["p"], solution.fields["r"]))
         sought = [(one, float(p), float(flow)) for one, p, flow in zip(supplies, P, flows, strict=True)]
-        problem.hold_at([replace(one, p=float(p)) for one, p in zip(supplies, P, strict=True)])
+        problem.hold_at(supplies, P)
         off = np.array(supply_defects(problem, flows.tolist()), dtype=float)
         misfit = np.array([one.sought(p, flow) if one.open else (0.0, 0.0, 0.0) for one, p, flow in sought])
         starved = (off > TOLERANCE) & (misfit[:, 0] > 0.0) & (P <= 0.0)
@@ -149,8 +147,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         by, P[free] = new_P - P[free], new_P
         moved = (by, flows[free], slopes) if model.effects and by.any() else None
         if model.stored is not None or follow:
-            z = solution.fields["p"] - solution.fields["r"] + by @ np.array(answers)
-            z = np.where(problem.held.mask.ravel(), np.append(P / problem.p_unit, 0.0)[problem.held.owner.ravel()], z)
+            z = sources.put(problem, solution.fields["p"] - solution.fields["r"] + by @ np.array(answers), P)
             ahead = {"p": np.maximum(z, 0.0), "r": np.maximum(-z, 0.0)}
     if solution.converged and np.max(off) > enough:
         worst = int(np.argmax(np.where(starved, off, 0.0) if starved.any() else off))
@@ -163,7 +160,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
                 message += ": the last digit of the pressure moves the film's flow by more than that"
             solution.outcome, solution.message = Outcome.MAX_ITERATIONS, message
     solution.steps = chain.steps
-    problem.hold_at([replace(one, p=float(p)) for one, p in zip(supplies, P, strict=True)])
+    problem.hold_at(supplies, P)
     solution.certificate = problem.certify(solution.fields, solution.settings["eps1"])
     if ask.certify:
         from .supply_band import enclose_fed  # here: seldom asked for

@@ -21,7 +21,7 @@ class Mirrored(Derived):
 
     @property
     def model(self) -> Model:
-        return self.whole.model.mirrored  # type: ignore[attr-defined]
+        return self.whole.model.mirrored
 
     def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
         return self.model.build(self.shape, comm)

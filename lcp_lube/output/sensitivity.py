@@ -96,7 +96,7 @@ def plot_error(error: GoalError, solution: Solution, path: str | Path) -> None:
         axes = figure.subplots()
         axes.set_xlabel(picture.along[1])  # type: ignore[union-attr]
         name = f"error of {error.quantity} ({unit or '1'} per mm²)"
-        _map(figure, axes, picture, 1e-6 * values, name)  # type: ignore[arg-type, operator]
+        _map(figure, axes, picture, 1e-6 * values, name)  # type: ignore[arg-type]
         head = f"{solution.settings.get('scene', '')}: {error.quantity} {with_unit(error.value, unit)}".rstrip()
         shares = f"error near {with_unit(error.error, unit)}; half of what cells add lies in {error.worst:.1%} of them"
         axes.set_title(f"{head}\n{shares}", fontsize=9, loc="left")

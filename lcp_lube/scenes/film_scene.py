@@ -149,7 +149,7 @@ class FilmScene(Scene):
             except InputError as error:
                 raise self._named(error) from None
             made = self._made = dict(vars(self)), where, replace(model, effects=effects) if effects else model
-        return made[2]  # type: ignore[no-any-return]
+        return made[2]
 
     def __getstate__(self) -> dict[Any, Any]:
         state = super().__getstate__()

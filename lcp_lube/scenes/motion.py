@@ -120,7 +120,7 @@ class MotionTable(Measured):
 
             rows = _rows((folder or Path()) / self.file, self.t_end, ("t, X, Y" if count == 2 else "t, h_offset"))
             spline = CubicSpline(rows[:, 0], rows[:, 1:])
-            return lambda t: tuple(map(float, spline(t)))  # type: ignore[return-value]
+            return lambda t: tuple(map(float, spline(t)))
         if "h_offset" in self.set and count == 1:
             return lambda t: _values("motion.set.h_offset", [self.set["h_offset"]], t)  # type: ignore[list-item]
         texts = self.journal

@@ -83,6 +83,6 @@ def travel_of(scene: Any, table: MotionTable | None) -> Callable[[float], float]
     places = (np.arange(PIECES)[:, None] + 0.5 + 0.5 * nodes) / PIECES
 
     def travel(t: float) -> float:
-        return float(per * t * np.mean(speed(places, places, t * places) @ (0.5 * weights)))  # type: ignore[arg-type]
+        return float(per * t * np.mean(speed(places, places, t * places) @ (0.5 * weights)))
 
     return travel

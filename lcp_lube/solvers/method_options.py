@@ -63,7 +63,7 @@ def make_options(kind: type[T], given: dict[str, Any]) -> T:
     ------
     InputError : an unknown name, or a value of another type; the dataclass itself checks ranges.
     """
-    known: dict[str, type] = {field.name: type(field.default) for field in fields(kind)}  # type: ignore[arg-type]
+    known: dict[str, type] = {field.name: type(field.default) for field in fields(kind)}
     values, method = {}, kind.method
     for name, value in given.items():
         if name not in known:

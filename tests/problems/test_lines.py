@@ -213,7 +213,7 @@ def test_a_line_on_every_kink(U):
     film += [{"shape": "linear", "h_start_um": 1.0, "h_end_um": 0.0, "along": axis, "between_mm": ends} for axis, ends in ramps]
     data = {"family": "bearing", "dimension": 2, "L_mm": 10, "width_mm": 10, "U": U, "n": 23, "film": film}
     scene = load_scene({**data, "fluid": {"mu": 0.02, "p_supply": 1e5}})
-    model = scene.model if U > 0 else scene.model.mirrored  # type: ignore[attr-defined]
+    model = scene.model if U > 0 else scene.model.mirrored
     for line, places in zip(model.lines((23, 23)), ([2.23e-3, 5.1e-3], [3.07e-3, 8.9e-3]), strict=True):
         places = 0.01 - np.array(places) if U < 0 and places[0] == 2.23e-3 else np.array(places)
         assert np.abs(line[:, None] - places).min(axis=0).max() < 1e-12

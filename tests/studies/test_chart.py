@@ -229,7 +229,7 @@ def test_panels_of_the_full_chart_can_be_read(draw: Any, printed: None) -> None:
         colours = {line.get_color() for line in lines if line.get_linewidth() < 3.0}
         assert 1 <= len(colours) <= 7
         low, high = axes.get_ylim()
-        assert any(low <= y <= high for line in lines for y in line.get_ydata())  # type: ignore[union-attr]
+        assert any(low <= y <= high for line in lines for y in line.get_ydata())
     legend = next(found for axes in figure.axes if (found := axes.get_legend()))
     black = [str(line.get_label()) for line in legend.get_lines() if line.get_color() == "#000000"]
     assert all(name.startswith("other codes") for name in black)  # a colour that no method has

@@ -26,7 +26,7 @@ def test_rows_are_the_runs_that_solve_makes() -> None:
     alone.destroy()
     for key in ("iterations", "linear_iterations", "load", "min_p", "min_r", "residual", "complementarity"):
         assert rows[1][key] == data[key], key
-    exact = scene.exact()  # type: ignore[attr-defined]
+    exact = scene.exact()
     assert rows[0]["load_error"] == pytest.approx(abs(data["pressure_integral"] / exact.load - 1), rel=1e-3)
     assert rows[0]["rupture_error"] == pytest.approx(abs(data["rupture"] - exact.rupture) / 0.1, abs=1e-9)
     assert rows[0]["rupture_error"] < 1 / 61  # the front is within a cell

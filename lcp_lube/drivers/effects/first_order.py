@@ -243,7 +243,7 @@ class FirstOrder:
         """The equations are those of the film with these coefficients; t : the part of what was not solved for in them."""
         eq, law = self.equations, self._physics(self.kept)[0]
         by = self._factors(cells, t)
-        film = answer(self.base, law, cells, by, self.p, self.r, eq._p_sides).problem  # type: ignore[arg-type]
+        film = answer(self.base, law, cells, by, self.p, self.r, eq._p_sides).problem
         if "contact" in cells and (contact := getattr(getattr(self, "at", None), "problem", film).contact) is not None:
             film.contact = replace(contact, p_a=cells["contact"])
         eq.constant = film

@@ -285,9 +285,9 @@ def _stiffness(at: Any, solution: Solution) -> Array:
     at = placed(at, solution)
     motions = motions_of(at.turning, False, 0.0)
     try:
-        return by_film(stiffness, at, solution, motions)  # type: ignore[no-any-return]
+        return by_film(stiffness, at, solution, motions)
     except NotFound:  # with the effects' part; then without it
-        return by_film(stiffness, without(at, named(at)), solution, motions)  # type: ignore[no-any-return]
+        return by_film(stiffness, without(at, named(at)), solution, motions)
 
 
 def _inverse(jacobian: Array) -> Array:

@@ -179,7 +179,7 @@ class Course:
         """2 dx (1 - r), times the density, at the end of step n: what each cell stores, as G has it, for each m of its film."""
         kept = self.kept(n)
         liquid: Any = self.fill if kept is None else 1.0 - kept.r
-        return 2.0 * self.grid.spacing[0] * point_weights(self.grid) * liquid * self.density(n)  # type: ignore[no-any-return]
+        return 2.0 * self.grid.spacing[0] * point_weights(self.grid) * liquid * self.density(n)
 
     def density(self, n: int) -> Any:
         """At the end of step n, over that at p_c."""

@@ -291,7 +291,7 @@ def first_film(scene: Any, models: Any, place: Any) -> Model:
     first, later = (models(t, place) for t in (0.0, SOME * scene.motion.t_end))
     if any(set(first.edges_along(axis)) != set(later.edges_along(axis)) for axis in "xy"[: len(first.lengths)]):
         first = replace(first, places=EVEN)  # its edges move: no line of points can lie on them
-    return first  # type: ignore[no-any-return]
+    return first
 
 
 def _badness(measure: float) -> float:

@@ -50,7 +50,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution | None:
     if not solution.converged:
         solution.destroy()
         return None
-    problem.hold_at([replace(one, p=p) for one, p in zip(model.supplies, P, strict=True)])
+    problem.hold_at(model.supplies, P)
     solution.certificate = problem.certify(solution.fields, solution.settings["eps1"])
     why = [WHY, *(one for one in solution.settings["why"] if not one.startswith("supplies"))]
     solution.settings |= {"supply_pressures": P, "why": why}

@@ -226,7 +226,7 @@ def scaled(
     problem: LubricationProblem,
     by: FaceFactors,
     mobility: Sequence[Array] | None = None,
-    p_sides: tuple[float, float, float, float] | None = None,
+    p_sides: tuple[float, ...] | None = None,
     held: Held | None = None,
 ) -> LubricationProblem:
     """The film with factors at its faces, conductances times mobilities, and other pressures at its sides and supplies."""
@@ -273,7 +273,7 @@ def answer(
     if held is not None and law.barus:  # back from q
         supplies = tuple(replace(one, p=float(law.pressure(np.array(one.p)))) for one in held.supplies)
         held = replace(held, supplies=supplies, law=None)
-    film = scaled(base, by, mobility, p_sides, held)  # type: ignore[arg-type]
+    film = scaled(base, by, mobility, p_sides, held)
     if base.integrals is not None:
         from .oil_along import oil_of  # here: of lines alone
 

@@ -87,7 +87,7 @@ def friction(problem: LubricationProblem, p_pa: Array, r: Array, lever: Array | 
         if alone:
             part.grid, part.scheme = places_of(grid, rows), s.rows(rows)
         along = lever[rows] if isinstance(lever, np.ndarray) else lever
-        return float(np.sum(sum(drag(part, part.scheme, p_pa[rows].ravel(), r[rows].ravel())) * along))  # type: ignore[arg-type]
+        return float(np.sum(sum(drag(part, part.scheme, p_pa[rows].ravel(), r[rows].ravel())) * along))
 
     if runs(problem, MANY):
         of_film = drag_sum(problem, p_pa, r, lever)

@@ -88,7 +88,7 @@ class LineIntegrals:
 
     def carries(self, x: Array) -> Array:
         """What a wall drags through places where the film is full, over its speed: h rho/rho_0, m."""
-        return self.film_at(x) / self.along_at(x)[1]  # type: ignore[no-any-return]
+        return self.film_at(x) / self.along_at(x)[1]
 
     def _panels(self, edges: Array) -> tuple[Array, Array | None]:
         """Ends of the panels, each point among them, to the bit; and the film at their Gauss points, if that is known by then.
@@ -245,7 +245,7 @@ def thinnest(grid: Grid, film: Callable[[Array, Array], Array]) -> tuple[float, 
         h = np.nan_to_num(np.broadcast_to(film(x, y), (y.size, x.size)), nan=-np.inf, posinf=np.inf, neginf=-np.inf)
         j, i = np.unravel_index(np.argmin(h), h.shape)
         lowest = min(lowest, (float(h[j, i]), float(x[0, i]), float(y[j, 0])))
-    return grid.comm.allreduce(lowest, MPI.MIN)  # type: ignore[no-any-return]
+    return grid.comm.allreduce(lowest, MPI.MIN)
 
 
 def _gauss_points(a: Array, b: Array) -> Array:

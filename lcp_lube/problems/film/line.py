@@ -73,7 +73,7 @@ class Line:
     def _thicker(self) -> Array | float:
         """mu/mu_0 at the panels' Gauss points."""
         by_p = 1.0 - self.law.barus * self.q_within if self.law.barus else 1.0
-        return self.integrals.thicker / by_p  # type: ignore[no-any-return]
+        return self.integrals.thicker / by_p
 
     @cached_property
     def slope(self) -> Array:
@@ -140,7 +140,7 @@ def crossings(line: LineIntegrals, U: float, level: float, exactly: bool = True)
     sign = np.where(over[k, i], 1.0, -1.0)
     (a, b), (f_a, f_b) = ([of[k, i + one] for one in (0, 1)] for of in (places, U * h - level))
     if not exactly:
-        return a + (b - a) * (f_a / (f_a - f_b))  # type: ignore[no-any-return]
+        return a + (b - a) * (f_a / (f_a - f_b))
     return bisect(lambda x: sign * (U * line.carries(x) - level), a, b, (sign * f_a, sign * f_b))
 
 

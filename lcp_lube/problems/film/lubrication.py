@@ -1,10 +1,10 @@
 """The door between physics and solvers: the data of A p + B r = c, p r = 0, p, r >= 0, and what certifies an answer."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
-from typing import Any, Self
+from typing import Any, Self, cast
 
 import numpy as np
 from petsc4py import PETSc
@@ -66,7 +66,7 @@ class LubricationProblem:
         mu: float,
         U: float,
         p_unit: float,
-        p_sides: tuple[float, float, float, float],
+        p_sides: tuple[float, ...],
         p_c: float,
         film: Callable[[Array, Array], Array],
         exact: Callable[[], ExactSolution | None] | None = None,
@@ -81,8 +81,7 @@ class LubricationProblem:
         self.coefficients_for: Callable[[Array], tuple[BoxScheme, Any]] | None = None  # of a film with rims, by its cavities
         self.dry: Array | None = None  # the points for which they have been made, 1 or 0; None: those of a full film
         self.extras: Callable[[dict[str, Any]], dict[str, Any]] | None = None
-        self.more: dict[str, Any] = {}  # numbers and fields (values, unit) of what is solved beside p and r
-        self.more_fields: dict[str, tuple[Array, str]] = {}
+        self.more, self.more_fields = dict[str, Any](), dict[str, tuple[Array, str]]()  # of what is solved beside p and r
         self.more_measures: dict[str, float] = {}  # of its equations, for the certificate
         self.cells: dict[str, Array] = {}  # what effects made of its coefficients (`film.effects`)
         self._own = Owned(self, grid.petsc_comm)
@@ -126,13 +125,9 @@ class LubricationProblem:
     def multiply(self, mat: PETSc.Mat, a: Array) -> Array:
         """mat @ a for one of A, B and an array of owned points. Collective."""
         x, y = self._vectors
-        out = np.empty(self.grid.local_size)
-        x.placeArray(np.ascontiguousarray(a))
-        y.placeArray(out)
+        x.setArray(a)
         mat.mult(x, y)
-        x.resetArray()
-        y.resetArray()
-        return out
+        return y.array_r.copy()
 
     def flow(self, p: Array, r: Array) -> Array:
         """F1 = A p + B r - c, the flow balance of every point in m2/s. Collective."""
@@ -167,9 +162,9 @@ class LubricationProblem:
         # The difference first: it may be small, and the pressures too, where the flows themselves are large.
         dragged = (s.couette_E + s.b_E * r[1:-1, 1:-1]) - (s.couette_W - s.b_W * r[1:-1, :-2])
         if s.storage is None or s.kept is None:
-            return pressed + dragged - self.sources(rows, s)  # type: ignore[no-any-return]
+            return pressed + dragged - self.sources(rows, s)
         more = 0.0 if s.gives is None else s.gives * p
-        return pressed + dragged + (s.storage * (1.0 - r[1:-1, 1:-1]) + more - s.kept)  # type: ignore[no-any-return]
+        return pressed + dragged + (s.storage * (1.0 - r[1:-1, 1:-1]) + more - s.kept)
 
     @cached_property
     def _at_sides(self) -> tuple[Any, ...]:
@@ -182,11 +177,11 @@ class LubricationProblem:
             c += np.where(at_side if len(at_side) == 1 else at_side[rows], k * (p_side / self.p_unit), 0.0) if p_side else 0.0
         return s.c - c if s.held is None else np.where(s.held, 0.0, s.c - c)
 
-    def hold_at(self, supplies: Sequence[Supply]) -> None:
-        """Other pressures and sources for its supplies."""
-        assert self.held is not None  # for the type checker: it has supplies
-        self.held = replace(self.held, supplies=tuple(supplies))
-        self.scheme = pressed(self.scheme, self.held, self.p_unit)
+    def hold_at(self, supplies: Sequence[Supply], P: Iterable[float] = ()) -> None:
+        """Other sources for its supplies, with the pressures that were found, Pa above p_c, where these are not their own."""
+        found = [replace(one, p=float(p)) for one, p in zip(supplies, P, strict=False)] or supplies
+        self.held = held = replace(cast(Held, self.held), supplies=tuple(found))
+        self.scheme = pressed(self.scheme, held, self.p_unit)
 
     def certify(self, fields: Fields, eps1: float) -> Certificate:
         """Certificate of the fields p and r for a run whose tolerance was eps1 (`film.certify`). Collective."""
@@ -273,11 +268,7 @@ class LubricationProblem:
         return other
 
     def with_scheme(
-        self,
-        scheme: BoxScheme,
-        mu: float | Array,
-        p_sides: tuple[float, float, float, float] | None = None,
-        held: Held | None = None,
+        self, scheme: BoxScheme, mu: float | Array, p_sides: tuple[float, ...] | None = None, held: Held | None = None
     ) -> Self:
         """The problem on the same grid with other coefficients; mu : viscosity at the east faces, Pa s."""
         (other := copy(self)).scheme, other.mu, other.exact = scheme, mu, None  # type: ignore[assignment]
@@ -288,8 +279,7 @@ class LubricationProblem:
 
     def with_lift(self, lift: Array) -> Self:
         """The problem with the film thicker by `lift` at the owned points, m: what is told of it, not its coefficients."""
-        other = copy(self)
-        other.plain, other.scheme = False, self.scheme.changed(h=self.scheme.h + lift.reshape(self.grid.box))
+        (other := copy(self)).plain, other.scheme = False, self.scheme.changed(h=self.scheme.h + lift.reshape(self.grid.box))
         other.film = LiftedFilm.of(self.film, self.grid, lift)
         return other
 
@@ -307,5 +297,4 @@ class LubricationProblem:
         return {name: value for name, value in self.__dict__.items() if name not in (*self._own.names, "_own")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-        self._own = Owned(self, self.grid.petsc_comm)
+        self.__dict__ |= state | {"_own": Owned(self, state["grid"].petsc_comm)}

@@ -151,7 +151,7 @@ class Model:
         changed: dict[str, Any] = {"sides": (east, west, *ends), "supplies": supplies, "places": places}
         changed["effects"] = tuple(effect.mirrored(self.lengths[0]) for effect in self.effects)
         changed["stored"] = self.stored.mirrored if self.stored else None
-        return replace(self, gap=gap, U=-self.U, exact=None, **changed)  # type: ignore[arg-type]
+        return replace(self, gap=gap, U=-self.U, exact=None, **changed)
 
     def lines(self, shape: Sequence[int]) -> Places:
         """Where the lines of points of a grid lie (`Grid.places`): on edges, where scheme 'face' can make use of it in 2D."""
@@ -226,7 +226,7 @@ class Model:
             mu=self.mu,
             U=self.U,
             p_unit=self.p_unit,
-            p_sides=self.p_sides,  # type: ignore[arg-type]
+            p_sides=self.p_sides,
             p_c=self.p_c,
             film=film,
             exact=self.exact,

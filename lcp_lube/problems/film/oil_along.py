@@ -49,10 +49,10 @@ def oil_of(
     dense = {"density"} if law.dowson_higginson else set()
     acting = tuple(effect for effect in effects if effect.channels != ("density",))
     if {*cells} == dense and not acting:
-        return Oil(base.mu, law) if dense or law.barus else None  # type: ignore[arg-type]
+        return Oil(base.mu, law) if dense or law.barus else None
     if base.held is not None or not all(effect.local for effect in acting) or {*cells} != dense | {"viscosity"}:
         return None
-    return Oil(base.mu, law, acting, [faces[name].ravel() for name in ("k_W", "u_W", "k_E", "u_E")])  # type: ignore[arg-type]
+    return Oil(base.mu, law, acting, [faces[name].ravel() for name in ("k_W", "u_W", "k_E", "u_E")])
 
 
 MEMORY = 2  # films beside the last two

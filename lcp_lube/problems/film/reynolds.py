@@ -32,7 +32,7 @@ class Made:
         if scheme is None:
             raise AttributeError(self._name)  # so that the dataclass sees no default
         value = scheme.__dict__[self._name]
-        return value() if callable(value) else value  # type: ignore[no-any-return]
+        return value() if callable(value) else value
 
     def __set__(self, scheme: Any, value: Array | Callable[[], Array]) -> None:
         scheme.__dict__[self._name] = value
@@ -191,7 +191,7 @@ def coefficients(
     mu: float,
     U: float,
     scheme: str,
-    p_sides: tuple[float, float, float, float],
+    p_sides: tuple[float, ...],
     p_unit: float,
     mean_cubes: bool = False,
     r_in: float = 0.0,
@@ -269,7 +269,7 @@ def coefficients(
         c[points] += conductance[points] * (p_side / p_unit)
     enters = grid.x_start > 0 or (grid.periodic[0] and U != 0.0)  # or else what does is in c
     b_C, b_W = partial(leaving, void, last, weight, U), partial(entering, void, enters, weight, U)
-    box = BoxScheme(k_W, k_E, k_S, k_N, c, couette_W, couette_E, h, b_C, b_W)  # type: ignore[arg-type]
+    box = BoxScheme(k_W, k_E, k_S, k_N, c, couette_W, couette_E, h, b_C, b_W)
     if stored is None:
         return box
     # Twice a cell's area over the mean dy.

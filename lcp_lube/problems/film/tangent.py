@@ -30,9 +30,7 @@ EMPTY = 1e-6  # of a cell's room: less liquid takes up nothing that others have 
 WIDEST = 40.0  # of the logarithm of a factor, of an iterate
 
 
-def effective(
-    problem: LubricationProblem, law: Law, p: Array, p_sides: tuple[float, float, float, float]
-) -> LubricationProblem:
+def effective(problem: LubricationProblem, law: Law, p: Array, p_sides: tuple[float, ...]) -> LubricationProblem:
     """The problem in p with the fluid's coefficients at p: p and r solve it if they solve the fluid's own. Collective.
 
     Parameters

@@ -55,7 +55,7 @@ class TurnedProblem(LubricationProblem):
             mu=moving.mu,
             U=-moving.U,
             p_unit=moving.p_unit,
-            p_sides=(east, west, *ends_y),  # type: ignore[arg-type]
+            p_sides=(east, west, *ends_y),
             p_c=moving.p_c,
             film=film,
             exact=exact,

@@ -80,7 +80,7 @@ class Temperature(EffectTable):
         if self.law == "walther":
             return oils.Walther.through(self.T, [1e6 * one / self.rho for one in self.mu], self.rho)
         laws: dict[str | None, Any] = {"vogel": oils.Vogel, "roelands": oils.Roelands}
-        return laws.get(self.law, oils.Exponential).through(self.T, self.mu)  # type: ignore[no-any-return]
+        return laws.get(self.law, oils.Exponential).through(self.T, self.mu)
 
     def effect(self, scene: Any) -> "Heat":
         mu = scene.mu_0

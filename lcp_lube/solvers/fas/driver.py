@@ -105,7 +105,7 @@ class Fas(FilmCycles):
 
     def _own(self) -> Array:
         self._finest.take_back(self._levels[0], self.problem, self._fields)
-        return self._finest.own(self._levels[0], self.problem.grid, self._levels[0].z)  # type: ignore[no-any-return]
+        return self._finest.own(self._levels[0], self.problem.grid, self._levels[0].z)
 
     @property
     def fields(self) -> Fields:

@@ -60,7 +60,7 @@ def coarser(fine: Level, coarse: Level) -> None:
     for values, out in zip(of_fine, parts, strict=True):
         given = np.where(lonely, values, 0.0)
         into = (fine.z, *ones, given, coarse.part(out))
-        transfer.restrict(*into, *where, False, fine.periodic[0], False, None)  # type: ignore[arg-type]
+        transfer.restrict(*into, *where, False, fine.periodic[0], False, None)
         coarse.collect(out)
         coarse.share(out)
     added = (parts[0] > 0.0) & (of_coarse[0] == 0.0)
