@@ -30,7 +30,6 @@ from .ask import Ask
 from .chain import Chain
 from .compose import Inner
 from .motions.linearised import Feed, Linear
-from .sources import Sources
 
 MOST_SOLVES = 40  # the end of a search that goes round: of drawn films with dense fluids those that were found took up to 11
 TOLERANCE = 1e-10  # of the largest flow: by how much what a source gives may differ from what the film takes
@@ -88,6 +87,8 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     if shut and all(one.flow is not None for one in supplies):
         raise InputError(f"{scene.name}: supply.1.flow: no side has a pressure, and no supply one or a restrictor: no way out")
     known = ask.start.settings.get("supply_pressures") if ask.start is not None else None
+    from .sources import Sources  # here: of such films alone
+
     sources = Sources(supplies)
     free, P = sources.free, np.array(_first(model))
     if known is not None and len(known) == len(supplies):
