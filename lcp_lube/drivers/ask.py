@@ -71,6 +71,8 @@ class Ask:
     quantity : which number `accuracy` is about; default the load, of other scenes 'sum_v', 'k', 'sigma'.
     finest : points a side that no grid of `accuracy` may exceed; default: what memory holds.
     stopping : tolerances and iteration limit; a dictionary gives some of them, the method's own (`MethodEntry.eps`) the rest.
+    cavities : ||F|| to which a film with round edges is solved the first time, for its cavities (`rims`), beside a `stopping`
+        that is no `Stopping`; default: as that.
     options : the method's own parameters by name (p0, r0, mu, conditions, ... of `DinOptions`).
     nested : start from the answers on coarser grids; default: where it pays.
     certify : also prove a band around the answer (`Solution.enclosure`), for the price of one linear solve at most.
@@ -100,6 +102,7 @@ class Ask:
     quantity: str | None = None
     finest: tuple[int, ...] | None = None
     stopping: Stopping | Mapping[str, Any] | None = None
+    cavities: float | None = None
     options: Mapping[str, Any] = field(default_factory=dict)
     nested: bool | None = None
     certify: bool = False

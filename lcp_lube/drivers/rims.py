@@ -22,7 +22,16 @@ from .ask import Ask
 from .chain import added
 from .compose import Inner
 
-LAST = ("method", "took_over", "system", "recipe", "ksp_type", "pc_type", "supply_pressures")  # settings of the second solve
+LAST = (
+    "eps1",
+    "method",
+    "took_over",
+    "system",
+    "recipe",
+    "ksp_type",
+    "pc_type",
+    "supply_pressures",
+)  # settings of the second solve
 
 
 @dataclass(frozen=True)
@@ -53,17 +62,26 @@ def applies(scene: Solvable, ask: Ask) -> bool:
 
 def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     """The second solution; the first where nothing is cavitated, or where there is no second one. Collective."""
-    first = inner(scene, replace(ask, certify=False))
+    loose = ask.stopping if ask.cavities is None else {**(ask.stopping or {}), "eps1": ask.cavities}  # type: ignore[dict-item]
+    first = inner(scene, replace(ask, certify=False, stopping=loose))
     problem: Any = first.problem
     if not first.converged:
         return first
     dry = cavitated(problem.reduce, first.fields["p"], first.fields["r"]).astype(float)
     count = int(problem.reduce.sum(dry))
     again = replace(ask, start=first, nested=False, monitor=None, checkpoint=None, resume=None)
-    second = inner(Revised(scene, Dry(dry, problem.grid)) if count else scene, again) if count or ask.certify else first
+    second = (
+        inner(Revised(scene, Dry(dry, problem.grid)) if count else scene, again)
+        if count or ask.certify or ask.cavities
+        else first
+    )
     if second is first:
         return first
     settings = first.settings | {name: second.settings[name] for name in LAST if name in second.settings}
+    if not second.converged and ask.cavities:
+        second.destroy()
+        first.destroy()
+        return solve(scene, replace(ask, cavities=None), inner)
     if not second.converged:
         first.because(f"faces at round edges are those of a full film: {second.message}")
         second.destroy()

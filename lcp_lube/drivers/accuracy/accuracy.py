@@ -31,6 +31,7 @@ from .values import Values, carried, sought
 FEW_KNOWN = 128  # points of the first grid of a line whose number is known: no coarser grid is cheaper
 FEW_PAIRS = 200  # of a film whose load is estimated from each two grids: these are solved by elimination
 ALGEBRAIC = 1e-3  # ||F|| relative to the tolerance: with many small cavities it leaves up to 60 times itself in a load
+CAVITIES = 1e-2  # ||F|| at which cavities are known well enough for round edges: of 46 loads 9 in 10 move by 1e-6 at most
 ALLOWED = (1e-10, 0.5)  # tolerances
 FIRST = 1e-2  # the same of a first grid that tells nothing by itself
 SOON = 3e-3  # a tolerance below which most films in 2D end on grids for multigrid
@@ -112,7 +113,8 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         near = ask.start if before is None else _start(before, prod(shape)) if ask.nested is not False else None
         stopping = _stopping(ask, tol, before) if before is not None or (pairs and not ring) else ask.stopping
         halved = ask.reduction and (not plane or prod(shape) > WHOLE[loops if before is None else before.asked == "fas"])
-        this = replace(ask, accuracy=None, stopping=stopping, start=near, nested=False, reduction=halved)
+        loose = CAVITIES if stopping is not ask.stopping else None
+        this = replace(ask, accuracy=None, stopping=stopping, cavities=loose, start=near, nested=False, reduction=halved)
         by_loops = loops and (plane or (line and shape[0] <= ELIMINATED))
         solution = inner(scene.with_shape(shape), replace(this, direct_below=0) if by_loops else this)
         problem = solution.problem
