@@ -432,3 +432,15 @@ def test_rings_take_hardly_more_cycles_than_open_films(scene):
             loads = [one.problem.quantities(one.fields)["load"] for one in (solution, direct)]
             assert loads[0] == pytest.approx(loads[1], rel=1e-6)
     assert max(cycles) <= 16 and cycles[1] <= cycles[0] + 3
+
+
+@pytest.mark.parametrize("nx, cells, sweeps", [(2000, 30, 40), (1000, 15, 20), (200, 6, 20), (40, 3, 10)])
+def test_strips_at_rare_fronts_are_wider_and_swept_oftener(nx, cells, sweeps):
+    """One front across 40 lines: relaxed points, by how rare it is."""
+    from lcp_lube.solvers.fas.loops import relax_front
+
+    z = np.where(np.arange(nx + 2) < nx // 2, 1.0, -1.0) * np.ones((42, 1))
+    z[:, [0, -1]] = z[[0, -1]] = 0.0
+    kx, ky, c = np.ones((42, nx + 3)), np.ones((43, nx + 2)), np.zeros((42, nx + 2))
+    points = relax_front(z, kx, ky, c, 10, 3, None, None, None, False, False, True)
+    assert points == 40 * sweeps * (2 * cells + 2)

@@ -10,6 +10,7 @@ from .waiting import await_part, fetch, write
 
 REACH = 8  # cells within which a cavity ends, if it does so at the front that is looked at
 RARE, WIDER = 0.1, 5  # part of the points that a strip this many times as wide may take
+VERY = 0.2  # and the part of that, of a strip which is then made twice as wide once more
 OVER, LAST = 1.7, 2  # overrelaxation of the sweeps near fronts, but for so many that leave smooth what remains
 AHEAD = 2  # runs of points for which memory is asked before their turn
 
@@ -118,8 +119,9 @@ def relax_front(
     looks, points = 1, together(own, thread, threads, done, near, 1)
     if often and points <= 0.5 * wider * rare:
         count *= 2
-    if points > rare:
-        width *= 2 if points <= 0.5 * wider * rare else 1
+    very = often and plain and points <= VERY * rare
+    if very or points > rare:
+        count, width = (2 * count, 2 * wider * width) if very else (count, 2 * width if points <= 0.5 * wider * rare else width)
         spans, at, own = spans_of_blocks(seen, width, ring, thread, threads, blocks)
         looks, points = 2, together(own, thread, threads, done, near, 2)
     if held is not None:
