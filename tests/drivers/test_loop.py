@@ -6,6 +6,7 @@ import pytest
 from lcp_lube import solve
 from lcp_lube.drivers.effects import loop, nonlinear
 from lcp_lube.drivers.effects.coupled_newton import CoupledNewton
+from lcp_lube.linear.krylov import LinearSolverError
 
 FILM = [{"shape": "linear", "h_start": 4e-5, "h_end": 2e-5}]
 SOFT = {"family": "bearing", "L": 0.1, "U": 5.0, "n": 24, "fluid": {"mu": 0.02, "p_supply": 1e5}, "film": FILM}
@@ -68,6 +69,18 @@ def test_what_does_not_settle_ends_at_its_best(monkeypatch):
     with solve(SOFT, model="full") as s:
         assert s.outcome == "max_iterations" and f"{min(changes):.1e}" in s.message
         assert s.certificate.measures["coupling"] == pytest.approx(min(changes), rel=1e-6)
+
+
+def test_a_matrix_without_factors_ends_newtons_method_for_film_and_effects(monkeypatch):
+    """Of a viscosity that grew beyond all bounds, say; films go on."""
+
+    def fails(self, R):
+        raise LinearSolverError("no factors")
+
+    monkeypatch.setattr(loop, "PATIENCE", 0)
+    monkeypatch.setattr(CoupledNewton, "_size_of", fails)
+    with solve(SOFT, model="full") as s:
+        assert s.converged and any("Newton's method for film and effects as one" in one for one in s.settings["why"])
 
 
 class Swinging:
@@ -143,3 +156,12 @@ def test_oil_in_a_supply_from_which_nothing_leaves_is_what_arrives():
         assert s.converged and s.settings["details"]["fluid_solves"] < 10
         inside = s.problem.held.mask.ravel()
         assert np.all(np.abs(s.problem.more_fields["T"][0][inside] - 345.0) < 0.01)
+
+
+@pytest.mark.parametrize("beside", [{}, {"roughness": {"sigma": 2e-6}}, {"viscosity": {"factor": "1 + 5*x"}}])
+def test_a_film_beyond_roelands_limit_is_told_by_its_first_films(beside):
+    """Also beside effects that are the same for every answer: one film has them, and constant viscosity."""
+    data = hot_line(60, FILM[0], L=0.1, U=300.0, fluid={"mu": 0.2}, roelands={"z": 0.8}, **beside)
+    with solve(data, model="full") as s:
+        assert s.outcome == "no_solution" and "Roelands" in s.message
+        assert s.settings["details"]["fluid_solves"] <= 2

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ...base.parallel import Array
+from ...linear.krylov import LinearSolverError
 from ..motions.coupled_response import STEP, Changes, CoupledResponse
 
 NARROW = 1e-6  # of differences to one side
@@ -46,9 +47,13 @@ class CoupledNewton(CoupledResponse):
         """
         R = self._left(self.p, self.r, self.x)
         while self.products < PRODUCTS:
-            y, size = self._settled(-R, 0.0, 0.0), self._size_of(R)
-            if not size > DONE**2:
+            try:
+                size = self._size_of(R)
+            except LinearSolverError:  # viscosities beyond what factors hold
                 break
+            if not DONE**2 < size < np.inf:
+                break
+            y = self._settled(-R, 0.0, 0.0)
             t = min(1.0, LONGEST / self.loop.base.reduce.max(np.abs(y[self.n :])))
             z, least = np.where(self.cavity, -self.r, self.p), SHORTEST * t
             while t > least:

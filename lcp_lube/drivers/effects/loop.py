@@ -69,6 +69,9 @@ class Loop:
         self.left: dict[str, float] = {}  # of a film's balances, where that went into what its cells store
         self.beyond = False  # whether no pressure carries the last film's flow
         self.endless = ""  # why no pressure carries it, by an effect that makes viscosity grow without bound
+        self.alone = all(
+            getattr(effect, "fixed", False) or hasattr(effect, "beyond") for effect in self.effects
+        )  # that is then sure
         self.start: Solution | Start | None = ask.start
         self.begun = self.last = np.zeros(0)  # the vectors of fields that the loop began with, and of the last film's
         self.told: list[str] = []  # how it went on where Anderson's method did not settle
@@ -285,7 +288,10 @@ class Loop:
         with np.errstate(all="ignore"):
             has = self.film(self.cells(x))
             self.log.append(self.vector(self.made()) if has else np.full_like(x, np.nan))
-        if has and self.solves == len(self.effects) == 1 and not self.base.reduce.max(np.abs(x)):
-            self.endless = getattr(self.effects[0], "beyond", lambda at: "")(self.answer)
+        plain = self.vector(neutral(self.effects, self.h.size))
+        if has and self.solves == 1 and self.alone and not self.base.reduce.max(np.abs(x - plain)):
+            from .nonlinear import beyond  # here, as above
+
+            self.endless = beyond(self)
         watch()
         return self.log[-1]

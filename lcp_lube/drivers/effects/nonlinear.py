@@ -109,7 +109,9 @@ def beyond(loop: Any) -> str:
             for other in loop.effects:
                 if other is not effect:
                     other.apply(kept, out)
-            if loop.film(out):
+            if len(loop.effects) == 1 and loop.solves == 1:  # that film is it
+                reason = effect.beyond(kept)
+            elif loop.film(out):
                 reason, loop.answer = effect.beyond(loop.answer), kept
             else:
                 loop.again(False)

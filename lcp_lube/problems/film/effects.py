@@ -61,8 +61,8 @@ class Effect:
     """A rung: what one effect makes of an answer; these are most: even, the same in the mirror image, nothing to tell.
 
     channels : what it may change. even : whether what it makes of an answer that is symmetric in y is so too. local : whether
-    what it makes at a place is made of what the answer has there. carried : of a field that the oil carries along in time, by
-    its equation: its name among those that are told, and the level from which it is counted; None: its law is local in time.
+    what it makes at a place is made of what the answer has there; where it is `fixed`, not even of that between rigid walls.
+    carried : of a field that the oil carries along in time: its name among those told, and the level from which it counts.
     What makes viscosity grow without bound has `beyond(at)`: why no pressure carries the flow of a film without it, or "".
     """
 

@@ -7,7 +7,7 @@
 They hold for H above some 1/2; asperities that carry load are not among them.
 """
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -25,6 +25,8 @@ class SurfaceRoughness(EffectTable):
 
     sigma: Positive = metres(..., "standard deviation of both walls together: sqrt(sigma_1^2 + sigma_2^2)")
     moving: Annotated[Finite, Field(ge=0, le=1)] = Field(0.5, description="part of sigma^2 that the moving wall has")
+
+    fixed: ClassVar[bool] = True
 
     @property
     def channels(self) -> tuple[str, ...]:  # type: ignore[override]

@@ -47,6 +47,7 @@ class Places(Effect):
     end: float | None = None
     even = False
     local: ClassVar[bool] = True
+    fixed: ClassVar[bool] = True
 
     def apply(self, at: Answer, out: Cells) -> None:
         x = at.grid.x if self.end is None else self.end - at.grid.x
