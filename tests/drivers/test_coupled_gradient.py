@@ -111,6 +111,7 @@ PAD = {"nx": 13, "ny": 11, "fluid.barus": 0.0}
 HEAT = {"temperature": {"beta": 0.02, "T_in": 320.0, "model": "effective"}, "roelands": {"z": 0.6}}
 SOFT = {"half_space": {"E_reduced": 2e10}, "asperity": {"sigma": 5e-6, "E_reduced": 1e11}}
 FED = {**RECESSES, "nx": 25, "ny": 5, "attitude_deg": 20.0, "roughness": {"sigma": 2e-6}}
+ROUND = {"nx": 21, "ny": 21, "film.2.form": "dome", "film.2.columns": 2, "film.2.rows": 2, "film.2.size_mm": 3.0}
 
 
 @pytest.mark.parametrize(
@@ -120,6 +121,7 @@ FED = {**RECESSES, "nx": 25, "ny": 5, "attitude_deg": 20.0, "roughness": {"sigma
         ("pocketed_pad_2d", {**PAD, **HEAT}, ["friction", "flow_east", "temperature_out"]),
         ("pocketed_pad_2d", {**PAD, **SOFT}, ["load", "asperity_load"]),
         ("hybrid_journal", FED, ["load", "supply_flow_2"]),
+        ("dimpled_pad", {**ROUND, "roughness": {"sigma": 1e-7}}, ["load", "friction"]),
     ],
 )
 def test_the_films_own_derivative(name, changes, quantities):

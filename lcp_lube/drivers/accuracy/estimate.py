@@ -247,7 +247,7 @@ def misplaced_film(problem: Problem) -> float:
             np.broadcast_to(problem.film(*((at[None, :], lines[:, None])[:: 1 - 2 * side])), (lines.size, at.size))
             for at in (fine, face)
         ]
-        told = problem.coefficients_for is not None
+        told = getattr(problem, "moving", problem).tops and bool(getattr(problem.film, "rims", ()))
         share += _misplaced(film[0].reshape(lines.size, PARTS + 1, n + 1), film[1], told, counts)
     return share
 

@@ -154,8 +154,13 @@ class CoupledFilm:
 
     def _thicker(self, d: Array) -> Any:
         """With a film that is thicker by d at the points, and between them by what lies between."""
-        model = self.gradient.loop.frozen.constant
+        loop = self.gradient.loop
+        model, s = loop.frozen.constant, loop.base.scheme
         gap = LiftedFilm.of(model.gap, self.grid, d)
+        if model.cut:  # what part of a cut face resists does not hang on the change
+            film, slopes = self._taped(loop.base.with_lift(d)), model.film_slopes(loop.base, gap)
+            film.scheme = s.changed(**{name: getattr(s, name) + getattr(slopes, name) for name in s.arrays})
+            return self._evaluated(film=film)
         film = replace(model, gap=gap).build(self.grid.shape, self.grid.petsc_comm, self.grid)
         try:
             return self._evaluated(film=self._taped(film))

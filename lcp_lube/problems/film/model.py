@@ -24,7 +24,7 @@ from .stored import Dry, Stored
 from .supplies import Held, Supply, hold, owners
 from .turned import TurnedProblem
 from .turning import Shaft
-from .views import FromHere, Inside, MirroredFilm, Raised
+from .views import FromHere, Inside, LiftedFilm, MirroredFilm, Raised
 
 NAMES = ("west", "east", "south", "north")
 STEP = 1e-30  # relative, of a complex step: nothing is subtracted, so no digits are lost however small it is
@@ -250,15 +250,16 @@ class Model:
         given = {name: getattr(self, name) for name in ("mu", "U", "scheme", "p_unit", "mean_cubes")}
         return {**given, "p_sides": self.p_sides, "r_in": self.sides[0].r, "stored": self.stored}
 
-    def film_slopes(self, problem: LubricationProblem) -> BoxScheme:
-        """Derivatives of the coefficients of a problem that was built from this (U >= 0) by its film. Collective.
+    def film_slopes(self, problem: LubricationProblem, lifted: LiftedFilm | None = None) -> BoxScheme:
+        """Derivatives of the coefficients of a problem built from this (U >= 0) by its film, or along a lift. Collective.
 
         A coefficient depends on the film at its own face or point alone (`mean_cubes`: at both points; `integrals`: between
         its two points), so one complex step through the code that makes them gives each its own derivative; h has 1.
         """
         grid, integrals, flow_unit = problem.grid, problem.integrals, problem.scheme.flow_unit
         step = STEP * grid.reduce.max(np.abs(np.asarray(self.gap(grid.x, grid.y))))
-        moved: Any = Raised(self.gap, 1j * step)
+        lift: Any = None if lifted is None else 1j * step * lifted.lift
+        moved: Any = Raised(self.gap, 1j * step) if lifted is None else replace(lifted, lift=lift)
         along = None if integrals is None else integrals.lifted(1j * step)
         box = coefficients(grid, moved, **{**self._data, "stored": None}, cavity=problem.dry, integrals=along)
         changes = {name: np.imag(getattr(box, name)) / step for name in box.arrays}

@@ -147,7 +147,10 @@ class LiftedFilm(View):
     x: Array
     y: Array
     lift: Array
-    rims = ()  # what bends them is not known between points
+
+    @property
+    def rims(self) -> tuple[Any, ...]:
+        return tuple(getattr(self.film, "rims", ()))
 
     @classmethod
     def of(cls, film: Any, grid: Grid, lift: Array) -> "LiftedFilm":
