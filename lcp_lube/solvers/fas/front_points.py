@@ -7,6 +7,8 @@ from ...base.compiled import piece
 from ...base.parallel import Array
 from .waiting import await_part, write
 
+BLOCK = 64  # columns that are looked at together
+
 
 @piece
 def spans_of_blocks(
@@ -70,50 +72,54 @@ def front_spans(z: Array, width: int, ring: bool = False, top: int = 1, bottom: 
 
     ring : the first and the last column are neighbours. top, bottom : the rows that are asked for; 0: up to the last one.
     """
-    ny, nx = z.shape[0] - 2, z.shape[1] - 2
-    rows, pad = 2 * width + 2, 2 * width + 8  # in the masks column i stands at i + pad
-    # Fronts to the east or north of the points of the last rows, and the first and last column that they take up.
-    marks = np.zeros((rows, nx + 2 * pad), dtype=np.uint8)
+    ny, nx, rows = z.shape[0] - 2, z.shape[1] - 2, 2 * width + 2
+    # The last row with a front to the east or north of each column's point, and where of the last rows there may be any.
+    marked = np.full(nx + 2, -rows, dtype=np.int32)
     low, high = np.full(rows, nx + 1), np.zeros(rows, dtype=np.int64)
-    full, full_north = np.zeros(nx + 2, dtype=np.uint8), np.zeros(nx + 2, dtype=np.uint8)
-    crossed, near = np.zeros(nx + 2 * pad, dtype=np.uint8), np.zeros(nx + 2 * pad, dtype=np.uint8)
+    full, full_north = np.zeros((2, nx + 2), dtype=np.uint8)
+    near, other = np.zeros((2, nx + 3 * rows), dtype=np.uint8)  # of column i at i + at
+    at = rows + width
     bottom, begin = bottom if bottom else ny, max(top - width - 1, 1)
     spans, found = np.empty((bottom - top + 65, 3), dtype=np.int32), 0
-    positive(z[begin], full)
+    positive(z, begin, ring, full)
     for m in range(begin, bottom + width + 1):
         new = m % rows
         low[new], high[new] = nx + 1, 0
         if m <= ny:
-            positive(z[min(m + 1, ny)], full_north)
-            if mark_changes(full, full_north, marks[new, pad:], nx, ring):
-                low[new], high[new] = extent(marks[new, pad:], nx)
+            positive(z, min(m + 1, ny), ring, full_north)
+            low[new], high[new] = mark_changes(full, full_north, m, marked)
             full, full_north = full_north, full
         row, first, last = m - width, low.min(), high.max()
         if row < top or first > last:
             continue
-        start, end = first + pad - width, last + pad + width + 2  # columns that can be near
-        crossed[start - width : end + width] = 0
-        for r in range(rows):
-            if low[r] <= high[r]:
-                merge(marks[r, low[r] + pad : high[r] + pad + 1], crossed[low[r] + pad : high[r] + pad + 1])
-        near[start:end] = 0
-        for shift in range(-width, width + 2):
-            merge(crossed[start - shift : end - shift], near[start:end])
-        first, last = max(first - width, 1), min(last + width + 1, nx)
-        if ring and (start <= pad or end > nx + pad + 1):
-            near[:start], near[end:] = 0, 0
-            merge(near[: pad + 1], near[nx : nx + pad + 1])
-            merge(near[nx + pad + 1 :], near[pad + 1 :])
+        near[first : rows + first], other[first : rows + first], near[rows + last + 1 : 2 * rows + last] = 0, 0, 0
+        for i in range(np.uint32(rows + first), np.uint32(rows + last + 1)):
+            near[i] = marked[i - np.uint32(rows)] > m - rows
+        shift = 1  # twice as many columns to the west with every step
+        while shift < rows:
+            more = min(shift, rows - shift)
+            for i in range(np.uint32(rows + first), np.uint32(2 * rows + last)):
+                other[i] = near[i] | near[i - np.uint32(more)]
+            near, other = other, near
+            shift += more
+        first, last = first - width, last + width + 1
+        if ring and (first < 1 or last > nx):
+            near[: at + first], near[at + last + 1 :] = 0, 0
+            for i in range(first, 1):
+                near[at + i + nx] |= near[at + i]
+            for i in range(nx + 1, last + 1):
+                near[at + i - nx] |= near[at + i]
             first, last = 1, nx
+        first, last = max(first, 1), min(last, nx)
         if found + nx // 2 + 1 > spans.shape[0]:
             spans = np.concatenate((spans, np.empty((spans.shape[0] + nx, 3), dtype=np.int32)))
-        i, stop = first, last
-        while i <= stop:
-            if near[i + pad] == 0:
+        i = first
+        while i <= last:
+            if near[at + i] == 0:
                 i += 1
                 continue
             begin = i
-            while i <= stop and near[i + pad]:
+            while i <= last and near[at + i]:
                 i += 1
             spans[found, 0], spans[found, 1], spans[found, 2] = row, begin, i
             found += 1
@@ -121,38 +127,25 @@ def front_spans(z: Array, width: int, ring: bool = False, top: int = 1, bottom: 
 
 
 @piece
-def positive(row: Array, out: NDArray[np.uint8]) -> None:
-    """1 where the film is full."""
-    for i in range(row.size):
-        out[i] = 1 if row[i] > 0.0 else 0
+def positive(z: Array, m: int, ring: bool, out: NDArray[np.uint8]) -> None:
+    """1 where the film is full in row m; beyond an end of the line as at it."""
+    for i in range(np.uint32(out.size)):
+        out[i] = 1 if z[m, i] > 0.0 else 0
+    if not ring:
+        out[-1] = out[-2]
 
 
 @piece
-def mark_changes(full: NDArray[np.uint8], north: NDArray[np.uint8], out: NDArray[np.uint8], nx: int, ring: bool) -> int:
-    """Mark the points with a front to the east or north of them; returns their number."""
-    total = 0
-    for i in range(1, nx):
-        out[i] = (full[i] ^ full[i + 1]) | (full[i] ^ north[i])
-        total += out[i]
-    out[nx] = full[nx] ^ north[nx]
-    if ring:
-        out[nx] |= full[nx] ^ full[nx + 1]
-    return total + out[nx]
-
-
-@piece
-def extent(mask: NDArray[np.uint8], nx: int) -> tuple[int, int]:
-    """First and last column that is marked, of at least one."""
-    first, last = 1, nx
-    while mask[first] == 0:
-        first += 1
-    while mask[last] == 0:
-        last -= 1
+def mark_changes(full: NDArray[np.uint8], north: NDArray[np.uint8], m: int, out: NDArray[np.int32]) -> tuple[int, int]:
+    """m at the points with a front to the east or north of them; columns between which they lie, in steps of BLOCK."""
+    nx = out.size - 2
+    first, last = nx + 1, 0
+    for start in range(1, nx + 1, BLOCK):
+        count, end = 0, min(start + BLOCK, nx + 1)
+        for i in range(np.uint32(start), np.uint32(end)):
+            change = (full[i] ^ full[i + 1]) | (full[i] ^ north[i])
+            out[i] = m if change else out[i]
+            count += change
+        if count:
+            first, last = min(first, start), end - 1
     return first, last
-
-
-@piece
-def merge(mask: NDArray[np.uint8], into: NDArray[np.uint8]) -> None:
-    """into |= mask."""
-    for i in range(mask.size):
-        into[i] |= mask[i]
