@@ -5,11 +5,10 @@ what the supply gives to the film less what its source gives at that pressure. H
 grows with P_s; so G and H together are inverse isotone as G alone is, and signs of both at two points are the proof.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..base.parallel import Array
 from ..linear.krylov import LinearSolverError
@@ -30,8 +29,7 @@ def enclose_fed(problem: LubricationProblem, fields: Fields) -> Enclosure:
 
     Its price are one linear solve and one for each supply whose pressure follows.
     """
-    held = problem.held
-    assert held is not None  # as the driver found
+    held: Any = problem.held
     if broken := conditions(problem):
         return Enclosure(False, f"no band: {broken}")
     P, free = np.array([one.p for one in held.supplies]), np.array([one.open for one in held.supplies])
@@ -58,48 +56,35 @@ def enclose_fed(problem: LubricationProblem, fields: Fields) -> Enclosure:
     by = np.array([_falls(one) for one in held.supplies])
     e_P = np.zeros(free.size)
     e_P[free] = ROOM * np.abs(np.linalg.solve(slopes + np.diag(by[free]), off[free])) + 16 * UNIT * P[free]
-    found = [_side(problem, band, P, free, e_P, width, pushed, sign) for sign in (-1.0, 1.0)]
-    return concluded(problem, fields, *found)
+
+    def side(sign: float, e_P: Array) -> Fields | None:
+        """The fields on one side of the answer if all balances have that sign there, None if it cannot be shown."""
+        for _ in range(TRIES):
+            beside = P + sign * e_P
+            if not (np.isfinite(beside).all() and beside.min() >= 0.0):
+                return None
+            e = width + sum((part * by for part, by in zip(e_P[free], pushed, strict=True)), np.zeros_like(width))
+            pair = band.prove(e, sign, _at(problem, beside))
+            lacks = np.ones(P.size) if pair is None else _lacking(problem, pair, beside, sign)
+            if pair is not None and not (lacks[free] > 0.0).any():
+                return pair
+            e_P = np.where(free & (lacks > 0.0), WIDER, 1.0) * e_P
+        return None
+
+    return concluded(problem, fields, side(-1.0, e_P), side(1.0, e_P))
 
 
-def _side(
-    problem: LubricationProblem,
-    band: Band,
-    P: Array,
-    free: NDArray[np.bool_],
-    e_P: Array,
-    width: Array,
-    pushed: Sequence[Array],
-    sign: float,
-) -> Fields | None:
-    """The fields on one side of the answer if all balances have that sign there, None if it cannot be shown. Collective."""
-    e_P = e_P.copy()
-    for _ in range(TRIES):
-        beside = P + sign * e_P
-        if not (np.isfinite(beside).all() and beside.min() >= 0.0):
-            return None
-        e = width + sum((part * by for part, by in zip(e_P[free], pushed, strict=True)), np.zeros_like(width))
-        pair = band.prove(e, sign, _at(problem, beside))
-        lacks = np.ones(P.size) if pair is None else _lacking(problem, pair, beside, sign)
-        if pair is not None and not (lacks[free] > 0.0).any():
-            return pair
-        e_P[free & (lacks > 0.0)] *= WIDER
-    return None
-
-
-def _at(problem: LubricationProblem, P: Array) -> Array:
+def _at(problem: Any, P: Array) -> Array:
     """Pressures (Pa) of supplies at their cells, in the problem's unit, NaN elsewhere: one number a supply."""
-    assert problem.held is not None
     return np.append(P / problem.p_unit, np.nan)[problem.held.owner].ravel()
 
 
-def _lacking(problem: LubricationProblem, fields: Fields, P: Array, sign: float) -> Array:
+def _lacking(problem: Any, fields: Fields, P: Array, sign: float) -> Array:
     """By how much sign H_s, less the rounding in it, falls short of zero, m3/s. Collective.
 
     Each term of Q_s passes at most N + SUMMED roundings, N the supply's cells.
     """
     grid, s, held, unit = problem.grid, problem.scheme, problem.held, volume_unit(problem)
-    assert held is not None
     p, r = fields["p"], fields["r"]
     Q = problem.face_flows(p, r).reshape(grid.box)
     sides = max((side / problem.p_unit for side in problem.p_sides), default=0.0)

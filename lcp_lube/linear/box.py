@@ -33,10 +33,6 @@ class BoxSystem:
             if self.krylov.pc_type == PETSc.PC.Type.MG:
                 self._multigrid = Multigrid(problem, self.krylov.ksp)
 
-    @property
-    def direct(self) -> bool:
-        return self.krylov.direct
-
     def linearise(self, v: Array) -> Array:
         """Take f' at v for the next `solve`; returns its diagonal. Collective."""
         with self.stages("Jacobian"):

@@ -12,18 +12,20 @@ from ..base.resumable import Row
 from ..output.style import Axes, Figure
 from ..problems.solution import Outcome
 from .drawing import WIDTH, new_figure
+from .experiment import FELL_BACK, KRYLOV_LIMIT
 
-# A marker for each way to fail.
-FAILURES: dict[str, tuple[str, str]] = {
-    Outcome.MAX_ITERATIONS: ("x", "iteration limit"),
-    Outcome.STEP_LENGTH: ("_", "no step length"),
-    Outcome.STALLED: ("v", "stalled"),
-    Outcome.WRONG_SOLUTION: ("o", "wrong solution"),
-    Outcome.LINEAR_SOLVER: ("+", "linear solver"),
-    Outcome.NOT_FINITE: ("D", "not finite"),
-    Outcome.NO_SOLUTION: ("|", "says: no solution"),
-    "fell_back": ("^", "rescued by another method"),
-    "krylov_limit": ("s", "Krylov limit"),
+KRYLOV_MOST = 100_000  # of a whole run; what takes more has a colour of its own
+# Of each way to fail: its marker, its label, and what runs that ended so are told as.
+FAILURES: dict[str, tuple[str, str, str]] = {
+    Outcome.MAX_ITERATIONS: ("x", "iteration limit", "at the iteration limit"),
+    Outcome.STEP_LENGTH: ("_", "no step length", "without a step length"),
+    Outcome.STALLED: ("v", "stalled", "stalled"),
+    Outcome.WRONG_SOLUTION: ("o", "wrong solution", "wrong"),
+    Outcome.LINEAR_SOLVER: ("+", "linear solver", "by the inner solver"),
+    Outcome.NOT_FINITE: ("D", "not finite", "not finite"),
+    Outcome.NO_SOLUTION: ("|", "says: no solution", "'no solution'"),
+    FELL_BACK: ("^", "rescued by another method", "rescued by another method"),
+    KRYLOV_LIMIT: ("s", "Krylov limit", f"over {KRYLOV_MOST:,} Krylov iterations"),
 }
 LEAST, MOST = 3, 500  # steps at the ends of the colours
 
@@ -154,7 +156,7 @@ def legend(rows: Sequence[Row], right: Callable[[Row], bool] = converged) -> lis
     seen = {row["outcome"] for row in rows if not right(row)}
     return [
         Line2D([], [], color="0.3", marker=mark, mfc="none", ls="none", label=label)
-        for outcome, (mark, label) in FAILURES.items()
+        for outcome, (mark, label, _) in FAILURES.items()
         if outcome in seen
     ]
 
@@ -173,7 +175,7 @@ def _cells(axes: Axes, rows: Sequence[Row], panels: Panels, x: Axis, y: Axis, ri
         if failed:
             worst = Counter(row["outcome"] for row in failed).most_common(1)[0][0]
             part = len(failed) < len(here)
-            mark = FAILURES.get(worst, ("p", ""))[0]
+            mark = FAILURES.get(worst, "p")[0]
             axes.plot(i - 0.22 * part, j, ls="none", marker=mark, mfc="none", ms=4.0, color="0.25")
             if part:
                 axes.text(i + 0.15, j, f"{len(failed)}/{len(here)}", ha="center", va="center", fontsize=small)

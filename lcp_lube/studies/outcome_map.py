@@ -19,25 +19,12 @@ from ..registry import METHODS
 from ..scenes.scene import Scene, load_scene
 from ..solvers.newton import Stopping
 from .drawing import save
-from .experiment import FELL_BACK, KRYLOV_LIMIT, open_store, run
+from .experiment import FELL_BACK, open_store, run
 from .log import write_log
-from .map_picture import Axis, Panels, converged, groups, picture
+from .map_picture import FAILURES, KRYLOV_MOST, Axis, Panels, converged, groups, picture
 from .reference import WRONG, Reference, References
 
 COLUMNS = ("distance", "reference", "system", "cpu_s", "command")
-KRYLOV_MOST = 100_000  # of a whole run; what takes more has a colour of its own
-
-WORDS = {
-    "max_iterations": "at the iteration limit",
-    "step_length": "without a step length",
-    "stalled": "stalled",
-    "wrong_solution": "wrong",
-    "linear_solver": "by the inner solver",
-    "not_finite": "not finite",
-    "no_solution": "'no solution'",
-    FELL_BACK: "rescued by another method",
-    KRYLOV_LIMIT: f"over {KRYLOV_MOST:,} Krylov iterations",
-}
 
 
 @dataclass(frozen=True)
@@ -146,7 +133,7 @@ def tally(rows: Sequence[Row], axes: Sequence[Axis], right: Callable[[Row], bool
     if not failed:
         return f"all {len(rows)}, in {most} steps at most"
     ends = Counter(row["outcome"] for row in failed)
-    ways = ", ".join(f"{count} {WORDS.get(outcome, outcome)}" for outcome, count in ends.most_common())
+    ways = ", ".join(f"{count} {FAILURES.get(outcome, [outcome])[-1]}" for outcome, count in ends.most_common())
     where = "; ".join(text for axis in axes if (text := extent(failed, rows, axis)))
     return f"{len(rows) - len(failed)} of {len(rows)} (fail: {ways}{': ' * bool(where)}{where})"
 

@@ -164,7 +164,7 @@ def _rule(axes: Axes, rows: Sequence[Row], number: int, name: str) -> None:
     x = [float(row["p0"]) for row in rows]
     y = [float(row["iterations"]) if converged(row) else math.nan for row in rows]
     axes.plot(x, y, **look(number), lw=2.6 - 0.7 * number, ms=5.6 - 1.0 * number, label=name)
-    for outcome, (mark, _) in FAILURES.items():
+    for outcome, (mark, *_) in FAILURES.items():
         failed = chosen(rows, outcome=outcome)
         x, y = [float(row["p0"]) for row in failed], [float(row["iterations"]) for row in failed]
         axes.plot(x, y, color=look(number)["color"], marker=mark, mfc="none", ls="none", ms=6.5 - number)

@@ -100,7 +100,6 @@ class MarchGradient:
     def _back(self, n: int) -> None:
         """The adjoints of step n, from those of later ones."""
         eq, kept = self.course.at(n), self.course.kept(n)
-        assert kept is not None  # as `__init__` asks
         p, r, asked = kept.p, kept.r, self._asked(n)
         numbers, grid = eq.numbers(p, r, None if asked else self.course.forces), eq.grid
         told = eq.report(numbers)
@@ -156,7 +155,6 @@ class MarchGradient:
         pushed, off_by : J'^-1 of the forces on what is free, and of what supplies and film disagree by.
         """
         course, kept, dot = self.course, self.course.kept(n), self.course.grid.reduce.dot
-        assert kept is not None  # as `_back` asks
         weight, at, count = course.formula(n).weight if n else 0.0, np.flatnonzero(course.sought(n)), course.free.size
         inertia = course.inertia[at]
         size = course.by_film(n)
@@ -185,7 +183,6 @@ class MarchGradient:
     def parts(self, n: int, eq: Equations) -> dict[str, dict[str, float]]:
         """By quantity the numbers of step n, and the shares of them, that it and what its supplies ask for are made of."""
         kept = self.course.kept(n)
-        assert kept is not None  # as it has adjoints
         numbers, asked = eq.numbers(kept.p, kept.r), self._asked(n)
         off = [eq.partials(numbers, name) for name in eq.report(numbers) if name.startswith(MISFIT)]
         out: dict[str, dict[str, float]] = {name: {} for name in self.names}
@@ -200,7 +197,6 @@ class MarchGradient:
     def _scaled(self, n: int, eq: Equations) -> Array:
         """G of step n in the units of its adjoints."""
         kept = self.course.kept(n)
-        assert kept is not None  # as it has adjoints
         return eq.scaled(kept.p, kept.r, self.units[n])
 
     def lagrangians(self, course: Course) -> Array:
@@ -213,7 +209,6 @@ class MarchGradient:
             if quick is not None and n and not asked:
                 continue
             eq, kept, dot = course.at(n), course.kept(n), course.grid.reduce.dot
-            assert kept is not None
             numbers = eq.numbers(kept.p, kept.r, None if asked else free)
             told = eq.report(numbers)
             for name, (base, share) in asked.items():
