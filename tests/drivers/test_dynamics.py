@@ -52,9 +52,9 @@ def test_the_short_bearing_with_half_a_film():
     weight = solution.problem.p_unit * solution.problem.grid.cell * np.where(positive, p, 0.0)
     theta = np.broadcast_to(scene.turning.theta(solution.problem.grid.x), solution.problem.grid.box).ravel()
     along = math.atan2(np.sum(weight * np.sin(theta)), np.sum(weight * np.cos(theta)))  # the load's line
-    none = np.zeros(p.size, dtype=bool)
     motions = motions_of(scene.turning, False, 0.0, along)
-    response = Response(solution.problem, scene.model, solution.fields, motions, 0.0, none, positive)
+    response = Response(solution.problem, scene.model, solution.fields, motions)
+    response._sides = [np.where(positive, side, 0.0) for side in response._sides]
     K, C = (matrix * (0.03 / B) ** 3 for matrix in (response.stiffness(), response.damping()))
     response.destroy()
     solution.destroy()

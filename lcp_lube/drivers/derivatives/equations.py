@@ -26,7 +26,7 @@ from ...problems.film.tangent import Tangent, effective, tangent
 from ...problems.grid import Grid, Places
 from ...problems.solution import Solution
 from ...registry import DRIVERS
-from ...scenes.moving import motion_of
+from ...scenes.moving import film_of, motion_of
 from ...scenes.scene import Scene
 from ..ask import Ask
 from ..effects.frozen import Frozen
@@ -255,8 +255,8 @@ def check_film(scene: Scene) -> Model:
     ------
     InputError : no film, one that goes on in time, or one around which something is found that derivatives do not know of.
     """
-    model = getattr(scene, "model", None)
-    if not isinstance(model, Model) or motion_of(scene) is not None:
+    model = film_of(scene)
+    if model is None or motion_of(scene) is not None:
         raise InputError(f"scene {scene.name}: gradients are of films with cavitation that stand still in time")
     for name, entry in DRIVERS.items():
         if name not in THROUGH and entry.load().applies(scene, Ask()):

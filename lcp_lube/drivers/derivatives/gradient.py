@@ -18,7 +18,7 @@ from ...base.parallel import Array
 from ...errors import InputError
 from ...problems.solution import Solution
 from ...scenes.grooved import GroovedJournalScene
-from ...scenes.moving import motion_of
+from ...scenes.moving import film_of, motion_of
 from ...scenes.scene import Scene
 from ...scenes.tilting import TiltingPadScene
 from ...scenes.values import key_of, values_of
@@ -37,6 +37,9 @@ from .transposed import CoupledFilm
 BY_STEPS = "no derivative on this grid: it changes by steps, whose mean slope is another over other widths"
 STEPWISE = "the lines of points go with the edges of grooves, and their number between two by steps"
 FOUND = "it was found, and follows the other numbers"
+
+
+ByKey = dict[str, dict[str, float]]
 
 
 @dataclass(frozen=True)
@@ -161,7 +164,7 @@ def _stepwise(scene: Any) -> tuple[str, ...]:
 
 
 def _coupled(scene: Any) -> bool:
-    return bool(getattr(getattr(scene, "model", None), "effects", ()))
+    return bool(getattr(film_of(scene), "effects", ()))
 
 
 def _adjoint(
@@ -195,9 +198,7 @@ def _gradients(
             asked = ["balance.load" if balance and key == "balance.load" else key_of(adjoint.scene, key) for key in keys]
         else:
             asked = [*(["balance.load"] if balance else []), *values_of(adjoint.scene)]
-        slopes: dict[str, dict[str, float]] = {}
-        jumps: dict[str, dict[str, float]] = {}
-        held: dict[str, str] = {}
+        slopes, jumps, held = ByKey(), ByKey(), dict[str, str]()
         for key in dict.fromkeys(asked):
             if key in adjoint.found:
                 held[key] = FOUND
@@ -210,7 +211,7 @@ def _gradients(
                     slopes[key], jumps[key] = adjoint.slopes(key)
                 except InputError as error:
                     held[key] = str(error)
-        out = [_told(adjoint, quantities, slopes, jumps, held, balance)]
+        out = [_told(adjoint, quantities, slopes, jumps, held, balance, other=False)]
         if any(plain(name) != name for name in adjoint.lambdas):
             slopes, jumps = ({key: other_side(of) for key, of in one.items()} for one in (slopes, jumps))
             out.append(_told(adjoint, quantities, slopes, jumps, held, balance, other=True))
@@ -222,19 +223,18 @@ def _gradients(
 def _told(
     adjoint: Any,
     quantities: Sequence[str],
-    slopes: dict[str, dict[str, float]],
-    jumps: dict[str, dict[str, float]],
+    slopes: ByKey,
+    jumps: ByKey,
     held: dict[str, str],
     balance: Any,
     other: bool = False,
 ) -> list[Gradient]:
     """Of every quantity, from dL/da by key."""
-    implicit, report, values = Implicit.of(adjoint, other), adjoint.report, values_of(adjoint.scene)
-    out = []
+    implicit, report, out = Implicit.of(adjoint, other), adjoint.report, []
+    of = values_of(adjoint.scene) | ({"balance.load": balance["load"]} if balance else {})
     for name in quantities:
         value = adjoint.value(name) if name in adjoint.found else report[name]
         found = {key: implicit.total(name, key, slope) for key, slope in slopes.items()}
-        of = {**values, **({"balance.load": balance["load"]} if balance else {})}
         none = {key: BY_STEPS for key, slope in found.items() if math.isnan(slope)}
         found = {key: slope for key, slope in found.items() if key not in none}
         elasticity = {key: slope * of[key] / value if value and of[key] else None for key, slope in found.items()}

@@ -5,7 +5,7 @@ What it has of each is known once; another number costs the films of the steps, 
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -14,14 +14,13 @@ import numpy as np
 from ...base.parallel import Array
 from ...problems.film.edges import Around, face_film, jumps_of, pairs
 from ...problems.film.fluid import Law
-from ...problems.film.model import Model
 from ...problems.film.reynolds import sides
 from ...problems.film.shapes import Sum
 from ...problems.film.stored import mean_film
 from ...problems.film.views import MirroredFilm, Travelling
 from ...problems.strips import MANY
 from ..marches.march_course import Course
-from .near_films import FREE, same
+from .near_films import alike, same
 
 
 @dataclass(frozen=True)
@@ -135,10 +134,7 @@ class MarchFilms:
 
     def sums(self, course: Course) -> Array | None:
         """Of each quantity; None where it is not that of another film, fluid or wall on as many points."""
-        model, own = course.film(1), self.model
-        rest = all(same(getattr(model, one.name), getattr(own, one.name)) for one in fields(Model) if one.name not in FREE)
-        alike = [(side.kind, side.r) for side in model.sides] == [(side.kind, side.r) for side in own.sides]
-        if not (rest and alike and self.can(course)):
+        if not (alike(course.film(1), self.model) and self.can(course)):
             return None
         films = self._films(course)
         if not course.grid.reduce.min(np.append(films.C, films.before)) > 0.0:

@@ -25,6 +25,7 @@ from ...problems.film.weighed import can
 from ...problems.grid import Grid
 from ...problems.strips import moved
 from ...registry import SMALL
+from ...scenes.moving import film_of
 from ...scenes.scene import Scene
 from ..turned import Mirrored
 from .equations import DRAGS, FLIPPED, Equations, followed
@@ -94,12 +95,13 @@ class NearFilms:
 
     def lagrangians(self, scene: Scene) -> Array | None:
         """L of every quantity; None where it is not that of another film at these points."""
-        if not self.known or not isinstance(getattr(scene, "model", None), Model):
+        if not self.known or film_of(scene) is None:
             return None
         eq = self.equations
         film: Any = Mirrored(scene) if eq.turned else scene
         model: Model = film.model
-        if model.U <= 0.0 or model.effects or not self._alike(model) or film.shape != eq.grid.shape:
+        known = alike(model, self.model) and not getattr(model.gap, "rims", ())
+        if model.U <= 0.0 or model.effects or not known or film.shape != eq.grid.shape:
             return None
         grid, law, p_sides = self._grid(model), model.law or Law(), model.p_sides
         sums = None if grid is None else self._sums(model.gap, law, grid, p_sides)
@@ -137,11 +139,13 @@ class NearFilms:
         places = model.lines(grid.shape) if grid.even else followed(grid, own, model)
         return None if places is None else moved(grid, model.lengths, places, model.polar)
 
-    def _alike(self, model: Model) -> bool:
-        own = self.model
-        sides = [(side.kind, side.r) for side in model.sides] == [(side.kind, side.r) for side in own.sides]
-        rest = all(same(getattr(model, one.name), getattr(own, one.name)) for one in fields(Model) if one.name not in FREE)
-        return sides and rest and not getattr(model.gap, "rims", ())
+
+def alike(model: Model, own: Model) -> bool:
+    """Whether films differ by no more than what may."""
+    sides = [(side.kind, side.r) for side in model.sides] == [(side.kind, side.r) for side in own.sides]
+    return sides and all(
+        same(getattr(model, one.name), getattr(own, one.name)) for one in fields(Model) if one.name not in FREE
+    )
 
 
 def plain(name: str) -> str:

@@ -72,7 +72,6 @@ class Response(OfLine):
     problem : solved by `fields`; model : what it is the discretisation of.
     motions : dh/de of each.
     first : x of the scene where this film's x is 0, m.
-    cavity : cells whose void answers, in place of those of the fields. counted : cells whose pressure counts in the force.
     film : what was solved on half its width, as it is symmetric.
     """
 
@@ -83,20 +82,17 @@ class Response(OfLine):
         fields: Fields,
         motions: Sequence[Change],
         first: float = 0.0,
-        cavity: Any = None,
-        counted: Any = None,
         film: Solvable | None = None,
     ):
         grid, self.p, self.r = problem.grid, fields["p"], fields["r"]
         self.problem = problem
         stored = model.stored and Stored(model.stored.weight, model.stored.on(grid).ravel(), grid)
         self.model = replace(model, stored=stored, exact=None)
-        self.cavity = cavity_sign(problem.reduce, self.p, self.r) < 0 if cavity is None else cavity
+        self.cavity = cavity_sign(problem.reduce, self.p, self.r) < 0
         self._moved = [Moved(model.gap, motion, 0.0, first) for motion in motions]
         self.changes = [np.broadcast_to(moved.change(grid.x, grid.y), grid.box).ravel() for moved in self._moved]
-        counted = ~self.cavity if counted is None else counted
         size = point_weights(grid)
-        weight = grid.cell * problem.p_unit * size * np.where(counted, 1.0, 0.0)  # cavitated cells have no p'
+        weight = grid.cell * problem.p_unit * size * np.where(self.cavity, 0.0, 1.0)  # cavitated cells have no p'
         self._sides = [weight * change for change in self.changes]
         unit = 2.0 * grid.spacing[0] / problem.scheme.flow_unit * size
         self._M = np.where(self.cavity, unit * problem.scheme.h.ravel(), 0.0)
