@@ -19,6 +19,7 @@ from ..problems.film.model import Model
 from ..problems.grid import Grid
 from ..problems.solution import Enclosure, Fields, Outcome, Solution
 from ..problems.transfer import fetch, numbers
+from ..scenes.moving import film_of
 from ..scenes.scene import Derived, Solvable
 from ..solvers.enclosure import bounds_of
 from .ask import Ask, Start
@@ -84,7 +85,7 @@ class SideBySide(Generic[Film]):
 
 def applies(scene: Solvable, ask: Ask) -> bool:
     """Whether the film has grooves."""
-    return bool(getattr(getattr(scene, "model", None), "grooves", ()))
+    return bool(getattr(film_of(scene), "grooves", ()))
 
 
 def pad_films(scene: Solvable) -> PadFilms:

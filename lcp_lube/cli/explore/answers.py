@@ -22,7 +22,7 @@ from ...output.files import gather, taken, thinning
 from ...output.results import as_dict, finite
 from ...problems.solution import Fields, Outcome, Problem, Solution
 from ...registry import scene_names
-from ...scenes.moving import motion_of
+from ...scenes.moving import film_of, motion_of
 from ...scenes.scene import Scene, as_scene, parse_changes, scene_line
 from ...scenes.written import toml_of
 from .controls import controls
@@ -192,7 +192,7 @@ class Answers:
         """The scene on the grid of a level, or what is asked of a ladder that ends there."""
         scene = as_scene(self.base, changes)
         moves = self.moves
-        shape, grooved = scene.shape, bool(getattr(getattr(scene, "model", None), "grooves", ()))  # their edges are points
+        shape, grooved = scene.shape, bool(getattr(film_of(scene), "grooves", ()))  # their edges are points
         while prod(shape) > (self._most if level else self._points) and min(shape) > 8:
             shape = (shape[0] // 2 if grooved else (shape[0] - 1) // 2, *((n - 1) // 2 for n in shape[1:]))
         if level > moves:

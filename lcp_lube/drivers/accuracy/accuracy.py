@@ -17,6 +17,7 @@ from ...problems.film.model import Model
 from ...problems.grid import OFFSET
 from ...problems.solution import Outcome, Solution
 from ...registry import ELIMINATED, METHODS
+from ...scenes.moving import film_of
 from ...scenes.scene import Solvable
 from ...solvers.newton import Stopping
 from ..ask import Ask
@@ -80,7 +81,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     tol, quantity, finest = ask.accuracy, ask.quantity, ask.finest
     assert tol is not None
     begin = perf_counter()
-    fewest = model.fewest_meshes() if isinstance(model := getattr(scene, "model", None), Model) else ()
+    fewest = model.fewest_meshes() if (model := film_of(scene)) is not None else ()
     line = is_known(scene)  # of the load in the plane each two grids give an estimate (`estimate.of_pair`):
     pairs = quantity in (None, *INTEGRALS) and len(scene.shape) == 2 and given_film(scene) is not None
     few = FEW_KNOWN if line else FEW_PAIRS if pairs else None

@@ -40,7 +40,7 @@ from ...problems.film.lubrication import LubricationProblem
 from ...problems.film.model import Model
 from ...problems.film.turned import TurnedProblem
 from ...problems.solution import Fields, Problem
-from ...scenes.moving import motion_of
+from ...scenes.moving import film_of, motion_of
 from ...scenes.scene import Solvable
 
 MOVED, PART = 1.1, 0.75  # factor of n, and what is added of a correction
@@ -181,8 +181,7 @@ def scalars(found: Mapping[str, Any]) -> dict[str, float]:
 
 def given_film(scene: Solvable) -> Model | None:
     """A film whose heights and past are known before it is solved: steady, and in no balance; None of other scenes."""
-    model, found = getattr(scene, "model", None), getattr(scene, "balance", None) is not None or motion_of(scene) is not None
-    return model if isinstance(model, Model) and not found else None
+    return None if getattr(scene, "balance", None) is not None or motion_of(scene) is not None else film_of(scene)
 
 
 def is_known(scene: Solvable) -> bool:

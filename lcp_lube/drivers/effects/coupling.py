@@ -22,6 +22,7 @@ from ...problems.film.fluid import Law
 from ...problems.film.model import Model
 from ...problems.solution import Enclosure, Fields, Outcome, Solution
 from ...problems.transfer import Transfer
+from ...scenes.moving import film_of
 from ...scenes.scene import Solvable
 from ...solvers.enclosure import bounds_of
 from ..ask import Ask, Start
@@ -36,8 +37,8 @@ NESTED_ABOVE = 2_000  # points from which the fields are first found on coarser 
 
 def applies(scene: Solvable, ask: Ask) -> bool:
     """Whether an effect makes the film's coefficients depend on its answer."""
-    model = getattr(scene, "model", None)
-    return isinstance(model, Model) and (model.law is not None or bool(model.effects))
+    model = film_of(scene)
+    return model is not None and (model.law is not None or bool(model.effects))
 
 
 def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
