@@ -152,11 +152,6 @@ def attitude(widest: float, force: Sequence[float], U: float) -> float:
     return float(np.degrees(np.angle(behind if U >= 0 else np.conj(behind))))
 
 
-def integral(problem: LubricationProblem, p_pa: Array, above: float, weight: Weight) -> float:
-    """The integral of (p - above) weight(x, y), as `integrals` tells. Collective."""
-    return integrals(problem, p_pa, [(above, weight)])[0]
-
-
 def integrals(
     problem: LubricationProblem,
     p_pa: Array,

@@ -61,9 +61,6 @@ class Patch:
     def middle(self) -> tuple[float, float]:
         return self.x, self.y
 
-    def moved(self, start: float) -> Patch:
-        return replace(self, x=self.x - start)
-
     def mirrored(self, L: float) -> Patch:
         return replace(self, x=L - self.x)
 
@@ -80,26 +77,22 @@ class Patch:
 
 @dataclass(frozen=True)
 class Where:
-    """Where a function of x and y (m) is positive, x counted from `start`, forwards or, from `end` back, backwards."""
+    """Where a function of x and y (m) is positive, x counted forwards or, from `end` back, backwards."""
 
     function: Callable[[Array, Array], Array]
     centre: tuple[float, float]
-    start: float = 0.0
     end: float | None = None
 
     def inside(self, x: Array, y: Array) -> NDArray[np.bool_]:
-        return self.function(x + self.start if self.end is None else self.end - x, y) > 0
+        return self.function(x if self.end is None else self.end - x, y) > 0
 
     @property
     def middle(self) -> tuple[float, float]:
         x, y = self.centre
-        return (x - self.start if self.end is None else self.end - x), y
-
-    def moved(self, start: float) -> Where:
-        return replace(self, start=self.start + start)
+        return (x if self.end is None else self.end - x), y
 
     def mirrored(self, L: float) -> Where:
-        return replace(self, end=L + self.start)
+        return replace(self, end=L)
 
     def symmetric(self, y: float) -> bool:
         return False
