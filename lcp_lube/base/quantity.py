@@ -120,7 +120,8 @@ def in_si(text: str, units: str) -> float | None:
         return None
     wanted = [_unit(unit)[1] if unit else NUMBER for unit in units.split(" or ")]
     if found.dimension not in wanted if found.unit else (text.strip().endswith("%") and NUMBER not in wanted):
-        raise InputError(f"{_named(wanted)} is needed{_article(found)}")
+        other = NAMES.get(found.dimension) if found.dimension != NUMBER else None
+        raise InputError(f"{_named(wanted)} is needed{f', not {other[0]}' if other else ''}")
     return found.value
 
 
@@ -130,11 +131,6 @@ def in_own(text: str, key: str) -> float | None:
     if own not in OWN or words is None or found is None or not found.unit or found.dimension != _unit(own)[1]:
         return None
     return float(Fraction(Decimal(words[1])) * _unit(words[2])[0] / _unit(own)[0]) if math.isfinite(found.value) else None
-
-
-def _article(found: Quantity) -> str:
-    known = NAMES.get(found.dimension)
-    return f", not {known[0]}" if known and found.dimension != NUMBER else ""
 
 
 def _named(wanted: Iterable[Dimension]) -> str:

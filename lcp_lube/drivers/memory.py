@@ -155,12 +155,6 @@ def inner_solver() -> str:
     return "light"
 
 
-def _restart(options: dict[str, str]) -> int:
-    """GMRES's restart, PETSc's default where the option is no whole number, which PETSc itself will refuse."""
-    given = options.get("ksp_gmres_restart", "")
-    return int(given) if given.isdecimal() else 30
-
-
 def bytes_needed(facts: Facts, plan: Plan) -> float | None:
     """Bytes that a run takes for its points, all ranks together; None if nothing is known of such runs.
 
@@ -181,7 +175,8 @@ def bytes_needed(facts: Facts, plan: Plan) -> float | None:
     each = max(max(a + b * log2(points), 60.0) for a, b in fits)
     if solver == "light" and options.get("ksp_type", "gmres") == "gmres":
         unknowns = 2 if plan.system == "full" else 1
-        each += 8 * unknowns * min(_restart(options), 200)
+        given = options.get("ksp_gmres_restart", "")  # PETSc's default where it is no whole number, which PETSc itself refuses
+        each += 8 * unknowns * min(int(given) if given.isdecimal() else 30, 200)
     return each * points + SPREAD[facts.moving] * facts.spread
 
 

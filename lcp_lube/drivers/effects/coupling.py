@@ -132,19 +132,15 @@ def _coarser(scene: Solvable, ask: Ask, inner: Inner, loop: Loop, file: Coupling
     shapes = level_shapes(scene.shape, loop.base.grid.comm.size)
     if len(shapes) < 2 or prod(shapes[-2]) >= prod(scene.shape):
         return None
-    found = _settled_on(scene.with_shape(shapes[-2]), replace(ask, start=None, stopping=_loose(ask)), inner, file)
+    given = ask.stopping_for((1e-8, 1e-8))
+    loose = {"eps1": max(given.eps1, 1e-5), "max_it": given.max_it}  # of a start
+    found = _settled_on(scene.with_shape(shapes[-2]), replace(ask, start=None, stopping=loose), inner, file)
     if not found.converged:
         found.destroy()
         return None
     loop.work += found.settings["details"]["coupling_work"]
     loop.start = found if loop.law.barus == 0.0 else None
     return found
-
-
-def _loose(ask: Ask) -> dict:
-    """A start's tolerances."""
-    given = ask.stopping_for((1e-8, 1e-8))
-    return {"eps1": max(given.eps1, 1e-5), "max_it": given.max_it}
 
 
 def _told(ask: Ask, loop: Loop) -> Solution:

@@ -6,11 +6,9 @@ and the last film's p and r, from which the next one starts: taken up again, the
 """
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
 from ...base.parallel import Array
 from ...errors import InputError
@@ -87,13 +85,3 @@ class CouplingFile:
         near = replace(loop.frozen, by=loop.by(loop.cells(vector("last")))).build(grid.petsc_comm)
         loop.start = Start(near, {name: arrays[f"fields.{name}"] for name in "pr"})
         return vector("first")
-
-
-def kept_in(path: str | Path, comm: MPI.Comm) -> list[str]:
-    """The effects that the run of a checkpoint solved for. Collective.
-
-    Raises
-    ------
-    InputError : no checkpoint, one cut short or damaged.
-    """
-    return list(checkpoint_file.read_header(Path(path), comm)[0].get("effects", ()))

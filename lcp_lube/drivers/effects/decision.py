@@ -11,6 +11,7 @@ counts, in parts of the largest value.
 """
 
 from dataclasses import replace
+from pathlib import Path
 from time import perf_counter
 
 from ...errors import InputError
@@ -55,9 +56,9 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     else:
         look.decide()
         if ask.resume is not None:
-            from .coupling_file import kept_in  # here, as above
+            from ..checkpoint_file import read_header  # here, as above
 
-            look.taken_up(kept_in(ask.resume, ask.mpi))
+            look.taken_up(read_header(Path(ask.resume), ask.mpi)[0].get("effects", ()))
     spent = perf_counter() - begin
     solution = look.solution or inner(look.reduced, look.ask)
     while look.doubtful and solution.converged:

@@ -76,7 +76,7 @@ def variable(scene: Scene, table: BalanceTable, begin: float | None, shapes: Seq
     to_value: Callable[[float], float] = exp
     slope = 1.0
     if key.rpartition(".")[2] == "eccentricity":
-        to_t, to_value, upper = _logit, lambda t: 1.0 / (1.0 + exp(-t)), 1.0
+        to_t, to_value, upper = (lambda e: log(e / (1.0 - e))), (lambda t: 1.0 / (1.0 + exp(-t))), 1.0
         turning = getattr(scene, "turning", None)
         if turning is not None and begin is None:
             from .position import half_film_eccentricity  # here: with it come stiffness, and families of scenes
@@ -104,10 +104,6 @@ def variable(scene: Scene, table: BalanceTable, begin: float | None, shapes: Seq
         wide = log(RANGE["eccentricity" if upper == 1.0 else "h_offset"])
         low, high = about - wide, about + wide
     return Variable(key, to_value, start, low, high, slope)
-
-
-def _logit(e: float) -> float:
-    return log(e / (1.0 - e))
 
 
 def applies(scene: Solvable, ask: Ask) -> bool:

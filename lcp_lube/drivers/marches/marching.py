@@ -276,7 +276,8 @@ class Run:
         """Of all steps."""
         found = self.certificates
         names = dict.fromkeys(name for c in found for name in c.measures)
-        measures = {name: max((c.measures.get(name, 0.0) for c in found), key=_badness) for name in names}
+        badness = lambda measure: np.inf if np.isnan(measure) else measure  # noqa: E731
+        measures = {name: max((c.measures.get(name, 0.0) for c in found), key=badness) for name in names}
         lowest = {name: min(c.extremes[name] for c in found) for name in found[0].extremes}
         return Certificate(measures, found[0].tol, lowest)
 
@@ -292,8 +293,3 @@ def first_film(scene: Any, models: Any, place: Any) -> Model:
     if any(set(first.edges_along(axis)) != set(later.edges_along(axis)) for axis in "xy"[: len(first.lengths)]):
         first = replace(first, places=EVEN)  # its edges move: no line of points can lie on them
     return first
-
-
-def _badness(measure: float) -> float:
-    """NaN is the worst."""
-    return measure if measure == measure else float("inf")

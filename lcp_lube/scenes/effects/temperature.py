@@ -154,13 +154,8 @@ class Heat(Effect):
         carries = rho_c * (max(fresh, 0.0) / self.table.share + held)
         return 1.0 / carries if carries > 0 else np.inf
 
-    def _temperature(self, at: Answer) -> tuple[Array, dict[str, float], float]:
-        """T at the points, K; what is told of the heat; the equations' residual. Taken once an answer. Collective."""
-        if id(self) not in at.memory:
-            at.memory[id(self)] = self._solve(at)
-        return at.memory[id(self)]
-
     def _solve(self, at: Answer) -> tuple[Array, dict[str, float], float]:
+        """T at the points, K; what is told of the heat; the equations' residual. Collective."""
         from ...problems.film.carried import carried
         from ...problems.film.energy import fresh_flow, heated
 
@@ -202,7 +197,9 @@ class Heat(Effect):
         return T, told, residual
 
     def report(self, at: Answer) -> Report:
-        T, told, residual = self._temperature(at)
+        if id(self) not in at.memory:  # taken once an answer
+            at.memory[id(self)] = self._solve(at)
+        T, told, residual = at.memory[id(self)]
         measures = {"energy_residual": residual, "heat_defect": told["heat_defect"]}
         hottest, coldest = told["temperature_max"], at.problem.reduce.min(T)
         failure = ""

@@ -21,7 +21,7 @@ from ...problems.solution import Fields, Step
 from ..job import Job
 from ..method_options import least
 from ..newton import StalledError
-from .cycles import COARSEST_SWEEPS, CycleOptions, Cycles
+from .cycles import CycleOptions, Cycles
 
 
 @dataclass(frozen=True)
@@ -199,7 +199,7 @@ class BoxFas(Cycles):
     def _solve_coarsest(self, k: int) -> None:
         level = self._levels[k]
         for s in range(4):
-            self._relax(self._grids[k], max(COARSEST_SWEEPS, 2 * level.nx, 2 * level.ny) // 4, s % 2 == 1)
+            self._relax(self._grids[k], max(level.nx, level.ny), s % 2 == 1)
 
     def _descend(self, k: int) -> None:
         grid, coarse = self._grids[k], self._grids[k + 1]

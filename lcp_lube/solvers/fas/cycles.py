@@ -17,7 +17,6 @@ from ..method import Method
 from ..method_options import MethodOptions, least, one_of, option
 
 WINDOW = 3  # cycles over which the fall of the norm is judged
-COARSEST_SWEEPS = 40  # at least, where the coarsest grid is not solved otherwise
 
 
 @dataclass(frozen=True)

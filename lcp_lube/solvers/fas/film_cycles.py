@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from ...problems.film.lubrication import LubricationProblem
-from .cycles import COARSEST_SWEEPS, Cycles
+from .cycles import Cycles
 
 BORDER = 4  # lines on either side of the border between two ranks
 
@@ -40,7 +40,7 @@ class FilmCycles(Cycles):
         level, self._correction = self._levels[k], 0.0
         if not self._tools.solve(level):
             for s in range(2):
-                self._relax(level, max(COARSEST_SWEEPS, 2 * level.nx, 2 * level.ny) // 2, s == 1)
+                self._relax(level, max(level.nx, level.ny), s == 1)
         elif self._following:
             self._following.solve(k)
 
