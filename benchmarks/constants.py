@@ -8,7 +8,7 @@ the same on every machine, but for a few in the last place.
 """
 
 import argparse
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
@@ -42,7 +42,6 @@ class Sweep:
     values: tuple[Any, ...]
     ask: dict[str, Any]
     scenes: tuple[tuple[str, dict[str, Any]], ...] = HARD
-    others: tuple[str, ...] = field(default=())  # modules that imported the constant by name
 
 
 SWEEPS = (
@@ -56,7 +55,6 @@ SWEEPS = (
     Sweep("solvers.active_set", "RESCUE_SWEEPS", (4, 16, 64), CAVITY),
     Sweep("solvers.fas.levels", "STRONG", (2.0, 4.0, 8.0, 16.0, 64.0, 1e9), FAS, LONG),
     Sweep("solvers.fas.levels", "FEWEST", (2, 3, 7), FAS),
-    Sweep("solvers.fas.cycles", "COARSEST_SWEEPS", (10, 40, 160), FAS, HARD, ("solvers.fas.film_cycles",)),
 )
 
 
@@ -81,19 +79,17 @@ def main() -> None:
     for sweep in SWEEPS:
         if names and sweep.name not in names:
             continue
-        modules = [import_module(f"{lcp_lube.__name__}.{name}") for name in (sweep.module, *sweep.others)]
-        ours = getattr(modules[0], sweep.name)
+        module = import_module(f"{lcp_lube.__name__}.{sweep.module}")
+        ours = getattr(module, sweep.name)
         for value in sweep.values:
-            for module in modules:
-                setattr(module, sweep.name, value)
+            setattr(module, sweep.name, value)
             done, iterations, linear, work = runs(sweep)
             mark = "*" if value == ours else " "
             label = f"{sweep.module}.{sweep.name}"
             print(
                 f"{label:34} {value:8g}{mark} {done:4}/{len(sweep.scenes)} {iterations:12} {linear:7} {work:8.1f}", flush=True
             )
-        for module in modules:
-            setattr(module, sweep.name, ours)
+        setattr(module, sweep.name, ours)
 
 
 if __name__ == "__main__":
