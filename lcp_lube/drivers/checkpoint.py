@@ -249,20 +249,21 @@ class Checkpoint:
         failed = self.record["failed"]
         return [(Outcome(outcome), message, [Step(*step) for step in steps]) for outcome, message, steps in failed]
 
-    def settle(self, **given: Any) -> dict[str, Any]:
-        """How the run was begun, for what is not given anew: None, 'auto' or nothing.
+    def settled(self, ask: Any) -> Any:
+        """The ask with how the run was begun, for what is not given anew: None, 'auto' or nothing.
 
         Raises
         ------
         InputError : something else is given than the run was begun with.
         """
+        given = {name: getattr(ask, name) for name in CHOICES}
         for name in CHOICES:
             kept = self.record[name]
             if given[name] in (None, "auto") or given[name] == {}:
                 given[name] = kept if kept != "" else given[name]  # a method without a system
             elif name != "recipe" and json.loads(json.dumps(given[name])) != kept:  # another inner solver may go on
                 raise InputError(f"--resume {self.path}: the run was begun with {name} {kept}, not {given[name]}")
-        return given
+        return replace(ask, **given)
 
 
 def load(path: str | Path, new: dict[str, Any], comm: MPI.Comm = MPI.COMM_WORLD) -> Checkpoint:

@@ -21,7 +21,7 @@ from ..solvers.method import Method
 from ..solvers.newton import Stopping
 from . import memory
 from .ask import Ask, Start
-from .checkpoint import CHOICES, Checkpoint, Checkpointer, load, scene_record
+from .checkpoint import Checkpoint, Checkpointer, load, scene_record
 from .compose import Inner
 from .levels import guess, level_shapes
 from .plan import Plan, default_recipe, plan
@@ -57,8 +57,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner | None = None) -> Solution:
     keeper = Checkpointer(ask.checkpoint, ask.every, problem.grid.comm)
     if ask.resume is not None:
         saved = load(ask.resume, scene_record(scene), problem.grid.comm)
-        given = {name: getattr(ask, name) for name in CHOICES}
-        ask = replace(ask, **saved.settle(**given))
+        ask = saved.settled(ask)
         chosen = plan(facts, ask, scene.name)
     entry = METHODS[chosen.method].of(facts.kind)
     run = Run(scene, problem, facts, chosen, replace(ask, stopping=ask.stopping_for(entry.eps)), stages, keeper, saved)

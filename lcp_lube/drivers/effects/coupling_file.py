@@ -41,7 +41,7 @@ class CouplingFile:
             self.saved = load(ask.resume, scene_record(scene), ask.mpi)
             if "effects" not in self.saved.record:
                 raise InputError(f"--resume {ask.resume}: no checkpoint of a film with effects")
-            ask = replace(ask, **self.saved.settle(**{name: getattr(ask, name) for name in CHOICES}))
+            ask = self.saved.settled(ask)
         self.keeper.begin(scene, tuple(getattr(ask, name) for name in CHOICES))
         self.keeper.record["effects"] = named(scene)
         self.ask = replace(ask, checkpoint=None, resume=None, every=1)
