@@ -1,6 +1,6 @@
 """One problem solved: the chosen method on grids from coarse to fine, then the methods that take over where it fails."""
 
-from dataclasses import astuple, replace
+from dataclasses import astuple, dataclass, field, replace
 from time import perf_counter
 from typing import Any
 
@@ -85,6 +85,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner | None = None) -> Solution:
     ).judged()
 
 
+@dataclass
 class Run:
     """How far a problem's solve has got: `grids`, then `take_over`. Every method is collective.
 
@@ -102,30 +103,28 @@ class Run:
     levels : a record of every grid, coarse to fine. details : what the method tells of itself beyond its steps.
     """
 
-    def __init__(
-        self,
-        scene: Solvable,
-        problem: Problem,
-        facts: Facts,
-        chosen: Plan,
-        ask: Ask,
-        stages: Stages,
-        keeper: Checkpointer,
-        saved: Checkpoint | None,
-    ):
-        self.scene, self.problem, self.facts, self.chosen, self.ask, self.stages = scene, problem, facts, chosen, ask, stages
-        self.stopping, self.options = ask.stopping_for((0.0, 0.0)), dict(ask.options)
-        self._keeper, self._saved = keeper, saved
-        self.outcome, self.message = Outcome.MAX_ITERATIONS, "no step was taken"
-        self.fields: Fields = {}
-        self.steps: list[Step] = []
-        self.levels: list[dict[str, Any]] = []
-        self.details: dict[str, Any] = {}
-        self.certificate: Certificate | None = None  # of the fields, where somebody has made one
-        self.method, self.system = chosen.method, chosen.system
-        self.recipe: str | None = None
-        self.ksp_type: str | None = None
-        self.pc_type: str | None = None
+    scene: Solvable
+    problem: Problem
+    facts: Facts
+    chosen: Plan
+    ask: Ask
+    stages: Stages
+    keeper: Checkpointer
+    saved: Checkpoint | None
+    outcome: Outcome = Outcome.MAX_ITERATIONS
+    message: str = "no step was taken"
+    fields: Fields = field(default_factory=dict)
+    steps: list[Step] = field(default_factory=list)
+    levels: list[dict[str, Any]] = field(default_factory=list)
+    details: dict[str, Any] = field(default_factory=dict)
+    certificate: Certificate | None = None  # of the fields, where somebody has made one
+    recipe: str | None = None
+    ksp_type: str | None = None
+    pc_type: str | None = None
+
+    def __post_init__(self) -> None:
+        self.stopping, self.options = self.ask.stopping_for((0.0, 0.0)), dict(self.ask.options)
+        self.method, self.system = self.chosen.method, self.chosen.system
 
     def grids(self, start: Solution | Start | None = None) -> None:
         """The chosen method on every grid; start: what lies near the answer on the first one."""
@@ -134,8 +133,8 @@ class Run:
         shapes = level_shapes(finest, self.problem.grid.comm.size) if self.chosen.nested else [finest]
         near: tuple[Problem, Fields] | None = (start.problem, start.fields) if start is not None else None
         previous = None  # near: what the next grid starts from, and the problem on the grid before
-        if self._saved is not None:
-            shapes, self.levels, near = self._saved.shapes, self._saved.record["levels"], None
+        if self.saved is not None:
+            shapes, self.levels, near = self.saved.shapes, self.saved.record["levels"], None
         for k, shape in enumerate(shapes):
             begin = perf_counter()
             with self.stages("setup"):
@@ -221,15 +220,15 @@ class Run:
         self, method: Method, level: Problem, stopping: Stopping, tried: int, reached: Fields | None = None, **record: Any
     ) -> None:
         """Run a method to its end, or take its end from the checkpoint; tried: how many methods had failed before it."""
-        saved = self._saved
+        saved = self.saved
         try:
             if saved is not None and len(saved.failures) > tried:  # another method had taken over
                 self.outcome, self.message, self.steps = saved.failures[tried]
             else:
                 before = saved.restore(method, level.grid, reached) if saved is not None else []
-                self._saved = None
+                self.saved = None
                 monitor = watching(self.ask, level, self.problem, stopping)
-                ended = self._keeper.iterate(method, level.grid, stopping, monitor, before, reached, **record)
+                ended = self.keeper.iterate(method, level.grid, stopping, monitor, before, reached, **record)
                 self.outcome, self.message, self.steps = ended
             self.fields, self.certificate = method.fields, method.certificate
             if not tried:

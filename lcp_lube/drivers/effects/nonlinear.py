@@ -12,10 +12,7 @@ from .loop import LONG
 
 PATIENT = 150  # half steps in which the least change has to halve
 WARMER = 1.0  # of log(viscosity): where a second start is
-LONGER, LONGEST = (
-    1.2,
-    0.5,
-)  # of steps: while a change keeps its sign they grow as in Rprop (Riedmiller and Braun 1993), to a half
+LONGER, LONGEST = 1.2, 0.5  # of steps, while a change keeps its sign: as in Rprop (Riedmiller and Braun 1993), to a half
 VAIN = 100  # films of Newton's method in which the change has to halve
 NEWTON = {"snes_mf": "", "snes_linesearch_type": "bt", "mat_mffd_err": 1e-6, "snes_ksp_ew": "", "ksp_max_it": 60}
 NEWTON |= {"ksp_gmres_restart": 60, "snes_max_linear_solve_fail": LONG}  # what 60 products give of a step is taken

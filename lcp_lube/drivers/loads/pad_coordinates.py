@@ -120,8 +120,8 @@ class JournalPads:
     @property
     def conditions(self) -> dict[str, float]:
         """The numbers of the results that are met by what is found, and their values: in the order of the coordinates."""
-        load = self.scene.balance.load if self.scene.balance is not None else 0.0
-        return {"load": load, "force_y": 0.0} | {f"{PIVOT}{k + 1}": 0.0 for k in self._pads}
+        table = self.scene.balance
+        return {"load": table.load if table is not None else 0.0, "force_y": 0.0} | {f"{PIVOT}{k + 1}": 0.0 for k in self._pads}
 
     @property
     def _pads(self) -> range:
@@ -131,9 +131,8 @@ class JournalPads:
         """What is left of each equation, and what it counts by."""
         told = _integrals(solution)
         fx, fy = told["force_x"], told["force_y"]
-        load = self.scene.balance.load if self.scene.balance is not None else math.hypot(fx, fy)
-        moments = [told[f"{PIVOT}{k + 1}"] for k in self._pads]
-        tol = self.scene.balance.tol if self.scene.balance is not None else 1.0
+        table, moments = self.scene.balance, [told[f"{PIVOT}{k + 1}"] for k in self._pads]
+        load, tol = (table.load, table.tol) if table is not None else (math.hypot(fx, fy), 1.0)
         lever = _moments(self.scene) * (load or 1.0) * 0.5 * self.scene.D
         return np.array([fx + load, fy, *moments]), np.array([tol * load] * 2 + [lever] * len(moments))
 
