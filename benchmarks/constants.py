@@ -46,7 +46,6 @@ class Sweep:
 
 SWEEPS = (
     Sweep("linear.nearnull", "COARSEST", (50, 200, 800, 3200), CAVITY),
-    Sweep("linear.nearnull", "COARSEST_SWEEPS", (5, 20, 80), CAVITY),
     Sweep("linear.nearnull", "SWEEPS", (1, 2, 3, 5), CAVITY),
     Sweep("linear.nearnull", "LEAK", (1e-6, 1e-5, 1e-4, 1e-3, 1e-2), CAVITY),
     Sweep("solvers.active_set", "FIRST", (1e-3, 1e-2, 1e-1), CAVITY),

@@ -13,9 +13,8 @@ from ..base.parallel import Array
 
 # benchmarks/constants.py sweeps them: all flat around these values.
 COARSEST = 200  # unknowns of the coarsest level
-COARSEST_SWEEPS = 20  # there
 LEAK = 1e-4  # right-hand side, in parts of diag(S): larger ones let the boundary's distance show, which spoils w
-SWEEPS = 3  # symmetric Gauss-Seidel sweeps before and after
+SWEEPS = 3  # symmetric Gauss-Seidel sweeps before and after, and on the coarsest level
 
 
 def near_null(S: PETSc.Mat, i: np.ndarray, j: np.ndarray, w: Array, cycles: int) -> Array:
@@ -49,10 +48,9 @@ def near_null(S: PETSc.Mat, i: np.ndarray, j: np.ndarray, w: Array, cycles: int)
 
 def _cycle(S: PETSc.Mat, x: PETSc.Vec, f: PETSc.Vec, prolongations: list[PETSc.Mat]) -> None:
     symmetric = PETSc.Mat.SORType.LOCAL_SYMMETRIC_SWEEP
-    if not prolongations:
-        S.SOR(f, x, sortype=symmetric, its=COARSEST_SWEEPS)
-        return
     S.SOR(f, x, sortype=symmetric, its=SWEEPS)
+    if not prolongations:
+        return
     P, *coarser = prolongations
     scaled = S.duplicate(copy=True)
     scaled.diagonalScale(None, x)
