@@ -208,6 +208,19 @@ def test_the_films_own_derivative(name):
     adjoint.destroy()
 
 
+def test_the_films_own_derivative_beside_a_supply():
+    """Of a line, whose numbers are free of the grid's error: at the points it has one, of second order."""
+    data = {"family": "bearing", "L": 0.1, "U": 5.0, "fluid": {"mu": 0.02, "p_supply": 1e5}}
+    data |= {"film": [{"shape": "linear", "h_start": 4e-5, "h_end": 2e-5}]}
+    data |= {"supply": [{"shape": "rectangle", "x": [0.045, 0.055], "p": 5e5}]}
+    off = []
+    for n in (99, 199):
+        with solve(load_scene({**data, "n": n})) as s:
+            lifted = s.problem.reduce.dot(s.film_gradient("load"), areas(s.problem.grid).ravel())
+            off.append(lifted / s.gradient("load", ["h_offset"])["h_offset"] - 1.0)
+    assert abs(off[0]) < 1e-3 and off[0] / off[1] == pytest.approx(4.0, rel=0.02)
+
+
 def test_taylor():
     """The error of the linear forecast falls by four when the step is halved."""
     scene, solution = solved("pocketed_pad")
