@@ -26,7 +26,13 @@ SCENES = {
     "turned": {"U": -1.0},
     "journal": {"nx": 40, "ny": 9},
     "thrust": {},
+    "hybrid": {"nx": 60, "ny": 13},
+    "holes": {},
 }
+HOLES = {"family": "bearing", "dimension": 2, "L": 0.06, "width": 0.04, "U": 1.5, "nx": 48, "ny": 34}
+HOLES |= {"film": [{"shape": "linear", "h_start": 3e-5, "h_end": 2e-5}], "fluid": {"mu": 0.03, "p_supply": 1e4}}
+HOLE = {"shape": "hole", "at": [0.019, 0.021], "diameter": 0.009, "p": 8e5}
+HOLES["supply"] = [HOLE, {"shape": "rectangle", "x": [0.036, 0.047], "y": [0.012, 0.026], "flow": 4e-6}]
 BASES = {
     "upwind": ("problem4", {"nx": 33, "ny": 20}),
     "fed": ("pocketed_pad_2d", {"nx": 33, "ny": 20}),
@@ -34,6 +40,8 @@ BASES = {
     "turned": ("dimpled_pad", {"nx": 31, "ny": 29}),
     "law": ("pocketed_pad_2d", {"nx": 33, "ny": 20}),
     "thrust": ("tapered_land", {"nx": 30, "ny": 17}),
+    "hybrid": ("hybrid_journal", {}),
+    "holes": (HOLES, {}),
 }
 
 
@@ -61,6 +69,10 @@ def test_films_near_by_have_the_lagrangians_of_their_problems(monkeypatch, name)
                 found += 1
                 slow = [adjoint.lagrangians(other) for other in others]
                 assert (np.abs((quick[0] - quick[1]) - (slow[0] - slow[1])) <= 1e-13 * sizes).all(), key
+        for k, P in enumerate(adjoint.pressures):  # of supplies
+            others = [[*adjoint.pressures[:k], P * (1 + part), *adjoint.pressures[k + 1 :]] for part in (1e-5, -1e-5)]
+            quick, slow = ([of(adjoint.scene, P) for P in others] for of in (adjoint.near.lagrangians, adjoint.lagrangians))
+            assert (np.abs((quick[0] - quick[1]) - (slow[0] - slow[1])) <= 1e-13 * sizes).all()
         adjoint.destroy()
     assert found >= 6
 

@@ -105,7 +105,7 @@ class Adjoint:
 
     @cached_property
     def near(self) -> NearFilms:
-        return NearFilms(self.equations, self.p, self.r, self.lambdas, self.parts, self.numbers)
+        return NearFilms(self.equations, self.p, self.r, self.lambdas, self.parts, self.numbers, self.pressures)
 
     @cached_property
     def _here(self) -> Array:
@@ -170,7 +170,9 @@ class Adjoint:
             which, unit = self._supplies.index(key), self.equations.constant.p_unit
 
             def at(P: float) -> Array:
-                return self.lagrangians(self.scene, [P if k == which else other for k, other in enumerate(self.pressures)])
+                pressures = [P if k == which else other for k, other in enumerate(self.pressures)]
+                found = self.near.lagrangians(self.scene, pressures)
+                return self.lagrangians(self.scene, pressures) if found is None else found
 
             slope, jump = differences(at, value, max(abs(value), 1e-3 * unit), sizes)
         else:

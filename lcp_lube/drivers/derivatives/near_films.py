@@ -7,11 +7,12 @@ Barus' law has another q, as p is held.
 
 from collections.abc import Collection, Mapping, Sequence
 from copy import copy
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 
 from ...base.parallel import Array
 from ...problems.film import forces
@@ -21,6 +22,8 @@ from ...problems.film.fluid import Law
 from ...problems.film.lubrication import LubricationProblem
 from ...problems.film.model import Model
 from ...problems.film.quantities import largest_pressure
+from ...problems.film.reynolds import sides
+from ...problems.film.supplies import Held, owners, shares_of
 from ...problems.film.weighed import can
 from ...problems.grid import Grid
 from ...problems.strips import moved
@@ -42,6 +45,7 @@ class NearFilms:
     Parameters
     ----------
     p : Pa above p_c, r : of the solution. lambdas : by quantity. parts : what each is made of. numbers : of the solution.
+    pressures : of its supplies, if any, Pa above p_c.
     """
 
     def __init__(
@@ -52,6 +56,7 @@ class NearFilms:
         lambdas: Mapping[str, Array],
         parts: Mapping[str, Collection[str]],
         numbers: dict[str, float],
+        pressures: Sequence[float] = (),
     ):
         self.equations, self.model, self.p, self.r = equations, equations.model, p, r
         self.lambdas, self.numbers = lambdas, numbers
@@ -59,8 +64,20 @@ class NearFilms:
         self.wanted = {part for one in parts.values() for part in one}
         self.drags = tuple(name for name in DRAGS if name in self.wanted)
         self.flows = tuple(name for name in FLOWS if name in self.wanted)
-        by_p = {*forces.weights(equations.constant), "p_max"}
-        self.known = can(equations.constant, self.model, SMALL) and self.wanted <= by_p.union(DRAGS, FLOWS)
+        problem, self.rows = equations.constant, list(lambdas.values())
+        by_p, held = {*forces.weights(problem), "p_max"}, problem.held
+        self.fed = [f"supply_flow_{k}" for k in range(1, len(held.supplies) + 1)] if held else []
+        self.pressures = pressures or [one.p for one in (held.supplies if held else ())]
+        if held is not None:  # rows of free cells, and what leaves the others
+            taken = [held.owner.ravel() == k for k in range(len(held.supplies))]
+            size, free = problem.scheme.diagonal.ravel() / problem.p_unit, ~held.mask.ravel()
+            self._pushed = np.array([[problem.reduce.sum(np.where(mine, w * size, 0.0)) for mine in taken] for w in self.rows])
+            self.rows = [*(w * free for w in self.rows), *(mine.astype(float) for mine in taken)]
+        self.known = can(problem, self.model, SMALL, held=self.model.law is None) and self.wanted <= by_p.union(
+            DRAGS, FLOWS, self.fed
+        )
+        self._shares = self._within(problem.grid, held) if held and self.known else None
+        self.known = self.known and (held is None or self._shares is not None)
 
     @cached_property
     def _own(self) -> ByFaces:
@@ -70,11 +87,12 @@ class NearFilms:
     def _law(self) -> Law:
         return self.equations.law or Law()
 
-    def _by_faces(self, law: Law, p_sides: Sequence[float]) -> ByFaces:
-        problem, rows = self.equations.constant, list(self.lambdas.values())
+    def _by_faces(self, law: Law, p_sides: Sequence[float], shares: Array | None = None) -> ByFaces:
+        problem = self.equations.constant
+        shares = self._shares if shares is None else shares
         names = [FLIPPED.get(name, name) if self.equations.turned else name for name in self.flows]
         flows = [name.removeprefix("flow_") for name in names]
-        return ByFaces(problem, self.model.scheme, law, self.p, self.r, p_sides, rows, self.drags, flows)
+        return ByFaces(problem, self.model.scheme, law, self.p, self.r, p_sides, self.rows, self.drags, flows, shares)
 
     @cached_property
     def _here(self) -> Array | None:
@@ -91,45 +109,66 @@ class NearFilms:
         found = forces.totals(problem, self.p, wanted=self.wanted, columns=self._columns)
         if "p_max" in self.wanted:
             found["p_max"] = largest_pressure(problem, self.p)[0] + problem.p_c
-        return self.numbers | {name: found[name] for name in self.wanted.difference(DRAGS, FLOWS)}
+        return self.numbers | {name: found[name] for name in self.wanted.difference(DRAGS, FLOWS, self.fed)}
 
-    def lagrangians(self, scene: Scene) -> Array | None:
-        """L of every quantity; None where it is not that of another film at these points."""
+    def lagrangians(self, scene: Scene, pressures: Sequence[float] = ()) -> Array | None:
+        """L of every quantity; None where it is not that of another film at these points. pressures : of supplies."""
         if not self.known or film_of(scene) is None:
             return None
         eq = self.equations
         film: Any = Mirrored(scene) if eq.turned else scene
         model: Model = film.model
-        known = alike(model, self.model) and not getattr(model.gap, "rims", ())
+        known = alike(model, self.model, "supplies") and not getattr(model.gap, "rims", ())
+        known = known and [one.open for one in model.supplies] == [one.open for one in self.model.supplies]
         if model.U <= 0.0 or model.effects or not known or film.shape != eq.grid.shape:
             return None
         grid, law, p_sides = self._grid(model), model.law or Law(), model.p_sides
-        sums = None if grid is None else self._sums(model.gap, law, grid, p_sides)
+        sums = None if grid is None else self._sums(model, law, grid, p_sides)
         if grid is None or sums is None:
             return None
-        last, q_sides = len(self.lambdas) + len(self.drags), [float(law.reduced(np.array(p))) for p in p_sides]
+        first, last = len(self.rows), len(self.rows) + len(self.drags)
+        q_sides = [float(law.reduced(np.array(p))) for p in p_sides]
         pressed, dragged = sums[:, 0] + sums[:, 2:] @ np.array(q_sides), model.U * sums[:, 1]
         flows = pressed / model.mu + dragged
-        G, numbers = flows[: len(self.lambdas)], dict(zip(self.flows, 0.5 * grid.spacing[1] * flows[last:], strict=True))
-        for name, of, shear in zip(self.drags, sums[len(self.lambdas) : last], dragged[len(self.lambdas) : last], strict=True):
+        G, given = np.split(flows[:first], [len(self.lambdas)])
+        numbers = dict(zip([*self.flows, *self.fed], 0.5 * grid.spacing[1] * np.append(flows[last:], given), strict=True))
+        for name, of, shear in zip(self.drags, sums[first:last], dragged[first:last], strict=True):
             numbers[name] = (-1.0 if eq.turned else 1.0) * (of[0] + of[2:] @ np.array(p_sides) + model.mu * shear)
         lean, near = copy(eq), copy(eq.constant)
         near.grid = grid
         near.mu, near.U, near.p_c, near.p_sides = model.mu, model.U, model.p_c, p_sides
         near.shaft, near.extras, near.film, lean.constant = model.shaft, model.extras, model.film, near
-        near.levers, own = model.levers, self.model
+        near.levers, own, pushed = model.levers, self.model, 0.0
+        if near.held is not None:
+            P = [new if one.open else one.p for one, new in zip(model.supplies, pressures or self.pressures, strict=True)]
+            pushed = self._pushed @ (np.array(P) - [one.p for one in near.held.supplies])
+            near.held = replace(near.held, supplies=tuple(replace(one, p=p) for one, p in zip(model.supplies, P, strict=True)))
         held = (eq._p_sides, eq.constant.p_c) == (p_sides, near.p_c) and grid is eq.grid
         held = held and same((own.shaft, own.levers), (near.shaft, near.levers))
         report = lean.report((self._told if held else self._totals(near)) | {name: float(a) for name, a in numbers.items()})
-        return np.array([report[name] for name in map(plain, self.lambdas)]) - G / eq.constant.scheme.flow_unit
+        return np.array([report[name] for name in map(plain, self.lambdas)]) - G / eq.constant.scheme.flow_unit + pushed
 
-    def _sums(self, gap: Any, law: Law, grid: Grid, p_sides: tuple[float, ...]) -> Array | None:
+    def _sums(self, model: Model, law: Law, grid: Grid, p_sides: tuple[float, ...]) -> Array | None:
+        gap, held = model.gap, self.equations.constant.held
+        if held is not None and not (grid is self.equations.grid and same(regions(model), regions(self.model))):
+            owner = owners(grid, model.supplies)
+            if grid.comm.allreduce(not np.array_equal(owner, held.owner), MPI.LOR):
+                return None
+            shares = self._within(grid, Held(model.supplies, owner))
+            return None if shares is None else self._by_faces(law, p_sides, shares).sums(gap, grid)
         at_sides = law.dowson_higginson or (law.barus and self.drags)  # whether what faces there count depends on the pressure
         if law != self._law or (at_sides and p_sides != self.equations._p_sides):
             return self._by_faces(law, p_sides).sums(gap, grid)
         if grid is self.equations.grid and same(gap, self.model.gap):
             return self._here
         return self._own.sums(gap, grid)
+
+    @staticmethod
+    def _within(grid: Grid, held: Held) -> Array | None:
+        """`shares_of`; None where a supply ends between a side and the points beside it."""
+        shares = np.broadcast_to(shares_of(grid, held), (4, *grid.box))
+        off = [float(np.any((way != 1.0) & at)) for way, at in zip(shares, sides(grid), strict=True)]
+        return None if grid.reduce.max(np.array(off)) else shares
 
     def _grid(self, model: Model) -> Grid | None:
         """The points where another film has them; None where edges came or went."""
@@ -140,12 +179,16 @@ class NearFilms:
         return None if places is None else moved(grid, model.lengths, places, model.polar)
 
 
-def alike(model: Model, own: Model) -> bool:
-    """Whether films differ by no more than what may."""
+def alike(model: Model, own: Model, *more: str) -> bool:
+    """Whether films differ by no more than what may, and by these."""
     sides = [(side.kind, side.r) for side in model.sides] == [(side.kind, side.r) for side in own.sides]
-    return sides and all(
-        same(getattr(model, one.name), getattr(own, one.name)) for one in fields(Model) if one.name not in FREE
-    )
+    names = {one.name for one in fields(Model)}.difference(FREE, more)
+    return sides and all(same(getattr(model, name), getattr(own, name)) for name in names)
+
+
+def regions(model: Model) -> list[Any]:
+    """Where a film's supplies lie."""
+    return [one.region for one in model.supplies]
 
 
 def plain(name: str) -> str:

@@ -61,11 +61,12 @@ class ByFaces:
     problem : of a fluid of constant viscosity and density. law : of its own fluid.
     p : owned points, Pa above p_c, r : owned points. p_sides : Pa above p_c. rows : the weights w.
     drags : of them `friction` and `friction_torque`, which follow the rows' sums. flows : sides, whose flows follow those.
+    shares : what `supplies.shares_of` says of a film with supplies.
     """
 
     def __init__(
         self, problem: LubricationProblem, scheme: str, law: Law, p: Array, r: Array, p_sides: Sequence[float],
-        rows: Sequence[Array], drags: Sequence[str] = (), flows: Sequence[str] = (),
+        rows: Sequence[Array], drags: Sequence[str] = (), flows: Sequence[str] = (), shares: Array | None = None,
     ):  # fmt: skip
         from .cell_loops import loop_by_faces
 
@@ -86,6 +87,10 @@ class ByFaces:
         for end, owned in ((0, grid.y_start == 0), (-1, grid.y_end == grid.shape[1])):
             if owned and grid.ends[1][end] in ("closed", "mirror"):
                 across[:, end] = 0.0
+        if shares is not None:
+            ways = 1.0 / np.broadcast_to(shares, (4, ny, nx))
+            along *= np.concatenate([ways[0], ways[1][:, -1:]], axis=1)
+            across *= np.concatenate([ways[2], ways[3][-1:]])
         west, east, south, north = (float(mask.any()) for mask in sides(grid))
         columns, rims = np.outer([west, east], np.ones(ny)), np.outer([south, north], np.ones(nx))  # of the faces at the sides
         if law.dowson_higginson:

@@ -203,7 +203,7 @@ def hold(
         raise InputError(f"grid {'x'.join(map(str, grid.shape))}: a supply holds the film's only point, between closed sides")
     held = Held(tuple(supplies), owners(grid, supplies))
     if not to_edges:
-        k = zip(("k_W", "k_E", "k_S", "k_N"), _shares(grid, held), strict=True)
+        k = zip(("k_W", "k_E", "k_S", "k_N"), shares_of(grid, held), strict=True)
         scheme = scheme.changed(**{name: getattr(scheme, name) / share for name, share in k})
     return pressed(scheme.changed(held=held.mask), held, p_unit), held
 
@@ -255,7 +255,7 @@ def _nearest(grid: Grid, place: tuple[float, float]) -> NDArray[np.bool_]:
     return mine
 
 
-def _shares(grid: Grid, held: Held) -> Array:
+def shares_of(grid: Grid, held: Held) -> Array:
     """Parts of the ways to the four neighbours over which faces resist: to the edge of a supply, and as at its `corners`."""
     (ny, nx), outside = grid.box, -2
     framed = grid.ghosted(held.owner.astype(float).ravel(), outside=outside).astype(np.int64)
