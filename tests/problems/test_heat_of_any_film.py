@@ -90,3 +90,15 @@ def test_dry_films_behind_a_closed_side(pocket):
     with solve({**data, "temperature": {"beta": 0.03}}, model="full") as s:
         assert s.converged and s.certificate.measures["heat_defect"] < 1e-8
         assert s.heat_out == pytest.approx(s.heat_power, rel=1e-8, abs=1e-12) and (s.heat_power > 1e-3) == bool(pocket)
+
+
+def test_roundings_of_void_are_no_front():
+    """DIN leaves some 1e-9 of void in full cells: oil turns round at fronts, not there (0.4 % of the load, 0.35 K)."""
+    data = {"family": "bearing", "L": 6.5e-3, "U": 14.0, "n": 3, "scheme": "face", "fluid": {"mu": 6e-3}}
+    data |= {"film": {"shape": "journal", "c": 8e-5, "eccentricity": 0.7}, "sides": {"west": 3e3, "east": 1.6e5}}
+    loads = []
+    for method in ("active-set", "din"):
+        with solve({**data, "temperature": {"model": "energy", "beta": 0.018}}, method=method, model="full") as s:
+            assert s.converged and s.cavitated_fraction == 0.0
+            loads.append(s.load)
+    assert loads[0] == pytest.approx(loads[1], rel=1e-7)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...base.parallel import Array
-from .cavity import cavity_sign
+from .cavity import cavitated, cavity_sign
 from .contact import areas
 from .effects import Answer, around, framed_by
 from .flows import linear, point_weights, sheared_faces, volume_unit
@@ -81,7 +81,9 @@ def carried(at: Answer, told: bool = True) -> Carried:
 
     # Whether the neighbour (west, east, south, north) is a cell whose temperature is unknown.
     other_free = [a > 0.5 for a in around(framed_by(grid, free.astype(float), (0.0,) * 4))]
-    front = free & ((r > 0.0) | (void_W > 0.0))
+    empty = cavitated(problem.reduce, at.p, at.r)  # some methods leave a rounding of void in full cells
+    empty_W = grid.ghosted(empty.astype(float), outside=0.0)[1:-1, :-2] > 0.5
+    front = free & (empty.reshape(box) | empty_W)
     back = np.minimum(dragged[1], -pushed[1]) - np.maximum(pushed[0], 0.0)
     turn = np.where(front, np.maximum(back, 0.0), 0.0)
     turns = (grid.ghosted(turn.ravel(), outside=0.0)[1:-1, :-2], turn)
