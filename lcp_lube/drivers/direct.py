@@ -7,25 +7,26 @@ from typing import Any
 import numpy as np
 
 from ..base.options import recipe
+from ..base.progress import decades
 from ..base.stages import Stages
 from ..problems.box import BoxProblem
 from ..problems.certificate import Certificate
 from ..problems.facts import Facts
 from ..problems.film.lubrication import LubricationProblem
+from ..problems.grid import Grid
 from ..problems.solution import Enclosure, Fields, Outcome, Problem, Solution, Step
 from ..registry import METHODS
 from ..scenes.scene import Solvable
 from ..solvers.enclosure import enclose
 from ..solvers.job import Job
 from ..solvers.method import Method
-from ..solvers.newton import Stopping
+from ..solvers.newton import Monitor, Stopping
 from . import memory
 from .ask import Ask, Start
 from .checkpoint import Checkpoint, Checkpointer, load, scene_record
 from .compose import Inner
 from .levels import guess, level_shapes
 from .plan import Plan, default_recipe, plan
-from .watch import watching
 
 # A coarse answer is a start: its front matters, not its last digits. An interior method's layer there must be thin, though.
 COARSE_EPS = {False: 1e-4, True: 1e-8}  # by MethodEntry.interior
@@ -227,7 +228,7 @@ class Run:
             else:
                 before = saved.restore(method, level.grid, reached) if saved is not None else []
                 self.saved = None
-                monitor = watching(self.ask, level, self.problem, stopping)
+                monitor = self._watching(level.grid, stopping)
                 ended = self.keeper.iterate(method, level.grid, stopping, monitor, before, reached, **record)
                 self.outcome, self.message, self.steps = ended
             self.fields, self.certificate = method.fields, method.certificate
@@ -237,6 +238,25 @@ class Run:
             self.ksp_type, self.pc_type = (krylov.ksp_type, krylov.pc_type) if krylov else (None, None)
         finally:
             method.destroy()
+
+    def _watching(self, grid: Grid, stopping: Stopping) -> Monitor | None:
+        """The caller's monitor, and what `Ask.progress` is told: the grid, and how far ||F|| has come down on it."""
+        ask, norms = self.ask, list[float]()
+        if ask.progress is None:
+            return ask.monitor
+        name, share = (
+            " x ".join(map(str, grid.shape)),
+            grid.size / self.problem.grid.size,
+        )  # coarser ones take a part of the time
+
+        def watch(k: int, step: Step) -> None:
+            if ask.monitor is not None:
+                ask.monitor(k, step)
+            norms.append(step.norm)
+            part = share * decades(max(norms), step.norm, stopping.eps1)
+            ask.tell("grids", f"grid {name}, step {k}, ||F|| {step.norm:.1e}", part)
+
+        return watch
 
     def enclose(self, problem: LubricationProblem) -> Enclosure:
         """A band around the answer, by the inner solver that has just solved this problem, or would have."""

@@ -44,19 +44,15 @@ class HistoryFile:
         with on_all_ranks(self.comm, f"--history {self.path}"):
             if self.comm.rank == 0:
                 if self._file is None:
-                    kept = self._kept(row["t"] - 0.5 * dt) if self.resumed else []
-                    self._begin([*row], kept)
+                    self._begin([*row], row["t"] - 0.5 * dt)
                 told = (f"{value:.12g}" if isinstance(value, float) else str(value) for value in row.values())
                 csv.writer(self._file, lineterminator="\n").writerow(told)
                 self._file.flush()
 
-    def _kept(self, before: float) -> list[list[str]]:
-        """Rows of the file up to a time; one cut short by a kill is not among them."""
-        lines = list(csv.reader(self.path.read_text().splitlines()))
-        width = len(lines[0]) if lines else 0
-        return [line for line in lines[1:] if len(line) == width and float(line[0]) < before]
-
-    def _begin(self, columns: list[str], kept: list[list[str]]) -> None:
+    def _begin(self, columns: list[str], before: float) -> None:
+        """A new file with the old one's rows up to a time, of a run that is taken up; one cut short by a kill is not kept."""
+        lines = list(csv.reader(self.path.read_text().splitlines())) if self.resumed else []
+        kept = [line for line in lines[1:] if len(line) == len(lines[0]) and float(line[0]) < before]
         temporary = self.path.with_name(f".{self.path.name}.{os.getpid()}")
         with temporary.open("w", newline="") as file:
             csv.writer(file, lineterminator="\n").writerows([columns, *kept])

@@ -16,7 +16,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from petsc4py import PETSc
 
 from ...base.parallel import Array
 from ...errors import NotFound
@@ -256,19 +255,12 @@ class CoupledFilm:
         z = np.where(gradient.cavity, -gradient.r, gradient.p)
         linear = gradient._linear
 
-        class Whole:
-            def mult(shell, mat: PETSc.Mat, v: PETSc.Vec, out: PETSc.Vec) -> None:
-                out.setArray(self._by_y(self._pulled(v.array_r.copy(), {})))
+        def film(v: Array) -> Array:
+            by_film = v[:n] - self._by_y(self._pulled(np.concatenate([np.zeros(n), v[n:]]), {}))[:n]
+            v[:n] = linear.solve_transposed([by_film], z)[0]
+            return v
 
-        class Film:
-            def apply(shell, pc: PETSc.PC, v: PETSc.Vec, out: PETSc.Vec) -> None:
-                done = v.array_r.copy()
-                effects = np.concatenate([np.zeros(n), done[n:]])
-                by_film = done[:n] - self._by_y(self._pulled(effects, {}))[:n]
-                done[:n] = linear.solve_transposed([by_film], z)[0]
-                out.setArray(done)
-
-        found, reason = krylov(self.grid.petsc_comm, b, Whole(), Film(), RTOL)
+        found, reason = krylov(self.grid.petsc_comm, b, lambda v: self._by_y(self._pulled(v, {})), film, RTOL)
         if reason < 0:
             raise NotFound(f"dQ/dh: the transposed effects were not solved (GMRES ended with {reason})")
         return found

@@ -12,6 +12,7 @@ film's own Jacobian at fixed coefficients for a preconditioner. Pressures behind
 
 from collections.abc import Sequence
 from functools import cached_property
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -177,24 +178,21 @@ class CoupledResponse(OfLine):
         size, n, parts = b.size, self.n, (b.real,) if nu == 0.0 else (b.real, b.imag)
         comm = self.loop.base.grid.petsc_comm
 
-        class Whole:
-            def mult(shell, mat: PETSc.Mat, v: PETSc.Vec, out: PETSc.Vec) -> None:
-                found = [self._along(y) for y in v.array_r.reshape(len(parts), size)]
-                whole = np.array([one[0] for one in found])
-                if nu:
-                    whole[0, :n] -= nu * stored * found[1][1]
-                    whole[1, :n] += nu * stored * found[0][1]
-                out.setArray(whole.ravel())
+        def whole(v: Array) -> Array:
+            found = [self._along(y) for y in v.reshape(len(parts), size)]
+            out = np.array([one[0] for one in found])
+            if nu:
+                out[0, :n] -= nu * stored * found[1][1]
+                out[1, :n] += nu * stored * found[0][1]
+            return out.ravel()
 
-        class Film:
-            def apply(shell, pc: PETSc.PC, v: PETSc.Vec, out: PETSc.Vec) -> None:
-                done = v.array_r.reshape(len(parts), size).copy()
-                for y in done:
-                    y[:n] = z = self._linear.solve([y[:n]])[0]
-                    y[n:] -= self._along(np.concatenate([z, 0.0 * y[n:]]))[0][n:]  # what the effects make of the film's answer
-                out.setArray(done.ravel())
+        def film(v: Array) -> Array:
+            for y in v.reshape(len(parts), size):
+                y[:n] = z = self._linear.solve([y[:n]])[0]
+                y[n:] -= self._along(np.concatenate([z, 0.0 * y[n:]]))[0][n:]  # what the effects make of the film's answer
+            return v
 
-        found, reason = krylov(comm, np.concatenate(parts), Whole(), Film(), self.rtol, self.most)
+        found, reason = krylov(comm, np.concatenate(parts), whole, film, self.rtol, self.most)
         if reason < 0 and self.most == MOST:
             raise NotFound(f"coefficients: the linearised effects were not solved (GMRES ended with {reason})")
         return found if nu == 0.0 else found[:size] + 1j * found[size:]
@@ -243,8 +241,9 @@ class CoupledResponse(OfLine):
 
 
 def krylov(comm: PETSc.Comm, b: Array, whole: Any, nearly: Any, rtol: float, most: int = MOST) -> tuple[Array, int]:
-    """GMRES with a linear map and one that nearly inverts it (`mult`, `apply`): what it finds, and how it ends. Collective."""
-    mat = PETSc.Mat().createPython(((b.size, None), (b.size, None)), whole, comm=comm)
+    """GMRES with a linear map of arrays and one that nearly inverts it: what it finds, and how it ends. Collective."""
+    mult, apply = (lambda _, v, out, of=of: out.setArray(of(v.array_r.copy())) for of in (whole, nearly))
+    mat = PETSc.Mat().createPython(((b.size, None), (b.size, None)), SimpleNamespace(mult=mult), comm=comm)
     mat.setUp()
     ksp = PETSc.KSP().create(comm)
     ksp.setOptionsPrefix("coupled_response_")
@@ -254,7 +253,7 @@ def krylov(comm: PETSc.Comm, b: Array, whole: Any, nearly: Any, rtol: float, mos
     ksp.setTolerances(rtol=rtol, atol=0.0, max_it=most)
     pc = ksp.getPC()
     pc.setType("python")
-    pc.setPythonContext(nearly)
+    pc.setPythonContext(SimpleNamespace(apply=apply))
     ksp.setFromOptions()
     v, rhs = mat.createVecs()
     rhs.setArray(b)
