@@ -127,12 +127,6 @@ def run_chart(args: argparse.Namespace) -> int:
     return max(STABILITY[name].load()(quick=args.quick, results=args.results) for name in args.maps or STABILITY)
 
 
-def run_new(args: argparse.Namespace) -> int:
-    from ..scenes.template import run
-
-    return run(args.file, args.source)
-
-
 def run_list(args: argparse.Namespace) -> int:
     groups: dict[str, Any] = {
         "scenes": {name: scene_line(name) for name in scene_names()},
@@ -164,6 +158,6 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "table": run_table,
     "chart": run_chart,
     **dict.fromkeys(("verify", "doctor"), run_elsewhere),
-    "new": run_new,
+    "new": lambda args: import_module("..scenes.template", __package__).run(args.file, args.source),
     "list": run_list,
 }

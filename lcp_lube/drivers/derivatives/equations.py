@@ -144,7 +144,9 @@ class Equations:
             if wanted is not None and set(wanted) <= set(weights(problem)):  # integrals of the pressure: no flows, no fronts
                 told = totals(problem, fields["p"] * problem.p_unit, known_of(problem), wanted)
             else:
-                told = _flat(problem.quantities(fields))
+                every = problem.quantities(fields)  # by the names of `slopes.numbers`
+                told = every | {f"flow_{side}": value for side, value in every["flow"].items()}
+                told |= zip(("force_x", "force_y"), every.get("force", ()), strict=False)
             own = problem if self.law is None else self.problem(fields["p"] * problem.p_unit)
             discrete = slopes.numbers(own, fields["p"], fields["r"], wanted)
             found = {name: value + (told.get(name, discrete[name]) - discrete[name]) for name, value in found.items()}
@@ -216,12 +218,6 @@ class Equations:
     def destroy(self) -> None:
         if not self.lent:
             self.constant.destroy()
-
-
-def _flat(told: dict[str, Any]) -> dict[str, Any]:
-    """Quantities by the names of `slopes.numbers`."""
-    parts = {f"flow_{side}": value for side, value in told["flow"].items()}
-    return {**told, **parts, **dict(zip(("force_x", "force_y"), told.get("force", ()), strict=False))}
 
 
 def followed(grid: Grid, before: Model, after: Model) -> Places | None:
