@@ -28,6 +28,7 @@ SCENES = {
     "thrust": {},
     "hybrid": {"nx": 60, "ny": 13},
     "holes": {},
+    "rims": {"nx": 30, "ny": 28, "film.dimples.form": "round"},
 }
 HOLES = {"family": "bearing", "dimension": 2, "L": 0.06, "width": 0.04, "U": 1.5, "nx": 48, "ny": 34}
 HOLES |= {"film": [{"shape": "linear", "h_start": 3e-5, "h_end": 2e-5}], "fluid": {"mu": 0.03, "p_supply": 1e4}}
@@ -42,6 +43,7 @@ BASES = {
     "thrust": ("tapered_land", {"nx": 30, "ny": 17}),
     "hybrid": ("hybrid_journal", {}),
     "holes": (HOLES, {}),
+    "rims": ("dimpled_pad", {}),
 }
 
 

@@ -73,7 +73,7 @@ class NearFilms:
             size, free = problem.scheme.diagonal.ravel() / problem.p_unit, ~held.mask.ravel()
             self._pushed = np.array([[problem.reduce.sum(np.where(mine, w * size, 0.0)) for mine in taken] for w in self.rows])
             self.rows = [*(w * free for w in self.rows), *(mine.astype(float) for mine in taken)]
-        self.known = can(problem, self.model, SMALL, held=self.model.law is None) and self.wanted <= by_p.union(
+        self.known = can(problem, self.model, SMALL, held=self.model.law is None, rims=True) and self.wanted <= by_p.union(
             DRAGS, FLOWS, self.fed
         )
         self._shares = self._within(problem.grid, held) if held and self.known else None
@@ -118,7 +118,7 @@ class NearFilms:
         eq = self.equations
         film: Any = Mirrored(scene) if eq.turned else scene
         model: Model = film.model
-        known = alike(model, self.model, "supplies") and not getattr(model.gap, "rims", ())
+        known = alike(model, self.model, "supplies") and model.cut == self.model.cut
         known = known and [one.open for one in model.supplies] == [one.open for one in self.model.supplies]
         if model.U <= 0.0 or model.effects or not known or film.shape != eq.grid.shape:
             return None

@@ -26,6 +26,7 @@ from .flows import SIDES, line_shares, linear, sheared_lines
 from .fluid import Law
 from .lubrication import LubricationProblem
 from .reynolds import sides
+from .rims import dry_of, made_along
 from .strip import line_weights, stream_weights
 
 EQUAL = 1e-15  # relative: ratios that differ by rounding alone
@@ -120,6 +121,7 @@ class ByFaces:
             q, r = q.reshape(grid.box), r.reshape(grid.box)
             self._through = columns, -columns * np.array([np.full(ny, enters), r[:, -1]]), columns * q[:, [0, -1]].T
             self._off = rims, rims * q[[0, -1]]
+        self._dry = None if problem.coefficients_for is None else dry_of(grid, problem.dry)  # where round edges cut faces
         self._known: dict[tuple[int, bytes], tuple[Array, Array]] = {}
         self._own: dict[tuple[bool, tuple[float, ...]], Laid] = {}
 
@@ -134,6 +136,9 @@ class ByFaces:
         balances, at = out[: self.count], self._laid(grid, level(film), tuple(cut[1]))
         for some, rows in _strips(at.lines, grid.box[1]):
             C, H, before = _along(film, at, at.y[rows], at.across[:, rows], cut)
+            if self._dry is not None:
+                C, H = np.array(C), np.array(H)
+                made_along(film, at.x_places[0], at.y[rows], self._dry[1:-1][rows], (C, H), film.period(0))
             positive = positive and all(bool((a > 0.0).all()) for a in (C, H, before))
             if self.drags and positive:
                 films = self._sheared(film, at, rows, before / H)
@@ -149,7 +154,12 @@ class ByFaces:
                 outer = np.array([a[:, end] for a in (C, wall, void) for end in (0, -1)])
                 out[first:, :4] += np.einsum("fkal,al->fk", at.of_flows[:, :, :, some], outer)
         for some, rows in _strips(at.faces, grid.box[1]):
-            C = _across(film, at, pairs(at.y_places[0])[:, rows], at.y_places[1][rows], cut) * at.widths
+            C = np.array(_across(film, at, pairs(at.y_places[0])[:, rows], at.y_places[1][rows], cut))
+            if self._dry is not None:
+                ends = slice(rows[0], rows[-1] + 2)
+                dry = self._dry[ends, 1:-1].T
+                made_along(film, at.y_places[0][ends], at.x_places[0][1:-1], dry, (C.T,), film.period(1), across=True)
+            C *= at.widths
             positive = positive and bool((C > 0.0).all())
             balances[:, 0] += _total(at.of_faces, some, C)
             for k, end, here in ((4, 0, some.start == 0), (5, -1, some.stop == at.faces.size)):

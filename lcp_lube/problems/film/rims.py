@@ -11,6 +11,7 @@ flows that leave one cell and enter the next: its solution is unique, and certif
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,7 +84,7 @@ def rims_across_x(
 ) -> tuple[Array, Array]:
     """C and H of the x faces, those that rims cut made anew; cavity: 1 at the owned points that are cavitated. Collective."""
     nodes, _ = grid.nodes_and_faces(0)
-    cut, cut_cubes, cut_films = cut_faces(film, rims, nodes, grid.y[:, 0], _dry(grid, cavity)[1:-1], True, period)
+    cut, cut_cubes, cut_films = cut_faces(film, rims, nodes, grid.y[:, 0], dry_of(grid, cavity)[1:-1], True, period)
     cubes, films = np.array(cubes), np.array(films)
     cubes[cut], films[cut] = cut_cubes, cut_films
     return cubes, films
@@ -93,15 +94,28 @@ def rims_across_y(grid: Grid, film: Shape, rims: Sequence[Shape], cavity: Array 
     """The same for C of the y faces. Collective."""
     nodes, _ = grid.nodes_and_faces(1)
     turned = [partial(_swapped, rim) for rim in (film, *rims)]
-    cut, cut_cubes, _ = cut_faces(turned[0], turned[1:], nodes, grid.x[0], _dry(grid, cavity)[:, 1:-1].T, False, period)
+    cut, cut_cubes, _ = cut_faces(turned[0], turned[1:], nodes, grid.x[0], dry_of(grid, cavity)[:, 1:-1].T, False, period)
     cubes = np.array(cubes)
     cubes.T[cut] = cut_cubes
     return cubes
+
+
+def made_along(
+    film: Any, nodes: Array, lines: Array, dry: Flags, of: Sequence[Array], period: float, across: bool = False
+) -> None:
+    """Put C, or C and H, of the cut faces of some lines, shape (lines, faces), in the places of those of whole films.
+
+    film : with its `rims` (`edges.Around`). dry : whether the lines' nodes are cavitated. across : faces along y, lines of x.
+    """
+    shapes = [partial(_swapped, one) if across else one for one in (film, *film.rims)]
+    cut, *found = cut_faces(shapes[0], shapes[1:], nodes, lines, dry, not across, period)
+    for a, values in zip(of, found, strict=False):
+        a[cut] = values
 
 
 def _swapped(shape: Shape, t: Array, s: Array) -> Array:
     return shape(s, t)
 
 
-def _dry(grid: Grid, cavity: Array | None) -> Flags:
+def dry_of(grid: Grid, cavity: Array | None) -> Flags:
     return grid.ghosted(np.zeros(grid.local_size) if cavity is None else cavity, outside=0.0) > 0.0

@@ -20,13 +20,13 @@ STEP = 1e-30  # relative, of a complex step
 Strip = tuple[slice, Grid, Array, Array, Array, Array]
 
 
-def can(problem: LubricationProblem, model: Model, least: int = MANY, held: bool = False) -> bool:
+def can(problem: LubricationProblem, model: Model, least: int = MANY, held: bool = False, rims: bool = False) -> bool:
     """Whether the coefficients are those of a steady film alone, under a wall that moves, and compiled loops pay.
 
-    held : supplies may hold some cells.
+    held : supplies may hold some cells. rims : round edges may cut faces.
     """
     grid = problem.grid
-    plain = type(problem) is LubricationProblem and problem.plain and problem.coefficients_for is None
+    plain = type(problem) is LubricationProblem and problem.plain and (rims or problem.coefficients_for is None)
     plain = plain and (held or problem.held is None)
     flow = not model.mean_cubes and model.U > 0.0 and model.stored is None and model.law is None
     return plain and flow and grid.dim == 2 and "closed" not in grid.ends[0] and grid.size >= least and has_numba()
