@@ -22,16 +22,8 @@ from .ask import Ask
 from .chain import added
 from .compose import Inner
 
-LAST = (
-    "eps1",
-    "method",
-    "took_over",
-    "system",
-    "recipe",
-    "ksp_type",
-    "pc_type",
-    "supply_pressures",
-)  # settings of the second solve
+# Settings of the second solve:
+LAST = ("eps1", "method", "took_over", "system", "recipe", "ksp_type", "pc_type", "supply_pressures")
 
 
 @dataclass(frozen=True)

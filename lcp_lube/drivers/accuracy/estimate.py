@@ -53,6 +53,7 @@ EXPECTED = 1.0 / 3.0  # of what corrections before lead one to expect of the las
 SPAN = 12.0  # over the square of finest over coarsest grid: factor of n
 ENOUGH = 3.9  # finest over coarsest of grids that are enough without those before
 INTEGRALS = ("load", "pressure_integral")  # whose change from grid to grid is at most that of the pressure
+FULL = 1.0  # in the place of PAIR for the first two grids of a film without cavities: a linear problem, of clean second order
 PAIR, BESIDE, SHARE = 1.4, 3.0, 0.3  # factors of an error from two grids, of these and of others, and of the pressure's change
 CLEAN = 0.01  # what moves of w leave over the last correction
 QUADRATURE = 1e-9  # relative: what a line's quadrature may leave
@@ -125,7 +126,13 @@ def estimate(values: Sequence[float], misplaced: Sequence[float], finer: Sequenc
 
 
 def of_pair(
-    values: Sequence[float], misplaced: Sequence[float], finer: Sequence[float], change: float, name: str, other: int = -2
+    values: Sequence[float],
+    misplaced: Sequence[float],
+    finer: Sequence[float],
+    change: float,
+    name: str,
+    other: int = -2,
+    full: bool = False,
 ) -> Estimate:
     """The best value and its error from two grids, and from how far the pressure changed between them.
 
@@ -136,10 +143,11 @@ def of_pair(
     ----------
     values, misplaced, finer : as in `estimate`. change : that sum over the quantity, or for a quantity that is no integral of p
         the integral of |p_k - p_j| over that of p. other : number of the grid j that the last one is compared with.
+    full : whether nothing is cavitated.
     """
     if name in NOISY or len(values) < 2:
         return Estimate(values[-1], inf)
-    factor, least = (PAIR, 1.0) if name in INTEGRALS else (BESIDE, SHARE)
+    factor, least = (FULL if full and len(values) == 2 else PAIR, 1.0) if name in INTEGRALS else (BESIDE, SHARE)
     step, to_come = values[-1] - values[other], 1.0 / ((finer[-1] / finer[other]) ** 2 - 1.0)
     error = factor * to_come * max(abs(step), least * change * abs(values[-1]))
     film = _of_film(np.abs(np.diff(values)), misplaced, values[-1])

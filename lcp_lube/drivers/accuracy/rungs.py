@@ -52,13 +52,15 @@ def rungs_up(estimates: Sequence[float], tol: float, known: bool, dim: int, pair
     (of three grids, or of one whose error is known) falls by second order; of several at most JUMP doublings of the points a
     side.
 
-    pairs : two grids give an estimate, for the first one best with half the spacing on the second; at most FAR rungs.
+    pairs : two grids give an estimate, for the first one best with half the spacing on the second; at most FAR rungs, at
+        least as many as grids have missed what second order had promised: errors of first order would else go rung by rung.
     """
     if pairs and not (len(estimates) >= 2 and estimates[-1] < ASYMPTOTIC):
         return dim
     if not (known or pairs or len(estimates) >= 3) or not estimates[-1] < ASYMPTOTIC:
         return 1
-    up = max(1, ceil(0.5 * dim * log2(estimates[-1] / tol) - NEARLY))
+    missed = sum(estimate < ASYMPTOTIC for estimate in estimates[1:-1]) if pairs else 1  # grids that second order said would do
+    up = max(missed, 1, ceil(0.5 * dim * log2(estimates[-1] / tol) - NEARLY))
     return up if known else min(up, FAR if pairs else dim * JUMP)
 
 

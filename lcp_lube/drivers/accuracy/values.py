@@ -17,7 +17,11 @@ from ...problems.solution import Fields, Problem, Solution
 from ...problems.transfer import interpolated
 from .estimate import INTEGRALS, QUADRATURE, Estimate, estimate, follow, known_line, misplaced_film, of_pair, scalars
 
-LEAST_PAIR = 0.25  # weight of the estimate of two grids beside that of all: in the exponent, halved by each grid more
+LEAST_PAIR = 0.25  # weight of the estimate of two grids beside that of all: in the exponent, at least
+FEWER = {
+    True: 0.5,
+    False: 0.75,
+}  # what each grid more leaves of it, of films without cavities and with: values agree by chance there
 APART = 1.8  # spacings of two grids over one another, at least, where two such are there: nearer ones tell little
 BLOCKS = 6  # parts of a side over which the change of the pressure is integrated
 LARGE = 1_000_000  # points beyond which a grid is not kept until its numbers are asked for
@@ -48,6 +52,7 @@ class Values:
         self._misplaced: list[float] = []
         self._converged = False  # on the last grid
         self._other, self._change = -2, (inf, inf)  # of the pressure from that grid on: `_change`
+        self._full = False  # whether nothing is cavitated on the last grid
 
     def add(
         self, solution: Solution, before: Solution | None, earlier: Solution | None, size: float, quantity: str, value: float
@@ -69,6 +74,7 @@ class Values:
         self._other = -3 if earlier is not None and size < APART * self._sizes[-2] else -2
         other = earlier if self._other == -3 else before
         self._change = _change(solution, other, quantity, self._own[self._other]) if other and self._pairs else (inf, inf)
+        self._full = self._pairs and not problem.reduce.max(solution.fields["r"]) > 0.0
         self.best = self._best(quantity, self._own)
         return self.best
 
@@ -81,8 +87,9 @@ class Values:
         of_all, (by_load, by_all) = estimate(values, self._misplaced, self._sizes, name), self._change
         if not isfinite(by_load) or (name not in INTEGRALS and len(values) > 2):
             return of_all
-        pair = of_pair(values, self._misplaced, self._sizes, by_load if name in INTEGRALS else by_all, name, self._other)
-        weight = max(0.5 ** (len(values) - 2), LEAST_PAIR)
+        change = by_load if name in INTEGRALS else by_all
+        pair = of_pair(values, self._misplaced, self._sizes, change, name, self._other, self._full)
+        weight = max(FEWER[self._full] ** (len(values) - 2), LEAST_PAIR)
         error = pair.error**weight * min(of_all.error, pair.error) ** (1.0 - weight)
         return replace(pair, error=max(error, self._least * abs(value)))
 
