@@ -85,6 +85,7 @@ def test_the_work_of_the_decision():
 
 def test_where_films_are_looked_at():
     assert first_shape((999,)) == (999,) and first_shape((40, 50)) == (40, 50)
+    assert first_shape((9999,)) == (9999,) and first_shape((9999,), sought=True) == (600,)
     for shape in ((99999,), (400, 300), (4000, 8), (2047, 2047)):
         coarse = first_shape(shape)
         assert np.prod(coarse) <= max(0.05 * np.prod(shape), 1000) and coarse[-1] >= 6

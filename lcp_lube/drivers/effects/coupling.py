@@ -22,6 +22,7 @@ from ...problems.film.fluid import Law
 from ...problems.film.model import Model
 from ...problems.solution import Enclosure, Fields, Outcome, Solution
 from ...problems.transfer import Transfer
+from ...registry import SMALL
 from ...scenes.moving import film_of
 from ...scenes.scene import Solvable
 from ...solvers.enclosure import bounds_of
@@ -32,7 +33,7 @@ from .coupling_file import CouplingFile
 from .loop import Loop
 
 ROUNDED = 2.0**-50  # relative error of p made of q, at most
-NESTED_ABOVE = 2_000  # points from which the fields are first found on coarser grids
+NESTED_ABOVE = 2_000  # points in the plane from which the fields are first found on coarser grids
 
 
 def applies(scene: Solvable, ask: Ask) -> bool:
@@ -127,7 +128,7 @@ def _taken(loop: Loop, problem: object) -> Cells | None:
 
 def _coarser(scene: Solvable, ask: Ask, inner: Inner, loop: Loop, file: CouplingFile) -> Solution | None:
     """The answer on the next coarser grid, as a start: there the loop costs a quarter, or a half in 1D."""
-    if ask.nested is False or prod(scene.shape) <= NESTED_ABOVE or loop.model.grooves:
+    if ask.nested is False or not nests(scene.shape) or loop.model.grooves:
         return None
     shapes = level_shapes(scene.shape, loop.base.grid.comm.size)
     if len(shapes) < 2 or prod(shapes[-2]) >= prod(scene.shape):
@@ -141,6 +142,11 @@ def _coarser(scene: Solvable, ask: Ask, inner: Inner, loop: Loop, file: Coupling
     loop.work += found.settings["details"]["coupling_work"]
     loop.start = found if loop.law.barus == 0.0 else None
     return found
+
+
+def nests(shape: tuple[int, ...]) -> bool:
+    """Whether coarser grids pay: for a line, whose films cost little but what none of them is without, much later."""
+    return prod(shape) > (SMALL if len(shape) == 1 else NESTED_ABOVE)
 
 
 def _told(ask: Ask, loop: Loop) -> Solution:
@@ -181,7 +187,7 @@ def _told(ask: Ask, loop: Loop) -> Solution:
     fields = {"p": at.p / problem.p_unit, "r": at.r}
     problem.cells = at.cells | {"stored": at.stored}
     problem.oil = problem.oil if loop.found else None  # numbers of what has not settled are those of the fields
-    problem.rigid = None if loop.effects or problem.size > NESTED_ABOVE else loop.base
+    problem.rigid = None if loop.effects or nests(problem.grid.shape) else loop.base
     certificate = problem.certify(fields, eps1)
     enclosure = _band(loop, solution.enclosure, fields) if ask.certify else None
     solution.destroy()

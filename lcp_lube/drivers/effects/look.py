@@ -14,7 +14,7 @@ from ...scenes.moving import motion_of
 from ..accuracy.accuracy import DEFAULT_QUANTITY, WHOLE, find_value
 from ..ask import Ask, Start
 from ..compose import Inner
-from .coupling import NESTED_ABOVE
+from .coupling import NESTED_ABOVE, nests
 from .decision import total_work
 from .first_order import FirstOrder
 
@@ -102,7 +102,7 @@ class Look:
         if coarse_shape(self.scene.shape, len(self.names) + 1) is None:
             self.record = {"reason": "the grid is so small that all are solved for"}
             return
-        shape = first_shape(self.scene.shape)
+        shape = first_shape(self.scene.shape, getattr(self.scene, "balance", None) is not None)
         filed = self.ask.checkpoint is not None or self.ask.resume is not None
         own = shape == self.scene.shape and self.ask.accuracy is None and not filed
         try:
@@ -206,10 +206,11 @@ def quick(ask: Ask, shape: tuple[int, ...]) -> Ask:
     return replace(ask, **none, times=(), certify=False, reduction=halved, stopping={"eps1": COARSE_EPS1})  # type: ignore[arg-type]
 
 
-def first_shape(shape: tuple[int, ...]) -> tuple[int, ...]:
-    """The grid on which the film without effects is looked at."""
+def first_shape(shape: tuple[int, ...], sought: bool = False) -> tuple[int, ...]:
+    """The grid on which the film without effects is looked at; sought : by several films, as for its place."""
     points = prod(shape)
-    return shape if points <= NESTED_ABOVE else _coarser(shape, min(max(FIRST, SHARE_FIRST * points), SMALL) / points)
+    own = points <= NESTED_ABOVE or not (sought or nests(shape))
+    return shape if own else _coarser(shape, min(max(FIRST, SHARE_FIRST * points), SMALL) / points)
 
 
 def _by_solving(
@@ -218,7 +219,7 @@ def _by_solving(
     """Effects to keep, what each changes on a coarse grid, how that was found, and the work. Collective."""
     tol = ask.accuracy or TOLERANCE
     motion = motion_of(scene)
-    shape = coarse_shape(scene.shape, len(names) + 1) if motion is None else first_shape(scene.shape)
+    shape = coarse_shape(scene.shape, len(names) + 1) if motion is None else first_shape(scene.shape, True)
     assert shape is not None  # for the type checker: `decide` has looked
     if "area" in (ask.quantity or "") and PART * tol * prod(shape) < 1.0:  # it goes in parts of a cell
         return names, {}, {"reason": f"on the coarse grid {shape} {ask.quantity} does not tell so small a change"}, 0.0
