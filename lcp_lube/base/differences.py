@@ -59,9 +59,11 @@ def differences(f: Callable[[float], Array], a: float, scale: float, sizes: Arra
         none = by_steps([slope, *chords]) if chords else np.zeros(sizes.shape, dtype=bool)
         return np.where(none, np.nan, slope), np.where(none, np.inf, kinks)
 
-    chords = [_chord(at, width * CHORD * scale) + np.zeros_like(sizes) for width in WIDTHS] if wary else []
-    if chords and by_steps(chords).all():  # before more is looked at
-        return np.full_like(sizes, np.nan), np.full_like(sizes, np.inf)
+    chords: list[Array] = []
+    for width in WIDTHS if wary else ():
+        chords.append(_chord(at, width * CHORD * scale) + np.zeros_like(sizes))
+        if by_steps(chords).all():  # before more is looked at
+            return np.full_like(sizes, np.nan), np.full_like(sizes, np.inf)
     d = QUICK * scale
     low, high, here = at(-d), at(d), at(0.0)
     if low is None and high is None:

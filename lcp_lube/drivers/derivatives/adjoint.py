@@ -14,7 +14,7 @@ import numpy as np
 from ...base.differences import QUICK, differences
 from ...base.parallel import Array
 from ...errors import InputError
-from ...problems.film.edges import oblique
+from ...problems.film.edges import jumps_of, oblique
 from ...problems.film.lubrication import LubricationProblem
 from ...problems.solution import Solution
 from ...registry import SMALL
@@ -187,19 +187,8 @@ class Adjoint:
                 quick[0] = found is not None
                 return self.lagrangians(scene) if found is None else found
 
-            slope, jump = differences(near, value, scale, sizes, self._by_steps(key, value + QUICK * scale))
+            slope, jump = differences(near, value, scale, sizes, moves_edges(self.scene, key, value + QUICK * scale))
         return dict(zip(names, slope, strict=True)), dict(zip(names, jump, strict=True))
-
-    def _by_steps(self, key: str, near: float) -> bool:
-        """Whether the film may change by steps with a number: edges across the lines of points, which it can move."""
-        gap: Any = self.equations.model.gap
-        if not oblique(gap):
-            return False
-        try:
-            other: Any = with_values(self.scene, {key: near})
-        except InputError:
-            return True
-        return not (same(gap, other.model.gap) and other.model.lengths == self.equations.model.lengths)
 
     @property
     def _supplies(self) -> list[str]:
@@ -243,6 +232,19 @@ def size_of(scene: Scene, key: str, problem: LubricationProblem, p: Array, found
     thinnest = problem.reduce.min(problem.scheme.h)
     small = {"Pa": p_max, "1/Pa": 1.0 / p_max, "m": thinnest, "rad": thinnest / max(problem.grid.lengths)}.get(unit)
     return value if value > ROUNDED * (small or GUESS) else small
+
+
+def moves_edges(scene: Any, key: str, near: float) -> bool:
+    """Whether a number, changed to one near by, moves edges across the lines of points, or what they lie among: by steps."""
+
+    def of(model: Any) -> Any:
+        return oblique(model.gap), *(jumps_of(model.gap, axis) for axis in "xy"), model.lengths, model.polar, model.edges
+
+    own = of(scene.model)
+    try:
+        return bool(own[0]) and not same(own, of(with_values(scene, {key: near}).model))  # type: ignore[attr-defined]
+    except InputError:
+        return True
 
 
 def conditions_of(scene: Scene, solution: Solution) -> tuple[list[str], dict[str, float]]:

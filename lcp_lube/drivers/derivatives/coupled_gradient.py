@@ -19,7 +19,6 @@ import numpy as np
 from ...base.differences import APART, CHORD, KINK, SLIGHT, WIDTHS
 from ...base.parallel import Array
 from ...errors import InputError, nearest
-from ...problems.film.edges import oblique
 from ...problems.film.forces import PIVOT, totals
 from ...problems.film.grooves import GroovedProblem
 from ...problems.film.supplies import Supply, supply_flows
@@ -32,7 +31,7 @@ from ..motions.coefficients import placed
 from ..motions.coupled_response import CoupledResponse
 from ..supplies import Fed
 from ..turned import Mirrored, as_solved
-from .adjoint import GUESS, conditions_of, size_of
+from .adjoint import GUESS, conditions_of, moves_edges, size_of
 
 STEP = 1e-4  # of a number, relative, and of the fields
 LARGER, ROUNDING = 10, 1e-14  # powers of ten by which a step from zero may grow; of a number: a smaller change of it is none
@@ -152,7 +151,7 @@ class CoupledGradient(CoupledResponse):
                 chord = self._chord(key, CHORD * d / STEP)
                 out |= {name: chord[name] for name in steps}
                 jumps |= dict.fromkeys(steps, np.inf)
-        if oblique(self.loop.model.gap):  # many steps, though it may seem smooth next to a
+        if moves_edges(self.scene, key, self.value(key) + d):  # many steps, though it may seem smooth next to a
             chords = [out, *(self._chord(key, width * CHORD * d / STEP) for width in WIDTHS)]
             for name in self.names:
                 values = [one[name] for one in chords]

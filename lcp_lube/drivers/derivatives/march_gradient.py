@@ -277,7 +277,7 @@ class MarchGradient:
             scale = scale_of(self.scene, key, eq.constant, last.p)
             eq.destroy()
         found = differences(
-            at, value, scale, np.array([self.sizes[name] for name in self.names]), oblique(self.course.first.gap)
+            at, value, scale, np.array([self.sizes[name] for name in self.names]), bool(oblique(self.course.first.gap))
         )
         slope, jump = (dict(zip(self.names, map(float, one), strict=True)) for one in found)
         return slope, jump

@@ -10,7 +10,7 @@ an edge inside a cell, only the part before it resists, which the coefficients c
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -51,10 +51,11 @@ def _told(film: Any, name: str, axis: str) -> tuple[float, ...]:
     return tuple(tell(axis)) if tell else tuple(t for part in getattr(film, "parts", ()) for t in _told(part, name, axis))
 
 
-def oblique(film: Any) -> bool:
-    """Whether a film has edges that run across the lines of points, by which its coefficients change in steps."""
+def oblique(film: Any) -> list[Any]:
+    """Parts of a film with edges that run across the lines of points, by which coefficients change in steps; all 1 m deep."""
     inside = (*getattr(film, "parts", ()), *filter(None, [getattr(film, "film", None)]))
-    return bool(getattr(film, "oblique", False)) or any(map(oblique, inside))
+    own = [replace(film, depth=1.0)] if getattr(film, "oblique", False) else []
+    return own + [one for part in inside for one in oblique(part)]
 
 
 def level(film: Any) -> bool:
