@@ -88,7 +88,7 @@ def loop_drag(
     moving: Array,
     first: Array,
     couette: Array,
-    b: Array,
+    leaving: tuple[Array, int, Array, Array],
     r: Array,
     p: Array,
     beyond: Array,
@@ -99,30 +99,34 @@ def loop_drag(
     by_r: Array | None,
     turn: float,
 ) -> float:
-    """Sum of `flows.face_drag` by its shares (`flows._shares`), and into by_p and by_r its derivatives; beyond : pressures
-    east of the last points. turn : 1 where that is the first point, else 0."""
+    """Sum of `flows.face_drag` by its shares (`flows._shares`), and into by_p and by_r its derivatives. h, resting,
+    moving, first : of each line, or one that is all lines'. leaving : b_E, as `strip.by_lines` has b_C. beyond : pressures east
+    of the last points. turn : 1 where that is the first point, else 0."""
     ny, nx = p.shape
-    total = np.zeros(nx)
+    total, b = np.zeros(nx), np.zeros(nx)
     for j in range(ny):
+        m, n = min(j, len(h) - 1), min(j, len(resting) - 1)
+        carried(leaving, j, b)
+        b[-1] = leaving[3][j]
         for i in range(nx - 1):
             east, push, thick = face(
-                choose, lengths, h[j, i], resting[j, i], moving[j, i], first[j, i],
-                couette[j, i], b[j, i], r[j, i], p[j, i], p[j, i + 1],
+                choose, lengths, h[m, i], resting[n, i], moving[m, i], first[m, i],
+                couette[j, i], b[i], r[j, i], p[j, i], p[j, i + 1],
             )  # fmt: skip
             total[i] += lines[j] * columns[i] * east + scale[j] * push
             if by_r is not None:
-                by_r[j, i] = lines[j] * columns[i] * b[j, i] / (choose(couette[j, i] == 0.0, np.inf, couette[j, i]) * thick)
+                by_r[j, i] = lines[j] * columns[i] * b[i] / (choose(couette[j, i] == 0.0, np.inf, couette[j, i]) * thick)
         i = nx - 1
         east, push, thick = face(
-            choose, lengths, h[j, i], resting[j, i], moving[j, i], first[j, i],
-            couette[j, i], b[j, i], r[j, i], p[j, i], beyond[j],
+            choose, lengths, h[m, i], resting[n, i], moving[m, i], first[m, i],
+            couette[j, i], b[i], r[j, i], p[j, i], beyond[j],
         )  # fmt: skip
         total[i] += lines[j] * columns[i] * east + scale[j] * push
         if by_p is not None and by_r is not None:
-            by_r[j, i] = lines[j] * columns[i] * b[j, i] / (choose(couette[j, i] == 0.0, np.inf, couette[j, i]) * thick)
-            by_p[j, 0] = 0.5 * scale[j] * (turn * h[j, i] - h[j, 0])
+            by_r[j, i] = lines[j] * columns[i] * b[i] / (choose(couette[j, i] == 0.0, np.inf, couette[j, i]) * thick)
+            by_p[j, 0] = 0.5 * scale[j] * (turn * h[m, i] - h[m, 0])
             for i in range(1, nx):
-                by_p[j, i] = 0.5 * scale[j] * (h[j, i - 1] - h[j, i])
+                by_p[j, i] = 0.5 * scale[j] * (h[m, i - 1] - h[m, i])
     return total.sum()
 
 

@@ -14,7 +14,7 @@ from ..strips import MANY, each_strip, places_of
 from .cavity import cavitated
 from .edges import Around, pairs, strips
 from .reynolds import BoxScheme, sides
-from .strip import line_weights, stream_weights
+from .strip import by_lines, line_weights, stream_weights
 
 if TYPE_CHECKING:
     from .lubrication import LubricationProblem
@@ -124,11 +124,12 @@ def drag_sum(
         part.grid = places_of(grid, rows)
         found = (*sheared_faces(part, grid.x + grid.steps(0)[1:] / 2), s.couette_E)
         # Numbers side by side: else no vector instructions are made. Most films are the same where a, b and c ask for them.
-        lying = {id(one): np.ascontiguousarray(one) for one in found}
+        lying = {id(one): np.ascontiguousarray(one[:1] if one.strides[0] == 0 else one) for one in found}
         h, a, b, c, couette = (lying[id(one)] for one in found)
         fields, of_lines = (r[rows], p[rows], beyond[rows]), (columns, shears[rows], pulls[rows])
         into: Any = (None, None) if by is None else by[:, rows]
-        return loop_drag(h, a, b, c, couette, s.b_E, *fields, *of_lines, into[0], into[1], float(grid.periodic[0]))
+        leaving = by_lines(s, "b_C") if s.storage is None else (s.b_E, 0, np.ones(len(couette)), s.b_E[:, -1].copy())
+        return loop_drag(h, a, b, c, couette, leaving, *fields, *of_lines, into[0], into[1], float(grid.periodic[0]))
 
     total = sum(each_strip(grid, add_up))
     if first.any():

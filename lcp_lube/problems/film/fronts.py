@@ -53,7 +53,7 @@ def line_fronts(problem: LubricationProblem, p: Array, r: Array, dry: NDArray[np
         Q = problem.boundary_flows(p, r)[0]
 
     def turns(rows: slice) -> tuple[NDArray, ...]:
-        cavity = framed(rows)[1:-1] > 0
+        cavity = framed(rows)[1:-1].astype(bool, copy=False)
         if grid.x_start == 0 and opens[0]:
             cavity[:, 0] = problem.r_in > 0
         (begun, here), (ceased, there) = _turns(cavity[:, :-2], cavity[:, 1:-1])
@@ -179,7 +179,7 @@ def across(grid: Grid, p: Array, cavity: NDArray[np.bool_]) -> Across:
 
 def _across(cavity: Array, frame: Array, steps: Array) -> Across:
     """The same of framed lines."""
-    dry, out = cavity > 0.0, []
+    dry, out = cavity.astype(bool, copy=False), []
     to_north, to_south = _turns(dry[:-1, 1:-1], dry[1:, 1:-1])  # rows of the frame, counted from a point's southern neighbour
     for (row, at), beside, beyond in ((to_south, 0, 2), (to_north, 2, 0)):
         own = (row >= beside // 2) & (row < len(dry) - 2 + beside // 2)
