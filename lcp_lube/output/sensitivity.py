@@ -58,7 +58,8 @@ def text(gradient: Gradient, solution: Solution, values: dict[str, float]) -> st
     lines += table(rows, align="<>>>", gap="  ")
     for key, gap in gradient.one_sided.items():
         differ = f"its derivatives to both sides differ by {gap:.3g}; their mean"
-        lines.append(f"{key}: {'changes by steps: the slope over 1 % to both sides' if np.isinf(gap) else differ}")
+        steps = "changes by steps: the slope over 1 % to both sides, or along the grid's lines"
+        lines.append(f"{key}: {steps if np.isinf(gap) else differ}")
     if gradient.switching:
         lines.append(
             f"{gradient.switching} points are about to change between full and cavitated, or tie for the largest pressure: "

@@ -286,6 +286,34 @@ def test_round_rims_have_no_derivative(monkeypatch):
     assert len(set(depths)) == 3  # the rims stay: no chords of many widths beside both sides
 
 
+def test_where_lines_of_points_are_laid_anew_is_told():
+    """By a recess's length edges part that shared a line of points; by its extent a line more lies in it than in others."""
+    scene, key = load_scene("hybrid_journal", nx=90, ny=21), "supply.1.extent_deg"
+    loads = {}
+    with solve(scene) as solution:
+        (found,) = gradients(scene, solution, ["load"], [key, "supply.1.angle_deg", "supply.1.length"])
+        for part in (-2e-4, -1e-4, 0.0, 1e-4):
+            with solve(with_values(scene, {key: 50.0 * (1 + part)})) as other:
+                loads[part] = other.load
+    behind = (3 * loads[0.0] - 4 * loads[-1e-4] + loads[-2e-4]) / (2e-4 * 50.0)
+    assert found.gradient[key] == pytest.approx(behind, rel=1e-6)
+    assert found.one_sided == {key: math.inf} and loads[1e-4] - loads[0.0] > 10 * (loads[0.0] - loads[-1e-4])
+    assert "share a line of points" in found.held["supply.1.length"]
+
+
+def test_even_lines_that_lie_on_edges_go_with_them():
+    """Beside the scene's own value other lines are laid, at which a load jumps (a slope was told to be ten times too large)."""
+    scene, key = load_scene("pocketed_pad_2d"), "film.pocket.x.1"  # 199 x 79, an edge on every 20th line
+    with solve(scene) as solution:
+        (found,) = gradients(scene, solution, ["load"], [key])
+    ends = []
+    for sign in (-1, 1):
+        with solve(with_values(scene, {key: scene.film[1].x[0] * (1 + 1e-4 * sign)})) as other:
+            ends.append(other.load)
+    assert found.gradient[key] == pytest.approx((ends[1] - ends[0]) / (2e-4 * scene.film[1].x[0]), rel=5e-3)
+    assert found.one_sided == {key: math.inf}
+
+
 def test_cells_about_to_change_are_counted():
     """A film at rest without pressures: p = r = 0 everywhere; and two points that tie for the largest pressure."""
     scene = load_scene("problem1", n=21, U=0.0)

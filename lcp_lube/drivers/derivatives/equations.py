@@ -23,7 +23,7 @@ from ...problems.film.known import known_fields, known_of
 from ...problems.film.lubrication import LubricationProblem
 from ...problems.film.model import Model
 from ...problems.film.tangent import Tangent, effective, tangent
-from ...problems.grid import Grid, Places
+from ...problems.grid import Grid, Places, some_places
 from ...problems.solution import Solution
 from ...registry import DRIVERS
 from ...scenes.moving import film_of, motion_of
@@ -76,11 +76,11 @@ class Equations:
         self.law, self._p_sides = model.law, model.p_sides
         film = Frozen(film, self.law) if self.law else film
         self.film, self.model = film, film.constant if self.law else model
-        places = None if near is None or near.grid.even else followed(near.grid, near.model, self.model)
+        places = None if near is None else followed(near.grid, near.model, self.model)
         self.lent = type(solved) is LubricationProblem and not (self.turned or self.law or solved.held)
         if self.lent:
             self.constant: LubricationProblem = solved
-        elif near is None or places is None:
+        elif near is None or places is None or all(at is None for at in places):
             self.constant = film.build(comm)
         else:
             self.constant = replace(self.model, places=places).build(near.grid.shape, comm)
@@ -225,16 +225,18 @@ def followed(grid: Grid, before: Model, after: Model) -> Places | None:
     out: list[Array | None] = []
     for side, places in enumerate(grid.places):
         if places is None:
-            out.append(None)
-            continue
-        knots = [_knots(model, side, grid.periodic[side]) for model in (before, after)]
-        if knots[0].size != knots[1].size:
+            if after.lines(grid.shape)[side] is None:
+                out.append(None)
+                continue
+            places = some_places(grid.shape[side], before.lengths[side], grid.ends[side], grid.shape[side])  # evenly, on edges
+        ends = [knots(model, side, grid.periodic[side]) for model in (before, after)]
+        if ends[0].size != ends[1].size:
             return None
-        out.append(np.interp(places, knots[0], knots[1]))
+        out.append(np.interp(places, ends[0], ends[1]))
     return out[0], out[1]
 
 
-def _knots(model: Model, side: int, periodic: bool) -> Array:
+def knots(model: Model, side: int, periodic: bool) -> Array:
     """The edges that lines of a grid follow, and the two ends."""
     axis, L = "xy"[side], model.lengths[side]
     within = np.unique([t for t in model.edges_along(axis) if 0.0 < t < L])

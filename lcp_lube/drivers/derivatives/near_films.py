@@ -175,7 +175,7 @@ class NearFilms:
         own, grid = self.model, self.equations.grid
         if (model.lengths, model.polar, model.edges) == (own.lengths, own.polar, own.edges) and model.places is own.places:
             return grid
-        places = model.lines(grid.shape) if grid.even else followed(grid, own, model)
+        places = followed(grid, own, model)
         return None if places is None else moved(grid, model.lengths, places, model.polar)
 
 
