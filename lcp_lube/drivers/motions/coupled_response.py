@@ -259,7 +259,7 @@ def krylov(comm: PETSc.Comm, b: Array, whole: Any, nearly: Any, rtol: float, mos
     rhs.setArray(b)
     ksp.solve(rhs, v)
     found, reason = v.array_r.copy(), ksp.getConvergedReason()
-    for obj in (v, rhs, ksp, mat):
+    for obj in (v, rhs, pc, ksp, mat):  # a PC that only Python still knew would keep what it calls
         obj.destroy()
     return found, reason
 
