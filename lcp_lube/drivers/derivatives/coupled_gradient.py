@@ -31,8 +31,9 @@ from ..motions.coefficients import placed
 from ..motions.coupled_response import CoupledResponse
 from ..supplies import Fed
 from ..turned import Mirrored, as_solved
-from .adjoint import GUESS, conditions_of, moves_edges, size_of
+from .adjoint import GUESS, conditions_of, laid_anew, moves_edges, size_of
 
+ANEW = "no derivative on this grid: beside this value its lines of points are others, which effects do not follow"
 STEP = 1e-4  # of a number, relative, and of the fields
 LARGER, ROUNDING = 10, 1e-14  # powers of ten by which a step from zero may grow; of a number: a smaller change of it is none
 # Weights of the first derivative by steps of it, of fourth order: central, or to one side where the other has no values.
@@ -170,6 +171,8 @@ class CoupledGradient(CoupledResponse):
         for stencil in STENCILS:
             try:
                 for m in stencil:
+                    if laid_anew(self.scene, with_values(self.scene, {key: a + m * d}), self.loop.base.grid.shape):
+                        raise InputError(ANEW)
                     known[m] = known.get(m) or self._beside(key, a + m * d)
                 return stencil, known
             except InputError as error:
