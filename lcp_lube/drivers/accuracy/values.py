@@ -18,10 +18,8 @@ from ...problems.transfer import interpolated
 from .estimate import INTEGRALS, QUADRATURE, Estimate, estimate, follow, known_line, misplaced_film, of_pair, scalars
 
 LEAST_PAIR = 0.25  # weight of the estimate of two grids beside that of all: in the exponent, at least
-FEWER = {
-    True: 0.5,
-    False: 0.75,
-}  # what each grid more leaves of it, of films without cavities and with: values agree by chance there
+# What each grid more leaves of it, of films without cavities and with: values agree by chance there.
+FEWER = {True: 0.5, False: 0.75}
 APART = 1.8  # spacings of two grids over one another, at least, where two such are there: nearer ones tell little
 BLOCKS = 6  # parts of a side over which the change of the pressure is integrated
 LARGE = 1_000_000  # points beyond which a grid is not kept until its numbers are asked for
