@@ -128,7 +128,9 @@ def which(rows: Sequence[Row]) -> list[str]:
             for theirs in (list(filter(published, mine)), [row for row in mine if row["system"] == PEER]):
                 rival = fastest(theirs, level)
                 label = f"{rival['method']}, " * (rival["system"] == PEER) if rival else ""
-                rivals.append(f"{label}{seconds(rival) / seconds(best):.2g} times" if rival else unreached(theirs, mine))
+                rivals.append(
+                    f"{label}{two_digits(seconds(rival) / seconds(best))} times" if rival else unreached(theirs, mine)
+                )
             name = describe(best).rpartition(": ")[0]
             lines.append(f"| {scene} | {percent(level)} | {name} | {time(best)} | {' | '.join(rivals)} |")
     return lines
@@ -154,6 +156,11 @@ def describe(row: Row) -> str:
     nested = ", nested" * (row["nested"] == "True" and row["n"] != "auto")
     inner = f"{row['system']} system, {row['recipe']}, " if row["system"] not in ("auto", "peer") else ""
     return f"{row['method']}{nested}, {inner}eps {float(row['eps']):g}, n = {row['n']}: {time(row)}"
+
+
+def two_digits(value: float) -> str:
+    """110 rather than 1.1e+02."""
+    return f"{float(f'{value:.2g}'):g}"
 
 
 def time(row: Row) -> str:
@@ -184,7 +191,8 @@ def sentence(rows: Sequence[Row], quantity: str) -> str:
         din = {s: fastest([row for row in scenes[s] if published(row)], level, quantity) for s in bests}
         ratios = sorted(seconds(row) / seconds(bests[s]) for s, row in din.items() if row)
         if ratios:
-            text += f"; the paper's DIN (2n system, no coarser grids) takes {ratios[0]:.2g} to {ratios[-1]:.2g} times as long"
+            least, most = two_digits(ratios[0]), two_digits(ratios[-1])
+            text += f"; the paper's DIN (2n system, no coarser grids) takes {least} to {most} times as long"
         lost = len(scenes) - len(bests)
         text += f"; on {lost} of {len(scenes)} scenes no run is known to" if lost else ""
         parts.append(f"{text}." if bests else f"Within {percent(level)}: no run.")
