@@ -244,10 +244,8 @@ class Run:
         ask, norms = self.ask, list[float]()
         if ask.progress is None:
             return ask.monitor
-        name, share = (
-            " x ".join(map(str, grid.shape)),
-            grid.size / self.problem.grid.size,
-        )  # coarser ones take a part of the time
+        name = " x ".join(map(str, grid.shape))
+        share = grid.size / self.problem.grid.size  # coarser ones take a part of the time
 
         def watch(k: int, step: Step) -> None:
             if ask.monitor is not None:

@@ -16,7 +16,6 @@ from ...base.parallel import Array
 from ...errors import InputError
 from ...problems.film.edges import jumps_of, oblique
 from ...problems.film.lubrication import LubricationProblem
-from ...problems.grid import some_places
 from ...problems.solution import Solution
 from ...registry import SMALL
 from ...scenes.effects.named import without
@@ -27,15 +26,14 @@ from ..loads.pad_coordinates import bearing_of
 from ..motions.coefficients import placed
 from ..motions.halved import Halved
 from ..motions.linearised import Linear
-from .equations import DRAGS, MISFIT, Equations, cavity_of, check_film, fields_of, knots, right_side, unknowns
+from .equations import DRAGS, MISFIT, Equations, cavity_of, check_film, fields_of, right_side, unknowns
+from .laid import Laid
 from .near_films import OTHER, NearFilms, plain, same
 
 ROUNDED = 1e-8  # of what is small of what was found: a 0 that rounding has moved, the attitude of pads about the load
 FEWER = 2_000  # points from which multigrid solves for an answer that multigrid gave: its loops are loaded
 DIRECT = {"load", "friction", "p_max", "force_x", "force_y"}  # numbers that are mostly made of no others but these
 GUESS = 1e-2  # what a number that is zero, of a unit that the film has no measure of, is changed by parts of
-OTHERWISE = 0.1  # of a mean spacing
-PARTED = "no derivative on this grid: edges that share a line of points part"
 SUPPLY = "supply.{}.p"  # the key of a supply's pressure, Pa above p_c
 
 
@@ -186,7 +184,7 @@ class Adjoint:
                 if a == value:
                     return self._near_here if quick[0] else self._here
                 scene = with_values(self.scene, {key: a})
-                if laid_anew(self.scene, scene, self.equations.grid.shape):
+                if self._laid.anew(scene):
                     steps.append(a)
                 found = self.near.lagrangians(scene)
                 quick[0] = found is not None
@@ -195,6 +193,10 @@ class Adjoint:
             slope, jump = differences(near, value, scale, sizes, moves_edges(self.scene, key, value + QUICK * scale))
             jump = np.full_like(jump, np.inf) if any(abs(a - value) <= 2.0 * QUICK * scale for a in steps) else jump
         return dict(zip(names, slope, strict=True)), dict(zip(names, jump, strict=True))
+
+    @cached_property
+    def _laid(self) -> Laid:
+        return Laid(self.scene, self.equations.grid.shape)
 
     @property
     def _supplies(self) -> list[str]:
@@ -251,30 +253,6 @@ def moves_edges(scene: Any, key: str, near: float) -> bool:
         return bool(own[0]) and not same(own, of(with_values(scene, {key: near}).model))  # type: ignore[attr-defined]
     except InputError:
         return True
-
-
-def laid_anew(scene: Any, near: Any, shape: Sequence[int]) -> bool:
-    """Whether a grid's lines of points do not go with the edges to a scene near by, but are others between them.
-
-    Raises
-    ------
-    InputError : edges came or went.
-    """
-    own, other = scene.model, near.model
-    if own.edges == other.edges:
-        return False
-    for k, (n, here, there) in enumerate(zip(shape, own.lines(shape), other.lines(shape), strict=False)):
-        if here is None and there is None:
-            continue
-        (L, kinds, _), (length, *_) = own.edges[k], other.edges[k]
-        at, to = (some_places(n, a, kinds, n) if lines is None else lines for a, lines in ((L, here), (length, there)))
-        before, after = (knots(model, k, kinds[0] == "periodic") for model in (own, other))
-        if before.size != after.size:
-            raise InputError(PARTED)
-        at = np.interp(at, before, after)
-        if np.abs(to - at).max() * n > OTHERWISE * length:
-            return True
-    return False
 
 
 def conditions_of(scene: Scene, solution: Solution) -> tuple[list[str], dict[str, float]]:

@@ -31,7 +31,8 @@ from ..motions.coefficients import placed
 from ..motions.coupled_response import CoupledResponse
 from ..supplies import Fed
 from ..turned import Mirrored, as_solved
-from .adjoint import GUESS, conditions_of, laid_anew, moves_edges, size_of
+from .adjoint import GUESS, conditions_of, moves_edges, size_of
+from .laid import Laid
 
 ANEW = "no derivative on this grid: beside this value its lines of points are others, which effects do not follow"
 STEP = 1e-4  # of a number, relative, and of the fields
@@ -168,10 +169,11 @@ class CoupledGradient(CoupledResponse):
     def _around(self, key: str, d: float) -> tuple[dict[int, float], dict[int, State]]:
         """A stencil of scenes that there are, and what they have at the solution's state; that of the scene itself too."""
         a, known = self.value(key), {0: self._here}
+        laid = Laid(self.scene, self.loop.base.grid.shape)
         for stencil in STENCILS:
             try:
                 for m in stencil:
-                    if laid_anew(self.scene, with_values(self.scene, {key: a + m * d}), self.loop.base.grid.shape):
+                    if laid.anew(with_values(self.scene, {key: a + m * d})):
                         raise InputError(ANEW)
                     known[m] = known.get(m) or self._beside(key, a + m * d)
                 return stencil, known

@@ -99,7 +99,7 @@ class MarchGradient:
 
     def _back(self, n: int) -> None:
         """The adjoints of step n, from those of later ones."""
-        eq, kept = self.course.at(n), self.course.kept(n)
+        eq, kept = self.course.at(n), self.course.solved(n)
         p, r, asked = kept.p, kept.r, self._asked(n)
         numbers, grid = eq.numbers(p, r, None if asked else self.course.forces), eq.grid
         told = eq.report(numbers)
@@ -154,7 +154,7 @@ class MarchGradient:
 
         pushed, off_by : J'^-1 of the forces on what is free, and of what supplies and film disagree by.
         """
-        course, kept, dot = self.course, self.course.kept(n), self.course.grid.reduce.dot
+        course, kept, dot = self.course, self.course.solved(n), self.course.grid.reduce.dot
         weight, at, count = course.formula(n).weight if n else 0.0, np.flatnonzero(course.sought(n)), course.free.size
         inertia = course.inertia[at]
         size = course.by_film(n)
@@ -182,7 +182,7 @@ class MarchGradient:
 
     def parts(self, n: int, eq: Equations) -> dict[str, dict[str, float]]:
         """By quantity the numbers of step n, and the shares of them, that it and what its supplies ask for are made of."""
-        kept = self.course.kept(n)
+        kept = self.course.solved(n)
         numbers, asked = eq.numbers(kept.p, kept.r), self._asked(n)
         off = [eq.partials(numbers, name) for name in eq.report(numbers) if name.startswith(MISFIT)]
         out: dict[str, dict[str, float]] = {name: {} for name in self.names}
@@ -196,7 +196,7 @@ class MarchGradient:
 
     def _scaled(self, n: int, eq: Equations) -> Array:
         """G of step n in the units of its adjoints."""
-        kept = self.course.kept(n)
+        kept = self.course.solved(n)
         return eq.scaled(kept.p, kept.r, self.units[n])
 
     def lagrangians(self, course: Course) -> Array:
@@ -208,7 +208,7 @@ class MarchGradient:
             asked = self._asked(n)
             if quick is not None and n and not asked:
                 continue
-            eq, kept, dot = course.at(n), course.kept(n), course.grid.reduce.dot
+            eq, kept, dot = course.at(n), course.solved(n), course.grid.reduce.dot
             numbers = eq.numbers(kept.p, kept.r, None if asked else free)
             told = eq.report(numbers)
             for name, (base, share) in asked.items():

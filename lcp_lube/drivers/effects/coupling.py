@@ -178,10 +178,10 @@ def _told(ask: Ask, loop: Loop) -> Solution:
         elif solution.converged and not loop.found:
             outcome = Outcome.MAX_ITERATIONS
             message = f"the coefficients still change by {loop.change:.1e} after {loop.solves} films ({', '.join(loop.names)})"
-            if loop.endless:  # alone it is exact; what others do to the viscosity may change yet
-                outcome, message = (
-                    (Outcome.NO_SOLUTION, loop.endless) if loop.alone else (outcome, f"{message}: {loop.endless}")
-                )
+            if loop.endless and loop.alone:
+                outcome, message = Outcome.NO_SOLUTION, loop.endless
+            elif loop.endless:  # what others do to the viscosity may change yet
+                message = f"{message}: {loop.endless}"
         elif not solution.converged:
             message = f"film {loop.solves} of the coupling: {message}"
     fields = {"p": at.p / problem.p_unit, "r": at.r}

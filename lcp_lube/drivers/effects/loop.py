@@ -69,9 +69,8 @@ class Loop:
         self.left: dict[str, float] = {}  # of a film's balances, where that went into what its cells store
         self.beyond = False  # whether no pressure carries the last film's flow
         self.endless = ""  # why no pressure carries it, by an effect that makes viscosity grow without bound
-        self.alone = all(
-            getattr(effect, "fixed", False) or hasattr(effect, "beyond") for effect in self.effects
-        )  # that is then sure
+        # Whether that is sure after a film with all else as it is without effects:
+        self.alone = all(getattr(effect, "fixed", False) or hasattr(effect, "beyond") for effect in self.effects)
         self.start: Solution | Start | None = ask.start
         self.begun = self.last = np.zeros(0)  # the vectors of fields that the loop began with, and of the last film's
         self.told: list[str] = []  # how it went on where Anderson's method did not settle

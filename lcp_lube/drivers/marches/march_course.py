@@ -126,9 +126,15 @@ class Course:
             raise InputError(f"scene {self.scene.name}: [motion]: no derivatives in time where the wall turns back")
         return model.mirrored if self.turned else model
 
-    def kept(self, n: int) -> Any:
-        """What step n left, a `Kept`; None where no equation gave the film at t = 0: no adjoint is asked for there."""
+    def kept(self, n: int) -> Kept | None:
+        """What step n left; None where no equation gave the film at t = 0."""
         return self.trace.steps[n - 1] if n else self.trace.begun if self.table.fill is None else None
+
+    def solved(self, n: int) -> Kept:
+        """What step n left, of those that have adjoints: an equation gave their film."""
+        kept = self.kept(n)
+        assert kept is not None
+        return kept
 
     @property
     def fill(self) -> float:
@@ -188,7 +194,7 @@ class Course:
 
     def at(self, n: int, shift: Any = 0.0, pressures: Any = None) -> Equations:
         """G and Q of step n; n = 0: of the steady film that it begins with. pressures : of the supplies, other than its own."""
-        model, kept = self.film(n, shift), self.kept(n)
+        model, kept = self.film(n, shift), self.solved(n)
         if n:
             formula = self.formula(n)
             old = formula.old([self.content(n - 1), self.content(n - 2) if formula.before else None])
@@ -200,7 +206,7 @@ class Course:
 
     def by_followed(self, n: int, at: Any, unit: float) -> list[tuple[Array, Array, dict[str, float]]]:
         """Derivatives of G in a unit of flow, the film and the numbers told, by each place and pressure that follows."""
-        kept = self.kept(n)
+        kept = self.solved(n)
         step = NUDGE * self.grid.reduce.min(mean_film(self.grid, self.film(n).film)) / self.reach
         P, changes = np.array(kept.pressures), [(step[k], {"shift": np.eye(self.free.size)[k]}) for k in at]
         for k, one in enumerate(self.film(n).supplies):

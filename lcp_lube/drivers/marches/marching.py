@@ -276,8 +276,7 @@ class Run:
         """Of all steps."""
         found = self.certificates
         names = dict.fromkeys(name for c in found for name in c.measures)
-        badness = lambda measure: np.inf if np.isnan(measure) else measure  # noqa: E731
-        measures = {name: max((c.measures.get(name, 0.0) for c in found), key=badness) for name in names}
+        measures = {name: float(np.max([c.measures.get(name, 0.0) for c in found])) for name in names}  # NaN is the worst
         lowest = {name: min(c.extremes[name] for c in found) for name in found[0].extremes}
         return Certificate(measures, found[0].tol, lowest)
 
