@@ -88,7 +88,8 @@ class NewtonMatrix:
             self.b.setArray(np.where(held, 0.0, 1.0))
             self.mat.diagonalScale(self.b, self.b)
             # Any positive value does where x is known; f's own keeps the rows in one size.
-            self.b.setArray(np.where(held & (self._diagonal <= 0), 1.0, self._diagonal))
+            known = np.where(self._diagonal > 0, self._diagonal, 1.0)
+            self.b.setArray(np.where(held, known, self._diagonal if shift is None else self._diagonal + shift))
         elif shift is not None:
             self.b.setArray(self._diagonal + shift)
         else:

@@ -5,6 +5,9 @@
 Points where the middle value is v - l or v - u are held at the bound, the others take a Newton step for f. Where the
 bounds in contact come out as they went in, this is Newton's method and converges as fast. The start is a coarser grid's
 answer where there is one (nested iteration): on one grid alone the contact area moves by a few cells a step.
+
+Where no part of a step makes ||R|| smaller, as before a turning point, an obstacle problem goes on along the flow
+D v' = -f(v) between the bounds by implicit steps (pseudo-transient continuation: Kelley and Keyes 1998), down to a solution.
 """
 
 from dataclasses import dataclass
@@ -19,10 +22,16 @@ from ..problems.solution import Fields, Step
 from .job import Job
 from .method import Method
 from .method_options import MethodOptions, part
-from .steplength import halve_until, inexact_decrease
+from .steplength import StepLengthError, halve_until, inexact_decrease
 
 Trial = tuple[Array, Array, Array]  # v, f(v), R(v)
 HALVINGS = 12  # to 2.4e-4 of a step: what decreases no sooner is left to the next signs
+ROUNDING = 1e-13  # ||R|| so small, as a start that is the answer may have, decreases no more
+STRIDE, SHORTEST = (
+    0.5,
+    1e-9,
+)  # of a flow: a step's part of the largest |v| so far, and the step, in times of D, that is taken whatever it does
+TINY = float(np.finfo(float).tiny)
 NEAR = 1e-2  # steps below this part of max |v| leave the size of f's terms as it is
 
 
@@ -44,7 +53,7 @@ class BoxActiveSet(Method):
     Options = BoxActiveSetOptions
     problem: BoxProblem
     system: BoxSystem
-    state = ("v", "D", "f", "R", "_scale", "norm")
+    state = ("v", "D", "f", "R", "_scale", "norm", "pace", "reach")
 
     def __init__(self, job: Job):
         super().__init__(job)
@@ -56,7 +65,7 @@ class BoxActiveSet(Method):
         self.f = problem.residual(self.v)
         self.R = problem.natural_residual(self.v, self.f, f_scale=self.D)
         self._scale = problem.scales(self.v)[1]
-        self.norm = self._norm()
+        self.norm, self.pace, self.reach = self._norm(), 0.0, problem.reduce.max(np.abs(self.v))
 
     @property
     def fields(self) -> Fields:
@@ -68,29 +77,70 @@ class BoxActiveSet(Method):
         return self.problem.reduce.max(np.abs(self.D * self.R)) / (self._scale or 1.0)
 
     def advance(self) -> Step:
-        """One Newton step on the points that touch no bound, halved until ||R|| decreases. Collective."""
-        problem, reduce, o = self.problem, self.problem.reduce, self.options
-        v, newton = self.v, self.f / self.D
-        held = (newton >= v - problem.lower) | (newton <= v - problem.upper)
+        """A Newton step on the points that touch no bound, halved until ||R|| decreases, or one along the flow. Collective."""
         # Superlinear: an inner solve need not be better than the linearisation, which errs by the square.
-        rtol = min(o.rtol, max(0.1 * self.norm, 1e-3 * o.rtol))
-        self.system.linearise(v)
-        d, iterations = self.system.solve(-np.where(held, self.R, self.f), rtol, held=held)
+        rtol = min(self.options.rtol, max(0.1 * self.norm, 1e-3 * self.options.rtol))
+        self.system.linearise(self.v)
+        if self.pace == 0.0:
+            try:
+                return self._newton(rtol)
+            except StepLengthError:
+                if self.problem.kind != "box":
+                    raise
+                self.pace = 1.0
+        return self._flow(rtol)
 
-        @lru_cache(maxsize=1)
-        def trial(alpha: float) -> Trial:
-            at = np.clip(v + alpha * d, problem.lower, problem.upper)
-            f = problem.residual(at)
-            return at, f, problem.natural_residual(at, f, f_scale=self.D)
+    def _direction(self, rtol: float, pace: float = np.inf) -> tuple[Array, int, float]:
+        """d, the number of linear iterations, and the slope of f along d where no bound is touched. Collective."""
+        problem, step = self.problem, min(pace, 1.0) * self.f / self.D
+        low, high = step >= self.v - problem.lower, step <= self.v - problem.upper
+        held = low | high
+        rhs = -np.where(low, self.v - problem.lower, np.where(high, self.v - problem.upper, self.f))
+        d, iterations = self.system.solve(rhs, rtol, None if pace == np.inf else self.D / pace, held)
+        d = np.where(held, rhs, d)  # to the bit
+        return d, iterations, problem.reduce.dot(np.where(held, 0.0, self.f), d)
 
+    def _newton(self, rtol: float) -> Step:
+        d, iterations, _ = self._direction(rtol)
         with self.system.stages("step length"):
-            before = reduce.norm(self.R)
-            alpha, cuts = halve_until(
-                lambda alpha: inexact_decrease(before, reduce.norm(trial(alpha)[2]), alpha, 0.0, o.beta), 1.0, most=HALVINGS
-            )
-            self.v, self.f, self.R = trial(alpha)
-            step_norm = reduce.max(np.abs(self.v - v)) / (max(reduce.max(np.abs(self.v)), problem.idle[0]) or 1.0)
-            if step_norm > NEAR:
-                self._scale = problem.scales(self.v)[1]
-            self.norm = self._norm()
+            reduce = self.problem.reduce
+            before, trial = reduce.norm(self.R), lru_cache(maxsize=1)(lambda alpha: self._at(self.v + alpha * d))
+
+            def decreases(alpha: float) -> bool:
+                return self.norm <= ROUNDING or inexact_decrease(
+                    before, reduce.norm(trial(alpha)[2]), alpha, 0.0, self.options.beta
+                )
+
+            alpha, cuts = halve_until(decreases, 1.0, most=HALVINGS)
+            return self._go(trial(alpha), alpha, iterations, cuts, rtol)
+
+    def _flow(self, rtol: float) -> Step:
+        """An implicit step of length `pace` along D v' = -f(v) between the bounds: where f is the slope of an energy that goes
+        down to a solution. Long steps are Newton's."""
+        reduce, cuts, total = self.problem.reduce, 0, 0
+        self.reach = max(self.reach, reduce.max(np.abs(self.v)))
+        while True:
+            d, iterations, slope = self._direction(rtol, self.pace)
+            new, total = self._at(self.v + d), total + iterations
+            moved = reduce.max(np.abs(new[0] - self.v)) / max(self.reach, reduce.max(np.abs(new[0])), TINY)
+            if self.pace < SHORTEST or (slope <= 0.0 and (moved <= STRIDE or self.reach == 0.0)):
+                break
+            self.pace, cuts = 0.25 * self.pace, cuts + 1
+        alpha = min(self.pace, 1.0)
+        self.pace *= min(4.0, STRIDE / max(moved, TINY))
+        return self._go(new, alpha, total, cuts, rtol)
+
+    def _at(self, v: Array) -> Trial:
+        v = np.clip(v, self.problem.lower, self.problem.upper)
+        f = self.problem.residual(v)
+        return v, f, self.problem.natural_residual(v, f, f_scale=self.D)
+
+    def _go(self, to: Trial, alpha: float, iterations: int, cuts: int, rtol: float) -> Step:
+        """Move, and tell of it. Collective."""
+        problem, reduce, v = self.problem, self.problem.reduce, self.v
+        self.v, self.f, self.R = to
+        step_norm = reduce.max(np.abs(self.v - v)) / (max(reduce.max(np.abs(self.v)), problem.idle[0]) or 1.0)
+        if step_norm > NEAR:
+            self._scale = problem.scales(self.v)[1]
+        self.norm = self._norm()
         return Step(self.norm, step_norm, alpha, iterations, backtracking=cuts, rtol=rtol)

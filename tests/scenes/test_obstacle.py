@@ -68,11 +68,14 @@ def test_beyond_the_turning_point():
     solution = obstacle({"n": 64, "lambda": 10})
     found = solution.problem.quantities(solution.fields)
     assert solution.converged and found["contact_upper"] == 1828 and found["max_v"] == 4
-    solution.destroy()
-    fails = obstacle({"n": 64, "lambda": 10, "v0": 1})
+    flowed = obstacle({"n": 64, "lambda": 10, "v0": 1})
+    np.testing.assert_allclose(flowed.fields["v"], solution.fields["v"], atol=1e-8)
+    flowed.destroy()
+    fails = obstacle({"n": 64, "lambda": 10, "v0": 1}, method="interior")
     assert fails.outcome is Outcome.STEP_LENGTH
     assert "lambda = 10 lies beyond the turning point 6.8" in fails.message and "v0" in fails.message
-    fails.destroy()
+    for each in (solution, fails):
+        each.destroy()
     none = obstacle({"n": 64, "lambda": 6.9, "v_upper": np.inf})
     assert none.outcome is Outcome.NO_SOLUTION and "there is no solution" in none.message
     none.destroy()

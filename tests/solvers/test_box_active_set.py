@@ -8,7 +8,6 @@ from lcp_lube.api import solve
 from lcp_lube.base.options import recipe
 from lcp_lube.errors import InputError
 from lcp_lube.linear.box import BoxSystem
-from lcp_lube.problems.solution import Outcome
 from lcp_lube.scenes.scene import load_scene
 
 
@@ -129,9 +128,21 @@ def test_start_from_fields_of_another_grid():
         obj.destroy()
 
 
-def test_steps_that_never_decrease_end_the_run():
-    solution = obstacle({"n": 24, "lambda": 7, "v0": 1})
-    assert solution.outcome is Outcome.STEP_LENGTH and not solution.converged
+@pytest.mark.parametrize("changes", [{"lambda": 7, "v0": 1}, {"lambda": 9, "v0": 0.5, "v_upper": 8}, {"lambda": 20, "v0": 1}])
+def test_where_no_step_decreases_the_flow_of_the_energy_goes_on(changes):
+    """Beyond the turning point v rises past where f is smallest to the upper obstacle."""
+    solution = obstacle({"n": 24, **changes}, rescue=False, nested=False)
+    assert solution.converged and solution.problem.quantities(solution.fields)["contact_upper"] > 0
+    norms = np.array([step.norm for step in solution.steps])
+    assert (np.diff(norms) > 0).any()
+    solution.destroy()
+
+
+@pytest.mark.parametrize("n", [5, 9])
+def test_a_start_that_is_the_answer_but_for_rounding(n):
+    """Contact everywhere, on a coarser grid too: nothing is left that could decrease."""
+    solution = obstacle({"nx": n, "ny": 64, "lambda": 0, "v_lower": 0.5, "v_upper": 1, "v0": 0}, rescue=False)
+    assert solution.converged and (solution.fields["v"] == 0.5).all()
     solution.destroy()
 
 
