@@ -243,6 +243,8 @@ def test_grids_that_an_estimate_leaves_out():
     assert rungs_up([math.inf, 1.4e-2], 1e-2, False, 2, True) == 1  # twice the points
     assert rungs_up([math.inf, 4e-3], 1e-4, False, 2, True) == rungs_up([math.inf, 5e-2], 1e-4, False, 2, True) == 5
     assert rungs_up([math.inf, 1.5e-2, 1.1e-2], 1e-2, False, 2, True) == 1
+    assert rungs_up([math.inf, 4e-2], 1e-2, False, 2, True) == 2  # by order 4/3 beside rims, or where a grid has missed:
+    assert rungs_up([math.inf, 4e-2], 1e-2, False, 2, True, True) == rungs_up([math.inf, 9e-2, 4e-2], 1e-2, False, 2, True) == 3
 
 
 def known_numbers(problem):
@@ -280,6 +282,7 @@ def test_estimate_of_two_grids():
     found = of_pair([1.0, 1.3], [0.0, 0.0], [16.0, 32.0], 0.1, "load")
     assert found.value == pytest.approx(1.375) and found.error == pytest.approx(1.4 * 0.3 / 3) and found.extrapolated
     assert of_pair([1.0, 1.0], [0.0, 0.0], [16.0, 32.0], 0.1, "load").error == pytest.approx(1.4 * 0.1 / 3)
+    assert of_pair([1.0, 1.3], [0.0, 0.0], [16.0, 32.0], 0.1, "load", rims=True).error == pytest.approx(2.3 * 0.3 / 3)
     far = of_pair([1.0, 1.2, 1.3], [0.0] * 3, [16.0, 23.0, 32.0], 0.1, "load", -3)  # with the grid of twice the spacing
     assert far.value == found.value and far.error == found.error
     assert of_pair([1.0, 1.0], [0.0, 0.0], [16.0, 32.0], 0.1, "friction").error == pytest.approx(3 * 0.03 / 3)

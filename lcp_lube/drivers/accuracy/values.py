@@ -36,6 +36,7 @@ class Values:
     Attributes
     ----------
     line : a problem and its fields that have the numbers of a line that is known; None of other films.
+    rims : whether the last grid has cavities beside faces that rims cut.
     """
 
     def __init__(self, line: bool, pairs: bool, least: float):
@@ -50,7 +51,7 @@ class Values:
         self._misplaced: list[float] = []
         self._converged = False  # on the last grid
         self._other, self._change = -2, (inf, inf)  # of the pressure from that grid on: `_change`
-        self._full = False  # whether nothing is cavitated on the last grid
+        self._full, self.rims = False, False  # _full: nothing is cavitated
 
     def add(
         self, solution: Solution, before: Solution | None, earlier: Solution | None, size: float, quantity: str, value: float
@@ -73,6 +74,7 @@ class Values:
         other = earlier if self._other == -3 else before
         self._change = _change(solution, other, quantity, self._own[self._other]) if other and self._pairs else (inf, inf)
         self._full = self._pairs and not problem.reduce.max(solution.fields["r"]) > 0.0
+        self.rims = "revised" in solution.settings.get("details", {})
         self.best = self._best(quantity, self._own)
         return self.best
 
@@ -86,7 +88,7 @@ class Values:
         if not isfinite(by_load) or (name not in INTEGRALS and len(values) > 2):
             return of_all
         change = by_load if name in INTEGRALS else by_all
-        pair = of_pair(values, self._misplaced, self._sizes, change, name, self._other, self._full)
+        pair = of_pair(values, self._misplaced, self._sizes, change, name, self._other, self._full, self.rims)
         weight = max(FEWER[self._full] ** (len(values) - 2), LEAST_PAIR)
         error = pair.error**weight * min(of_all.error, pair.error) ** (1.0 - weight)
         return replace(pair, error=max(error, self._least * abs(value)))
