@@ -3,7 +3,9 @@
 import sys
 from collections.abc import Callable
 from functools import cache
+from hashlib import sha256
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
 Kernel = TypeVar("Kernel", bound=Callable)
@@ -52,9 +54,31 @@ def _machine_code(function: Kernel, **how: Any) -> Kernel:
         return function
     _announce()
     try:
-        return cast(Kernel, njit(cache=True, **how)(function))
+        made = njit(cache=True, **how)(function)
     except RuntimeError:  # numba found no directory for its cache
         return cast(Kernel, njit(**how)(function))
+    # numba's own stamp is of the kernel's file: code made before another file changed, by an upgrade in place, would be taken.
+    file = made._cache._cache_file
+    file._source_stamp = file._source_stamp, _stamp(function)
+    return cast(Kernel, made)
+
+
+def _stamp(function: Callable) -> tuple[Any, ...]:
+    """What a kernel's machine code has in it beside the text of its own file: the pieces and numbers of others."""
+    parts = list[Any]()
+    for name in function.__code__.co_names:
+        value = function.__globals__.get(name)
+        if isinstance(value, int | float | str | tuple):
+            parts.append(value)
+        elif inner := getattr(value, "py_func", None):
+            parts.append((_text(inner.__code__.co_filename), _stamp(inner)))
+    return tuple(parts)
+
+
+@cache
+def _text(path: str) -> str:
+    """A file's hash."""
+    return sha256(Path(path).read_bytes()).hexdigest()
 
 
 @cache

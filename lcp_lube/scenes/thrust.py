@@ -10,7 +10,8 @@ from pydantic import Field
 
 from ..base.parallel import Array
 from ..problems.film.model import Model, Side
-from ..problems.film.shapes import Along, Block, Shape, SpiralGrooves, Sum
+from ..problems.film.shapes import Along, Block, Shape, Sum
+from ..problems.film.slanted import SpiralGrooves
 from .balance import BalanceTable
 from .effects.table import WithEffects
 from .film import FilmPart

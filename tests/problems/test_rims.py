@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from lcp_lube import load_scene, solve
 from lcp_lube.problems.film.lubrication import LubricationProblem
-from lcp_lube.problems.film.rims import cut_faces
+from lcp_lube.problems.film.rims import STEEP, _layer, cut_faces
 from lcp_lube.problems.film.shapes import DimpleArray
 
 
@@ -20,7 +20,7 @@ def half_plane(x0: float):
 def test_series_where_full_the_thin_part_alone_before_a_cavity(cavity, C, H):
     film, rim = half_plane(0.25)
     dry = np.array([[False, bool(cavity)]])
-    cut, cubes, films = cut_faces(film, [rim], np.array([0.0, 1.0]), np.zeros(1), dry, True)
+    cut, cubes, films = cut_faces(film, [rim], np.array([0.0, 1.0]), np.zeros(1), np.ones(1), dry, True)
     assert cut.all()
     np.testing.assert_allclose(cubes, [C], rtol=1e-12)
     np.testing.assert_allclose(films, [H], rtol=1e-12)
@@ -31,7 +31,7 @@ def test_where_the_film_thins_again_both_parts_resist():
     film, rim = half_plane(0.25)
     back = (lambda t, s: film(1.0 - t, s)), (lambda t, s: rim(1.0 - t, s))
     dry = np.array([[True, False]])
-    _, cubes, _ = cut_faces(back[0], [back[1]], np.array([0.0, 1.0]), np.zeros(1), dry, True)
+    _, cubes, _ = cut_faces(back[0], [back[1]], np.array([0.0, 1.0]), np.zeros(1), np.ones(1), dry, True)
     np.testing.assert_allclose(cubes, [1 / (0.25 + 0.75 / 8)], rtol=1e-12)
 
 
@@ -118,3 +118,15 @@ def test_methods_and_halves_agree():
     assert turned.numbers["load"] == pytest.approx(first.numbers["load"], rel=1e-8)
     turned.destroy()
     first.destroy()
+
+
+def test_slanted_edges_leave_every_face_more_than_half_of_its_conductance():
+    """Whatever the edge's depth, slope and cells: matrices stay those of the theorem, and H goes to the film's other side."""
+    rng = np.random.default_rng(5)
+    h, depth = np.exp(rng.uniform(-3, 3, (2, 10_000)))
+    away, length = rng.uniform(-1.5, 1.5, 10_000), rng.uniform(0.0, STEEP**-0.6, 10_000)
+    h = np.where(away < 0.0, h + depth, h)
+    more, slope = _layer(depth, away, length, h)
+    assert (more > -0.5 * h**3).all() and (more[away < 0.0] >= 0.0).all() and (more[away > 0.0] <= 0.0).all()
+    other = h + np.where(away < 0.0, -depth, depth)
+    np.testing.assert_allclose(h + slope * (other**3 - h**3), other, rtol=1e-9)

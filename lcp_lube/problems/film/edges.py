@@ -63,6 +63,11 @@ def level(film: Any) -> bool:
     return bool(getattr(film, "level", False))
 
 
+def one_line(film: Any) -> bool:
+    """Whether all its lines along x are the same, as far as it tells."""
+    return level(film) and not jumps_of(film, "y")
+
+
 def pairs(a: Array) -> Array:
     """Each of them but the last with its next one, shape (2, a.size - 1)."""
     return np.array([a[:-1], a[1:]])
@@ -77,11 +82,11 @@ class Around:
 
     def __call__(self, x: Array, y: Array) -> Array:
         """The film at x and y, which broadcast; of a film that is the same along y the one line there is."""
-        return self.film(*self._inside(x, y[:1] if self._one_line and x.shape[:-1] == (1,) else y))
+        return self.film(*self._inside(x, y[:1] if self.one_line and x.shape[:-1] == (1,) else y))
 
     @cached_property
-    def _one_line(self) -> bool:
-        return level(self.film) and not jumps_of(self.film, "y")
+    def one_line(self) -> bool:
+        return one_line(self.film)
 
     def _inside(self, *at: Array) -> list[Array]:
         out = list(at)
@@ -119,7 +124,7 @@ class Around:
 
     @property
     def rims(self) -> Sequence[Any]:
-        return [lambda x, y, rim=rim: rim(*self._inside(x, y)) for rim in getattr(self.film, "rims", ())]
+        return [replace(self, film=rim) for rim in getattr(self.film, "rims", ())]
 
 
 def face_film(

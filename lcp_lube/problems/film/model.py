@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from ...base.parallel import Array
 from ...errors import InputError
 from ..facts import Facts
 from ..grid import EVEN, Grid, Places, Polar, some_places
-from .edges import jumps_of, kinks_of
+from .edges import jumps_of, kinks_of, one_line
 from .effects import Effect
 from .exact import ExactSolution
 from .fluid import Law
@@ -138,7 +139,8 @@ class Model:
         periodic = tuple(self.sides[2 * k].kind == "periodic" for k in range(len(self.lengths)))
         ranks, held = (comm or PETSc.COMM_WORLD).getSize(), bool(self.supplies)
         told = {"held": held, "moving": self.stored is not None, "free": self.stored is not None and self.stored.exact}
-        return Facts("lubrication", tuple(shape), ranks, periodic, **told)
+        even = len(shape) == 2 and self.polar is None and self.lines(shape)[1] is None
+        return Facts("lubrication", tuple(shape), ranks, periodic, **told, alike=even and one_line(self.film))
 
     @property
     def mirrored(self) -> "Model":
@@ -153,13 +155,16 @@ class Model:
         changed["stored"] = self.stored.mirrored if self.stored else None
         return replace(self, gap=gap, U=-self.U, exact=None, **changed)
 
-    def lines(self, shape: Sequence[int]) -> Places:
-        """Where the lines of points of a grid lie (`Grid.places`): on edges, where scheme 'face' can make use of it in 2D."""
+    def lines(self, shape: Sequence[int], asked: Sequence[bool] = (True, True)) -> Places:
+        """Where the lines of points of a grid lie (`Grid.places`): on edges, where scheme 'face' can make use of it in 2D.
+
+        asked : whether of each side; of the others None."""
         if self.places is not None:  # a coarser grid of a part: evenly
             x, y = (None if a is None or a.size != n else a for a, n in zip(self.places, (*shape, 1), strict=False))
             return x, y
-        x, y = (on_edges(n, *edges) for n, edges in zip(shape, self.edges, strict=True)) if self.edges else EVEN
-        if x is None and self.grooves:  # even, or with too few lines for what lies between the grooves as well
+        sides = zip(shape, self.edges, asked, strict=True)
+        x, y = (on_edges(n, *edges) if of else None for n, edges, of in sides) if self.edges else EVEN
+        if x is None and self.grooves and asked[0]:  # even, or with too few lines for what lies between the grooves as well
             x = on_edges(shape[0], self.lengths[0], RING, self._groove_edges)
         return x, y
 
@@ -201,7 +206,6 @@ class Model:
         """
         if not self.fed and not self.in_time:
             raise InputError("periodic along the flow, and no side above the cavitation pressure: nothing feeds the film")
-        kind = GroovedProblem if self.grooves else LubricationProblem
         if self.U < 0:
             return TurnedProblem(self.mirrored.build(shape, comm), self.exact)
         west = self.sides[0]
@@ -215,12 +219,9 @@ class Model:
             owner = np.concatenate(grid.comm.allgather(owners(grid, self.supplies).ravel()))
             integrals.part(supplied(integrals, grid, self.supplies, owner))
 
-        def scheme_for(cavity: Array | None) -> tuple[BoxScheme, Held | None]:
-            return self._held(grid, box_scheme(grid, self.gap, **self._data, integrals=integrals, cavity=cavity), integrals)
-
         dry = None if self.dry is None else self.dry.on(grid)
-        scheme, held = scheme_for(dry)
-        problem = kind(
+        scheme, held = self._scheme(grid, integrals, dry)
+        problem = (GroovedProblem if self.grooves else LubricationProblem)(
             grid,
             scheme,
             mu=self.mu,
@@ -241,7 +242,7 @@ class Model:
         if isinstance(problem, GroovedProblem):
             problem.grooves = self.grooves
         if self.cut:
-            problem.coefficients_for, problem.dry = scheme_for, dry
+            problem.coefficients_for, problem.dry = partial(self._scheme, grid, integrals), dry
         return problem
 
     @property
@@ -265,6 +266,10 @@ class Model:
         changes = {name: np.imag(getattr(box, name)) / step for name in box.arrays}
         slopes = BoxScheme(**{name: a if name == "h" else a / flow_unit for name, a in changes.items()}, flow_unit=flow_unit)
         return self._held(grid, slopes, integrals)[0]
+
+    def _scheme(self, grid: Grid, integrals: LineIntegrals | None, cavity: Array | None) -> tuple[BoxScheme, Held | None]:
+        """Coefficients with supplies, faces at round edges made for these cavities. Collective."""
+        return self._held(grid, box_scheme(grid, self.gap, **self._data, integrals=integrals, cavity=cavity), integrals)
 
     def _held(self, grid: Grid, scheme: BoxScheme, integrals: LineIntegrals | None) -> tuple[BoxScheme, Held | None]:
         """With its supplies."""

@@ -75,7 +75,7 @@ class Block:
     level: ClassVar[bool] = True
 
     def __call__(self, x: Array, y: Array) -> Array:
-        return np.where(_within(x, *self.x) & _within(y, *self.y), self.height, 0.0)
+        return np.where(within(x, *self.x) & within(y, *self.y), self.height, 0.0)
 
     def breakpoints(self) -> tuple[float, ...]:
         return tuple(x for x in self.x if np.isfinite(x))
@@ -180,33 +180,6 @@ class Herringbone:
 
 
 @dataclass(frozen=True)
-class SpiralGrooves:
-    """`count` logarithmic spirals on a full turn, of a depth, between two radii; inclined by `angle` (rad) against the motion.
-
-    They pump inwards, and outwards where the angle is negative. polar : radius at y = 0 (there a groove begins at x = 0), and
-    that on which x is measured, m.
-    """
-
-    depth: float
-    count: int
-    angle: float
-    ratio: float
-    between: tuple[float, float]
-    polar: tuple[float, float]
-
-    oblique: ClassVar[bool] = True
-
-    def __call__(self, x: Array, y: Array) -> Array:
-        theta, r = x / self.polar[1], self.polar[0] + y
-        turns = (theta + np.log(r / self.polar[0]) / np.tan(self.angle)) / (2.0 * np.pi)
-        phase = np.remainder((turns + EDGE) * self.count, 1.0)
-        return np.where((phase < self.ratio) & _within(r, *self.between), self.depth, 0.0)
-
-    def jumps(self, axis: str) -> tuple[float, ...]:
-        return tuple(r - self.polar[0] for r in self.between) if axis == "y" else ()
-
-
-@dataclass(frozen=True)
 class RandomSurface:
     """Cubic B-spline through normal numbers on a lattice of `cells` meshes a side: the same surface on every grid.
 
@@ -255,9 +228,10 @@ class Sum:
 
     @property
     def rims(self) -> tuple[Shape, ...]:
-        """Distances (m) from the curved edges of round dimples and domes, as functions of x and y; negative inside."""
+        """Distances (m) from edges that are curved or slanted, as functions of x and y; negative inside."""
         found = (part for part in self.parts if isinstance(part, DimpleArray) and part.form != "square")
-        return tuple(part.rim for part in found if np.isfinite(part.y).all())
+        slanted = (part.slanted for part in self.parts if hasattr(part, "slanted"))
+        return *(part.rim for part in found if np.isfinite(part.y).all()), *slanted
 
     def marks(self) -> tuple[float, ...]:
         return tuple(t for part in self.parts for t in marks_of(part))
@@ -286,7 +260,7 @@ class Sum:
         return out
 
 
-def _within(t: Array, start: float, end: float) -> NDArray[np.bool_] | np.bool_:
+def within(t: Array, start: float, end: float) -> NDArray[np.bool_] | np.bool_:
     if start == -np.inf and end == np.inf:
         return np.True_
     slack = EDGE * max(abs(v) for v in (start, end, 0.0) if np.isfinite(v))
