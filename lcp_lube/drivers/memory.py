@@ -40,6 +40,7 @@ MEASURED: dict[tuple[str, str, str], tuple[float, float]] = {
     ("lubrication 1D", "full", "mumps"): (1250, 0),
     ("lubrication 1D", "full", "light"): (750, 0),
     ("lubrication 2D", "", ""): (70, 0),
+    ("lubrication 2D alike", "", ""): (54, 0),
     ("lubrication 2D moving", "", ""): (200, 0),
     ("lubrication 2D free", "", ""): (1100, 0),  # most of it the basis of its stiffness
     ("lubrication 2D", "cavity", "multigrid"): (780, 0),
@@ -160,8 +161,8 @@ def bytes_needed(facts: Facts, plan: Plan) -> float | None:
 
     An inner solver that was not measured counts as the most expensive one of the same system.
     """
-    also = "" if plan.system or not facts.moving else " free" if facts.free else " moving"
-    points, kind = facts.size, f"{facts.kind} {facts.dim}D{also}"
+    also = " free" if facts.free else " moving" if facts.moving else " alike" if facts.alike else ""
+    points, kind = facts.size, f"{facts.kind} {facts.dim}D{'' if plan.system else also}"
     if facts.dense:
         return DENSE * points**2 * (facts.ranks if plan.recipe == "redundant_lu" else 1)
     options = PETSc.Options().getAll()
@@ -172,7 +173,7 @@ def bytes_needed(facts: Facts, plan: Plan) -> float | None:
     if not known:
         return None
     fits = [known[solver]] if solver in known else list(known.values())
-    each = max(max(a + b * log2(points), 60.0) for a, b in fits)
+    each = max(max(a + b * log2(points), 50.0) for a, b in fits)
     if solver == "light" and options.get("ksp_type", "gmres") == "gmres":
         unknowns = 2 if plan.system == "full" else 1
         given = options.get("ksp_gmres_restart", "")  # PETSc's default where it is no whole number, which PETSc itself refuses

@@ -17,6 +17,7 @@ class Facts:
     dense : whether the Jacobian is a dense matrix.
     held : whether supplies hold cells inside at their pressures.
     moving : whether cells store liquid: a time step. free : whether what moves answers to the film by its stiffness.
+    alike : whether all lines along x have the same film and width: what it drags is stored once.
     spread : points of the whole film whose fields a part's answer becomes; 0: it is the whole one.
     """
 
@@ -28,6 +29,7 @@ class Facts:
     held: bool = False
     moving: bool = False
     free: bool = False
+    alike: bool = False
     spread: int = 0
 
     @property

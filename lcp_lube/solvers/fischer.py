@@ -19,6 +19,7 @@ from .steplength import StepLengthError, armijo, halve_until, inexact_decrease
 SMALL = np.finfo(float).tiny / np.finfo(float).eps
 
 Trial = tuple[Array, Array, Array, Array]  # p, r, F1, F2
+Direction = tuple[Array, Array, Array]  # dp, dr, and the change of F2 along them
 
 
 def fischer_burmeister(p: Array, r: Array) -> Array:
@@ -93,17 +94,15 @@ class FischerNewton(PairMethod):
                 p, r = self.p + alpha * dp, self.r + alpha * dr
                 return p, r, self.problem.flow(p, r), fischer_burmeister(p, r)
 
-            decreases = self._decrease(trial, D_p * dp + D_r * dr, dp, dr, delta)
+            decreases = self._decrease(trial, (dp, dr, D_p * dp + D_r * dr), delta)
             alpha, backtracking = halve_until(decreases, 1.0, o.theta)
             self.p, self.r, self.F1, self.F2 = trial(alpha)
             self.norm = reduce.norm(self.F1, self.F2)
             step_norm = alpha * reduce.norm(dp, dr)
         return Step(self.norm, step_norm, alpha, linear_iterations, backtracking=backtracking, rtol=delta)
 
-    def _decrease(
-        self, trial: Callable[[float], Trial], change2: Array, dp: Array, dr: Array, delta: float
-    ) -> Callable[[float], bool]:
-        """The test of a trial alpha; change2 : of F2 along the step."""
+    def _decrease(self, trial: Callable[[float], Trial], d: Direction, delta: float) -> Callable[[float], bool]:
+        """The test of a trial alpha."""
         reduce, norm, beta = self.problem.reduce, self.norm, self.options.beta
         return lambda alpha: inexact_decrease(norm, reduce.norm(*trial(alpha)[2:]), alpha, delta, beta)
 
@@ -113,16 +112,14 @@ class ArmijoNewton(FischerNewton):
 
     Options = ArmijoOptions
 
-    def _decrease(
-        self, trial: Callable[[float], Trial], change2: Array, dp: Array, dr: Array, delta: float
-    ) -> Callable[[float], bool]:
+    def _decrease(self, trial: Callable[[float], Trial], d: Direction, delta: float) -> Callable[[float], bool]:
         """The test; raises StepLengthError where the inner solver's direction does not reduce the merit function."""
-        reduce, norm, beta, slope = self.problem.reduce, self.norm, self.options.beta, self._slope(change2, dp, dr)
+        reduce, norm, beta, slope = self.problem.reduce, self.norm, self.options.beta, self._slope(*d)
         if slope >= 0.0 and norm > 0.0:
             raise StepLengthError(f"the inexact direction is not one of descent: slope {slope:.1e}")
         return lambda alpha: armijo(0.5 * norm**2, 0.5 * reduce.norm(*trial(alpha)[2:]) ** 2, alpha, slope, beta)
 
-    def _slope(self, change2: Array, dp: Array, dr: Array) -> float:
+    def _slope(self, dp: Array, dr: Array, change2: Array) -> float:
         """Derivative of Phi = ||F~||^2/2 along d, F~ . F~' d: -2 Phi for an exact step."""
         problem = self.problem
         if self.system.direct:

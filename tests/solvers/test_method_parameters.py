@@ -87,7 +87,7 @@ def test_the_armijo_slope_is_that_of_an_inexact_step() -> None:
 
         D_p, D_r = derivatives(method.p, method.r)
         change = np.asarray(D_p * dp + D_r * dr, dtype=float)
-        slope = method._slope(change, dp, dr)
+        slope = method._slope(dp, dr, change)
         assert slope == pytest.approx((merit(1e-5) - merit(-1e-5)) / 2e-5, rel=1e-6)
         assert abs(slope + 2.0 * merit(0.0)) > 0.1 * abs(slope)
     method.destroy()

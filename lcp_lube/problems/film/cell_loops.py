@@ -7,6 +7,7 @@ import numpy as np
 from ...base.compiled import kernel, piece
 from ...base.parallel import Array
 from .certify import cell_misfit
+from .face_lines import Rows
 from .flows import face_drag, linear
 
 
@@ -23,8 +24,9 @@ misfit, face, lengths = piece(cell_misfit), piece(face_drag), piece(linear)
 def carried(voids: tuple[Array, int, Array, Array], j: int, out: Array) -> None:
     """b_C or b_W of a line, `strip.by_lines`, but for the column that is its own."""
     array, shift, lines, _ = voids
+    m = min(j, len(array) - 1)
     for i in range(np.uint32(out.size)):
-        out[i] = lines[j] * array[j, i + np.uint32(shift)]
+        out[i] = lines[j] * array[m, i + np.uint32(shift)]
 
 
 @piece
@@ -100,30 +102,30 @@ def loop_drag(
     turn: float,
 ) -> float:
     """Sum of `flows.face_drag` by its shares (`flows._shares`), and into by_p and by_r its derivatives. h, resting,
-    moving, first : of each line, or one that is all lines'. leaving : b_E, as `strip.by_lines` has b_C. beyond : pressures east
-    of the last points. turn : 1 where that is the first point, else 0."""
+    moving, first, couette : of each line, or one that is all lines'. leaving : b_E, as `strip.by_lines` has b_C. beyond :
+    pressures east of the last points. turn : 1 where that is the first point, else 0."""
     ny, nx = p.shape
     total, b = np.zeros(nx), np.zeros(nx)
     for j in range(ny):
-        m, n = min(j, len(h) - 1), min(j, len(resting) - 1)
+        m, n, k = min(j, len(h) - 1), min(j, len(resting) - 1), min(j, len(couette) - 1)
         carried(leaving, j, b)
         b[-1] = leaving[3][j]
         for i in range(nx - 1):
             east, push, thick = face(
                 choose, lengths, h[m, i], resting[n, i], moving[m, i], first[m, i],
-                couette[j, i], b[i], r[j, i], p[j, i], p[j, i + 1],
+                couette[k, i], b[i], r[j, i], p[j, i], p[j, i + 1],
             )  # fmt: skip
             total[i] += lines[j] * columns[i] * east + scale[j] * push
             if by_r is not None:
-                by_r[j, i] = lines[j] * columns[i] * b[i] / (choose(couette[j, i] == 0.0, np.inf, couette[j, i]) * thick)
+                by_r[j, i] = lines[j] * columns[i] * b[i] / (choose(couette[k, i] == 0.0, np.inf, couette[k, i]) * thick)
         i = nx - 1
         east, push, thick = face(
             choose, lengths, h[m, i], resting[n, i], moving[m, i], first[m, i],
-            couette[j, i], b[i], r[j, i], p[j, i], beyond[j],
+            couette[k, i], b[i], r[j, i], p[j, i], beyond[j],
         )  # fmt: skip
         total[i] += lines[j] * columns[i] * east + scale[j] * push
         if by_p is not None and by_r is not None:
-            by_r[j, i] = lines[j] * columns[i] * b[i] / (choose(couette[j, i] == 0.0, np.inf, couette[j, i]) * thick)
+            by_r[j, i] = lines[j] * columns[i] * b[i] / (choose(couette[k, i] == 0.0, np.inf, couette[k, i]) * thick)
             by_p[j, 0] = 0.5 * scale[j] * (turn * h[m, i] - h[m, 0])
             for i in range(1, nx):
                 by_p[j, i] = 0.5 * scale[j] * (h[m, i - 1] - h[m, i])
@@ -132,57 +134,71 @@ def loop_drag(
 
 @kernel
 def loop_by_film(
-    w: Array, p: Array, r: Array, k_x: Array, k_y: Array, wall: Array, void: Array,
-    along: Array, across: Array, of_wall: Array, of_void: Array, out: Array,
-) -> None:  # fmt: skip
-    """Into `out` what the sum of w times the cells' balances changes by with the film at each point, by its parts of the faces.
+    w: Array, p: Array, r: Array, along: Array, of: Rows, lines: Array, across: Array, over: Rows, faces: Array, out: Array
+) -> None:
+    """Add to `out` what the sum of w times the cells' balances changes by with the film at each point.
 
-    w, p, r : with a frame of neighbours. k_x, k_y, wall, void : derivatives by the film at the faces. along, of_wall, of_void :
-    parts of a column's west and east face that are the point's, shape (2, columns); across : of a line's south and north face.
+    w, p, r : with a frame of neighbours. along : of lines that differ by what their points' films change what the west and the
+    east face conduct, what they drag and what of it the void lacks, shape (lines, 6, columns); of, lines : which of them each
+    line is like, and by what it multiplies the first two and the others. across, over, faces : the same of y faces; faces : by
+    what they multiply it for the line to the north, and for the one to the south.
     """
+    one, two = np.uint32(1), np.uint32(2)
     ny, nx = out.shape
     for j in range(ny):
-        for i in range(nx):
-            a, b = w[j + 1, i + 1], p[j + 1, i + 1]
-            west, east = w[j + 1, i] - a, a - w[j + 1, i + 2]
-            pressed = along[0, i] * west * k_x[j, i] * (p[j + 1, i] - b)
-            pressed += along[1, i] * east * k_x[j, i + 1] * (b - p[j + 1, i + 2])
-            pressed += across[0, j] * (w[j, i + 1] - a) * k_y[j, i] * (p[j, i + 1] - b)
-            pressed += across[1, j] * (a - w[j + 2, i + 1]) * k_y[j + 1, i] * (b - p[j + 2, i + 1])
-            dragged = of_wall[0, i] * west * wall[j, i] + of_wall[1, i] * east * wall[j, i + 1]
-            carried = of_void[0, i] * west * void[j, i] * r[j + 1, i] + of_void[1, i] * east * void[j, i + 1] * r[j + 1, i + 1]
-            out[j, i] = pressed + (dragged - carried)
+        a, k, by_x, by_wall, by_south, by_north = j + 1, of[j], lines[0, j], lines[1, j], faces[0, j], faces[1, j + 1]
+        south, north = over[j], over[j + 1]
+        for i in range(np.uint32(nx)):
+            west, east = w[a, i] - w[a, i + one], w[a, i + one] - w[a, i + two]
+            pressed = west * along[k, 0, i] * (p[a, i] - p[a, i + one]) + east * along[k, 1, i] * (
+                p[a, i + one] - p[a, i + two]
+            )
+            dragged = west * (along[k, 2, i] - along[k, 4, i] * r[a, i]) + east * (
+                along[k, 3, i] - along[k, 5, i] * r[a, i + one]
+            )
+            beside = by_south * (w[j, i + one] - w[a, i + one]) * across[south, i] * (p[j, i + one] - p[a, i + one])
+            beside += by_north * (w[a, i + one] - w[j + 2, i + one]) * across[north, i] * (p[a, i + one] - p[j + 2, i + one])
+            out[j, i] += by_x * pressed + by_wall * dragged + beside
 
 
 @kernel
-def loop_cubes(h: Array, columns: Array, lines: Array) -> Array:
-    """3 h^2 times what belongs to each column and line."""
-    out = np.empty_like(h)
-    for j in range(h.shape[0]):
-        for i in range(h.shape[1]):
-            out[j, i] = (columns[i] * lines[j]) * (3.0 * h[j, i] ** 2)
-    return out
+def loop_drag_by_film(p: Array, r: Array, along: Array, of: Rows, lines: Array, out: Array) -> None:
+    """The same of the drag. along : by what its points' films change what pulls at the west and the east face, what shears
+    them, and how much less goes with the void before them, r; lines : by what pulls and shears count."""
+    one, two = np.uint32(1), np.uint32(2)
+    ny, nx = out.shape
+    for j in range(ny):
+        a, k, pulls, shears = j + 1, of[j], lines[0, j], lines[1, j]
+        for i in range(np.uint32(nx)):
+            pull = along[k, 0, i] * (p[a, i + one] - p[a, i]) + along[k, 1, i] * (p[a, i + two] - p[a, i + one])
+            sheared = along[k, 2, i] + along[k, 3, i] - along[k, 4, i] * r[j, i] - along[k, 5, i] * r[j, i + one]
+            out[j, i] += pulls * pull + shears * sheared
 
 
 @kernel
 def loop_by_faces(
-    w: Array, p: Array, r: Array, along: Array, across: Array, wall: Array, void: Array,
-) -> None:  # fmt: skip
-    """Add to the arrays of x faces, of y faces and again of x faces what w' G grows by with what each face conducts and drags.
+    w: Array, first: int, p: Array, r: Array, along: Array, across: Array, wall: Array, void: Array | None
+) -> None:
+    """Into the arrays of x faces, of y faces and again of x faces what w' G grows by with what each face conducts and drags.
 
-    w : of some lines of cells. p, r : with a frame of neighbours. wall, void : of what drags oil, and less of the void with it.
+    w : of all lines, those beside the owned points 0. p, r : of lines from `first` on, with a frame of neighbours. wall, void :
+    of what drags oil, and less of the void with it; None: of both together.
     """
-    ny, nx = w.shape
+    one, ny, (lines, nx) = np.uint32(1), p.shape[0] - 2, w.shape
+    dw = np.zeros(nx + 1)
     for j in range(ny):
-        for i in range(nx):
-            a, here = w[j, i], p[j + 1, i + 1]
-            along[j, i + 1] += a * (here - p[j + 1, i + 2])
-            across[j, i] -= a * (p[j, i + 1] - here)
-            across[j + 1, i] += a * (here - p[j + 2, i + 1])
-            wall[j, i + 1] += a
-            void[j, i + 1] -= a * r[j + 1, i + 1]
-        for i in range(nx):
-            a = w[j, i]
-            along[j, i] -= a * (p[j + 1, i] - p[j + 1, i + 1])
-            wall[j, i] -= a
-            void[j, i] += a * r[j + 1, i]
+        a, m = j + 1, first + j
+        dw[0], dw[nx] = -w[m, 0], w[m, nx - 1]
+        for i in range(np.uint32(nx - 1)):
+            dw[i + one] = w[m, i] - w[m, i + one]
+        for i in range(np.uint32(nx + 1)):
+            along[j, i] = dw[i] * (p[a, i] - p[a, i + one])
+            if void is None:
+                wall[j, i] = dw[i] * (1.0 - r[a, i])
+            else:
+                wall[j, i] = dw[i]
+                void[j, i] = -dw[i] * r[a, i]
+        for i in range(np.uint32(nx)):
+            across[j, i] = ((w[m - 1, i] if m > 0 else 0.0) - w[m, i]) * (p[j, i + one] - p[a, i + one])
+        for i in range(np.uint32(nx if m == lines - 1 else 0)):
+            across[a, i] = w[m, i] * (p[a, i + one] - p[a + 1, i + one])

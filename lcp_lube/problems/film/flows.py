@@ -128,7 +128,7 @@ def drag_sum(
         h, a, b, c, couette = (lying[id(one)] for one in found)
         fields, of_lines = (r[rows], p[rows], beyond[rows]), (columns, shears[rows], pulls[rows])
         into: Any = (None, None) if by is None else by[:, rows]
-        leaving = by_lines(s, "b_C") if s.storage is None else (s.b_E, 0, np.ones(len(couette)), s.b_E[:, -1].copy())
+        leaving = by_lines(s, "b_C") if s.storage is None else (s.b_E, 0, np.ones(len(s.b_E)), s.b_E[:, -1].copy())
         return loop_drag(h, a, b, c, couette, leaving, *fields, *of_lines, into[0], into[1], float(grid.periodic[0]))
 
     total = sum(each_strip(grid, add_up))

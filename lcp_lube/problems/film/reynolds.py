@@ -15,7 +15,7 @@ from ..strips import each_strip, in_strips, places_of
 from .edges import Around
 from .integrals import LineIntegrals, check_film
 from .stored import Stored
-from .strip import coefficients_of, dragged, entering, entering_at, leaving, leaving_at, line_weights, stream_weights
+from .strip import coefficients_of, dragged, entering, entering_at, leaving, leaving_at, line_weights, lines_of, stream_weights
 
 Film = Callable[[Array, Array], Array]
 USUAL = 1e6  # the largest coefficient lies between this and its inverse: absolute tolerances then mean something
@@ -52,7 +52,7 @@ class BoxScheme:
     Dirichlet neighbours are in c; `k_*` keeps their conductance, for A's diagonal and the boundary fluxes.
 
     As `box_scheme` makes them, k_W and k_E are parts of one array, and so are k_S and k_N, couette_W and couette_E, of which
-    b_C and b_W are made when they are asked for: 40 bytes a point in all.
+    b_C and b_W are made when they are asked for: 40 bytes a point in all, 24 where lines alike share couette_* and h.
     """
 
     k_W: Array
@@ -222,9 +222,10 @@ def coefficients(
     # The void is dragged as the film at the points, or as what the wall drags through the faces, which are stored anyway.
     nodal, weight = scheme != "face" and U != 0.0, None
     # With a frame of neighbours, as sweeps want them (`solvers.fas.levels`).
-    frames = ((ny + 2, nx + 3), (ny + 3, nx + 2), (ny + 2, nx + 2), (ny, nx + 1), (ny, nx + 1))
+    frames = ((ny + 2, nx + 3), (ny + 3, nx + 2), (ny + 2, nx + 2))
     kind = np.asarray(film(grid.x[:, :1], grid.y[:1])).dtype
-    kx, ky, c_frame, wall, films = (np.zeros(shape, dtype=kind) for shape in frames)
+    kx, ky, c_frame = (np.zeros(shape, dtype=kind) for shape in frames)
+    films, wall = lines_of(grid, film, bool(rims), kind)
     void = films if nodal else wall if U else np.zeros_like(wall)
 
     def make(rows: slice) -> None:

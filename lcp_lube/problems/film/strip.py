@@ -83,6 +83,18 @@ def stream_weights(grid: Grid) -> Array:
     return line_weights(grid) * grid.stretch(grid.y)
 
 
+def lines_of(grid: Grid, film: Around, cut: bool, kind: Any) -> list[Array]:
+    """Room for h at the points and the one before, and for what the wall drags through x faces.
+
+    What all lines have in common takes the memory of one, of which each is a view. cut : by round edges, which lines differ in.
+    """
+    (ny, nx), out = grid.box, []
+    for even in (True, np.ptp(stream_weights(grid)) == 0.0):
+        own = np.zeros((1 if even and film.one_line and not cut else ny, nx + 1), dtype=kind)
+        out.append(own if len(own) == ny else np.ndarray((ny, nx + 1), kind, own, 0, (0, own.itemsize)))
+    return out
+
+
 def dragged(void: Array, weight: Array | None, U: float) -> Array:
     """What goes through x faces if all is void: given as it is, or as films that are dragged."""
     return void if weight is None else (weight * U) * void
@@ -145,13 +157,14 @@ def entering_at(row: Any, i: Any, void: Array, first: bool, weight: Array | None
 
 
 def by_lines(scheme: Any, name: str) -> tuple[Array, int, Array, Array]:
-    """b_C or b_W for compiled loops, which make it: of an array from this column on what each line multiplies, and what stands
-    in the last column of b_C, in the first one of b_W."""
+    """b_C or b_W for compiled loops, which make it: of an array, or the one line of all, from this column on what each line
+    multiplies, and what stands in the last column of b_C, in the first one of b_W."""
     made, last = vars(scheme)[name], name == "b_C"
     if not isinstance(made, partial):
         return made, 0, np.ones(len(made)), np.ascontiguousarray(made[:, -1 if last else 0])
     void, other, weight, U = made.args
     lines = np.ones(len(void)) if weight is None else (weight * U)[:, 0]
+    void = void if void.strides[0] else void[:1]
     if last:
         return void, 1, -lines, -lines * void[:, -1] if other is None else -other
     return void, 0, lines, lines * void[:, 0] * float(other)

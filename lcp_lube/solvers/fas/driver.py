@@ -32,7 +32,7 @@ TRUNCATIONS = {"none": 0, "clip": 1, "points": 2}  # see `transfer.correct`
 EXACT = (1200, 5000, 10_000)  # points of the coarsest grid once the cycles have stalled, and stalled again
 OWN = 17_000  # points of a problem that is then solved so itself
 EXTREME = 1000.0  # film ratio above which a small ||G|| says little of p, and the corrections have to be small too
-SETTLED = 1e-8  # of the largest pressure: what they may then be in the mean
+SETTLED = 1e-8  # of the largest pressure, or eps1 where that is more: what they may then be in the mean
 CLOSE = 1e-6  # ||G|| below which a ring that is hardly fed is not what has stalled
 FED = 3e-5  # of the certificate's tolerance: the flow that a film with supplies may lose, 3e-12 in parts of what flows
 SLOWER, LEAST_FALL = 2.5, (0.04, 0.2)  # times what an F cycle leaves is what a V cycle does in its place; at least, in time too
@@ -180,7 +180,7 @@ class Fas(FilmCycles):
             whole = self.problem.reduce.max(self.fields["p"]) * np.sqrt(self.problem.size)
             # Where pressures drive less through a cell than the wall does, ||c|| is no scale for them.
             if whole > 0.0 and ((self._extreme and not anew) or whole < self._unit * self._c_norm):
-                self.norm = max(self.norm, self.eps1 * size / (SETTLED * whole))
+                self.norm = max(self.norm, size / whole * min(self.eps1 / SETTLED, 1.0))
         return Step(self.norm, size, 1.0, enough=self._rest > self.eps1 and self.norm <= self._rest)
 
     def _kind(self) -> str:

@@ -1,6 +1,5 @@
 """The finest grid of the nonlinear multigrid: a problem's own, whose coefficients are not stored twice."""
 
-import ctypes
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,6 @@ from . import held, kernels, loops
 from .levels import FEWEST_LINES, Level, carried
 
 SHARP = 1e-12  # of the largest flow of void: less is rounding
-LARGE = 1_000_000  # points of a grid whose coarser ones are worth being given back to the system
 
 
 def finest(problem: LubricationProblem) -> Level:
@@ -123,12 +121,12 @@ def give_up(levels: list[Level], problem: LubricationProblem) -> Fields | None:
     level, grid = levels[0], problem.grid
     for coarse in levels[1:]:
         coarse.rest()
-    if grid.local_size >= LARGE and (trim := getattr(ctypes.CDLL(None), "malloc_trim", None)):  # glibc's
-        trim(0)  # what rests of a fourth of the points is kept by the heap otherwise, beside r
-    z = level.z
+    z, room, level.room = level.z, level.room, np.zeros(0)
     if level.held is not None or level.void is not None or z.shape != (grid.box[0] + 2, grid.box[1] + 2):
         return None
-    p, r = z.ravel()[: grid.local_size], loops.void(z[1:-1, 1:-1], problem.scheme, grid)
+    room = room if room.size >= grid.local_size else np.empty(grid.local_size)
+    p, r = z.ravel()[: grid.local_size], room[: grid.local_size]
+    loops.void(z[1:-1, 1:-1], problem.scheme, grid, r.reshape(grid.box))
     kernels.pressure(z[1:-1, 1:-1], p.reshape(grid.box))
     level.z = np.zeros((0, 0))
     return {"p": p, "r": r}

@@ -94,8 +94,8 @@ def relax_front(
     often: bool,
     thread: int,
     threads: int,
-    done: Array | None,
-    near: Array | None,
+    done: Array,
+    near: Array,
 ) -> int:
     """`count` sweeps, to and fro, over the points within `width` cells of a front; returns how many points were relaxed.
 
@@ -106,15 +106,15 @@ def relax_front(
     often : swept twice as often then. Only in steady films without supplies the sweeps overrelax, and strips are more than
     twice as wide.
 
-    done, near : of large grids, which are divided into blocks of lines: every second one first, then those between, so that no
-    two neighbours are at work at once. How often each block has been swept, and its points in both strips; thread : the one of
-    so many that this is, with pairs of blocks of its own.
+    done, near : of the blocks of lines into which large grids are divided, every second one first, then those between, so that
+    no two neighbours are at work at once: how often each has been swept, and its points in both strips; thread : the one of so
+    many that this is, with pairs of blocks of its own.
     """
     plain = carry is None and held is None
     wider, most = (WIDER, OVER) if plain else (2, 1.0)
     ny, nx = z.shape[0] - 2, z.shape[1] - 2
     seen, rare = z if slips is None else np.where(slips, -1.0, z), RARE * ny * nx
-    blocks = 1 if done is None else done.shape[0]
+    blocks = done.shape[0]
     spans, at, own = spans_of_blocks(seen, wider * width, ring, thread, threads, blocks)
     looks, points = 1, together(own, thread, threads, done, near, 1)
     if often and points <= 0.5 * wider * rare:
@@ -131,16 +131,14 @@ def relax_front(
         over = most if more or s < count - LAST else 1.0
         for half in range(min(blocks, 2)):
             for b in range(2 * thread + half, blocks, 2 * threads):
-                if done is not None:
-                    await_part(done, b - 1, looks + s + half)
-                    await_part(done, b + 1, looks + s + half)
+                await_part(done, b - 1, looks + s + half)
+                await_part(done, b + 1, looks + s + half)
                 for k in range(at[b], at[b + 1]):
                     here, step = (at[b] + at[b + 1] - 1 - k, -1) if s % 2 == 1 else (k, 1)
                     if at[b] <= here + AHEAD * step < at[b + 1]:
                         bring_near(z, kx, ky, c, spans[here + AHEAD * step], step)
                     relax_pairs(z, kx, ky, c, spans[here, 0], spans[here, 1], spans[here, 2], carry, ring, over, work)
-                if done is not None:
-                    write(done, b, looks + s + 1)
+                write(done, b, looks + s + 1)
     return count * points
 
 

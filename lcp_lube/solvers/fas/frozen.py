@@ -67,10 +67,10 @@ class Frozen(Cycles):
             x = self._solved(b, at)
         elif transposed:
             x = self._solved(np.where(given, 0.0, b), None if at is None else np.where(given, 0.0, at))
-            x = None if x is None else np.where(given, over * (b + self._rest(x, None).reshape(b.shape)), x)
+            x = None if x is None else np.where(given, over * self._rest(b, x, None), x)
         else:
             pressed = over * b
-            x = self._solved(np.where(given, 0.0, b + self._rest(pressed, None).reshape(b.shape)))
+            x = self._solved(np.where(given, 0.0, self._rest(b, pressed, None)))
             x = None if x is None else np.where(given, pressed, x)
         if x is None or transposed:
             return x
@@ -95,7 +95,7 @@ class Frozen(Cycles):
         b, x = b / sizes, x / sizes  # answers of one size, that both be as good
         settled = False
         while not settled:
-            rest = b + self._rest(x, self.free[0]).reshape(b.shape) if self.transposed else b
+            rest = self._rest(b, x, self.free[0]) if self.transposed else b
             found = self._improved(x, rest, b, z, most)
             if found is None:
                 return None
@@ -110,7 +110,7 @@ class Frozen(Cycles):
         rtol, drop = self._keen * TRANSPOSED if self.transposed else RTOL, DROP if self.single else 0.0
         norm, total = self.grid.reduce.norm, self.grid.comm.allreduce
         self._put(self.c[0], rest)
-        V, H = np.zeros((MANY, rest.size), self.z[0].dtype), np.zeros((MOST + 2, MOST + 1))  # V: small pages, as written
+        V, H = np.empty((MANY, rest.size), self.z[0].dtype), np.zeros((MOST + 2, MOST + 1))
         self.change(None, V[0])
         self.c[0][:] = 0.0
         first, y = norm(V[0]), np.zeros(0)
@@ -133,7 +133,7 @@ class Frozen(Cycles):
             if self.work >= most:
                 return None
             if k + 1 == len(V):
-                V = np.concatenate([V, np.zeros_like(V)])
+                V = np.concatenate([V, np.empty_like(V)])
             w = V[k + 1]
             np.negative(self.change(V[k], w), out=w)
             for _ in range(2 if k > 8 else 1):  # rounding has left long bases less orthogonal
@@ -151,7 +151,7 @@ class Frozen(Cycles):
 
     def _agree(self, found: Array, b: Array, z: Array) -> bool:
         """Whether x' (J z) = b' z, each."""
-        dot, rest = self.grid.reduce.dot, b + self._rest(found, self.free[0]).reshape(b.shape)
+        dot, rest = self.grid.reduce.dot, self._rest(b, found, self.free[0])
         return all(
             abs(dot(left, z)) <= self._keen * AGREES * dot(np.abs(asked), np.abs(z))
             for left, asked in zip(rest, b, strict=True)

@@ -64,8 +64,9 @@ class Cycles:
         """Take so many right-hand sides, 1 or 2; at nu > 0 they are one, real and imaginary. single : precision of cycles."""
         kind: Any = np.float32 if single else np.float64
         self.several, self.transposed, self.single = several, transposed, single
-        self.z, self.c, self.rest = ([np.zeros((several, *level.z.shape), kind) for level in self.levels] for _ in range(3))
-        self.at, self.nothing, self.left = (np.zeros((several, *self.levels[0].z.shape)) for _ in range(3))
+        self.z, self.c = ([np.zeros((several, *level.z.shape), kind) for level in self.levels] for _ in range(2))
+        self.rest = [] if transposed else [np.zeros_like(z) for z in self.z]
+        self.at, self.asked, self.left = (np.zeros((several, *self.levels[0].z.shape)) for _ in range(3))
         self.k = [(level.kx.astype(kind, copy=False), level.ky.astype(kind, copy=False)) for level in self.levels]
         self.passed: list[tuple[Array | None, Array | None]] = [(None, None)] * len(self.levels)
         if self.stored is None:
@@ -134,16 +135,17 @@ class Cycles:
             into[:] = finest.own(self.levels[0], self.grid, one)
         return out
 
-    def _rest(self, x: Array, free: NDArray[np.bool_] | None) -> Array:
-        """-J x or -J' x, at free points."""
+    def _rest(self, b: Array, x: Array, free: NDArray[np.bool_] | None) -> Array:
+        """b - J x or b - J' x, at free points."""
+        self._put(self.asked, b)
         self._put(self.at, x)
         level = self.levels[0]
-        data = self.at, self.full[0], free, level.kx, level.ky, self.nothing
+        data = self.at, self.full[0], free, level.kx, level.ky, self.asked
         if self.transposed:
             frozen_kernels.transposed_residual(*data, self._carry(0), self.left)
         else:
             frozen_kernels.residual(*data, *self.passed[0], self.left)
-        return self._own(self.left)
+        return self._own(self.left).reshape(b.shape)
 
     def _run(self, k: int, kind: str) -> None:
         level, z = self.levels[k], self.z[k]
@@ -170,9 +172,9 @@ class Cycles:
         """What level k leaves is the coarser one's right-hand side."""
         level, coarse, z, c = self.levels[k], self.levels[k + 1], self.z[k], self.c[k + 1]
         where = level.first, level.by_x, level.by_y
-        rest, (kx, ky) = self.rest[k], self.k[k]
+        kx, ky = self.k[k]
         if not self.transposed:
-            frozen_kernels.residual(z, self.full[k], self.free[k], kx, ky, self.c[k], *self.passed[k], rest)
+            frozen_kernels.residual(z, self.full[k], self.free[k], kx, ky, self.c[k], *self.passed[k], self.rest[k])
         c[:] = 0.0
         for n in range(self.several):
             into = coarse.part(c[n])
@@ -182,7 +184,7 @@ class Cycles:
                 coarse.collect(c[n])
                 c[n] *= self.full[k + 1]
             else:
-                transfer.restrict(z[n], kx, ky, rest[n], into, *where, True, level.periodic[0], False, None)
+                transfer.restrict(z[n], kx, ky, self.rest[k][n], into, *where, True, level.periodic[0], False, None)
                 coarse.collect(c[n])
 
     def _ascend(self, k: int) -> None:

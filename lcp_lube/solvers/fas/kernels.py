@@ -196,7 +196,7 @@ def add_balance(z: Array, kx: Array, ky: Array, c: Array, carry: Array | None, s
 
 @kernel
 def void(z: Array, leaving: tuple[Array, int, Array, Array], r: Array) -> None:
-    """Into r that of z, whose frame is left out; leaving : `strip.by_lines` of b_C."""
+    """Into r that of z, whose frame is left out; leaving : `strip.by_lines` of b_C, of which one line may stand for all."""
     b_C = np.zeros(z.shape[1])
     for j in range(z.shape[0]):
         carried(leaving, j, b_C)

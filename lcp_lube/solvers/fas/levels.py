@@ -28,6 +28,7 @@ class Level:
     ----------
     z, c : iterate and right-hand side; old : the finer level's values that z started from. Of a coarse level they are made at
         their first use (`work_on`), and may be dropped between two cycles (`rest`).
+    room : of the finest level, where those of the coarse ones lie (`lodge`), and then r.
     kx, ky : conductances of the x and y faces.
     comm : the ranks, None where this one holds the whole grid and need not tell anyone.
     whole : every rank holds the whole grid, though comm has several.
@@ -50,6 +51,7 @@ class Level:
     kx: Array
     ky: Array
     old: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    room: Array = field(default_factory=lambda: np.zeros(0))
     by_x: bool = False
     by_y: bool = False
     carry: Array | None = None
@@ -66,10 +68,9 @@ class Level:
 
     def work_on(self) -> None:
         """Make the arrays of a coarse level that a cycle fills, where they are not there."""
-        if not self.z.size:
-            self.z, self.c = (np.zeros((self.kx.shape[0], self.ky.shape[1])) for _ in range(2))
-        if not self.old.size:
-            self.old = np.zeros_like(self.z)
+        for name in ("z", "c", "old"):
+            if not getattr(self, name).size:
+                setattr(self, name, np.zeros((self.kx.shape[0], self.ky.shape[1])))
 
     def rest(self) -> None:
         """Drop them until the next cycle; of films with supplies or in time they hold more than that."""
@@ -173,6 +174,22 @@ def empty(nx: int, ny: int, y0: int, y1: int, comm: MPI.Comm | None, whole: bool
     return Level(nx, ny, y0, y1, comm, whole, periodic, z, c, kx, ky)
 
 
+def lodge(levels: Sequence[Level]) -> None:
+    """What cycles fill on the coarse grids laid into one array of the size of the finest one, or as much of it as has room.
+
+    Once they are dropped r is made there: memory costs most when it is touched for the first time.
+    """
+    finest, at = levels[0], 0
+    for coarse in levels[1:]:
+        coarse.rest()
+    arrays = [(coarse, name, (coarse.kx.shape[0], coarse.ky.shape[1])) for coarse in levels[1:] for name in ("z", "c", "old")]
+    finest.room = np.zeros(min(finest.z.size + 8 * sum(finest.z.shape), sum(rows * width for _, _, (rows, width) in arrays)))
+    for coarse, name, (rows, width) in arrays:
+        if at + rows * width <= finest.room.size:
+            setattr(coarse, name, finest.room[at : at + rows * width].reshape(rows, width))
+            at += rows * width
+
+
 def hierarchy(level: Level, harmonic: bool, enough: int = 0) -> list[Level]:
     """A level and all coarser ones, down to so few points or as far as they go. Collective."""
     levels = [level]
@@ -182,10 +199,12 @@ def hierarchy(level: Level, harmonic: bool, enough: int = 0) -> list[Level]:
 
 
 def settled(levels: list[Level]) -> list[Level]:
-    """The same without what `carry` was made of, once all are made."""
+    """The same without what `carry` was made of, once all are made; of steady films without supplies the coarse ones lodged."""
     for level in levels:
         if level.void is not None:
             level.void = np.zeros((3, 0, 0))
+    if levels[0].void is None and levels[0].held is None:
+        lodge(levels)
     return levels
 
 

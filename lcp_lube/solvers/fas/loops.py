@@ -36,9 +36,7 @@ def sweep(z: Array, *others: Any) -> None:
 
 def relax_front(z: Array, *others: Any) -> int:
     """`fronts.relax_front`, of a large grid in blocks, whose number does not depend on the threads."""
-    if z.size < FEWEST:
-        return int(fronts.relax_front(*(z, *others, 0, 1, None, None)))
-    blocks = min(PARTS, z.shape[0] - 2)
+    blocks = 1 if z.size < FEWEST else min(PARTS, z.shape[0] - 2)
     threads = min(crew().threads, (blocks + 1) // 2)
     done, near = np.zeros((blocks, LINE), dtype=np.int64), np.zeros((2, blocks), dtype=np.int64)
     sweep_blocks = lambda k: fronts.relax_front(*(z, *others, k, threads, done, near))  # noqa: E731
@@ -95,16 +93,15 @@ def restrict(z: Array, kx: Array, ky: Array, c: Array, out: Array, *others: Any)
 
 def pressure_and_void(z: Array, scheme: BoxScheme, grid: Grid) -> Fields:
     """p and r of the owned points."""
-    p = np.empty(z.shape)
+    p, r = np.empty(z.shape), np.empty(z.shape)
     each_strip(grid, lambda rows: kernels.pressure(z[rows], p[rows]))
-    return {"p": p.ravel(), "r": void(z, scheme, grid)}
+    void(z, scheme, grid, r)
+    return {"p": p.ravel(), "r": r.ravel()}
 
 
-def void(z: Array, scheme: BoxScheme, grid: Grid) -> Array:
-    """r of the owned points."""
-    r = np.empty(z.shape)
+def void(z: Array, scheme: BoxScheme, grid: Grid, r: Array) -> None:
+    """Into r that of the owned points."""
     each_strip(grid, lambda rows: kernels.void(z[rows], by_lines(scheme.rows(rows), "b_C"), r[rows]))
-    return r.ravel()
 
 
 def _by_rows(task: Any, z: Array) -> list[Any]:
