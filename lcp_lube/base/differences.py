@@ -9,7 +9,12 @@ from ..errors import InputError
 from .parallel import Array
 
 STEP, SMALLER, TRIES = 1e-4, 0.1, 4  # of a number, relative; where its effect is not smooth, smaller ones
-SMOOTH = 1e-5  # relative difference between differences of second and fourth order that is left to truncation
+LARGER, WANTED = (1e-3, 1e-2), 1e-7  # steps where rounding leaves more than this of the slope
+QUIET, LEFT = 1e-5, 0.1  # of the slope: rounding at most, of which this part is left, where two values do
+TRUNCATED = 0.1  # an error, of what lower order differs by
+SCATTER, ODD = 0.7, 1.9  # six standard deviations of rounding, of fourth differences and of third ones, which pass by kinks
+LESS = 0.03  # by which smaller steps leave less scatter that is no rounding, and less of a kink beside a than of what bends
+SMOOTH = 3e-7  # relative error that is left to truncation
 QUICK, BENT = 1e-5, 1e-4  # of a number, relative; least part of the slope that the second difference must have to be heeded
 KINK = 1e-2  # relative difference between both sides
 CHORD, SLIGHT = 1e-2, 1e-2  # relative: width and least slope of a function that changes by steps
@@ -17,16 +22,28 @@ ROUNDING, TINY = 1e-15, 1e-300  # of a value, generously (2^-53 is 1.1e-16); wha
 WIDTHS, APART = (0.5, 1.0, 2.0), 0.2  # of chords, in CHORD; by what part they may differ where f changes by steps
 
 
-def differences(f: Callable[[float], Array], a: float, scale: float, sizes: Array, wary: bool = False) -> tuple[Array, Array]:
-    """df/da of a vector function to rounding, and by how much its derivatives to both sides differ where it has a kink.
+def differences(
+    f: Callable[[float], Array],
+    a: float,
+    scale: float,
+    sizes: Array,
+    wary: bool = False,
+    points: int = 1,
+    least: Array | float = 0.0,
+) -> tuple[Array, Array, Array]:
+    """df/da of a vector function to rounding, by how much its derivatives to both sides differ where it has a kink, and an
+    estimate of its error, of rounding and truncation.
 
     A kink's derivative is the mean of both sides. Where f changes by steps (it jumps at a, or nothing changes but over a wider
     range), it is the slope of its chord over a hundredth to both sides, and the difference inf. Where it hardly bends, two
-    values of it do beside f(a).
+    values of it do beside f(a). Rounding is seen by fourth differences; where it is not small against the slope steps are
+    larger, as far as f is as smooth there, up to a hundredth of what f is linear in.
 
     Parameters
     ----------
     scale : a change of a that is not small. sizes : of the terms that f is made of, whose rounding is left in it.
+    points : by whose terms' chance rounding is less than of all terms together.
+    least : of f, small changes that need not be better known.
     wary : f may change by many steps, though it seems smooth next to a: NaN where chords half and twice as wide differ.
 
     Raises
@@ -55,58 +72,98 @@ def differences(f: Callable[[float], Array], a: float, scale: float, sizes: Arra
         apart, most = np.ptp(slopes, axis=0), np.abs(slopes).max(axis=0)
         return (apart > APART * most) & (apart * scale > SLIGHT * np.abs(at(0.0)) + 1e-9 * sizes)  # type: ignore[arg-type]
 
-    def told(slope: Array, kinks: Array) -> tuple[Array, Array]:
+    def told(slope: Array, kinks: Array, error: Array) -> tuple[Array, Array, Array]:
         none = by_steps([slope, *chords]) if chords else np.zeros(sizes.shape, dtype=bool)
-        return np.where(none, np.nan, slope), np.where(none, np.inf, kinks)
+        return np.where(none, np.nan, slope), np.where(none, np.inf, kinks), error
+
+    def enough(error: Array, slope: Array, part: float) -> Any:
+        return error <= part * np.maximum(np.abs(slope), least / scale)
 
     chords: list[Array] = []
     for width in WIDTHS if wary else ():
         chords.append(_chord(at, width * CHORD * scale) + np.zeros_like(sizes))
         if by_steps(chords).all():  # before more is looked at
-            return np.full_like(sizes, np.nan), np.full_like(sizes, np.inf)
-    d = QUICK * scale
-    low, high, here = at(-d), at(d), at(0.0)
+            return np.full_like(sizes, np.nan), np.full_like(sizes, np.inf), np.zeros_like(sizes)
+    d, slope = QUICK * scale, None
+    low, high = at(-d), at(2.0 * d)  # not as far to both sides: bends that cancel would not be seen
     if low is None and high is None:
-        raise known[d]  # type: ignore[misc]
+        raise known[-d]  # type: ignore[misc]
+    here = at(0.0)
     if here is not None and (low is None) != (high is None):  # values to one side
         d = d if low is None else -d
         low, here, high = here, at(d), at(2.0 * d)
     if low is not None and here is not None and high is not None:
         ahead, behind, noise = high - here, here - low, 10.0 * ROUNDING * sizes / abs(d)
         one_sided = known.get(0.0) is low
-        slope = (3.0 * behind - ahead) / (2.0 * d) if one_sided else (ahead + behind) / (2.0 * d)
-        noise, bend = noise * (2.0 if one_sided else 1.0), np.abs(ahead - behind) / abs(d)
-        none = np.abs(slope) <= noise
-        if (bend <= BENT * np.abs(slope) + noise).all() and not (none.any() and stepped(none)[1].any()):
-            return told(np.where(none, 0.0, slope), np.zeros_like(slope))
-    best: tuple[float, Array] | None = None
-    before, kinks = np.zeros_like(sizes), np.zeros_like(sizes)
+        slope = (3.0 * behind - ahead) / (2.0 * d) if one_sided else (ahead + 4.0 * behind) / (6.0 * d)
+        noise, bend = (
+            noise * (2.0 if one_sided else 1.0) / np.sqrt(points),
+            np.abs(ahead * (1.0 if one_sided else 0.5) - behind) / abs(d),
+        )
+        none = (ahead == 0.0) & (behind == 0.0)
+        quiet = enough(noise, slope, QUIET) & enough(bend, slope, BENT) | none
+        if quiet.all() and not (none.any() and stepped(none)[1].any()):
+            return told(
+                slope,
+                np.zeros_like(slope),
+                np.where(none, 0.0, LEFT * noise + bend**2 / (np.abs(slope) + least / scale + TINY)),
+            )
+    before, kinks, bent, kinked = np.zeros_like(sizes), np.zeros_like(sizes), np.zeros_like(sizes), False
+    rounding, last, limit = np.full_like(sizes, np.inf), slope, None
+    tried: list[tuple[Array, Array, float]] = []  # slopes, what truncation leaves of them, and by what rounding is in them
+
+    def best() -> tuple[Array, Array]:
+        """Of the slopes those with the least error each, and the errors."""
+        errors = np.array([off + rounding * part for _, off, part in tried])
+        return tuple(
+            np.take_along_axis(a, errors.argmin(axis=0)[None], 0)[0] for a in (np.array([one for one, *_ in tried]), errors)
+        )  # type: ignore[return-value]
+
     for k in range(TRIES):
         d = STEP * SMALLER**k * scale
         noise = 10.0 * ROUNDING * sizes / d
         found = _stencil(at, d)
         if found is None:
             continue
-        slope, second, jump = found
-        slope = np.where(np.abs(slope) <= noise, 0.0, slope)
-        excess = float(np.max((np.abs(slope - second) - 10.0 * noise) / np.maximum(np.abs(slope), noise + TINY), initial=0.0))
-        if best is None or excess < best[0]:
-            best = (excess, slope)
+        slope, second, jump, scattered = found
+        scattered = np.minimum(scattered, noise * d) + ROUNDING * np.abs(np.nan_to_num(at(0.0)))  # type: ignore[arg-type]
+        passed, bent = (before > 0.0) & (jump < LESS * bent), jump  # a kink beside a, which smaller steps no longer reach
+        for _, beyond, _ in tried:
+            np.copyto(beyond, np.inf, where=passed)
+        rounding = np.where(scattered < LESS * rounding, scattered, np.maximum(scattered, rounding))
+        off = TRUNCATED * np.abs(slope - second)
+        if k == 0 and last is not None:  # of a smaller step
+            off = np.maximum(off, np.abs(slope - last) - rounding * (1.0 / d + 1.0 / (QUICK * scale)))
+        elif last is not None:  # what bends otherwise to either side leaves an error in proportion to the step
+            off = np.where(passed, off, np.maximum(off, SMALLER * np.abs(slope - last)))
+            to = slope + (slope - last) * SMALLER / (1.0 - SMALLER)
+            if limit is not None:
+                tried.append((to, np.where(passed, np.inf, TRUNCATED * np.abs(to - limit)), 2.0 / d))
+            limit = to
+        tried.append((slope, off, 1.0 / d))
+        last = slope
         jump = np.where(jump > KINK * np.abs(slope) + 10.0 * noise, jump, 0.0)
         # What bends falls with the step, a kink stays, and a jump grows.
         kinks = np.where(jump > 0.3 * before, jump, 0.0) if k else jump
         kinks = np.where((jump > 3.0 * before) & (before > 0.0), np.inf, kinks)
-        before = jump
-        if (excess <= SMOOTH and not jump.any()) or np.isinf(kinks).any():
+        before, kinked, (slope, error) = jump, kinked or bool(jump.any()), best()
+        if (enough(error - 2.0 * rounding / d, slope, SMOOTH).all() and not jump.any()) or np.isinf(kinks).any():
             break
-    if best is None:
+    if not tried:
         raise next(one for one in known.values() if isinstance(one, InputError))
-    slope, steps = best[1], np.isinf(kinks)
+    slope, error = best()
+    for step in LARGER if not kinked else ():
+        if enough(error, slope, WANTED).all() or (found := _stencil(at, step * scale)) is None:
+            break
+        off = TRUNCATED * np.abs(found[0] - found[1]) + found[3] / (step * scale)
+        tried.append((found[0], off, 1.0 / (step * scale)))
+        slope, error = best()
+    slope, steps = np.where(np.abs(slope) <= error, 0.0, slope), np.isinf(kinks)
     if steps.any() or not slope.all():
         chord, more = stepped(slope == 0.0)
         steps = steps | more
         slope, kinks = np.where(steps, chord, slope), np.where(steps, np.inf, kinks)
-    return told(slope, kinks)
+    return told(slope, kinks, np.where(steps, 0.0, error))
 
 
 def _chord(at: Callable[[float], Array | None], d: float) -> Array:
@@ -119,16 +176,20 @@ def _chord(at: Callable[[float], Array | None], d: float) -> Array:
     return (high - here) / d if high is not None else (here - low) / d  # type: ignore[operator]
 
 
-def _stencil(at: Callable[[float], Array | None], d: float) -> tuple[Array, Array, Array] | None:
-    """Differences of fourth and of second order with step d, and of both sides; to one side where the other has no values."""
+def _stencil(at: Callable[[float], Array | None], d: float) -> tuple[Array, Array, Array, Array] | None:
+    """Differences of fourth and of second order with step d, and of both sides; and what they scatter by, by rounding
+    and what bends more than these do. To one side where the other has no values."""
     low2, low, here, high, high2 = (at(m * d) for m in (-2, -1, 0, 1, 2))
     if low2 is not None and low is not None and high is not None and high2 is not None and here is not None:
         fourth = (8.0 * (high - low) - (high2 - low2)) / (12.0 * d)
-        return fourth, (high - low) / (2.0 * d), np.abs(high - 2.0 * here + low) / d
+        even, odd = low2 - 4.0 * low + 6.0 * here - 4.0 * high + high2, high2 - 2.0 * high + 2.0 * low - low2
+        scattered = np.minimum(SCATTER * np.abs(even), ODD * np.abs(odd))
+        return fourth, (high - low) / (2.0 * d), np.abs(high - 2.0 * here + low) / d, scattered
     side = 1.0 if high is not None else -1.0
     v: list[Any] = [at(side * m * d) for m in range(5)]
     if any(value is None for value in v):
         return None
     fourth = side * (-25.0 * v[0] + 48.0 * v[1] - 36.0 * v[2] + 16.0 * v[3] - 3.0 * v[4]) / (12.0 * d)
     second = side * (-1.5 * v[0] + 2.0 * v[1] - 0.5 * v[2]) / d
-    return fourth, second, np.abs(4.0 * v[1] - 6.0 * v[2] + 4.0 * v[3] - v[4] - v[0]) / d  # what the others foretell of v_0
+    apart = np.abs(4.0 * v[1] - 6.0 * v[2] + 4.0 * v[3] - v[4] - v[0])  # what the others foretell of v_0
+    return fourth, second, apart / d, 2.0 * apart

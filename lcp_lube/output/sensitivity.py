@@ -40,6 +40,7 @@ def as_dict(gradient: Gradient, solution: Solution) -> dict[str, Any]:
         "units": {key: key_unit(solution.solved_scene, key) for key in gradient.ranked},
         "held": gradient.held,
         "one_sided": gradient.one_sided,
+        "uncertain": gradient.uncertain,
         "switching": {"points": gradient.switching, "gap": gradient.switching_gap},
     }
 
@@ -60,6 +61,7 @@ def text(gradient: Gradient, solution: Solution, values: dict[str, float]) -> st
         differ = f"its derivatives to both sides differ by {gap:.3g}; their mean"
         steps = "changes by steps: the slope over 1 % to both sides, or along the grid's lines"
         lines.append(f"{key}: {steps if np.isinf(gap) else differ}")
+    lines += [f"{key}: its derivative's error is estimated as {error:.2g}" for key, error in gradient.uncertain.items()]
     if gradient.switching:
         lines.append(
             f"{gradient.switching} points are about to change between full and cavitated, or tie for the largest pressure: "

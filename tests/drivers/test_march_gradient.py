@@ -217,6 +217,17 @@ def test_by_the_speed_of_a_texture_the_mean_of_both_sides_is_the_limit_of_differ
     assert errors[0].max() > 1e-5 > errors[1].max()  # a kink is found by differences of L, to some 1e-6
 
 
+def test_lines_of_points_that_are_laid_anew_go_with_the_edges():
+    """A march that has come to rest has the derivatives of the film at rest, whose edges lie on even lines."""
+    changes, keys = {"nx": 59, "ny": 19, "fluid.barus": 0.0}, ["film.pocket.x.1", "L"]
+    rest = load_scene("pocketed_pad_2d", changes)
+    march = load_scene("pocketed_pad_2d", {**changes, "motion": {"t_end": 50.0, "steps": 3}})
+    with solve(rest) as one, solve(march) as two:
+        (steady,), (last,) = (gradients(scene, s, ["load"], keys) for scene, s in ((rest, one), (march, two)))
+    assert last.one_sided == steady.one_sided == dict.fromkeys(keys, np.inf)
+    assert last.gradient == pytest.approx(steady.gradient, rel=1e-6)
+
+
 def test_films_near_by_of_a_march_have_the_lagrangians_of_their_problems():
     """Also where edges that travel cut faces, and with void from one step to the next."""
     film = [{"shape": "constant", "h": 5e-6}, {"shape": "dimples", "moves": True, "depth": 5e-6, "size": 1.7e-3, "columns": 4}]

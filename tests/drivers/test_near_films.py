@@ -28,12 +28,15 @@ SCENES = {
     "thrust": {},
     "hybrid": {"nx": 60, "ny": 13},
     "holes": {},
+    "seam": {},  # a ring whose ends are of different heights
     "rims": {"nx": 30, "ny": 28, "film.dimples.form": "round"},
 }
 HOLES = {"family": "bearing", "dimension": 2, "L": 0.06, "width": 0.04, "U": 1.5, "nx": 48, "ny": 34}
 HOLES |= {"film": [{"shape": "linear", "h_start": 3e-5, "h_end": 2e-5}], "fluid": {"mu": 0.03, "p_supply": 1e4}}
 HOLE = {"shape": "hole", "at": [0.019, 0.021], "diameter": 0.009, "p": 8e5}
 HOLES["supply"] = [HOLE, {"shape": "rectangle", "x": [0.036, 0.047], "y": [0.012, 0.026], "flow": 4e-6}]
+RING = {key: HOLES[key] for key in ("family", "dimension", "L", "width", "U", "nx", "ny", "film", "fluid")}
+RING["sides"] = {"west": {"kind": "periodic"}, "east": {"kind": "periodic"}}
 BASES = {
     "upwind": ("problem4", {"nx": 33, "ny": 20}),
     "fed": ("pocketed_pad_2d", {"nx": 33, "ny": 20}),
@@ -43,6 +46,7 @@ BASES = {
     "thrust": ("tapered_land", {"nx": 30, "ny": 17}),
     "hybrid": ("hybrid_journal", {}),
     "holes": (HOLES, {}),
+    "seam": (RING, {}),
     "rims": ("dimpled_pad", {}),
 }
 
@@ -81,15 +85,16 @@ def test_films_near_by_have_the_lagrangians_of_their_problems(monkeypatch, name)
 
 @pytest.mark.parametrize("name", SCENES)
 def test_the_film_s_own_derivative_is_that_of_its_arrays(monkeypatch, name):
-    scene = made(name)
-    with solve(scene, reduction=False) as solution:
+    scene, names = made(name), ["load", "friction", "friction_torque" if name == "thrust" else "p_max"]
+    with solve(scene) as solution:  # some of them on half of the width
         fields = []
         for least in (1, 10**9):
             monkeypatch.setattr(film_gradient, "SMALL", least)
-            adjoint = Adjoint(scene, solution, ["load"])
-            fields.append(FilmGradient(adjoint).field("load"))
+            adjoint = Adjoint(scene, solution, names)
+            fields.append([FilmGradient(adjoint).field(name) for name in names])
             adjoint.destroy()
-    assert fields[0] == pytest.approx(fields[1], abs=1e-12 * np.abs(fields[1]).max())
+    for field, other in zip(*fields, strict=True):
+        assert field == pytest.approx(other, abs=1e-12 * np.abs(other).max())
 
 
 @pytest.mark.parametrize("name", ["problem4", "upwind", "fed", "dimpled_pad", "turned", "journal", "thrust"])
@@ -136,3 +141,13 @@ def test_a_load_that_nearly_cancels_has_an_adjoint_that_is_as_good(monkeypatch):
         load, carried = solution.numbers["load"], solution.numbers["pressure_integral"]
     assert abs(load) < 0.02 * carried
     assert found[0] == pytest.approx(found[1], rel=5e-6)  # 3e-4 where lambda is as good as of other loads
+
+
+def test_a_fluid_that_grows_thicker_with_pressure_is_told_by_the_adjoint_s_own_equation(monkeypatch):
+    monkeypatch.setattr(near_films, "SMALL", 1)
+    slopes = []
+    with solve(load_scene(RING)) as solution:
+        for slight in (1e-2, -1.0):
+            monkeypatch.setattr(near_films, "SLIGHT", slight)
+            slopes.append(solution.gradient("load", "fluid.barus")["fluid.barus"])
+    assert slopes[0] == pytest.approx(slopes[1], rel=1e-8)

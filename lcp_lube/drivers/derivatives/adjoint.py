@@ -16,6 +16,7 @@ from ...base.parallel import Array
 from ...errors import InputError
 from ...problems.film.edges import jumps_of, oblique
 from ...problems.film.lubrication import LubricationProblem
+from ...problems.grid import Grid
 from ...problems.solution import Solution
 from ...registry import SMALL
 from ...scenes.effects.named import without
@@ -34,6 +35,7 @@ ROUNDED = 1e-8  # of what is small of what was found: a 0 that rounding has move
 FEWER = 2_000  # points from which multigrid solves for an answer that multigrid gave: its loops are loaded
 DIRECT = {"load", "friction", "p_max", "force_x", "force_y"}  # numbers that are mostly made of no others but these
 GUESS = 1e-2  # what a number that is zero, of a unit that the film has no measure of, is changed by parts of
+CYCLED, FINEST = 5e-8, 1e-4  # of a quantity, or that part of what it is made of: what lambda's errors by multigrid make at most
 SUPPLY = "supply.{}.p"  # the key of a supply's pressure, Pa above p_c
 
 
@@ -64,7 +66,7 @@ class Adjoint:
         if self.equations.grid.shape != solution.problem.grid.shape:
             raise InputError(f"{scene.name}: the solution is on another grid than the scene")
         self._least = FEWER if solution.settings.get("method") == "fas" else SMALL
-        self._reduction = solution.settings.get("details", {}).get("reduction")
+        self.reduction = solution.settings.get("details", {}).get("reduction")
         self.found, self.conditions = conditions_of(scene, solution)
         supplies = self.equations.constant.held.supplies if self.equations.constant.held else ()
         free = [k for k, one in enumerate(supplies, start=1) if one.open]
@@ -81,7 +83,7 @@ class Adjoint:
             self.numbers = eq.numbers(p, r)
         parts = {name: eq.partials(self.numbers, name) for name in names}
         self.cavity, switching = cavity_of(eq, p, r)
-        self.switching = int(eq.grid.reduce.sum(switching.astype(float)))
+        self.switching = int(eq.grid.reduce.sum(np.array([np.count_nonzero(switching)])))
         made_of = dict.fromkeys(part for weights in parts.values() for part in weights)
         slopes = {part: drags.get(part) or eq.slope(p, r, part) for part in made_of}
         self.ties = {name: sum(slopes[part].ties for part in weights) for name, weights in parts.items()}
@@ -95,6 +97,12 @@ class Adjoint:
         for of, cavity in sets:  # those with one J together
             sizes = [abs(report[plain(name)]) if plain(name) in quantities else math.inf for name in of]
             self.lambdas |= zip(of, self._solve(list(of.values()), cavity, sizes), strict=True)
+        self._rows = rows | more
+        met, z = {*self.conditions} - {*quantities}, np.abs(unknowns(self.cavity, p, r, eq.constant.p_unit))
+        made = {name: eq.grid.reduce.dot(np.abs(rows[name]), z) for name in (names if self._cycled else met)}
+        self._least_of = {name: made[name] for name in met}
+        off = {name: CYCLED * min(size, max(abs(report[name]), FINEST * size)) for name, size in made.items()}
+        self._off = off if self._cycled else {}
         self.flow_unit = eq.problem(p).scheme.flow_unit
 
     @cached_property
@@ -106,7 +114,7 @@ class Adjoint:
 
     @cached_property
     def near(self) -> NearFilms:
-        return NearFilms(self.equations, self.p, self.r, self.lambdas, self.parts, self.numbers, self.pressures)
+        return NearFilms(self.equations, self.p, self.r, self.lambdas, self.parts, self.numbers, self.pressures, self._rows)
 
     @cached_property
     def _here(self) -> Array:
@@ -124,11 +132,12 @@ class Adjoint:
         if law and free and not law.dowson_higginson:  # J's rows by q are those of a constant fluid
             rows, p, law = [np.where(cavity, 1.0, law.viscosity(p)) * row for row in rows], law.reduced(p), None
         problem = eq.constant if law is None else eq.problem(p)
-        if law is None and free and not eq.turned and self.reported.grid.size > self._least and self._reduction == "mirror":
+        if law is None and free and not eq.turned and self.reported.grid.size > self._least and self.reduction == "mirror":
             linear: Linear | Halved = Halved(problem, cavity, eq.film, least=self._least)
         else:
             entries = None if law is None else eq.tangent(p, self.r).entries(problem.scheme)
             linear = Linear(problem, cavity, entries, eq.held, least=self._least)
+        self._cycled = getattr(linear, "frozen", linear) is not None
         try:
             return linear.solve_transposed(rows, unknowns(cavity, p, self.r, eq.constant.p_unit), sizes)
         finally:
@@ -157,8 +166,8 @@ class Adjoint:
             if eq is not self.equations:
                 eq.destroy()
 
-    def slopes(self, key: str) -> tuple[dict[str, float], dict[str, float]]:
-        """dL/da and the difference between both sides, by quantity and condition. Collective.
+    def slopes(self, key: str) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
+        """dL/da, the difference between both sides, and an estimate of the error, by quantity and condition. Collective.
 
         Raises
         ------
@@ -166,37 +175,43 @@ class Adjoint:
         """
         names = list(self.lambdas)
         value = self.value(key)
-        sizes = np.array([self.sizes[name] for name in names])
-        if key in self._supplies:
-            which, unit = self._supplies.index(key), self.equations.constant.p_unit
+        sizes, points = np.array([self.sizes[name] for name in names]), points_of(self.equations.grid)
+        least = np.array([self._least_of.get(name, 0.0) for name in names])
+        fed = key in self._supplies and key in self.found
+        scale = max(abs(value), 1e-3 * self.equations.constant.p_unit) if fed else self.scale(key)
+        if fed:
+            which = self._supplies.index(key)
 
             def at(P: float) -> Array:
                 pressures = [P if k == which else other for k, other in enumerate(self.pressures)]
                 found = self.near.lagrangians(self.scene, pressures)
                 return self.lagrangians(self.scene, pressures) if found is None else found
 
-            slope, jump = differences(at, value, max(abs(value), 1e-3 * unit), sizes)
+            slope, jump, error = differences(at, value, scale, sizes, False, points, least)
         else:
-            scale = self.scale(key)
             quick, steps = [False], list[float]()
 
             def near(a: float) -> Array:
                 if a == value:
                     return self._near_here if quick[0] else self._here
                 scene = with_values(self.scene, {key: a})
-                if self._laid.anew(scene):
+                if self._laid.anew(scene.model):  # type: ignore[attr-defined]
                     steps.append(a)
                 found = self.near.lagrangians(scene)
                 quick[0] = found is not None
                 return self.lagrangians(scene) if found is None else found
 
-            slope, jump = differences(near, value, scale, sizes, moves_edges(self.scene, key, value + QUICK * scale))
+            wary = moves_edges(self.scene, key, value + QUICK * scale)
+            slope, jump, error = differences(near, value, scale, sizes, wary, points, least)
             jump = np.full_like(jump, np.inf) if any(abs(a - value) <= 2.0 * QUICK * scale for a in steps) else jump
-        return dict(zip(names, slope, strict=True)), dict(zip(names, jump, strict=True))
+        off = np.array([self._off.get(plain(name), 0.0) for name in names])  # a number that changes all by its part
+        error = error + off / scale
+        by_name = (dict(zip(names, map(float, one), strict=True)) for one in (slope, jump, error))
+        return next(by_name), next(by_name), next(by_name)
 
     @cached_property
     def _laid(self) -> Laid:
-        return Laid(self.scene, self.equations.grid.shape)
+        return Laid(self.scene.model, self.equations.grid.shape)  # type: ignore[attr-defined]
 
     @property
     def _supplies(self) -> list[str]:
@@ -219,6 +234,11 @@ class Adjoint:
 
     def destroy(self) -> None:
         self.equations.destroy()
+
+
+def points_of(grid: Grid) -> int:
+    """By whose terms' chance rounding is less; of a line, whose points' places are differences, by no more than one's."""
+    return grid.size if grid.dim == 2 else 1
 
 
 def scale_of(scene: Scene, key: str, problem: LubricationProblem, p: Array, found: bool = False) -> float:

@@ -10,7 +10,7 @@ y' and a, none of them of a solve.
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, cast
 
@@ -21,20 +21,23 @@ from ...base.parallel import Array
 from ...errors import InputError, nearest
 from ...problems.film.forces import PIVOT, totals
 from ...problems.film.grooves import GroovedProblem
+from ...problems.film.model import Model
 from ...problems.film.supplies import Supply, supply_flows
+from ...problems.grid import Places
 from ...problems.solution import Solution
-from ...scenes.scene import Scene
+from ...scenes.scene import Derived, Scene
 from ...scenes.values import values_of, with_values
 from ..ask import Ask
+from ..effects.frozen import Frozen
 from ..effects.loop import Loop
 from ..motions.coefficients import placed
 from ..motions.coupled_response import CoupledResponse
 from ..supplies import Fed
 from ..turned import Mirrored, as_solved
 from .adjoint import GUESS, conditions_of, moves_edges, size_of
+from .equations import followed
 from .laid import Laid
 
-ANEW = "no derivative on this grid: beside this value its lines of points are others, which effects do not follow"
 STEP = 1e-4  # of a number, relative, and of the fields
 LARGER, ROUNDING = 10, 1e-14  # powers of ten by which a step from zero may grow; of a number: a smaller change of it is none
 # Weights of the first derivative by steps of it, of fourth order: central, or to one side where the other has no values.
@@ -47,6 +50,17 @@ MEAN = {1: 1.0, -1: -1.0, 2: -0.25, -2: 0.25}  # and the mean of both, bends tha
 SEEN = 1e-5  # of the equations' derivative: a kink of them that is smaller is not looked at
 FINER = 0.1  # steps so much smaller leave a kink as it is, and make what a jump makes of it larger
 State = tuple[Array, Array, dict[str, float]]  # R, what sources and film disagree by, and the numbers
+
+
+@dataclass(frozen=True)
+class Placed(Derived):
+    """A scene with lines of points where another grid has them."""
+
+    places: Places
+
+    @property
+    def model(self) -> Model:
+        return replace(self.whole.model, places=self.places)
 
 
 class CoupledGradient(CoupledResponse):
@@ -121,12 +135,12 @@ class CoupledGradient(CoupledResponse):
                 H = np.where(inside, (at.p - groove.p) / self.loop.base.p_unit, H)
         loop.answer = at
         R = np.concatenate([H, self.x - loop.vector(loop.made()) if loop.names else self.x])
-        sources = loop.scene.whole.model.supplies if self.free else ()  # type: ignore[attr-defined]
+        sources = loop.scene.whole.model.supplies if self.free else ()  # type: ignore[union-attr]
         taken = supply_flows(film, at.p / film.p_unit, at.r)
         off = [sources[k].misfit(self.supplies[k].p, taken[k])[0] for k in self.free]
         return R, np.array(off)
 
-    def slopes(self, key: str) -> tuple[dict[str, float], dict[str, float]]:
+    def slopes(self, key: str) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
         """dQ/da and the difference between both sides by quantity and condition, what was found held. Collective.
 
         Kinks by the number, and those that the fields come to along y', make a difference to first order: by one more solve,
@@ -137,12 +151,12 @@ class CoupledGradient(CoupledResponse):
         InputError : no scene on either side.
         """
         d = self._step(key, self.value(key))
-        stencil, known = self._around(key, d)
+        stencil, known, anew = self._around(key, d)
         slope, kink = self._total(known, stencil, d)
         least = {name: ROUNDING * abs(value) / d for name, value in self.report.items()}
         out = {name: one if abs(one) > least[name] else 0.0 for name, one in slope.items()}
         if stencil is not CENTRAL:
-            return out, {}
+            return out, dict.fromkeys(out, np.inf) if anew else {}, {}
         jumps = {name: abs(one) for name, one in kink.items() if abs(one) > KINK * abs(out[name]) + 10.0 * least[name]}
         if jumps:
             mean, closer = self._total(self._around(key, FINER * d)[1], MEAN, FINER * d)
@@ -159,24 +173,25 @@ class CoupledGradient(CoupledResponse):
                 values = [one[name] for one in chords]
                 if np.ptp(values) > max(APART * np.abs(values).max(), SLIGHT * abs(self.report[name]) * STEP / d):
                     out[name], jumps[name] = np.nan, np.inf
-        return out, jumps
+        return out, dict.fromkeys(out, np.inf) if anew else jumps, {}
 
     def _chord(self, key: str, width: float) -> dict[str, float]:
         """Mean slopes from so far below to so far above."""
         ends = {m: self._beside(key, self.value(key) + m * width) for m in (-1, 1)}
         return self._total(ends, {-1: -0.5, 1: 0.5}, width)[0]
 
-    def _around(self, key: str, d: float) -> tuple[dict[int, float], dict[int, State]]:
-        """A stencil of scenes that there are, and what they have at the solution's state; that of the scene itself too."""
+    def _around(self, key: str, d: float) -> tuple[dict[int, float], dict[int, State], bool]:
+        """A stencil of scenes that there are, and what they have at the solution's state; that of the scene itself too. And
+        whether the lines of points of some are laid anew."""
         a, known = self.value(key), {0: self._here}
-        laid = Laid(self.scene, self.loop.base.grid.shape)
+        laid = Laid(self.scene.model, self.loop.base.grid.shape)
         for stencil in STENCILS:
             try:
+                beside: list[Any] = [with_values(self.scene, {key: a + m * d}) for m in stencil]
+                anew = any(laid.anew(scene.model) for scene in beside)
                 for m in stencil:
-                    if laid.anew(with_values(self.scene, {key: a + m * d})):
-                        raise InputError(ANEW)
                     known[m] = known.get(m) or self._beside(key, a + m * d)
-                return stencil, known
+                return stencil, known, anew
             except InputError as error:
                 refused = error
         raise refused
@@ -246,7 +261,12 @@ class CoupledGradient(CoupledResponse):
 
     def _beside(self, key: str, value: float) -> State:
         """R, what sources and film disagree by, and the numbers of the scene with another value, at the solution's state."""
-        scene = self._facing(with_values(self.scene, {key: value}))
+        scene, own = self._facing(with_values(self.scene, {key: value})), self.loop.base.grid
+        places = followed(own, self.loop.frozen.constant, Frozen(scene, self.loop.law).constant)
+        if places is None:
+            raise InputError("the film's edges are others beside this value")
+        if any(at is not None for at in places):
+            scene = Placed(scene, places)
         if self.free:
             held = zip(scene.model.supplies, self.supplies, strict=True)
             scene = Fed(scene, tuple(Supply(one.region, known.p) for one, known in held))

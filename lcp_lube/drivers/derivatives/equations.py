@@ -138,7 +138,7 @@ class Equations:
         """`slopes.numbers` as the scene has them; rest : the values of those that are not wanted. Collective."""
         wanted = {FLIPPED.get(name, name) for name in wanted} if wanted is not None and self.turned else wanted
         problem = self.problem(p)
-        found = slopes.numbers(problem, p / problem.p_unit, r, wanted)
+        found = slopes.numbers(problem, p, r, wanted)
         fields = known_fields(problem) if wanted is None or wanted or problem.held else None
         if fields is not None:  # a line's numbers are free of the grid's error (`film.known`)
             if wanted is not None and set(wanted) <= set(weights(problem)):  # integrals of the pressure: no flows, no fronts
@@ -148,7 +148,7 @@ class Equations:
                 told = every | {f"flow_{side}": value for side, value in every["flow"].items()}
                 told |= zip(("force_x", "force_y"), every.get("force", ()), strict=False)
             own = problem if self.law is None else self.problem(fields["p"] * problem.p_unit)
-            discrete = slopes.numbers(own, fields["p"], fields["r"], wanted)
+            discrete = slopes.numbers(own, fields["p"] * own.p_unit, fields["r"], wanted)
             found = {name: value + (told.get(name, discrete[name]) - discrete[name]) for name, value in found.items()}
         if self.turned:
             found = {FLIPPED.get(name, name): -value if name in DRAGS else value for name, value in found.items()}
@@ -158,7 +158,7 @@ class Equations:
         """dQ/dp (p in p_unit) and dQ/dr of one of `numbers` (`slopes.slope`). Collective."""
         name = FLIPPED.get(name, name) if self.turned else name
         tangent = self.tangent(p, r) if "flow_" in name or (self.law and name in DRAGS) else None
-        found = slopes.slope(self.problem(p), tangent, p / self.constant.p_unit, r, name, last)
+        found = slopes.slope(self.problem(p), tangent, p, r, name, last)
         return slopes.Slope(-found.p, -found.r, value=-found.value) if self.turned and name in DRAGS else found
 
     def report(self, numbers: dict[str, float]) -> dict[str, float]:
@@ -289,6 +289,6 @@ def right_side(slopes_of: Mapping[str, slopes.Slope], weights: Mapping[str, floa
     total: Array | None = None
     for part, w in weights.items():
         one = np.multiply(w, slopes_of[part].p)
-        np.multiply(slopes_of[part].r, -w, out=one, where=cavity)
+        np.copyto(one, -w * slopes_of[part].r, where=cavity)
         total = one if total is None else np.add(total, one, out=total)
     return np.zeros(cavity.size) if total is None else total

@@ -59,6 +59,23 @@ class FilmGradient:
         changed = LubricationProblem(eq.grid, slopes, mu=1.0, U=0.0, p_c=0.0, **known)
         return effective(changed, eq.law, self.adjoint.p, eq._p_sides).scheme
 
+    @cached_property
+    def _weighed(self) -> Weighed | None:
+        """Where compiled loops know the film."""
+        adjoint, constant = self.adjoint, self.adjoint.equations.constant
+        known = adjoint.equations.law is None and can(constant, self.model, SMALL)
+        return Weighed(constant, self.model, adjoint.p, adjoint.r) if known else None
+
+    @cached_property
+    def _mirrored(self) -> bool:
+        """Whether the film was solved on half of its width, on one rank."""
+        return getattr(self.adjoint, "reduction", None) == "mirror" and self.problem.grid.comm.size == 1
+
+    def _even(self, a: Array) -> bool:
+        lines = a.reshape(self.problem.grid.box)
+        half = len(lines) // 2
+        return np.array_equal(lines[:half], lines[: -half - 1 : -1])
+
     def field(self, quantity: str) -> Array:
         """dQ/dh at the owned points of the solution's grid, unit of Q per m and m2 (1D: per m and m).
 
@@ -66,7 +83,7 @@ class FilmGradient:
         """
         total: Any = 0.0
         for name, factor in self.implicit.weights(quantity).items():
-            total = total + factor * self.lagrangian(name)
+            total = factor * self.lagrangian(name) + total
         return per_area(total.ravel(), self.adjoint.equations.grid, self.adjoint.reported)
 
     def destroy(self) -> None:
@@ -77,7 +94,7 @@ class FilmGradient:
         adjoint = self.adjoint
         held = adjoint.equations.given
         rows = -adjoint.lambdas[name] if held is None else np.where(held, 0.0, -adjoint.lambdas[name])
-        total: Any = 0.0
+        total: list[Array] = []
         unit = volume_unit(self.problem)
         for part, weight in adjoint.parts[name].items():
             part = FLIPPED.get(part, part) if adjoint.equations.turned else part
@@ -87,17 +104,15 @@ class FilmGradient:
             elif part in DRAGS:
                 polar = self.problem.grid.polar
                 lever = polar[0] + self.problem.grid.y if part == "friction_torque" and polar else 1.0
-                total = total + weight * self._friction(lever) * (-1.0 if adjoint.equations.turned else 1.0)
+                total.append(weight * (-1.0 if adjoint.equations.turned else 1.0) * self._friction(lever))
             elif part.startswith("flow_"):
-                total = total + weight * self._flow(part.removeprefix("flow_"))
-        return total + self._balance(rows)
+                total.append(weight * self._flow(part.removeprefix("flow_")))
+        return sum(total, self._balance(rows))
 
     def _balance(self, rows: Array) -> Array:
         """rows' dG/dh, dealt to the points."""
-        constant = self.adjoint.equations.constant
-        if self.adjoint.equations.law is None and can(constant, self.model, SMALL):
-            weighed, unit = Weighed(constant, self.model.scheme, self.adjoint.p, self.adjoint.r), constant.scheme.flow_unit
-            return weighed.by_film(self.model.gap, rows / unit, constant.mu, constant.U, constant.p_sides)
+        if self._weighed is not None:
+            return self._weighed.by_film(rows, self.problem.scheme.flow_unit, self._mirrored and self._even(rows))
         grid, s, adjoint = self.problem.grid, self.slopes, self.adjoint
         w = rows.reshape(grid.box)
         frame_p, frame_r = (grid.ghosted(a, outside=0.0) for a in (adjoint.p / self.problem.p_unit, adjoint.r))
@@ -139,6 +154,8 @@ class FilmGradient:
 
     def _friction(self, lever: Any) -> Array:
         """Of the friction by the film, fields held."""
+        if self._weighed is not None:
+            return self._weighed.drag_by_film(lever, self._mirrored)
         problem, s = self.problem, self.slopes
         step = STEP * problem.reduce.max(problem.scheme.h)
         moved = {name: getattr(problem.scheme, name) + 1j * step * getattr(s, name) for name in ("b_C", "couette_E", "h")}

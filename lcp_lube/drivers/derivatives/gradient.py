@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from ...base.differences import KINK
 from ...base.parallel import Array
 from ...errors import InputError
 from ...problems.solution import Solution
@@ -36,6 +37,7 @@ from .transposed import CoupledFilm
 
 BY_STEPS = "no derivative on this grid: it changes by steps, whose mean slope is another over other widths"
 STEPWISE = "the lines of points go with the edges of grooves, and their number between two by steps"
+SURE = 1e-6  # of a derivative: an error that is not told
 FOUND = "it was found, and follows the other numbers"
 
 
@@ -52,6 +54,8 @@ class Gradient:
     gradient : dQ/da by key, SI.
     elasticity : d ln Q/d ln a by key; None where Q or a is zero.
     held : numbers without a derivative, and why.
+    error : of dQ/da by key, an estimate: rounding, truncation of differences, and what is left of the film and its adjoint.
+    uncertain : those of them that are more than SURE of the derivative; where it is 0, of the quantity.
     one_sided : by key, how much the derivatives to both sides differ: an edge on a point of the grid, a floor that is touched.
     switching : points at which p and r both vanish, or that tie for the largest pressure; the film answers to a growing and to
         a falling number differently there. switching_gap : the largest relative change of a derivative if they count to the
@@ -62,6 +66,8 @@ class Gradient:
     value: float
     gradient: dict[str, float]
     elasticity: dict[str, float | None]
+    error: dict[str, float] = field(default_factory=dict)
+    uncertain: dict[str, float] = field(default_factory=dict)
     held: dict[str, str] = field(default_factory=dict)
     one_sided: dict[str, float] = field(default_factory=dict)
     switching: int = 0
@@ -198,23 +204,23 @@ def _gradients(
             asked = ["balance.load" if balance and key == "balance.load" else key_of(adjoint.scene, key) for key in keys]
         else:
             asked = [*(["balance.load"] if balance else []), *values_of(adjoint.scene)]
-        slopes, jumps, held = ByKey(), ByKey(), dict[str, str]()
+        slopes, jumps, errors, held = ByKey(), ByKey(), ByKey(), dict[str, str]()
         for key in dict.fromkeys(asked):
             if key in adjoint.found:
                 held[key] = FOUND
             elif key.startswith(_stepwise(scene)):
                 held[key] = STEPWISE
             elif key == "balance.load":
-                slopes[key], jumps[key] = dict.fromkeys(adjoint.lambdas, 0.0), {}
+                slopes[key], jumps[key], errors[key] = dict.fromkeys(adjoint.lambdas, 0.0), {}, {}
             else:
                 try:
-                    slopes[key], jumps[key] = adjoint.slopes(key)
+                    slopes[key], jumps[key], errors[key] = adjoint.slopes(key)
                 except InputError as error:
                     held[key] = str(error)
-        out = [_told(adjoint, quantities, slopes, jumps, held, balance, other=False)]
+        out = [_told(adjoint, quantities, slopes, jumps, errors, held, balance)]
         if any(plain(name) != name for name in adjoint.lambdas):
-            slopes, jumps = ({key: other_side(of) for key, of in one.items()} for one in (slopes, jumps))
-            out.append(_told(adjoint, quantities, slopes, jumps, held, balance, other=True))
+            slopes, jumps, errors = ({key: other_side(of) for key, of in one.items()} for one in (slopes, jumps, errors))
+            out.append(_told(adjoint, quantities, slopes, jumps, errors, held, balance, other=True))
         return out
     finally:
         adjoint.destroy()
@@ -225,6 +231,7 @@ def _told(
     quantities: Sequence[str],
     slopes: ByKey,
     jumps: ByKey,
+    errors: ByKey,
     held: dict[str, str],
     balance: Any,
     other: bool = False,
@@ -236,9 +243,18 @@ def _told(
         value = adjoint.value(name) if name in adjoint.found else report[name]
         found = {key: implicit.total(name, key, slope) for key, slope in slopes.items()}
         none = {key: BY_STEPS for key, slope in found.items() if math.isnan(slope)}
-        found = {key: slope for key, slope in found.items() if key not in none}
+        error = {key: implicit.error(name, key, slopes[key], errors[key]) for key in found if key not in none}
+        found = {key: slope if abs(slope) > error[key] else 0.0 for key, slope in found.items() if key not in none}
         elasticity = {key: slope * of[key] / value if value and of[key] else None for key, slope in found.items()}
-        sides = {key: jump[name] for key, jump in jumps.items() if jump.get(name) and key in found}
+        uncertain = {key: one for key, one in error.items() if one > _least_told(found[key], value, of[key])}
+        sides = {key: implicit.jump(name, jumps[key]) for key in found}
+        sides = {key: jump for key, jump in sides.items() if jump > KINK * abs(found[key])}
         switching = adjoint.switching + adjoint.ties.get(name, 0)
-        out.append(Gradient(name, value, found, elasticity, held | none, sides, switching))
+        out.append(Gradient(name, value, found, elasticity, error, uncertain, held | none, sides, switching))
     return out
+
+
+def _least_told(slope: float, value: float, a: float) -> float:
+    """The error of dQ/da from which on it is told: its SURE, but for elasticities that are nearly 0; Q's where it is 0."""
+    size = abs(value / a) if a else 0.0 if slope else math.inf
+    return SURE * max(abs(slope), (SURE if slope else 1.0) * size)

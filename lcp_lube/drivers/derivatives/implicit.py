@@ -6,7 +6,7 @@ Where v was found such that C = 0 holds (an attitude, the eccentricity or level 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -31,12 +31,13 @@ class Implicit:
     conditions: list[str]
     inverse: Array
     by_found: dict[str, Array]  # L_v
+    errors: dict[str, Array] = field(default_factory=dict)  # of L_v, and of C_v
 
     @classmethod
     def of(cls, adjoint: Any, other: bool = False) -> "Implicit":
         """other : of `other_side`. Raises InputError where the conditions do not depend on what was found."""
-        slopes = [adjoint.slopes(key)[0] for key in adjoint.found]
-        slopes = [other_side(one) for one in slopes] if other else slopes
+        both = [adjoint.slopes(key) for key in adjoint.found]
+        slopes, errors = ([other_side(one[k]) if other else one[k] for one in both] for k in (0, 2))
         conditions = list(adjoint.conditions)
         C_v = np.array([[one[name] for one in slopes] for name in conditions]).reshape(len(conditions), len(slopes))
         C_v += np.diag(~C_v.any(axis=0) & ~C_v.any(axis=1))  # pads that idle keep their tilts: any will do
@@ -44,8 +45,9 @@ class Implicit:
             inverse = np.linalg.inv(C_v)
         except np.linalg.LinAlgError:
             raise InputError(f"{', '.join(conditions)} do not depend on {', '.join(adjoint.found)}: no derivatives") from None
-        by_found = {name: np.array([one[name] for one in slopes]) for name in map(plain, adjoint.lambdas)}
-        return cls(adjoint.found, conditions, inverse, by_found)
+        names = list(map(plain, adjoint.lambdas))
+        by_found, off = ({name: np.array([one.get(name, 0.0) for one in of]) for name in names} for of in (slopes, errors))
+        return cls(adjoint.found, conditions, inverse, by_found, off)
 
     def weights(self, quantity: str) -> dict[str, float]:
         """Of the derivatives of each L by something, in what the quantity changes by where v follows."""
@@ -62,12 +64,27 @@ class Implicit:
         """dQ/da from the derivatives of every L by a."""
         if not self.found:
             return slope[quantity]
-        C_a = np.array([slope[name] - float(key == "balance.load" and name == "load") for name in self.conditions])
-        change = -self.inverse @ C_a
+        change = self._change(key, slope)
         if quantity in self.found:
             return float(change[self.found.index(quantity)])
-        parts = [slope[quantity], *(self.by_found[quantity] * change)]
-        return _sum(parts)
+        return _sum([slope[quantity], *(self.by_found[quantity] * change)])
+
+    def error(self, quantity: str, key: str, slope: dict[str, float], error: dict[str, float]) -> float:
+        """Of `total`, from the errors of all derivatives of L; none where they are not known."""
+        if not self.found:
+            return error.get(quantity, 0.0)
+        size = np.abs(self._change(key, slope))
+        of = {name: error.get(name, 0.0) + float(self.errors[name] @ size) for name in self.errors}
+        return sum(abs(w) * of[name] for name, w in self.weights(quantity).items())
+
+    def jump(self, quantity: str, jump: dict[str, float]) -> float:
+        """By how much derivatives to both sides differ at most, from what those of every L do."""
+        return sum(abs(w) * jump[name] for name, w in self.weights(quantity).items() if w and jump.get(name))
+
+    def _change(self, key: str, slope: dict[str, float]) -> Array:
+        """Of what was found."""
+        C_a = np.array([slope[name] - float(key == "balance.load" and name == "load") for name in self.conditions])
+        return -self.inverse @ C_a
 
 
 def _sum(parts: Sequence[float]) -> float:

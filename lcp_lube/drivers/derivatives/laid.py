@@ -8,6 +8,7 @@ import numpy as np
 
 from ...base.parallel import Array
 from ...errors import InputError
+from ...problems.film.model import Model
 from ...problems.grid import some_places
 from .equations import knots
 
@@ -16,10 +17,10 @@ PARTED = "no derivative on this grid: edges that share a line of points part"
 
 
 class Laid:
-    """A scene's lines of points on a grid of this shape, which are looked for once."""
+    """A film's lines of points on a grid of this shape, which are looked for once."""
 
-    def __init__(self, scene: Any, shape: Sequence[int]):
-        self.model, self.shape = scene.model, tuple(shape)
+    def __init__(self, model: Model, shape: Sequence[int]):
+        self.model, self.shape = model, tuple(shape)
 
     @cached_property
     def _edges(self) -> Any:
@@ -31,19 +32,19 @@ class Laid:
         ends = [knots(self.model, k, kinds[0] == "periodic") for k, (_, kinds, _) in enumerate(self._edges)]
         return list(zip(self.model.lines(self.shape), ends, strict=False))
 
-    def anew(self, near: Any) -> bool:
-        """Whether lines do not go with the edges to a scene near by, but are others between them.
+    def anew(self, other: Model) -> bool:
+        """Whether lines do not go with the edges to a film near by, but are others between them.
 
         Raises
         ------
         InputError : edges came or went.
         """
-        other = near.model
         edges = other.edges
         if self._edges == edges:
             return False
-        for k, (n, (here, before), there) in enumerate(zip(self.shape, self._own, other.lines(self.shape), strict=False)):
-            if here is None and there is None:
+        lines = other.lines(self.shape, [own != one for own, one in zip(self._edges, edges, strict=True)])
+        for k, (n, (here, before), there) in enumerate(zip(self.shape, self._own, lines, strict=False)):
+            if self._edges[k] == edges[k] or (here is None and there is None):
                 continue
             (L, kinds, _), (length, *_) = self._edges[k], edges[k]
             at, to = (some_places(n, a, kinds, n) if lines is None else lines for a, lines in ((L, here), (length, there)))

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from ...base.differences import differences
+from ...base.differences import QUICK, differences
 from ...base.parallel import Array
 from ...errors import InputError
 from ...problems.film.edges import oblique
@@ -32,8 +32,9 @@ from ..ask import Ask
 from ..compose import solve
 from ..marches.march_course import Course, Trace, check_march
 from ..motions.linearised import Linear
-from .adjoint import scale_of
+from .adjoint import points_of, scale_of
 from .equations import MISFIT, Equations, cavity_of, right_side, unknowns
+from .laid import Laid
 from .march_films import MarchFilms
 
 MEAN = "mean_"  # of a quantity: its mean over the march, of the steps' ends
@@ -237,6 +238,10 @@ class MarchGradient:
         return MarchFilms(self.course, self.lambdas, self.units) if MarchFilms.can(self.course) else None
 
     @cached_property
+    def _laid(self) -> Laid:
+        return Laid(self.course.alone, self.course.grid.shape)
+
+    @cached_property
     def speeds(self) -> list[Array]:
         """Of what is free at the end of each step, the first at t = 0, clearances per second; of a level m/s."""
         course = self.course
@@ -249,8 +254,8 @@ class MarchGradient:
     def value(self, key: str) -> float:
         return values_of(self.scene)[key]
 
-    def slopes(self, key: str) -> tuple[dict[str, float], dict[str, float]]:
-        """dQ/da and the difference between both sides, by quantity. Collective.
+    def slopes(self, key: str) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
+        """dQ/da, the difference between both sides, and an estimate of the error, by quantity. Collective.
 
         Raises
         ------
@@ -258,13 +263,15 @@ class MarchGradient:
         """
         if key.removeprefix("motion.") in HELD:
             raise InputError(STEPS)
-        value, last = self.value(key), self.trace.steps[-1]
+        value, last, steps = self.value(key), self.trace.steps[-1], list[float]()
 
         def at(a: float) -> Array:
             if a == value:
                 return self._here
             course = Course(with_values(self.scene, {key: a}), self.trace, self.comm, self.course)
             try:
+                if self._laid.anew(course.alone):
+                    steps.append(a)
                 if course.grid.shape != self.course.grid.shape:
                     raise InputError("the grid has another number of points")
                 return self.lagrangians(course)
@@ -276,11 +283,11 @@ class MarchGradient:
             eq = self.course.at(len(self.trace.steps))
             scale = scale_of(self.scene, key, eq.constant, last.p)
             eq.destroy()
-        found = differences(
-            at, value, scale, np.array([self.sizes[name] for name in self.names]), bool(oblique(self.course.first.gap))
-        )
-        slope, jump = (dict(zip(self.names, map(float, one), strict=True)) for one in found)
-        return slope, jump
+        sizes = np.array([self.sizes[name] for name in self.names])
+        found = differences(at, value, scale, sizes, bool(oblique(self.course.first.gap)), points_of(self.course.grid))
+        slope, jump, error = (dict(zip(self.names, map(float, one), strict=True)) for one in found)
+        anew = any(abs(a - value) <= 2.0 * QUICK * scale for a in steps)
+        return slope, dict.fromkeys(jump, np.inf) if anew else jump, error
 
     def destroy(self) -> None:
         self.course.destroy()

@@ -9,6 +9,7 @@ from collections.abc import Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import fields, replace
 from functools import cached_property
+from math import factorial
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,7 @@ OTHER = "'"  # after a quantity: with the points that are about to change, or th
 FLOWS = [f"flow_{side}" for side in SIDES]
 FREE = {"gap", "mu", "U", "p_unit", "p_c", "sides", "exact", "extras", "shaft", "levers", "law"}  # what may differ
 FREE |= {"lengths", "polar", "places"}  # where its lines of points lie
+SLIGHT, POWERS = 1e-2, 6  # of b p; as many terms leave 1e-17 of it
 
 
 class NearFilms:
@@ -45,7 +47,7 @@ class NearFilms:
     Parameters
     ----------
     p : Pa above p_c, r : of the solution. lambdas : by quantity. parts : what each is made of. numbers : of the solution.
-    pressures : of its supplies, if any, Pa above p_c.
+    pressures : of its supplies, if any, Pa above p_c. asked : J' lambda.
     """
 
     def __init__(
@@ -57,10 +59,12 @@ class NearFilms:
         parts: Mapping[str, Collection[str]],
         numbers: dict[str, float],
         pressures: Sequence[float] = (),
+        asked: Mapping[str, Array] | None = None,
     ):
         self.equations, self.model, self.p, self.r = equations, equations.model, p, r
         self.lambdas, self.numbers = lambdas, numbers
         self._columns: dict[bytes, Array] = {}
+        self._asked = asked or {}
         self.wanted = {part for one in parts.values() for part in one}
         self.drags = tuple(name for name in DRAGS if name in self.wanted)
         self.flows = tuple(name for name in FLOWS if name in self.wanted)
@@ -157,11 +161,39 @@ class NearFilms:
             shares = self._within(grid, Held(model.supplies, owner))
             return None if shares is None else self._by_faces(law, p_sides, shares).sums(gap, grid)
         at_sides = law.dowson_higginson or (law.barus and self.drags)  # whether what faces there count depends on the pressure
+        same_film = grid is self.equations.grid and same(gap, self.model.gap)
+        if same_film and self._slight(law):
+            return self._thickened(law.barus)
         if law != self._law or (at_sides and p_sides != self.equations._p_sides):
             return self._by_faces(law, p_sides).sums(gap, grid)
-        if grid is self.equations.grid and same(gap, self.model.gap):
-            return self._here
-        return self._own.sums(gap, grid)
+        return self._here if same_film else self._own.sums(gap, grid)
+
+    def _slight(self, law: Law) -> bool:
+        """Whether a law makes a fluid of constant viscosity so little thicker that the first powers of b p tell its q."""
+        own, eq = self._law == Law() != law and not law.dowson_higginson, self.equations
+        own = (
+            own and not self.drags and not self.flows and eq.constant.held is None and self._asked.keys() == self.lambdas.keys()
+        )
+        return own and abs(law.barus) * eq.grid.reduce.largest(self.p) <= SLIGHT
+
+    @cached_property
+    def _powers(self) -> Array:
+        """The sums of J' lambda times p^2, p^3, ... at the points, of every lambda."""
+        found, power, dot = [], self.p, self.equations.grid.reduce.dot
+        for _ in range(POWERS):
+            power = power * self.p
+            found.append([dot(row, power) for row in self._asked.values()])
+        return np.array(found)
+
+    def _thickened(self, b: float) -> Array | None:
+        """`_here` with q = p - b p^2/2 + b^2 p^3/6 - ... : what lambda' G grows by with a point's q is J' lambda there."""
+        problem, known = self.equations.constant, self._here
+        if known is None:
+            return None
+        terms = [(-b) ** k / factorial(k + 1) * sums for k, sums in enumerate(self._powers, start=1)]
+        out = np.array(known)
+        out[: len(self.lambdas), 0] += problem.mu * problem.scheme.flow_unit / problem.p_unit * sum(terms)
+        return out
 
     @staticmethod
     def _within(grid: Grid, held: Held) -> Array | None:

@@ -86,7 +86,7 @@ class CoupledFilm:
             self._by_field(place)
         for k, value in enumerate(self.tape.known):
             (self._by_field if np.ndim(value) else self._by_sum)(("tape", k))
-        tops = slope(loop.base, None, gradient.p, gradient.r, "p_max").p
+        tops = slope(loop.base, None, gradient.p * loop.base.p_unit, gradient.r, "p_max").p
         if "p_max" in self.names:  # not of the tape: it is that of a parabola through five points
             self.numbers["p_max"] = {0: np.where(gradient.cavity, 0.0, tops)}
 

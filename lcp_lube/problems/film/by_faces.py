@@ -15,38 +15,28 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...base.parallel import Array
 from ..grid import Grid
 from ..strips import STRIP, ghosted, in_strips
-from .edges import Around, face_film, jumps_of, level, pairs
+from .edges import Around, level, pairs
 from .effects import framed_by
-from .flows import SIDES, line_shares, linear, sheared_lines
+from .face_lines import FaceLines, Rows, line_factors
+from .flows import SIDES, line_shares
 from .fluid import Law
 from .lubrication import LubricationProblem
 from .reynolds import sides
 from .rims import dry_of, made_along
-from .strip import line_weights, stream_weights
+from .strip import line_weights
 
-EQUAL = 1e-15  # relative: ratios that differ by rounding alone
-NEAR = 1e-6  # of a cell: an edge so near it counts as inside
-Rows = NDArray[np.int64]
+EQUAL = 1e-12  # relative: widths of lines of one run, from places that are rounded
 
 
 @dataclass(frozen=True)
-class Laid:
-    """Places of a grid's lines and of the faces between them, and the sums' parts of those that are alike."""
+class Laid(FaceLines):
+    """With the sums' parts of those that are alike."""
 
-    grid: Grid
-    x_places: tuple[Array, Array]
-    y_places: tuple[Array, Array]
-    steps: Array
     widths: Array
-    y: Array
-    across: Array
-    lines: Rows
-    faces: Rows
     ends: Array
     of_lines: list[Any]
     of_faces: Any
@@ -75,16 +65,17 @@ class ByFaces:
         self.grid = grid = problem.grid
         (ny, nx), self.count = grid.box, len(rows)
         at_face, before = scheme != "upwind", scheme != "face"  # where the wall's film is taken, and where the void's
-        along, wall, void = (np.zeros((self.count, ny, nx + 1)) for _ in range(3))
-        across, w = np.zeros((self.count, ny + 1, nx)), [row.reshape(grid.box) for row in rows]
-        void = wall if at_face != before else void
+        along, wall = (np.empty((self.count, ny, nx + 1)) for _ in range(2))
+        across, w = np.empty((self.count, ny + 1, nx)), [np.ascontiguousarray(row.reshape(grid.box)) for row in rows]
+        void = wall if at_face != before else np.empty_like(wall)
         enters = problem.r_in if grid.ends[0][0] == "open" else 0.0
         frames = ghosted(grid, q, 0.0), ghosted(grid, r, enters)
         for lines in in_strips(grid):
             faces = slice(lines.start, lines.stop + 1)
             near_p, near_r = (frame(lines) for frame in frames)
             for k in range(self.count):
-                loop_by_faces(w[k][lines], near_p, near_r, along[k, lines], across[k, faces], wall[k, lines], void[k, lines])
+                of_void = None if void is wall else void[k, lines]
+                loop_by_faces(w[k], lines.start, near_p, near_r, along[k, lines], across[k, faces], wall[k, lines], of_void)
         for end, owned in ((0, grid.y_start == 0), (-1, grid.y_end == grid.shape[1])):
             if owned and grid.ends[1][end] in ("closed", "mirror"):
                 across[:, end] = 0.0
@@ -130,15 +121,16 @@ class ByFaces:
         (weights, 6); None for a film that is not positive. Of drags what the pressures (N) and mu U (m) make, of flows
         twice what leaves per mean spacing in y. grid : the problem's, or the same points elsewhere."""
         film = Around(gap, grid)
-        cut = [jumps_of(film, axis) for axis in "xy"]
+        cut = [film.edges(side) for side in range(2)]
         first = self.count + len(self.drags)
         out, positive = np.zeros((first + len(self.flows), 6)), True
         balances, at = out[: self.count], self._laid(grid, level(film), tuple(cut[1]))
         for some, rows in _strips(at.lines, grid.box[1]):
-            C, H, before = _along(film, at, at.y[rows], at.across[:, rows], cut)
+            C, H, before = at.along(film, rows, cut)
             if self._dry is not None:
                 C, H = np.array(C), np.array(H)
-                made_along(film, at.x_places[0], at.y[rows], self._dry[1:-1][rows], (C, H), film.period(0))
+                widths = 0.5 * at.across[:, rows].sum(axis=0)
+                made_along(film, at.x_places[0], at.y[rows], widths, self._dry[1:-1][rows], (C, H), film.period(0))
             positive = positive and all(bool((a > 0.0).all()) for a in (C, H, before))
             if self.drags and positive:
                 films = self._sheared(film, at, rows, before / H)
@@ -154,11 +146,12 @@ class ByFaces:
                 outer = np.array([a[:, end] for a in (C, wall, void) for end in (0, -1)])
                 out[first:, :4] += np.einsum("fkal,al->fk", at.of_flows[:, :, :, some], outer)
         for some, rows in _strips(at.faces, grid.box[1]):
-            C = np.array(_across(film, at, pairs(at.y_places[0])[:, rows], at.y_places[1][rows], cut))
+            C = np.array(at.over(film, rows, cut))
             if self._dry is not None:
                 ends = slice(rows[0], rows[-1] + 2)
                 dry = self._dry[ends, 1:-1].T
-                made_along(film, at.y_places[0][ends], at.x_places[0][1:-1], dry, (C.T,), film.period(1), across=True)
+                widths = 0.5 * pairs(at.steps).sum(axis=0)
+                made_along(film, at.y_places[0][ends], at.x_places[0][1:-1], widths, dry, (C.T,), film.period(1), across=True)
             C *= at.widths
             positive = positive and bool((C > 0.0).all())
             balances[:, 0] += _total(at.of_faces, some, C)
@@ -175,23 +168,17 @@ class ByFaces:
         key = level, cut
         if grid is self.grid and key in self._own:
             return self._own[key]
-        y_nodes, y_faces = grid.nodes_and_faces(1)
-        y, across = grid.y[:, 0], pairs(grid.steps(1))
-        lines, faces = np.arange(y.size), np.arange(y_faces.size)
-        if level:
-            lines = _alike(cut, y - 0.5 * across[0], y + 0.5 * across[1])
-            faces = _alike(cut, *pairs(y_nodes))
-        # What conductances have of the lines, and of the faces between them; and what the wall drags.
-        ends = grid.spacing[0] * grid.stretch(y_faces) / (6.0 * grid.steps(1) * grid.spacing[1])
-        pressed, dragged = (line_weights(grid) / grid.stretch(grid.y) / 6.0)[:, 0], stream_weights(grid)[:, 0]
+        places = FaceLines.of(grid, level, cut)
+        lines, faces = places.lines, places.faces
+        pressed, ends, dragged = line_factors(grid)
         of_lines = [(self._along, pressed), (self._at_face, dragged), (self._before, dragged)]
         of_lines += [(one, pressed) for one in self._beside]
         found = Laid(
-            grid, grid.nodes_and_faces(0), (y_nodes, y_faces), grid.steps(0), grid.widths(0), y, across, lines, faces, ends,
-            [None if a is None else self._added(a, b, lines) for a, b in of_lines],
-            self._added(self._across, ends, faces),
-            self._drag_parts(grid, lines) if self.drags else [],
-            self._flow_parts(grid, lines, pressed, dragged) if self.flows else np.zeros(0),
+            **vars(places), widths=grid.widths(0), ends=ends,
+            of_lines=[None if a is None else self._added(a, b, lines) for a, b in of_lines],
+            of_faces=self._added(self._across, ends, faces),
+            of_drags=self._drag_parts(grid, lines) if self.drags else [],
+            of_flows=self._flow_parts(grid, lines, pressed, dragged) if self.flows else np.zeros(0),
         )  # fmt: skip
         if grid is self.grid:
             self._own[key] = found
@@ -222,35 +209,24 @@ class ByFaces:
 
     def _sheared(self, film: Around, at: Laid, rows: Rows, void: Array) -> list[Array]:
         """By what `_drag_parts` count on the x faces of some lines. void : the film of the void, in parts of the wall's."""
-        places, steps = at.grid.x[0], at.steps
-        x = np.append(places[0] - steps[0] / 2, places + steps[1:] / 2)[None]
-        h, *lengths = sheared_lines(film, x, at.y[rows][:, None], at.across[:, rows])
         void = void if self._nodal else np.ones(1)
-        resting, moving = linear(np.where, 1.0 + void * self._void[0][rows], *lengths)  # lines that are added up have one pair
-        pull, full = 0.5 * h, steps / moving
-        return [pull, steps * resting + full, full * void, pull[:, :1], pull[:, -1:]]
+        h, resting, moving = at.sheared(film, rows, 1.0 + void * self._void[0][rows])
+        pull, full = 0.5 * h, at.steps / moving
+        return [pull, at.steps * resting + full, full * void, pull[:, :1], pull[:, -1:]]
 
     def _added(self, a: Array, weights: Array, first: Rows) -> tuple[Array, Array]:
-        """Runs of rows added up with their weights, shape (weights, runs, columns), which are kept, and what is left of the
-        weights: the same for all where lines have only moved apart. Rows that are all apart stay as they are."""
+        """Runs of rows added up with their weights, shape (weights, runs, columns), which are kept, and by what each run's
+        weights are others, where its lines have only moved apart. Rows that are all apart stay as they are."""
         if first.size == weights.size:
             return a, weights
         added, of = self._known.get((id(a), first.tobytes()), (a, np.nan * weights))
-        ratio = weights / of
-        if not np.ptp(ratio) <= EQUAL * ratio[0]:
-            runs, ratio = [slice(*ends) for ends in pairs(np.append(first, weights.size)).T], np.ones(1)
+        ends = np.append(first, weights.size)
+        ratio = np.add.reduceat(weights, first) / np.add.reduceat(of, first)
+        if not (np.abs(weights - of * np.repeat(ratio, np.diff(ends))) <= EQUAL * np.abs(weights)).all():
+            runs, ratio = [slice(*one) for one in pairs(ends).T], np.ones(first.size)
             added = np.array([[np.einsum("j,ji->i", weights[run], one[run]) for run in runs] for one in a])
             self._known[id(a), first.tobytes()] = added, weights
-        return added, np.full(first.size, ratio[0])
-
-
-def _alike(jumps: Sequence[float], low: Array, high: Array) -> Rows:
-    """The first of each run of intervals with no jump in or between them."""
-    places, slack = np.unique(np.asarray(jumps, dtype=float)), NEAR * np.abs(high - low)
-    below = np.searchsorted(places, low - slack)
-    alone = (np.searchsorted(places, high + slack) > below) | (high <= low)
-    new = np.append(True, alone[1:] | alone[:-1] | (below[1:] != below[:-1]))
-    return np.flatnonzero(new)
+        return added, ratio
 
 
 def _strips(rows: Rows, columns: int) -> Iterator[tuple[slice, Rows]]:
@@ -262,26 +238,3 @@ def _strips(rows: Rows, columns: int) -> Iterator[tuple[slice, Rows]]:
 def _total(part: tuple[Array, Array], some: slice, films: Array) -> Array:
     a, weights = part
     return np.array([weights[some] @ np.einsum("ji,ji->j", one[some], films) for one in a])
-
-
-def _along(film: Around, at: Laid, y: Array, across: Array, cut: Sequence[Any]) -> tuple[Array, Array, Array]:
-    """C and H of the x faces of some lines, and the film at the points before them (`strip.coefficients_of`)."""
-    (nodes, faces), grid = at.x_places, at.grid
-    shape = y.size, faces.size
-    before = np.broadcast_to(film(nodes[None, :-1], y[:, None]), shape)
-    if cut[0] or cut[1]:
-        period = grid.lengths[0] if grid.periodic[0] else 0.0
-        return *face_film(film, pairs(nodes), faces, y, cut[0], cut[1], across, period), before
-    h = np.broadcast_to(film(faces[None, :], y[:, None]), shape)
-    return h * h * h, h, before
-
-
-def _across(film: Around, at: Laid, nodes: Array, faces: Array, cut: Sequence[Any]) -> Array:
-    """C of some lines of y faces."""
-    x, grid = at.x_places[0][1:-1], at.grid
-    if cut[0] or cut[1]:
-        period = grid.lengths[1] if grid.periodic[1] else 0.0
-        turned = face_film(lambda t, s: film(s, t), nodes, faces, x, cut[1], cut[0], pairs(at.steps), period)
-        return turned[0].T
-    h = np.broadcast_to(film(x[None, :], faces[:, None]), (faces.size, x.size))
-    return np.asarray(h * h * h)

@@ -15,14 +15,14 @@ from ...base.parallel import Array
 from ...registry import SMALL
 from .cavity import cavity_sign
 from .effects import around
-from .flows import SIDES, drag_sum, friction, linear, point_weights, runs, sheared_faces, side_flows, volume_unit
-from .forces import totals, weights
+from .flows import SIDES, drag_sum, friction, linear, runs, sheared_faces, side_flows, volume_unit
+from .forces import open_pressures, totals, weights
 from .grooves import GroovedProblem
 from .lubrication import LubricationProblem
 from .peak import Window
 from .quantities import largest_of, largest_pressure, thinnest
 from .reynolds import sides
-from .strip import line_weights
+from .strip import line_weights, stream_weights
 from .supplies import supply_flows
 from .tangent import Tangent
 
@@ -31,25 +31,25 @@ TIE = 1e-9  # relative: pressures so near the largest one are as large
 
 @dataclass(frozen=True)
 class Slope:
-    """dQ/dp, p in p_unit, and dQ/dr of a number at the owned points. ties : points that could as well have it. value : the
-    number itself, where one pass has both, else NaN."""
+    """dQ/dp, p in p_unit, and dQ/dr (0: at all) of a number at the owned points. ties : points that could as well have it.
+    value : the number itself, where one pass has both, else NaN."""
 
     p: Array
-    r: Array
+    r: Array | float
     ties: int = 0
     value: float = np.nan
 
 
-def numbers(problem: LubricationProblem, p: Array, r: Array, wanted: Collection[str] | None = None) -> dict[str, float]:
+def numbers(problem: LubricationProblem, p_pa: Array, r: Array, wanted: Collection[str] | None = None) -> dict[str, float]:
     """The numbers that have slopes, SI units; vectors by their parts, force_x, flow_west. Collective.
 
-    wanted : the others that take time, what is an integral, flows and the largest pressure, are NaN; None: all.
+    p_pa : Pa above p_c. wanted : the others that take time, what is an integral, flows and the largest pressure, are NaN;
+        None: all.
     """
 
     def asked(start: str) -> bool:
         return wanted is None or any(name.startswith(start) for name in wanted)
 
-    p_pa = p * problem.p_unit
     out = totals(problem, p_pa, wanted=wanted)
     out["friction"] = friction(problem, p_pa, r) if asked("friction") else np.nan
     if problem.grid.polar is not None:
@@ -58,9 +58,11 @@ def numbers(problem: LubricationProblem, p: Array, r: Array, wanted: Collection[
     out["p_max"] = largest_pressure(problem, p_pa)[0] + problem.p_c if asked("p_max") else np.nan
     out["min_h"] = thinnest(problem)[0] if asked("min_h") else np.nan
     kinds = [kind for pair in problem.grid.ends for kind in pair]
+    grooved = isinstance(problem, GroovedProblem) and asked("groove_flow")
+    p = p_pa / problem.p_unit if asked("flow_") or grooved or problem.held is not None else p_pa
     flows = side_flows(problem, p, r) if asked("flow_") else dict.fromkeys(SIDES, np.nan)
     out |= {f"flow_{name}": flows[name] for name, kind in zip(SIDES, kinds, strict=False) if kind == "open"}
-    if isinstance(problem, GroovedProblem) and asked("groove_flow"):
+    if isinstance(problem, GroovedProblem) and grooved:
         out |= {f"groove_flow_{k}": flow for k, flow in enumerate(problem.groove_flows(p, r), start=1)}
     out |= {f"supply_flow_{k}": flow for k, flow in enumerate(supply_flows(problem, p, r), start=1)}
     return out
@@ -75,7 +77,7 @@ def giving_points(problem: LubricationProblem, name: str) -> NDArray[np.bool_]:
     return (problem.held.owner == which - 1).ravel()
 
 
-def slope(problem: LubricationProblem, tangent: Tangent | None, p: Array, r: Array, name: str, last: bool = False) -> Slope:
+def slope(problem: LubricationProblem, tangent: Tangent | None, p_pa: Array, r: Array, name: str, last: bool = False) -> Slope:
     """dQ/dp and dQ/dr of one of `numbers`. Collective.
 
     Parameters
@@ -86,15 +88,15 @@ def slope(problem: LubricationProblem, tangent: Tangent | None, p: Array, r: Arr
     """
     if (weight := weights(problem).get(name)) is not None:
         grid = problem.grid
-        w = np.broadcast_to(weight(grid.x, grid.y), grid.box).ravel() * point_weights(grid)
-        return Slope(w * grid.cell * problem.p_unit, np.zeros(w.size))
+        lines = grid.cell * problem.p_unit * stream_weights(grid)
+        return Slope(np.broadcast_to(weight(grid.x, grid.y) * grid.widths(0) * lines, grid.box).ravel(), 0.0)
     if name == "p_max":
-        return _largest(problem, p, last)
+        return _largest(problem, p_pa / problem.p_unit, last)
     if name == "min_h":
-        return Slope(np.zeros(p.size), np.zeros(p.size))
+        return Slope(np.zeros(p_pa.size), 0.0)
     if name in ("friction", "friction_torque"):
         lever = problem.grid.polar[0] + problem.grid.y if name == "friction_torque" and problem.grid.polar else 1.0
-        return _friction(problem, tangent, p, r, lever)
+        return _friction(problem, tangent, p_pa / problem.p_unit, r, lever)
     assert tangent is not None  # as flows need it
     if name.startswith("flow_"):
         return _flow(problem, tangent, name.removeprefix("flow_"))
@@ -160,8 +162,8 @@ def _largest(problem: LubricationProblem, p: Array, last: bool) -> Slope:
         assert place is not None  # a solution's pressures are numbers
         window = Window(grid, p, place, p_sides, problem.scheme.held)
         by_p, largest = window.slopes(p.size), window.top()[0]
-    at_side = max((q for q in p_sides if q), default=0.0) > largest
-    return Slope(by_p * (0.0 if at_side else problem.p_unit), np.zeros(p.size), 0 if at_side else ties)
+    at_side = max((q / problem.p_unit for q in open_pressures(problem) if q), default=0.0) > largest
+    return Slope(by_p * (0.0 if at_side else problem.p_unit), 0.0, 0 if at_side else ties)
 
 
 def _flow(problem: LubricationProblem, tangent: Tangent, side: str) -> Slope:

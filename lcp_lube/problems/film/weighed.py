@@ -1,23 +1,22 @@
 """What sums of a film's balances times weights change by with the film everywhere, strip by strip: no coefficient is kept."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from ...base.compiled import has_numba
 from ...base.parallel import Array
-from ..grid import Grid
 from ..strips import MANY, ghosted, in_strips, places_of
-from .edges import Around, jumps_of
+from .edges import Around, level
+from .face_lines import FaceLines, Rows, line_factors, runs
+from .flows import line_shares
 from .lubrication import LubricationProblem
 from .model import Model
 from .reynolds import sides
-from .strip import coefficients_of, line_weights, stream_weights
 from .views import Raised
 
 STEP = 1e-30  # relative, of a complex step
-Strip = tuple[slice, Grid, Array, Array, Array, Array]
 
 
 def can(problem: LubricationProblem, model: Model, least: int = MANY, held: bool = False, rims: bool = False) -> bool:
@@ -40,73 +39,102 @@ class Weighed:
     p : Pa above p_c, r : owned points.
     """
 
-    def __init__(self, problem: LubricationProblem, scheme: str, p: Array, r: Array):
-        self.scheme, self.grid = scheme, problem.grid
+    def __init__(self, problem: LubricationProblem, model: Model, p: Array, r: Array):
+        self.problem, self.scheme, self.grid = problem, model.scheme, problem.grid
         enters = problem.r_in if self.grid.ends[0][0] == "open" else 0.0
         self._p, self._r = ghosted(self.grid, p, 0.0), ghosted(self.grid, r, enters)
+        self._film, step = Around(model.gap, self.grid), STEP * float(np.max(np.abs(model.gap(self.grid.x, self.grid.y[:1]))))
+        self._raised, self._step = Around(Raised(model.gap, 1j * step), self.grid), step
+        self._cut = [self._film.edges(side) for side in range(2)]
+        self._at = FaceLines.of(self.grid, level(self._film), tuple(self._cut[1]))
 
-    def by_film(self, gap: Any, w: Array, mu: float, U: float, p_sides: Sequence[float]) -> Array:
-        """What w' G changes by with the film at each owned point, that between two points being their mean, m/s."""
+    def by_film(self, w: Array, unit: float, even: bool = False) -> Array:
+        """What w' G changes by with the film at each owned point, that between two points being their mean, in so many m/s.
+
+        even : all is symmetric about the middle line, film and weights too, on one rank."""
         from .cell_loops import loop_by_film
 
-        out, grid = np.zeros(self.grid.box), self.grid
-        weights = ghosted(grid, w, 0.0)
-        for rows, part, k_x, k_y, wall, void in self._strips(gap):
-            west, east, south, north = (np.broadcast_to(mask, part.box) for mask in sides(part, ("open", "closed", "mirror")))
-            along = np.array([np.where(west[0], 1.0, 0.5), np.where(east[0], 1.0, 0.5)])
-            across = np.array([np.where(south[:, 0], 1.0, 0.5), np.where(north[:, 0], 1.0, 0.5)])
-            before = np.array([np.where(west[0], 1.0, 0.0), np.ones(part.box[1])])  # of what the film at the point before is
-            of_wall, of_void = before if self.scheme == "upwind" else along, along if self.scheme == "face" else before
-            shares = (along, across, of_wall, of_void)
-            p = self._framed(rows, part, p_sides)
-            loop_by_film(weights(rows), p, self._r(rows), k_x / mu, k_y / mu, U * wall, U * void, *shares, out[rows])
+        grid, problem, at, ghosts = self.grid, self.problem, self._at, ("open", "closed", "mirror")
+        weights, (pressed, ends, dragged) = ghosted(grid, w, 0.0), line_factors(grid)
+        west, east, south, north = (mask.ravel() for mask in sides(grid, ghosts))
+        closed = [mask.ravel() for mask in sides(grid, ghosts[1:])[2:]]
+        along, before = np.where([west, east], 1.0, 0.5), np.array([1.0 * west, np.ones(grid.box[1])])
+        parts = [along, before if self.scheme == "upwind" else along, along if self.scheme == "face" else before]
+        of_lines = np.array([pressed / (problem.mu * unit), dragged * (problem.U / unit)])
+        of_faces = ends / (problem.mu * unit) * np.ones((2, 1))
+        of_faces[0, :-1] *= np.where(closed[0], 0.0, np.where(south, 1.0, 0.5))
+        of_faces[1, 1:] *= np.where(closed[1], 0.0, np.where(north, 1.0, 0.5))
+
+        def add(rows: slice, out: Array) -> None:
+            lines, of_line = runs(at.lines, rows.start, rows.stop)
+            faces, of_face = runs(at.faces, rows.start, rows.stop + 1)
+            C_x, wall, void, C_y = self._slopes(lines, faces)
+            by_x = _dealt(parts, (C_x / at.steps, wall, void))
+            by_y = C_y * grid.widths(0), of_face, of_faces[:, rows.start : rows.stop + 1]
+            loop_by_film(weights(rows), self._framed(rows), self._r(rows), by_x, of_line, of_lines[:, rows], *by_y, out)
+
+        return self._strip_by_strip(add, even)
+
+    def drag_by_film(self, lever: Any, even: bool = False) -> Array:
+        """The same of the drag at the wall (`flows.drag`), times the lever of each line, in N/m."""
+        from .cell_loops import loop_drag_by_film
+
+        grid, at, speed = self.grid, self._at, self.problem.mu * self.problem.U
+        shears, pulls = (np.broadcast_to(share * lever, (grid.box[0], 1)).ravel() for share in line_shares(grid))
+        west, east = (mask.ravel() for mask in sides(grid)[:2])
+        along, of_lines = np.where([west, east], 1.0, 0.5), np.array([pulls, speed * shears])
+
+        def add(rows: slice, out: Array) -> None:
+            lines, of_line = runs(at.lines, rows.start, rows.stop)
+            void: Any = np.ones(1)
+            if self.scheme == "nodal":
+                _, H, before = at.along(self._raised, lines, self._cut)
+                void = before / H
+            r = self._r(rows)[1:-1, :-1].copy()
+            r[:, : int(west.any())] = 0.0
+            h, resting, moving = at.sheared(self._raised, lines, 1.0 - void * r[lines - rows.start])
+            films = 0.5 * h, at.steps * (resting + 1.0 / moving), at.steps * (void / moving)
+            by_x = _dealt([along] * 3, [np.imag(a) / self._step for a in films])
+            loop_drag_by_film(self._framed(rows), r, by_x, of_line, of_lines[:, rows], out)
+
+        return self._strip_by_strip(add, even)
+
+    def _strip_by_strip(self, add: Callable[[slice, Array], None], even: bool) -> Array:
+        """What is added to the lines of each strip; of what is even half of it is made."""
+        out, count = np.zeros(self.grid.box), self.grid.box[0]
+        half = count - count // 2 if even else count
+        for rows in in_strips(self.grid):
+            if rows.start < half:
+                some = slice(rows.start, min(rows.stop, half))
+                add(some, out[some])
+        out[half:] = out[: count - half][::-1]
         return out
 
-    def _framed(self, rows: slice, part: Grid, p_sides: Sequence[float]) -> Array:
+    def _framed(self, rows: slice) -> Array:
         """p with a frame that has the sides' pressures."""
-        west, east, south, north = (np.broadcast_to(mask, part.box) for mask in sides(part, ("open", "closed", "mirror")))
-        p = np.array(self._p(rows))
+        p, part = self._p(rows), places_of(self.grid, rows)
+        west, east, south, north = (np.broadcast_to(mask, part.box) for mask in sides(part))
         lines = ((p[1:-1, 0], west[:, 0]), (p[1:-1, -1], east[:, -1]), (p[0, 1:-1], south[0]), (p[-1, 1:-1], north[-1]))
-        for (line, mask), p_side in zip(lines, p_sides, strict=True):
+        for (line, mask), p_side in zip(lines, self.problem.p_sides, strict=True):
             line[mask] = p_side
         return p
 
-    def _strips(self, gap: Any) -> Iterator[Strip]:
-        """Lines, their places, and derivatives by a film that is everywhere thicker by as much: of conductances of the x and y
-        faces at mu = 1, and at U = 1 of what the wall drags through x faces and what if all is void."""
-        grid, film = self.grid, Around(gap, self.grid)
-        cut = bool(jumps_of(film, "x") or jumps_of(film, "y"))
-        if cut:
-            step = STEP * float(np.max(np.abs(gap(grid.x, grid.y[:1]))))
-            raised = Around(Raised(gap, 1j * step), grid)
-        for rows in in_strips(grid):
-            part = places_of(grid, rows)
-            if cut:
-                k_x, k_y, _, wall, void = coefficients_of(part, raised, 1.0 / 6.0, 1.0, self.scheme, False, (), None, None)
-                k_x, k_y, wall, void = (np.imag(a) / step for a in (k_x, k_y, wall, void))
-            else:
-                k_x, k_y, wall, void = self._smooth(part, film)
-            first, last = (part.ends[1][k] in ("closed", "mirror") for k in (0, 1))
-            if first and part.y_start == 0:
-                k_y[0] = 0.0
-            if last and part.y_end == part.shape[1]:
-                k_y[-1] = 0.0
-            yield rows, part, k_x, k_y, wall, void
+    def _slopes(self, lines: Rows, faces: Rows) -> list[Array]:
+        """Derivatives by a film that is everywhere thicker by as much, of some lines: of C of the x faces, of the film that the
+        wall drags there and of the void's, and of C of the y faces."""
+        film, at = self._film, self._at
+        if self._cut[0] or self._cut[1]:
+            C, H, before = at.along(self._raised, lines, self._cut)
+            made = [C, before if self.scheme == "upwind" else H, H if self.scheme == "face" else before]
+            return [np.imag(a) / self._step for a in (*made, at.over(self._raised, faces, self._cut))]
+        (_, x_faces), y_faces = at.x_places, at.y_places[1]
+        h_x = np.broadcast_to(film(x_faces[None, :], at.y[lines][:, None]), (lines.size, x_faces.size))
+        h_y = np.broadcast_to(film(at.x_places[0][None, 1:-1], y_faces[faces][:, None]), (faces.size, self.grid.box[1]))
+        same = np.ones_like(h_x)
+        return [3.0 * h_x * h_x, same, same, 3.0 * h_y * h_y]
 
-    def _smooth(self, part: Grid, film: Around) -> tuple[Array, Array, Array, Array]:
-        """As `strip.coefficients_of`, of a film without edges."""
-        from .cell_loops import loop_cubes
 
-        x_nodes, x_faces = part.nodes_and_faces(0)
-        _, y_faces = part.nodes_and_faces(1)
-        (ny, nx), y = part.box, part.y
-        h_x = np.broadcast_to(film(x_faces[None, :], y), (ny, nx + 1))
-        h_y = np.broadcast_to(film(x_nodes[None, 1:-1], y_faces[:, None]), (ny + 1, nx))
-        along = line_weights(part) / part.stretch(y) / 6.0
-        across = part.spacing[0] * part.stretch(y_faces)[:, None] / (6.0 * (part.steps(1) * part.spacing[1])[:, None])
-        k_x, k_y = (
-            loop_cubes(np.ascontiguousarray(h), columns, lines.ravel())
-            for h, columns, lines in ((h_x, 1.0 / part.steps(0), along), (h_y, part.widths(0), across))
-        )
-        same = np.broadcast_to(stream_weights(part), h_x.shape).copy()
-        return k_x, k_y, same, same
+def _dealt(parts: Sequence[Array], films: Sequence[Array]) -> Array:
+    """Of x faces what belongs to the points behind and before them, shape (lines, 2 films, columns)."""
+    found = [(west * a[:, :-1], east * a[:, 1:]) for (west, east), a in zip(parts, films, strict=True)]
+    return np.stack([one for pair in found for one in pair], axis=1)
