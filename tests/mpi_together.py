@@ -105,8 +105,6 @@ def checkpoint(write):
                 checkpoint_file.write(Path("x.ckpt"), grid, {}, [("p", p), ("again", p)])
             else:
                 checkpoint_file.read_arrays(Path("y.ckpt"), grid, header, start)
-        except OSError as error:
-            raise InputError(str(error)) from None
         finally:
             WORLD.barrier()
             if WORLD.rank == 0:

@@ -68,17 +68,9 @@ def _p0(args: argparse.Namespace, text: str) -> float:
 
 def ask_of(args: argparse.Namespace, monitor: Monitor | None = None) -> Ask:
     """How to solve, of the options that `solve` and `sweep` share."""
-    return Ask(
-        method=args.method,
-        system=args.system,
-        recipe=args.recipe,
-        stopping=stopping_of(args),
-        options=options_of(args, args.method),
-        nested=args.nested,
-        model=args.model,
-        rescue=not args.no_rescue,
-        monitor=monitor,
-    )
+    stopping, options = stopping_of(args), options_of(args, args.method)
+    named = {name: getattr(args, name) for name in ("method", "system", "recipe", "nested", "model")}
+    return Ask(stopping=stopping, options=options, rescue=not args.no_rescue, monitor=monitor, **named)
 
 
 def solution_of(
@@ -93,19 +85,14 @@ def solution_of(
     return solve(
         scene,
         ask_of(args, monitor),
-        accuracy=args.accuracy,
-        quantity=args.quantity,
         finest=scene.shape if args.n or args.nx or args.ny else None,
-        certify=args.certify,
-        checkpoint=args.checkpoint,
         every=args.every or 1,
-        resume=args.resume,
-        reduction=args.reduction,
         memory_check=not args.no_memory_check,
         direct_below=FEW,  # as for any one solve; a run to an accuracy would load multigrid's loops for this command alone
         progress=progress,
         watch=watching,
         times=watching.args_times if watching is not None else (),
+        **{name: getattr(args, name) for name in ("accuracy", "quantity", "certify", "checkpoint", "resume", "reduction")},
     )
 
 

@@ -3,6 +3,7 @@
 import argparse
 import json
 import math
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -12,6 +13,7 @@ from ..api import solve
 from ..base.files import write_text
 from ..base.options import check_unread
 from ..base.progress import Line
+from ..drivers.chain import Chain
 from ..drivers.motions.coefficients import Coefficients, check_film, check_frequencies, coefficients, placed, stability
 from ..errors import InputError, NotFound
 from ..output.console import say
@@ -19,7 +21,7 @@ from ..output.files import check_target
 from ..output.results import as_dict, finite
 from ..output.style import save_figure
 from ..problems.film.turning import Turning
-from ..problems.solution import Outcome, Solution
+from ..problems.solution import Outcome
 from ..scenes.scene import Scene, as_scene
 from .asked import ask_of, scene_of
 from .sweep import parse_axis
@@ -69,25 +71,21 @@ def table(args: argparse.Namespace, scene: Scene, frequencies: list[float]) -> i
     if args.plot is not None:
         check_target(args.plot, plot=True)
     rows: list[list[float]] = []
-    near, failed, drawn = None, 0, []
+    drawn: list[dict[str, Any]] = []
     with Line() as line:
-        ask = replace(ask_of(args), progress=line)
+        chain = Chain(replace(ask_of(args), progress=line), solve)  # type: ignore[arg-type]
         for rpm in line.over(speeds, lambda rpm: f"{rpm:g} rpm, speed"):
             at = as_scene(scene, {"speed_rpm": float(rpm)})
-            solution = solve(at, ask, start=near)
-            if near is not None:
-                near.destroy()
-            one = _first(at, solution, frequencies) if solution.converged else None
+            solution, found = chain.solve(at), list[Coefficients]()
+            with suppress(NotFound):
+                found = coefficients(at, solution, frequencies[:1]) if solution.converged else []
             check_unread()  # the linearised film has options of its own
-            if one is not None:
+            for one in found:
                 turn = np.array([[0.0, -1.0], [1.0, 0.0]])  # our axes as columns, in theirs
                 K, C = (turn.T @ matrix @ turn for matrix in (one.K, one.C))
                 rows.append([at.omega, *K.ravel(), *C.ravel()])  # type: ignore[attr-defined]
-                drawn.append(report([one], placed(at, solution), as_dict(solution)))
-            failed += one is None
-            near = solution
-    if near is not None:
-        near.destroy()
+                drawn.append(report(found, placed(at, solution), as_dict(solution)))
+    solution.destroy()
     told = [",".join(f"{value:.9g}" for value in row) for row in rows]
     lines = "\n".join([",".join(("frequency", *ROTOR)), *told])
     if args.output is None:
@@ -98,15 +96,7 @@ def table(args: argparse.Namespace, scene: Scene, frequencies: list[float]) -> i
         from ..output.coefficients_picture import figure_of
 
         save_figure(lambda: figure_of(np.array(rows)[:, 0] * 30.0 / math.pi, drawn, scene.name), args.plot)
-    return 1 if failed else 0
-
-
-def _first(scene: Scene, solution: Solution, frequencies: list[float]) -> Coefficients | None:
-    """At the first frequency; None where they are not found. Collective."""
-    try:
-        return coefficients(scene, solution, frequencies[:1])[0]
-    except NotFound:
-        return None
+    return 0 if len(rows) == len(speeds) else 1
 
 
 def report(found: list[Coefficients], scene: Scene, data: dict[str, Any]) -> dict[str, Any]:

@@ -39,3 +39,9 @@ class Chain:
         self._last, self.steps = new, [*self.steps, *new.steps]
         self._times = new.times = added(self._times, new.times)
         return new
+
+    def forget(self) -> None:
+        """The next one starts as the first."""
+        if self._last is not None:
+            self._last.destroy()
+        self._last = None

@@ -201,7 +201,7 @@ class Checkpointer:
         header = {**self.record, "version": __version__, "steps": [astuple(step) for step in steps], **more}
         try:
             checkpoint_file.write(self.path, grid, header, arrays)
-        except OSError as error:
+        except InputError as error:
             kept = "; the last one is still there" if self._saved else ""
             raise InputError(f"--checkpoint {self.path}: could not be written: {error}{kept}") from None
         self._saved = True

@@ -31,7 +31,7 @@ def write(path: Path, grid: Grid, header: dict[str, Any], arrays: list[tuple[str
 
     Raises
     ------
-    OSError : on every rank, with the reason; what was there before is there still.
+    InputError : on every rank, with the reason; what was there before is there still.
     """
     named = [(name, _checksum(grid, values)) for name, values in arrays]
     text = json.dumps({**header, "shape": grid.shape, "arrays": named}).encode()
@@ -40,25 +40,19 @@ def write(path: Path, grid: Grid, header: dict[str, Any], arrays: list[tuple[str
     line = f"{MAGIC} {FORMAT} {len(text):12d} {zlib.crc32(text):08x}"
     head = line.encode().ljust(63) + b"\n" + text
     temporary, comm = path.with_name(f".{path.name}.new"), grid.comm
-
-    def together(reason: str) -> None:
-        """Go on if no rank has a reason not to. Collective."""
-        if reason := max(comm.allgather(reason)):
+    try:
+        with on_all_ranks(comm):
             if comm.rank == 0:
-                temporary.unlink(missing_ok=True)
-            raise OSError(reason)
-
-    def on_rank_0(call: Any, *arguments: Any) -> str:
-        try:
+                _reserve(temporary, head, 8 * grid.size * len(arrays))
+        with on_all_ranks(comm):
+            _transfer(grid, temporary, len(head), [values for _, values in arrays], write=True)
+        with on_all_ranks(comm):
             if comm.rank == 0:
-                call(*arguments)
-        except OSError as error:
-            return error.strerror or str(error)
-        return ""
-
-    together(on_rank_0(_reserve, temporary, head, 8 * grid.size * len(arrays)))
-    together(_transfer(grid, temporary, len(head), [values for _, values in arrays], write=True))
-    together(on_rank_0(_settle, temporary, path))
+                _settle(temporary, path)
+    except InputError:
+        if comm.rank == 0:
+            temporary.unlink(missing_ok=True)
+        raise
 
 
 def read_header(path: Path, comm: MPI.Comm) -> tuple[dict[str, Any], int]:
@@ -68,18 +62,9 @@ def read_header(path: Path, comm: MPI.Comm) -> tuple[dict[str, Any], int]:
     ------
     InputError : no checkpoint, one that was cut short or damaged; on every rank, with the reason.
     """
-    reason, found = "", None
-    if comm.rank == 0:
-        try:
-            found = _header_of(path)
-        except OSError as error:
-            reason = error.strerror or str(error)
-        except ValueError as error:  # InputError, or a name that no file can have
-            reason = str(error)
-    reason, found = comm.bcast((reason, found))
-    if found is None:
-        raise InputError(f"--resume {path}: {reason}")
-    return found
+    with on_all_ranks(comm, f"--resume {path}", (OSError, ValueError)):  # a ValueError: a name that no file can have
+        found = _header_of(path) if comm.rank == 0 else None
+    return comm.bcast(found)  # type: ignore[return-value]
 
 
 def read_arrays(path: Path, grid: Grid, header: dict[str, Any], start: int) -> dict[str, Array]:
@@ -90,9 +75,8 @@ def read_arrays(path: Path, grid: Grid, header: dict[str, Any], start: int) -> d
     InputError : they cannot be read, or are not what was written; on every rank, whichever could not.
     """
     arrays = [np.empty(grid.local_size) for _ in header["arrays"]]
-    with on_all_ranks(grid.comm):
-        if reason := _transfer(grid, path, start, arrays, write=False):
-            raise InputError(f"--resume {path}: {reason}")
+    with on_all_ranks(grid.comm, f"--resume {path}"):
+        _transfer(grid, path, start, arrays, write=False)
     for (name, checksum), values in zip(header["arrays"], arrays, strict=True):
         if _checksum(grid, values) != checksum:
             raise InputError(f"--resume {path}: damaged: {name} is not what was written")
@@ -136,8 +120,8 @@ def _checksum(grid: Grid, values: Array) -> str:
     return f"{sum(grid.comm.allgather(own)) % 2**64:016x}"
 
 
-def _transfer(grid: Grid, path: Path, start: int, arrays: list[Array], write: bool) -> str:
-    """This rank's part of arrays that lie one behind the other in a file, in the natural order; why it failed, or nothing.
+def _transfer(grid: Grid, path: Path, start: int, arrays: list[Array], write: bool) -> None:
+    """This rank's part of arrays that lie one behind the other in a file, in the natural order; raises OSError.
 
     Every rank has the file to itself: where one fails, no other waits for it inside MPI.
     """
@@ -155,10 +139,9 @@ def _transfer(grid: Grid, path: Path, start: int, arrays: list[Array], write: bo
         finally:
             file.Close()
     except MPI.Exception as error:
-        return error.Get_error_string()
+        raise OSError(error.Get_error_string()) from None
     finally:
         box.Free()
-    return ""
 
 
 def _reserve(temporary: Path, head: bytes, rest: int) -> None:

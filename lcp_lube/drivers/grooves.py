@@ -90,7 +90,7 @@ def applies(scene: Solvable, ask: Ask) -> bool:
 
 def pad_films(scene: Solvable) -> PadFilms:
     """The films between the grooves, and where they lie."""
-    model: Model = scene.model  # type: ignore[attr-defined]
+    model: Model = scene.model  # type: ignore[union-attr]
     return [(pad, PadFilm(scene, film, (pad.n, *scene.shape[1:]), pad.first)) for pad, film in model.pads(scene.shape)]
 
 

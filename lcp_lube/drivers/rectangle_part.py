@@ -4,9 +4,8 @@ Symmetric must be all that the equation is made of: source, bounds, values on th
 several solutions. Newton's steps from there are then symmetric too.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,18 +27,7 @@ UNLIKELY = "source, bounds, start and boundary do not all mirror themselves abou
 NONE = UNLIKELY
 
 
-class Rectangular(Solvable, Protocol):
-    """A scene with one unknown on a rectangle: where that lies, and all that the equation is made of."""
-
-    @property
-    def rectangle(self) -> tuple[tuple[float, float], tuple[float, float]]: ...
-
-    @property
-    def on_boundary(self) -> Callable[[Array, Array], Array] | None: ...
-
-    def inside(self, x: Array, y: Array) -> list[Array]: ...
-
-    def problem_on(self, grid: Grid) -> Problem: ...
+Rectangular = Any  # a scene with one unknown on a rectangle (`scenes.semilinear`)
 
 
 @dataclass(frozen=True)

@@ -37,6 +37,7 @@ DIGITS, ENOUGH = 1e-7, 1e-4  # steps of such parts of the largest pressure may b
 PATIENCE, GIVE_UP = 2, 8  # such steps that do not halve the misfit, before one that is left is enough; or given up
 DEAF = 1e-9  # of the slope that would end the misfit within P: a flow that follows P less does so by rounding
 LIKELY = 20.0  # times a film's slope, or a part of it: what coefficients that follow make of it
+RETREATS, RETREAT = 5, 0.1  # times, and part of the way from pressures with an answer to ones that have none
 FIRST = 0.5  # part of p_s behind a restrictor, to begin with
 
 
@@ -76,7 +77,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     -------
     Solution : outcome NO_SOLUTION where the film draws more than a supply gives even at the cavitation pressure.
     """
-    model: Model = scene.model  # type: ignore[attr-defined]
+    model: Model = scene.model  # type: ignore[union-attr]
     supplies = model.supplies
     if model.stored is not None:
         from .marches import supply_step  # here: of marches alone
@@ -105,6 +106,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     together = False  # film and pressures
     moved: Any = None  # the last step, and from where
     beside: Any = 0.0  # what effects add to the slopes
+    retreats, carried = 0, 0.0 * P[free]  # from pressures that effects leave without an answer, and the last that had one
     for count in range(1, MOST_SOLVES + 1):
         if together:
             solution = chain.solve(scene, ahead, rescue=False)
@@ -114,7 +116,13 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
             solution = chain.solve(Fed(scene, sources.held(P)), ahead)
         problem: Any = solution.problem
         if not solution.converged:
-            break
+            if not model.effects or solution.outcome != Outcome.MAX_ITERATIONS or retreats == RETREATS:
+                break
+            retreats, moved, ahead = retreats + 1, None, None
+            P[free] = carried + RETREAT * (P[free] - carried)
+            chain.forget()
+            continue
+        carried = P[free]
         flows = np.array(supply_flows(problem, solution.fields["p"], solution.fields["r"]))
         sought = [(one, float(p), float(flow)) for one, p, flow in zip(supplies, P, flows, strict=True)]
         problem.hold_at(supplies, P)

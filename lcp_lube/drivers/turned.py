@@ -3,8 +3,6 @@
 from dataclasses import dataclass, replace
 from typing import Any
 
-from petsc4py import PETSc
-
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.turned import TurnedProblem
@@ -22,9 +20,6 @@ class Mirrored(Derived):
     @property
     def model(self) -> Model:
         return self.whole.model.mirrored
-
-    def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
-        return self.model.build(self.shape, comm)
 
 
 def as_solved(solution: Solution) -> Solution:
@@ -46,7 +41,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         ask = replace(ask, start=Start(near.moving, near.there(ask.start.fields), ask.start.settings, made))
     solution = inner(Mirrored(scene), ask)
     assert isinstance(solution.problem, LubricationProblem)  # as `applies` found
-    problem = TurnedProblem(solution.problem, scene.model.exact)  # type: ignore[attr-defined]
+    problem = TurnedProblem(solution.problem, scene.model.exact)  # type: ignore[union-attr]
     band = solution.enclosure
     if band is not None:
         band = replace(band, lower=problem.here(band.lower), upper=problem.here(band.upper))

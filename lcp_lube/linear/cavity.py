@@ -28,17 +28,6 @@ from .system import System
 CYCLES = 1  # from w = 1 or the last w; more of them gain nothing (benchmarks/README.md)
 
 
-def _solve(krylov: Krylov, rhs: Array, rtol: float) -> tuple[int, Array]:
-    """Iterations and the solution's values on this rank. Collective."""
-    x, b = krylov.mat.createVecs()
-    b.setArray(rhs)
-    iterations = krylov.solve(b, x, rtol)
-    values = x.array_r.copy()
-    x.destroy()
-    b.destroy()
-    return iterations, values
-
-
 class CavitySystem(System):
     """Steps of the active-set method (theta in {0, 1}) through a KSP on the Schur complement of the full film.
 
@@ -90,7 +79,7 @@ class CavitySystem(System):
             with self.stages("KSP"):
                 self.krylov = Krylov(mat)
         with self.stages("KSP"):
-            iterations, y = _solve(self.krylov, rhs, rtol)
+            y, iterations = self.krylov.of_array(rhs, rtol)
         dp = np.zeros_like(f1)
         dp[full] = self._w[full] * y
         with self.stages("Jacobian"):

@@ -1,16 +1,17 @@
 """One KSP, configured by options alone: tolerances, counts, and failures that are reported."""
 
 import atexit
+import ctypes
 import gc
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 
 import numpy as np
 from petsc4py import PETSc
 
 from ..base.options import explain_error, set_names
 from ..base.owned import Owned
-from ..base.threads import one_thread_for_superlu_dist
+from ..base.parallel import Array
 from ..errors import InputError
 
 ZERO_PIVOT = (71, 81)  # PETSc's codes for LU and Cholesky: the matrix is singular, not the options wrong
@@ -67,6 +68,17 @@ def zeros_fail_together() -> Iterator[None]:
     finally:
         for name in names:
             options.delValue(name)
+
+
+def one_thread_for_superlu_dist() -> None:
+    """OpenMP with one thread if an option asks for superlu_dist: 8.1.2 gives wrong factors with more (benchmarks/README.md).
+
+    OMP_NUM_THREADS, read when PETSc is loaded, may be unset or too large in a program that started PETSc itself. OpenMP is
+    reached through the libraries that petsc4py depends on; without one there are no threads.
+    """
+    if "superlu_dist" in PETSc.Options().getAll().values():
+        with suppress(AttributeError):
+            ctypes.CDLL(PETSc.__file__).omp_set_num_threads(1)
 
 
 class Krylov:
@@ -170,6 +182,16 @@ class Krylov:
         if not np.isfinite(x.norm()):
             raise LinearSolverError(f"KSP {self.ksp_type} with PC {self.pc_type} gave a vector that is not finite")
         return 0 if self.direct else self.ksp.getIterationNumber()
+
+    def of_array(self, b: Array, rtol: float, transposed: bool = False) -> tuple[Array, int]:
+        """`solve` for an array of this rank's part: the solution's, and the number of iterations. Collective."""
+        x, rhs = self.mat.createVecs()
+        rhs.setArray(b)
+        iterations = self.solve(rhs, x, rtol, transposed)
+        found = x.array_r.copy()
+        for vec in (x, rhs):
+            vec.destroy()
+        return found, iterations
 
     def _run(self, b: PETSc.Vec, x: PETSc.Vec, transposed: bool = False) -> int:
         """Solve; returns PETSc's reason."""

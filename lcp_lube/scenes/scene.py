@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Protocol, Self
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,25 +25,6 @@ Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[Finite, Field(gt=0)]
 NotNegative = Annotated[Finite, Field(ge=0)]
 Count = Annotated[int, Field(strict=True, ge=1, le=2**31 - 2)]
-
-
-class Solvable(Protocol):
-    """What can be solved: a scene, or what a driver makes of one (a part, a step, a fluid held)."""
-
-    @property
-    def name(self) -> str: ...
-
-    @property
-    def scheme(self) -> str | None: ...
-
-    @property
-    def shape(self) -> tuple[int, ...]: ...
-
-    def with_shape(self, shape: tuple[int, ...]) -> "Solvable": ...
-
-    def facts(self, comm: PETSc.Comm | None = None) -> Facts: ...
-
-    def build(self, comm: PETSc.Comm | None = None) -> Problem: ...
 
 
 @dataclass(frozen=True)
@@ -69,6 +50,10 @@ class Derived:
 
     def facts(self, comm: PETSc.Comm | None = None) -> Facts:
         return self.model.facts(self.shape, comm)  # type: ignore[attr-defined]
+
+    def build(self, comm: PETSc.Comm | None = None) -> Any:
+        """The discrete problem. Collective."""
+        return self.model.build(self.shape, comm)  # type: ignore[attr-defined]
 
     def factored(self, problem: Any, j: NDArray[np.int64], i: NDArray[np.int64]) -> Any:
         """A problem on these lines and columns, with what effects make of its coefficients. Collective."""
@@ -126,6 +111,9 @@ class Scene(Measured):
     def build(self, comm: PETSc.Comm | None = None) -> Problem:
         """The discrete problem on this scene's grid. Collective."""
         raise NotImplementedError
+
+
+Solvable = Scene | Derived  # what can be solved
 
 
 def scene_line(name: str) -> str:

@@ -165,3 +165,39 @@ def test_a_film_beyond_roelands_limit_is_told_by_its_first_films(beside):
     with solve(data, model="full") as s:
         assert s.outcome == "no_solution" and "Roelands" in s.message
         assert s.settings["details"]["fluid_solves"] <= 2
+
+
+@pytest.mark.parametrize(
+    "beside, films", [({"temperature": {"beta": 1e-3, "T_in": 320.0}}, 10), ({"elastic": {"compliance": 1e-16}}, 26)]
+)
+def test_and_beside_what_may_change_it_yet_after_some_more(beside, films):
+    """Heat and soft walls have had their say by then; Eyring's law leaves the logarithm of what grows, which has no limit."""
+    data = hot_line(60, FILM[0], L=0.1, U=300.0, fluid={"mu": 0.2}, roelands={"z": 0.8}) | beside
+    with solve(data, model="full") as s:
+        assert s.outcome == "max_iterations" and "Roelands" in s.message
+        assert s.settings["details"]["fluid_solves"] <= films
+    with solve(data | {"shear": {"law": "eyring", "tau_0": 1e5}}, model="full") as s:
+        assert "Roelands" not in s.message
+
+
+def test_pressures_of_supplies_are_sought_from_where_effects_leave_an_answer():
+    """Behind half of p_s the oil would be sheared to nothing: stresses of a hundred Eyring's."""
+    film = [{"shape": "constant", "h": 2.88e-5}, {"shape": "step", "height": 3.58e-5, "at": 1.058e-3}]
+    film.append({"shape": "step", "height": 3.09e-5, "at": 3.41e-4})
+    data = {"family": "bearing", "L": 2.317e-3, "U": -0.145, "n": 5, "fluid": {"mu": 7.97e-3}, "film": film}
+    data |= {"sides": {"west": "periodic", "east": "periodic"}, "shear": {"law": "eyring", "tau_0": 17.18}}
+    fed = {"x": [2.83e-4, 5.77e-4], "restrictor": "capillary", "p_s": 1.027e5, "K": 7.87e-11, "backflow": True}
+    with solve(data | {"supply": [fed, {"x": [1.504e-3, 1.83e-3], "flow": 1.783e-6}]}, model="full") as s:
+        assert s.converged, s.message
+        assert s.settings["supply_pressures"][0] == pytest.approx(1.027e5 + 1.783e-6 / 7.87e-11, rel=1e-6)
+
+
+def test_asperities_that_push_far_more_than_the_film():
+    """Their pressure is 35 times the film's unit: no step for each of these."""
+    data = hot_line(
+        20, {"shape": "linear", "h_start": 2e-6, "h_end": 1e-6}, L=0.01, U=1e-3, fluid={"mu": 0.01, "p_supply": 1e5}
+    )
+    data |= {"asperity": {"sigma": 5e-7, "E_reduced": 1e12}, "shear": {"law": "carreau", "time": 1e-3, "n": 0.5}}
+    with solve(data, model="full") as s:
+        assert s.problem.cells["contact"].max() > 30 * s.problem.p_unit
+        assert s.converged and s.settings["details"]["fluid_solves"] < 15, s.message

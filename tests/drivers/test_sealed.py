@@ -56,6 +56,31 @@ def test_what_is_known_exactly():
         assert s.converged and s.load == 0.0
 
 
+def test_a_ring_may_stay_empty_all_round():
+    """Beside a source that gives less than it can take: that is the reason, not a certificate that wants a full cell."""
+    ring = {
+        "family": "bearing",
+        "dimension": 2,
+        "L": 1.9e-3,
+        "width": 1.35e-3,
+        "U": 0.614,
+        "nx": 3,
+        "ny": 11,
+        "fluid": {"mu": 0.157},
+    }
+    ring |= {
+        "film": {"shape": "parabola", "h_min": 3.4e-6, "h_max": 1.36e-5},
+        "sides": {"west": "periodic", "east": "periodic"},
+    }
+    ring |= {
+        "supply": [{"x": [8e-4, 1.1e-3], "y": [5e-4, 1e-3], "flow": 5e-11}],
+        "motion": {"t_end": 1e-3, "steps": 2, "fill": 0.3},
+    }
+    with solve(load_scene(ring)) as s:
+        assert s.outcome == "no_solution" and "draws" in s.message
+        assert s.certificate.measures.get("p_error", 0.0) == 0.0
+
+
 @pytest.mark.parametrize(
     "changes, message",
     [

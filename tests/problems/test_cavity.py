@@ -1,11 +1,14 @@
 """Which points are cavitated: one threshold, whatever rounding or a method leaves in p and r."""
 
+import tomllib
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from lcp_lube import load_scene, solve
+from lcp_lube.problems.film.cavity import cavitated, cavity_sign
 
 FULL = 'family = "bearing"\nL_mm = 10\nU = 1\nnx = 9\n[fluid]\nmu = 0.01\n[film]\nshape = "constant"\nh_um = 10\n'
 CLOSED = """family = "bearing"
@@ -70,3 +73,11 @@ def test_traces_change_nothing(films, seed, size):
         assert one[name] == two[name]
     for name in ("friction", "load", "rupture", "reformation"):
         assert two[name] == pytest.approx(one[name], rel=1e-6)
+
+
+def test_what_an_iteration_leaves_of_no_pressure_fills_no_film():
+    """Every cell has void, and the largest pressure is dust, which is not a film's scale."""
+    with solve(load_scene(tomllib.loads(FULL))) as s:
+        p, r = np.array([1e-9, 3e-9, 0.0]), np.array([0.07, 0.17, 0.0])
+        assert list(cavitated(s.problem.reduce, p, r)) == [True, True, False]
+        assert list(cavity_sign(s.problem.reduce, p, r) < 0) == [True, True, False]

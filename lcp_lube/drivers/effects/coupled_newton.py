@@ -19,6 +19,7 @@ NARROW = 1e-6  # of differences to one side
 PRODUCTS = 1000  # with the system's derivative, from one film's answer on
 LONGEST, SHORTEST = 3.0, 1e-3  # change of a field by a step; part of a step
 DESCENT = 1e-4  # of the square of what is left, that a whole step has to take off
+VAIN, GAINS = 3, 0.9  # steps in a row, not solved for by `most` products, that leave more than this part of it: it stands still
 DONE = 1e-9  # of fields: what is left then is for films to tell
 
 
@@ -45,15 +46,16 @@ class CoupledNewton(CoupledResponse):
 
         A step is halved until what the film's Jacobian makes of what is left, which has the size of the fields, gets less.
         """
-        R = self._left(self.p, self.r, self.x)
+        R, vain, before, spent = self._left(self.p, self.r, self.x), 0, np.inf, 0
         while self.products < PRODUCTS:
             try:
                 size = self._size_of(R)
             except LinearSolverError:  # viscosities beyond what factors hold
                 break
-            if not DONE**2 < size < np.inf:
+            vain, before = vain + 1 if size > GAINS * before and self.products - spent >= 2 * self.most else 0, size
+            if not DONE**2 < size < np.inf or vain == VAIN:
                 break
-            y = self._settled(-R, 0.0, 0.0)
+            spent, y = self.products, self._settled(-R, 0.0, 0.0)
             t = min(1.0, LONGEST / self.loop.base.reduce.max(np.abs(y[self.n :])))
             z, least = np.where(self.cavity, -self.r, self.p), SHORTEST * t
             while t > least:

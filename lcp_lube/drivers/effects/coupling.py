@@ -48,13 +48,14 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     Returns
     -------
     Solution : of the film with the coefficients found; where they do not settle or no film can be solved with them, the last
-        state, its outcome and the reason. settings['details'] has fluid_solves, the number of films solved on this grid.
+        state, its outcome and the reason. settings['details'] has fluid_solves, the number of films solved on this grid,
+        but for looks at a law's end.
 
     Raises
     ------
     InputError : a scheme that has no faces where densities or lifts could act.
     """
-    model: Model = scene.model  # type: ignore[attr-defined]
+    model: Model = scene.model  # type: ignore[union-attr]
     if not model.effects and not model.dense:
         loop = Loop(scene, _reduced(ask, model.law), inner)
         loop.film({})
@@ -73,7 +74,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
 def _settled_on(scene: Solvable, ask: Ask, inner: Inner, file: CouplingFile) -> Solution:
     """The solution on this grid, from that on coarser ones, or from where the file has it."""
     inside = replace(ask, certify=False)
-    loop, coarse = Loop(scene, _reduced(inside, scene.model.law), inner), None  # type: ignore[attr-defined]
+    loop, coarse = Loop(scene, _reduced(inside, scene.model.law), inner), None  # type: ignore[union-attr]
     if file.holds(loop):
         begin = file.restore(loop)
     elif isinstance(loop.ask.start, Start) and (made := loop.ask.start.made) is not None:

@@ -35,7 +35,7 @@ IN_VAIN = 8  # steps that do not halve what is left, after which `coupling` take
 
 def applies(scene: Solvable, ask: Ask) -> bool:
     """Whether it is such a step, from the one before, by Newton's method."""
-    model: Model = scene.model  # type: ignore[attr-defined]
+    model: Model = scene.model  # type: ignore[union-attr]
     alone = model.dense and not model.effects and not model.grooves
     plain = ask.method == "active-set" and not ask.certify and model.scheme == "face"
     return alone and plain and model.stored is not None and ask.start is not None and "method" in ask.start.settings

@@ -36,7 +36,7 @@ class Loop:
 
     def __init__(self, scene: Solvable, ask: Ask, inner: Inner):
         self.scene, self.ask, self.inner = scene, ask, inner
-        self.model: Model = scene.model  # type: ignore[attr-defined]
+        self.model: Model = scene.model  # type: ignore[union-attr]
         self.law = self.model.law or Law()
         more = (Compressible(self.law),) if self.law.dowson_higginson else ()
         self.effects: tuple[Effect, ...] = (*more, *self.model.effects)
@@ -69,7 +69,6 @@ class Loop:
         self.left: dict[str, float] = {}  # of a film's balances, where that went into what its cells store
         self.beyond = False  # whether no pressure carries the last film's flow
         self.endless = ""  # why no pressure carries it, by an effect that makes viscosity grow without bound
-        # Whether that is sure after a film with all else as it is without effects:
         self.alone = all(getattr(effect, "fixed", False) or hasattr(effect, "beyond") for effect in self.effects)
         self.start: Solution | Start | None = ask.start
         self.begun = self.last = np.zeros(0)  # the vectors of fields that the loop began with, and of the last film's
@@ -80,7 +79,7 @@ class Loop:
     def vector(self, cells: Cells) -> Array:
         """Fields as one vector, in which equal steps are equal relative changes of coefficients."""
         parts = {"viscosity": np.log, "warmth": np.log, "lift": lambda a: logarithm(a / self.h)}
-        parts["contact"] = lambda a: a / self.base.p_unit
+        parts["contact"] = lambda a: logarithm(a / self.base.p_unit)
         parts["pressure"] = lambda a: logarithm(a * self.giving.slopes)  # type: ignore[union-attr]
         return np.concatenate([parts.get(name, lambda a: a)(cells[name]) for name in self.names])  # type: ignore[operator]
 
@@ -98,7 +97,7 @@ class Loop:
         if self.giving is not None:
             found["pressure"] = np.maximum(lift_of(found["pressure"]), 0.0) / self.giving.slopes
         if "contact" in found:
-            found["contact"] = self.base.p_unit * np.maximum(found["contact"], 0.0)
+            found["contact"] = self.base.p_unit * np.maximum(lift_of(found["contact"]), 0.0)
         return found
 
     def by(self, cells: Cells) -> FaceFactors:
@@ -257,10 +256,10 @@ class Loop:
                 x.setArray(warm)
                 self.told.append(f"from film {self.solves + 1} on from oil of 1/e of the viscosity")
                 best, warm, near, idle, mark = (np.inf, warm), None, False, 0, (np.inf, self.solves)
-        if steady and not self.found and "warmth" in self.names and np.isfinite(least[0]):
+        if steady and not (self.found or self.endless) and "warmth" in self.names and np.isfinite(least[0]):
             least = at_once(least[1])
             least = least if self.found or "lift" in self.names else by_half_steps(self, least, watch)
-        if steady and not self.found and "lift" in self.names and np.isfinite(self.change):
+        if steady and not (self.found or self.endless) and "lift" in self.names and np.isfinite(self.change):
             x.setArray(least[1])
             self.told.append(f"from film {self.solves + 1} on by Newton's method with films for its products")
             least = by_films(self, x, least, watch)
@@ -287,10 +286,15 @@ class Loop:
         with np.errstate(all="ignore"):
             has = self.film(self.cells(x))
             self.log.append(self.vector(self.made()) if has else np.full_like(x, np.nan))
-        plain = self.vector(neutral(self.effects, self.h.size))
-        if has and self.solves == 1 and self.alone and not self.base.reduce.max(np.abs(x - plain)):
+        plain = not self.base.reduce.max(np.abs(x - self.vector(neutral(self.effects, self.h.size))))
+        # Others may change it yet, soft walls longest; alone, it is sure after a film with all else as it is without effects.
+        after = 1 if self.alone else 3 * FIRST if "lift" in self.names else FIRST
+        far = self.base.reduce.max(np.abs(x - self.log[-1])) > NEAR and (plain or not self.alone)
+        if has and far and self.solves in (after * 2**k for k in range(6)):
             from .nonlinear import beyond  # here, as above
 
+            solves, own = self.solves, self.own
             self.endless = beyond(self)
+            self.own, self.solves = own, self.solves if self.endless else solves
         watch()
         return self.log[-1]

@@ -101,8 +101,10 @@ def warmer(loop: Any, x: Array) -> Array:
 
 def beyond(loop: Any) -> str:
     """Why no pressure carries the flow, by a film without each effect that may make viscosity grow without bound; the loop's
-    last answer stays. Collective."""
+    last answer stays. Nothing grows so beside an effect that takes its logarithm. Collective."""
     kept, reason = loop.answer, ""
+    if any(getattr(effect, "logarithmic", False) for effect in loop.effects):
+        return reason
     for effect in loop.effects:
         if hasattr(effect, "beyond") and kept is not None and not reason:
             out = neutral(loop.effects, loop.h.size)

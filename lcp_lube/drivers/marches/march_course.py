@@ -106,12 +106,13 @@ class Course:
         self.tilts = free >= len(scene.place)
         self.load: Callable[[float], Array] = lambda t: of.loads(t)[free]
         self.begun = of.begin(self._given, None, None)  # places and speeds, of pads where a search for them begins
-        self.first = first_film(scene, self.models, self.place(0))
-        if near is not None and not near.grid.even:
+        self.first = self.alone = first_film(scene, self.models, self.place(0))  # alone: whose lines follow no others
+        if near is not None:
             places = followed(near.grid, near.first, self.first)
-            if places is None:
+            if places is None and not near.grid.even:
                 raise InputError("the film's edges are others beside this value")
-            self.first = replace(self.first, places=places)
+            if places is not None and any(at is not None for at in places):
+                self.first = replace(self.first, places=places)
         problem = self.first.build(scene.shape, comm)
         problem.shares_grid = True
         self.grid: Grid = problem.grid

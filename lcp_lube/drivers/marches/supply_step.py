@@ -34,7 +34,7 @@ HALVED = 3000  # points of symmetric films from which two builds and half the fa
 
 def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution | None:
     """The film at the step's end with the pressures of its supplies; None where it is not found so. Collective."""
-    model: Model = scene.model  # type: ignore[attr-defined]
+    model: Model = scene.model  # type: ignore[union-attr]
     begun = model.stored is not None and ask.start is not None and "supply_pressures" in ask.start.settings
     if not begun or ask.certify or ask.method not in ("active-set", "fas"):
         return None
@@ -69,7 +69,7 @@ def _film(scene: Solvable, ask: Ask) -> Solution:
     large = whole.grid.size > HALVED and film_part.applies(scene) and not symmetry.why_not(ask)
     part = film_part.part_of(scene, whole) if large and film_part.promising(scene) else None
     film: Any = part.build(whole.grid.petsc_comm) if part is not None else whole
-    model, law = (scene.constant, scene.law) if isinstance(scene, Frozen) else (scene.model, CONSTANT)  # type: ignore[attr-defined]
+    model, law = (scene.constant, scene.law) if isinstance(scene, Frozen) else (scene.model, CONSTANT)  # type: ignore[union-attr]
     sources = Sources(model.supplies, law, like=1 if part is None else 2)
     z = z_of(near, film.p_unit)
     z = z if part is None else _taken(whole.grid, film.grid, numbers(film.grid), z)

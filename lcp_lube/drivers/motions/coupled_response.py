@@ -74,7 +74,8 @@ class CoupledResponse(OfLine):
         steps = [least / (base.reduce.max(np.abs(self._change(gap, least))) or 1.0) for gap in gaps]
         changes = [self._change(gap, e) for gap, e in zip(gaps, steps, strict=True)]
         self._sides = [weight * change for change in changes]
-        self._contacts = [base.p_unit * self._areas * change for change in changes]
+        touched = base.p_unit + problem.cells.get("contact", 0.0)  # dp_a by the loop's field, log(1 + p_a/p_unit)
+        self._contacts = [touched * self._areas * change for change in changes]
         self._forward, forces = [], []
         told = bool(gaps) and known_of(problem) is not None
         for k, (gap, e) in enumerate(zip(gaps, steps, strict=True)):

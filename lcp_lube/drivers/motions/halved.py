@@ -52,10 +52,12 @@ class Halved:
         k_W, k_E = kx[1:-1, 1:-2], kx[1:-1, 2:-1]
         k_S[:], k_N[-1] = s.k_S, 0.0
         k_W[:], k_E[:, -1] = s.k_W, s.k_E[:, -1]
-        b_C, b_W = np.array(s.b_C), np.array(s.b_W)
-        for one in (kx[:-1], b_C, b_W) if whole.grid.shape[1] % 2 else ():  # the line on the mirror
-            one[-1] *= 0.5
-        some = {"k_W": k_W, "k_E": k_E, "k_S": k_S, "k_N": k_N, "b_C": b_C, "b_W": b_W}
+        share = np.ones((n, 1))
+        if whole.grid.shape[1] % 2:  # the line on the mirror
+            kx[-2] *= 0.5
+            share[-1] = 0.5
+        some: dict[str, Any] = {"k_W": k_W, "k_E": k_E, "k_S": k_S, "k_N": k_N}
+        some |= {"b_C": lambda: share * s.b_C, "b_W": lambda: share * s.b_W}  # whole, and mostly the first alone
         half.scheme, half.held, half.shares_grid = s.changed(**some), None, False
         return half
 
@@ -67,9 +69,11 @@ class Halved:
         return change(a.real) + 1j * change(a.imag) if np.iscomplexobj(a) else change(a)
 
     def _solved(self, ask: Callable[[Linear, list[Any], Callable[[Any], Any]], list[Any]], rows: Sequence[Any]) -> list[Any]:
-        reduce, halves = self.problem.reduce, [self._of(self._take, b) for b in rows]
-        odd = [np.abs(half - self._of(self._beyond, b)) for b, half in zip(rows, halves, strict=True)]
-        even = all(reduce.max(part) <= EVEN * reduce.max(np.abs(half)) for part, half in zip(odd, halves, strict=True))
+        halves = [self._of(self._take, b) for b in rows]
+        largest = lambda a: self.problem.reduce.largest(a.view(float))  # noqa: E731
+        even = all(
+            largest(self._of(self._beyond, b) - half) <= EVEN * largest(half) for b, half in zip(rows, halves, strict=True)
+        )
         if not even or self.half.scheme.flow_unit != self.problem.scheme.flow_unit:
             return ask(self._whole, list(rows), lambda a: a)
         found = ask(self._small, [self._share * half for half in halves], self._take)

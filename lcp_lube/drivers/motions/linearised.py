@@ -19,6 +19,7 @@ from ...problems.film.lubrication import LubricationProblem
 from ...registry import SMALL
 from ..plan import default_recipe
 
+RTOL = 1e-12  # of an iterative inner solver
 Entries = list[tuple[int, int, Array]]
 
 
@@ -55,14 +56,14 @@ class Linear:
     def solve(self, rows: Sequence[Array]) -> list[Array]:
         """J^-1 b for each b. Collective."""
         found = self.frozen and self.frozen.solve(rows)
-        return found or [self._solve(self._factors, self.J, b) for b in rows]
+        return found or [self._factors.of_array(b, RTOL)[0] for b in rows]
 
     def solve_transposed(self, rows: Sequence[Array], z: Array, sizes: Sequence[float] = ()) -> list[Array]:
         """J'^-1 b for each b; z : the solution, p where the film is full and -r where it is not. Collective.
 
         sizes : of the quantities, which may be small against the terms of b' z; default as large."""
         found = self.frozen and self.frozen.solve(rows, transposed=True, z=z, sizes=sizes)
-        return found or [self._solve(self._factors, self.J, b, transposed=True) for b in rows]
+        return found or [self._factors.of_array(b, RTOL, transposed=True)[0] for b in rows]
 
     def at(self, nu: float, rows: Sequence[Any], stored: bool = True) -> list[Any]:
         """(J + i nu M)^-1 b for each complex b; stored = False: J^-1 b. Collective."""
@@ -103,7 +104,7 @@ class Linear:
         nest = PETSc.Mat().createNest([[J, minus], [plus, J]], comm=J.comm)
         big = nest.convert("aij", PETSc.Mat())
         krylov = self._factored(big)
-        found = [self._solve(krylov, big, np.concatenate([b.real, b.imag])) for b in rows]
+        found = [krylov.of_array(np.concatenate([b.real, b.imag]), RTOL)[0] for b in rows]
         krylov.destroy()
         for obj in (nest, big, minus, plus, diagonal):
             obj.destroy()
@@ -116,16 +117,6 @@ class Linear:
             krylov = Krylov(mat)
             krylov.set_up()
         return krylov
-
-    @staticmethod
-    def _solve(krylov: Krylov, mat: PETSc.Mat, b: Array, transposed: bool = False) -> Array:
-        x, rhs = mat.createVecs()
-        rhs.setArray(b)
-        krylov.solve(rhs, x, 1e-12, transposed)
-        z = x.array_r.copy()
-        x.destroy()
-        rhs.destroy()
-        return z
 
     def destroy(self) -> None:
         for name in ("_factors", "J"):

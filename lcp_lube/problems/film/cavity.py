@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,6 +11,7 @@ from ...base.crew import crew
 from ...base.parallel import Array, Reduce
 
 VOID = 1e-9  # void fraction up to which a film counts as full: below what any solve resolves, and nothing that one could see
+EMPTY = 1e-2  # void fraction that no full film has within the loosest certificate, however small its pressures are
 BLOCK = 65_536  # points that are looked at together
 
 
@@ -16,7 +19,7 @@ def cavity_sign(reduce: Reduce, p: Array, r: Array) -> Array:
     """p / max|p| - r: negative in the cavity alone, positive (or 0) in the full film. Collective.
 
     Contact of p with its bound is what the comparison of the two says, in units in which both are at most 1; a void fraction up
-    to VOID is none, also where p is zero all over.
+    to VOID is none, also where p is zero all over, and one of EMPTY is, also where p is all that an iteration has left of zero.
 
     Parameters
     ----------
@@ -24,23 +27,27 @@ def cavity_sign(reduce: Reduce, p: Array, r: Array) -> Array:
     """
     p_max = reduce.largest(p)
     z = p / p_max if p_max > 0 else p
-    return np.where(r > VOID, z - r, np.maximum(z, 0.0))
+    return np.where(r > VOID, np.where(r > EMPTY, 0.0, z) - r, np.maximum(z, 0.0))
 
 
 def cavitated(reduce: Reduce, p: Array, r: Array) -> NDArray[np.bool_]:
     """Where `cavity_sign` is negative. Collective."""
-    p_max, out = reduce.largest(p), np.empty(p.shape, dtype=bool)
-
-    def look(k: int) -> None:
-        some = slice(k * BLOCK, (k + 1) * BLOCK)
-        np.greater(r[some], VOID, out=out[some])
-        out[some] &= (p[some] / p_max if p_max > 0 else p[some]) < r[some]
-
-    crew().run(look, -(-len(p) // BLOCK))  # what lies between stays in the cache: new memory takes longer than the arithmetic
-    return out
+    p_max = reduce.largest(p)
+    return _looked(lambda p, r: (r > VOID) & (((p / p_max if p_max > 0 else p) < r) | (r > EMPTY)), p, r)
 
 
 def about_to_change(reduce: Reduce, p: Array, r: Array) -> NDArray[np.bool_]:
     """Where p and r both vanish: full or cavitated, as one likes. Collective."""
     small = VOID * reduce.largest(p)
-    return (p <= small) & (p >= -small) & (r <= VOID) & (r >= -VOID)
+    return _looked(lambda p, r: (np.abs(p) <= small) & (np.abs(r) <= VOID), p, r)
+
+
+def _looked(look: Callable[[Array, Array], NDArray[np.bool_]], p: Array, r: Array) -> NDArray[np.bool_]:
+    """What is found at each point: what lies between stays in the cache, as new memory takes longer than the arithmetic."""
+    out, blocks = np.empty(p.shape, dtype=bool), [slice(k, k + BLOCK) for k in range(0, len(p), BLOCK)]
+
+    def put(k: int) -> None:
+        out[blocks[k]] = look(p[blocks[k]], r[blocks[k]])
+
+    crew().run(put, len(blocks))
+    return out

@@ -26,7 +26,6 @@ ROUNDINGS = 64  # of 2^-53 in a supply's flows
 UNEVEN = 1e-4  # part of the flow that the rounding of pressures inside may make of a mass defect, at most
 BLOCK = 16_384  # cells of a line that are looked at together
 LEAST = 1e-200  # below any void or pressure
-SLACK = 1e-6  # void that no rounding of flows closes
 FINE = 1e-7  # of p_max: rounding that may leave less than this in p needs no closer look
 CHECKS = 30  # sets of full cells that the closer look may try
 
@@ -79,7 +78,7 @@ def certify(problem: "LubricationProblem", p: Array, r: Array, eps1: float) -> C
         "complementarity": found.gap,
         "mass_defect": mass_defect(problem, p, r, supplied, found, driven > 0.0),
     }
-    if within_reach(problem.grid) and rounding_may_dominate(problem, p_max) and not slack(problem, p, r):
+    if within_reach(problem.grid) and rounding_may_dominate(problem, p_max):
         measures["p_error"] = p_error(problem, p, r)
     return Certificate(
         measures,
@@ -99,11 +98,6 @@ def filled(problem: "LubricationProblem", p: Array) -> "LubricationProblem":
     if problem.held is not None:
         other.scheme = pressed(other.scheme, problem.held, problem.p_unit)
     return other
-
-
-def slack(problem: "LubricationProblem", p: Array, r: Array) -> bool:
-    """Whether a film that stores has void in every cell, far more than rounding makes of it: then p = 0, whatever pushes."""
-    return problem.scheme.storage is not None and problem.reduce.largest(p) == 0.0 and problem.reduce.min(r) > SLACK
 
 
 def rounding_may_dominate(problem: "LubricationProblem", p_max: float) -> bool:

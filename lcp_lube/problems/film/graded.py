@@ -147,10 +147,10 @@ class Pivots:
     def _part(self) -> None:
         """No void in the full cells, no pressure in the others.
 
-        A ring that is empty all round, which no solution is and whose matrix is singular, is full where it is least empty.
+        A ring that is empty all round, which no steady film is and whose matrix is singular, is full where it is least empty.
         """
         grid = self.problem.grid
-        if grid.periodic[0]:
+        if grid.periodic[0] and self.problem.scheme.storage is None:
             full, void = whole(grid, self.full.astype(float), self.r)
             empty = np.flatnonzero(~(full > 0).any(axis=1))
             full[empty, np.argmin(void[empty], axis=1)] = 1.0

@@ -14,7 +14,6 @@ not the grade's.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import exp, log, log10
-from typing import Protocol
 
 import numpy as np
 
@@ -47,14 +46,6 @@ GRADES = {
 }
 THIN = (2, 3, 5)  # grades of ISO 3448 without a viscosity index
 NAMES = [f"ISO VG {grade}" for grade in GRADES]
-
-
-class Viscosity(Protocol):
-    """mu(T), Pa s, of temperatures in K; T(mu) the other way round, inf or NaN where none is so hot."""
-
-    def __call__(self, T: Array) -> Array: ...
-
-    def T(self, mu: Array) -> Array: ...
 
 
 @dataclass(frozen=True)
@@ -157,6 +148,10 @@ class Roelands:
             raise InputError(f"mu = {min(mu):g}: Roelands' law is for viscosities above {exp(-ROELANDS_MU):.3g} Pa s")
         s = log(y[0] / y[1]) / log((T[1] - ROELANDS_T) / (T[0] - ROELANDS_T))
         return cls(y[0] * (T[0] - ROELANDS_T) ** s, s)
+
+
+# mu(T), Pa s, of temperatures in K; T(mu) the other way round, inf or NaN where none is so hot.
+Viscosity = Exponential | Vogel | Walther | Roelands
 
 
 def named(name: str, rho: float = DENSITY) -> Walther:

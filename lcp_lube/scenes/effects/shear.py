@@ -35,6 +35,11 @@ class Shear(EffectTable):
         if missing:
             raise ValueError(f"law = {self.law}: {' and '.join(missing)} is missing")
 
+    @property
+    def logarithmic(self) -> bool:
+        """Whether a viscosity that grows by pressure comes out as its logarithm."""
+        return self.law == "eyring"
+
     def apply(self, at: Answer, out: Cells) -> None:
         U, h = at.speed, at.h
         along, across = at.gradient
