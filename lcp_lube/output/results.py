@@ -202,9 +202,12 @@ def summary(data: dict[str, Any]) -> str:
     if "model" in data:
         lines.append(f"model: {sentence(data['model'])}")
     if "accuracy_estimate" in data:
-        own = f"; extrapolated, this grid's own is {data['accuracy_grid_value']:.9g}" if data["accuracy_extrapolated"] else ""
+        name, own = data["accuracy_quantity"], ""
+        if data["accuracy_extrapolated"]:  # of what a balance has found it stands nowhere else
+            best = data["estimates"][name]["value"]
+            own = f"; extrapolated to {best:.6g}, this grid's own is {data['accuracy_grid_value']:.6g}"
         lines.append(
-            f"{data['accuracy_quantity']}: estimated relative error {data['accuracy_estimate']:.1e} "
+            f"{name}: estimated relative error {data['accuracy_estimate']:.1e} "
             f"({data['accuracy']:g} was asked for), {len(data['levels'])} grid{'s' * (len(data['levels']) > 1)}{own}"
         )
     if data.get("certified"):

@@ -357,7 +357,7 @@ def test_finest_grid_allowed(cli):
     assert run.json["nx"] <= 60
     assert "60 is not allowed" in run.json["message"]
     run = cli("solve", "problem4", "--accuracy", "1e-7", "--n", 45)
-    assert run.status == 1 and "extrapolated, this grid's own is" in run.out
+    assert run.status == 1 and "; extrapolated to " in run.out and ", this grid's own is " in run.out
     run = cli("solve", "problem1", "--quantity", "load")
     assert run.status == 2
     assert "--accuracy TOL is needed" in run.err
