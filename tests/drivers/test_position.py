@@ -123,3 +123,22 @@ def test_a_given_attitude_where_the_groove_holds_up_half_of_the_load():
         assert near.converged and far.converged, far.message
         assert far.settings["balance"]["carried"] == pytest.approx(5.8, rel=2e-6)
         assert far.settings["start"] == "cold" and any("from the beginning" in reason for reason in far.settings["why"])
+
+
+@pytest.mark.parametrize("rpm, asperities", [(3000.0, 0.0), (150.0, 0.5), (10.0, 0.96)])
+def test_mixed_lubrication_from_the_film_alone(rpm, asperities):
+    """Closed forms of a film put the journal so near the bore that the film has no answer; asperities hold it farther away."""
+    scene = load_scene(
+        "ring_journal",
+        **{"nx": 120, "ny": 11, "D_mm": 47.8, "clearance_um": 23.9, "L_over_D": 0.36, "mu": 6.8e-3, "speed_rpm": rpm},
+        balance={"load": 8200.0},
+        roughness={"sigma_um": 0.394},
+        asperity={"sigma_um": 0.309, "delta_um": 0.6, "E_reduced": 53.3e9, "friction": 0.02},
+        roelands={"alpha": 9.5e-9},
+    )
+    with solve(scene, model="full") as solution:
+        assert solution.converged
+        assert solution.settings["balance"]["carried"] == pytest.approx(8200.0, rel=2e-6)
+        assert solution.settings["balance"]["solves"] <= 20
+        carried = solution.problem.quantities(solution.fields)["asperity_load"]
+        assert carried / 8200.0 == pytest.approx(asperities, abs=0.05)

@@ -37,6 +37,7 @@ SEEN = 0.5  # a mesh in parts of the stretch sqrt(2 (1 - s)) on which the film i
 MOST_COARSE = 8  # solves on a grid that is not the last
 LONGEST = (2.0, 0.4)  # of a step in t and in the attitude (rad)
 MOST_FAILED = 4  # solves without an answer on a grid, from each of which half of the step is taken
+RETREAT = np.array([0.7, 0.0])  # from a first place without an answer: some twice the thinnest film
 SHORTEST = 1e-4  # of a step that was halved
 WIDEST = 14.0  # of t: s from 1e-6 to 1 - 1e-6
 AWRY = 0.7  # rad from the load's line: then the force goes on in a line, not its logarithm
@@ -208,11 +209,15 @@ def _on_grid(
         solution = chain.solve(at)
         if not solution.converged:
             failed += 1
-            if before is None or count == most or failed > MOST_FAILED:
+            if count == most or failed > MOST_FAILED or (before is None and t < 0.0):
                 return solution, q, count, False
             solution.destroy()
-            chain, before = Chain(replace(ask, start=None), inner), (before[0], before[1], 0.5 * before[2])
-            q = before[0] + before[2]
+            chain = Chain(replace(ask, start=None), inner)
+            if before is None:  # the film alone was taken to carry the load: asperities may, farther from the bore
+                q = q - RETREAT
+            else:
+                before = (before[0], before[1], 0.5 * before[2])
+                q = before[0] + before[2]
             continue
         force = np.array(solution.problem.quantities(solution.fields)["force"])
         best.add(q, force, load, given)
