@@ -19,10 +19,13 @@ from tqdm import tqdm
 from ..api import solve
 from ..base.options import check_unread
 from ..base.resumable import ResumableCsv
+from ..drivers.accuracy.accuracy import DEFAULT_QUANTITY
 from ..errors import InputError
 from ..output.console import note, say
+from ..output.files import check_target
 from ..output.results import as_dict
 from ..output.rows import flat
+from ..problems.film.quantities import units as film_units
 from ..problems.solution import Outcome, Solution, Step
 from ..scenes.scene import Scene
 from .asked import ask_of, scene_of
@@ -157,6 +160,8 @@ def run(args: argparse.Namespace) -> int:
     """The command: exit status 0 if every point converged, else 1; raises InputError as `sweep` does. Collective."""
     if args.output is not None and args.output.suffix.lower() != ".csv":
         raise InputError(f"--output {args.output}: a sweep writes a .csv")
+    if args.plot is not None:
+        check_target(args.plot, plot=True)
 
     def monitor(k: int, step: Step) -> None:
         if k == 1:
@@ -181,7 +186,20 @@ def run(args: argparse.Namespace) -> int:
         writer.writeheader()
         writer.writerows(rows)
         say(text.getvalue().rstrip("\n"))
+    if args.plot is not None:
+        _draw(args, rows, [axis.key for axis in axes])
     failed = sum(row["outcome"] != Outcome.CONVERGED for row in rows)
     steps = sum(int(row.get("iterations") or 0) for row in rows)
     note(f"sweep: {len(rows)} points, {failed} failed, {steps} iterations")
     return 1 if failed else 0
+
+
+def _draw(args: argparse.Namespace, rows: list[dict[str, Any]], keys: list[str]) -> None:
+    """The picture of --plot. Collective."""
+    from ..output.style import save_figure
+    from ..output.sweep_picture import check_names, figure_of
+
+    names = args.quantity.split(",") if args.quantity else [next((q for q in DEFAULT_QUANTITY if q in rows[0]), "load")]
+    check_names(rows, names)
+    units = film_units(len(scene_of(args, {}).shape))
+    save_figure(lambda: figure_of(rows, keys, names, units, args.scene), args.plot)

@@ -16,6 +16,7 @@ from lcp_lube.cli.axes import Axis, chains, parse_axis, points
 from lcp_lube.cli.sweep import run as run_command
 from lcp_lube.cli.sweep import sweep
 from lcp_lube.errors import InputError
+from lcp_lube.output.sweep_picture import by_ratios
 from lcp_lube.problems.solution import Outcome
 from lcp_lube.scenes.scene import load_scene
 
@@ -251,3 +252,19 @@ def test_rows_of_another_layout_are_refused(cli, tmp_path):
         done = cli(*words)
         assert done.status == 2 and message in done.err and "s.csv" in done.err and done.err.count("\n") == 1
         assert path.read_text() == before
+
+
+def test_picture(cli, tmp_path):
+    """A line for each value of the first key; what failed is a cross, what is no number of the runs is refused by name."""
+    words = ["sweep", "problem1", "--n", 20, "--vary", "mu=0.01,0.02", "--vary", "U=1:100:3:log", "--output", "s.csv"]
+    done = cli(*words, "--plot", "s.png", "--quantity", "load,p_max,friction_coefficient")
+    assert done.status == 0 and (tmp_path / "s.png").stat().st_size > 10_000
+    refused = cli(*words, "--plot", "t.png", "--quantity", "p_mex")
+    assert refused.status == 2 and "p_max" in refused.err and not (tmp_path / "t.png").exists()
+    failing = cli(*words[:-2], "--method", "din", "--max-it", 12, "--no-rescue", "--plot", "u.png")
+    assert failing.status == 1 and (tmp_path / "u.png").exists()
+
+
+def test_values_at_equal_ratios():
+    assert by_ratios([1.0, 10.0, 100.0]) and by_ratios([float(f"{x:.4g}") for x in np.geomspace(3.0, 700.0, 9)])
+    assert not any(map(by_ratios, ([1.0, 2.0, 3.0], [1.0, 4.0], [-1.0, 1.0, 3.0], ["sinusoid", "parabola", "line"], [5.0] * 3)))
