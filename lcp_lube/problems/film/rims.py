@@ -97,7 +97,7 @@ def _reforms(cavity: Flags) -> Flags:
 
 def _slope(rim: Shape, t: Array, d: Array, s: Array) -> Array:
     """By how much the distance grows with a length t: the normal's part along it, at most 1 in size."""
-    return np.clip((rim(t + STEP * d, s) - rim(t - STEP * d, s)) / (2.0 * STEP * d), -1.0, 1.0)
+    return np.clip(np.real(rim(t + STEP * d, s) - rim(t - STEP * d, s)) / (2.0 * STEP * d), -1.0, 1.0)
 
 
 def depth_of(rim: Any) -> float:
