@@ -26,7 +26,7 @@ from .flows import SIDES, line_shares
 from .fluid import Law
 from .lubrication import LubricationProblem
 from .reynolds import sides
-from .rims import dry_of, made_along
+from .rims import across_flow, dry_of, made_along
 from .strip import line_weights
 
 EQUAL = 1e-12  # relative: widths of lines of one run, from places that are rounded
@@ -149,7 +149,7 @@ class ByFaces:
             C = np.array(at.over(film, rows, cut))
             if self._dry is not None:
                 ends = slice(rows[0], rows[-1] + 2)
-                dry = self._dry[ends, 1:-1].T
+                dry = across_flow(grid, self._dry[ends])
                 widths = 0.5 * pairs(at.steps).sum(axis=0)
                 made_along(film, at.y_places[0][ends], at.x_places[0][1:-1], widths, dry, (C.T,), film.period(1), across=True)
             C *= at.widths

@@ -5,8 +5,10 @@ crosses it. That is right where the film is full. Where a dimple is cavitated it
 ends: only the film before it resists, and carries, and what lies behind would be a length that varies with the rim's place in
 the cell, an error of first order. A fixed coefficient cannot know; the answer does. So a problem with such faces is solved, its
 cavities are looked at, and it is solved once more, from the answer on, with the cut faces made for them
-(`drivers.rims`). Either problem is of the one form, with positive conductances that both cells share and Couette
-flows that leave one cell and enter the next: its solution is unique, and certificate and bands hold as ever (docs/accuracy.md).
+(`drivers.rims`). Where a film reforms before a rim it is full for but a cell or so, and the pressure in it runs along the rim:
+faces across the flow lead there as layers do that lie so. Either problem is of the one form, with positive conductances that
+both cells share and Couette flows that leave one cell and enter the next: its solution is unique, and certificate and bands
+hold as ever (docs/accuracy.md).
 """
 
 from collections.abc import Callable, Sequence
@@ -45,19 +47,26 @@ def cut_faces(
     ----------
     film : h(t, s) in m. rims : distances to edges at (t, s), m, negative inside. nodes : t of the points, one more than faces.
     lines : s of the lines of points. widths : of their cells, m.
-    cavity : whether the points are cavitated, shape (lines, nodes).
+    cavity : whether the points are cavitated, shape (lines, nodes); of faces across the flow with the line before the first.
     along_flow : whether the flow goes to larger t. period : round a ring, whose last point lies before the first.
     """
     a, d = nodes[:-1], np.diff(nodes)
     d = np.where(d < 0.0, d + period, d)
     cut = np.zeros((lines.size, d.size), dtype=bool)
+    oblique = np.zeros(cut.shape)
+    if not along_flow:
+        reforms, cavity = _reforms(cavity), cavity[1:]
     beside = []
     for rim in rims:
         if depth := depth_of(rim):
             beside.append((depth, *_beside(rim, a + 0.5 * d, d, lines, widths, along_flow)))
-            cut |= np.abs(beside[-1][1]) < REACH
+            by_rim = np.abs(beside[-1][1]) < REACH
         else:
-            cut |= np.abs(rim((a + 0.5 * d)[None, :], lines[:, None])) <= 0.5 * d
+            by_rim = np.abs(rim((a + 0.5 * d)[None, :], lines[:, None])) <= 0.5 * d
+        cut |= by_rim
+        if not along_flow:
+            j, i = np.nonzero(by_rim & reforms & (d > 0.0))
+            oblique[j, i] = 1.0 - _slope(rim, a[i] + 0.5 * d[i], d[i], lines[j]) ** 2
     cut &= d > 0.0
     kind = np.asarray(film(nodes[:1], lines[:1])).dtype  # complex, where a derivative is asked for
     cubes, films = np.zeros((2, np.count_nonzero(cut)), dtype=kind)
@@ -71,10 +80,24 @@ def cut_faces(
         drag = np.where(resists[1:-1], inverse * inverse, 0.0)
         resistance = np.mean(drag * inverse, axis=0)
         cubes[some], films[some] = 1.0 / resistance, np.mean(drag, axis=0) / resistance
+        part = oblique[j[some], at]
+        if (k := np.flatnonzero(part)).size:
+            cubes[some.start + k] += part[k] * (np.mean(h[1:-1, k] ** 3, axis=0) - cubes[some.start + k])
     for depth, away, length in beside:
         more, slope = _layer(depth, away[j, i], length[j, i], film(a[i] + 0.5 * d[i], lines[j]))
         cubes, films = cubes + more, films + slope * more
     return cut, cubes, films
+
+
+def _reforms(cavity: Flags) -> Flags:
+    """Which faces across the flow lie where a film has just reformed: both points full, one a cell before them cavitated."""
+    dry = cavity[:, :-1] | cavity[:, 1:]
+    return dry[:-1] & ~dry[1:]
+
+
+def _slope(rim: Shape, t: Array, d: Array, s: Array) -> Array:
+    """By how much the distance grows with a length t: the normal's part along it, at most 1 in size."""
+    return np.clip(np.real(rim(t + STEP * d, s) - rim(t - STEP * d, s)) / (2.0 * STEP * d), -1.0, 1.0)
 
 
 def depth_of(rim: Any) -> float:
@@ -157,7 +180,7 @@ def rims_across_y(grid: Grid, film: Shape, rims: Sequence[Shape], cavity: Array 
     nodes, _ = grid.nodes_and_faces(1)
     turned = [partial(_swapped, rim) for rim in (film, *rims)]
     cut, cut_cubes, _ = cut_faces(
-        turned[0], turned[1:], nodes, grid.x[0], _widths(grid, 0), dry_of(grid, cavity)[:, 1:-1].T, False, period
+        turned[0], turned[1:], nodes, grid.x[0], _widths(grid, 0), across_flow(grid, dry_of(grid, cavity)), False, period
     )
     cubes = np.array(cubes)
     cubes.T[cut] = cut_cubes
@@ -169,7 +192,8 @@ def made_along(
 ) -> None:
     """Put C, or C and H, of the cut faces of some lines, shape (lines, faces), in the places of those of whole films.
 
-    film : with its `rims` (`edges.Around`). dry : whether the lines' nodes are cavitated. across : faces along y, lines of x.
+    film : with its `rims` (`edges.Around`). dry : whether the lines' nodes are cavitated, as `cut_faces` has it.
+    across : faces along y, lines of x.
     """
     shapes = [partial(_swapped, one) if across else one for one in (film, *film.rims)]
     cut, *found = cut_faces(shapes[0], shapes[1:], nodes, lines, widths, dry, not across, period)
@@ -187,3 +211,9 @@ def _widths(grid: Grid, side: int) -> Array:
 
 def dry_of(grid: Grid, cavity: Array | None) -> Flags:
     return grid.ghosted(np.zeros(grid.local_size) if cavity is None else cavity, outside=0.0) > 0.0
+
+
+def across_flow(grid: Grid, dry: Flags) -> Flags:
+    """Of the points of a frame those that `cut_faces` asks for across the flow: line by line, the one before the first too."""
+    before = dry[:, -2:-1] & grid.periodic[0]
+    return np.concatenate([before, dry[:, 1:-1]], axis=1).T
