@@ -20,6 +20,7 @@ PRODUCTS = 1000  # with the system's derivative, from one film's answer on
 LONGEST, SHORTEST = 3.0, 1e-3  # change of a field by a step; part of a step
 DESCENT = 1e-4  # of the square of what is left, that a whole step has to take off
 VAIN, GAINS = 3, 0.9  # steps in a row, not solved for by `most` products, that leave more than this part of it: it stands still
+POOR = 8  # steps in a row that leave more than that: of those that lead to an answer none had more than six
 DONE = 1e-9  # of fields: what is left then is for films to tell
 
 
@@ -46,14 +47,15 @@ class CoupledNewton(CoupledResponse):
 
         A step is halved until what the film's Jacobian makes of what is left, which has the size of the fields, gets less.
         """
-        R, vain, before, spent = self._left(self.p, self.r, self.x), 0, np.inf, 0
+        R, vain, poor, before, spent = self._left(self.p, self.r, self.x), 0, 0, np.inf, 0
         while self.products < PRODUCTS:
             try:
                 size = self._size_of(R)
             except LinearSolverError:  # viscosities beyond what factors hold
                 break
-            vain, before = vain + 1 if size > GAINS * before and self.products - spent >= 2 * self.most else 0, size
-            if not DONE**2 < size < np.inf or vain == VAIN:
+            poor = poor + 1 if size > GAINS * before else 0
+            vain, before = vain + 1 if poor and self.products - spent >= 2 * self.most else 0, size
+            if not DONE**2 < size < np.inf or vain == VAIN or poor == POOR:
                 break
             spent, y = self.products, self._settled(-R, 0.0, 0.0)
             t = min(1.0, LONGEST / self.loop.base.reduce.max(np.abs(y[self.n :])))
@@ -94,8 +96,12 @@ def newton(loop: Any, x: Array, watch: Callable[[], None]) -> tuple[float, Array
 
     The film's answer at the fields found tells by how much they are off, and is gone on from while that falls to a half.
     No film is started from another, and what is found is logged as films' answers are: a resumed run takes the same steps.
+    Fields that it began from before lead nowhere else.
     """
     best, before = (np.inf, x), np.inf
+    if any(not loop.base.reduce.max(np.abs(x - other)) > 0.0 for other in loop.tried):
+        return best
+    loop.tried.append(x)
     while True:
         loop.start = None
         loop.change, _ = loop.off(x, watch)
