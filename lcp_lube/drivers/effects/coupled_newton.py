@@ -20,7 +20,6 @@ PRODUCTS = 1000  # with the system's derivative, from one film's answer on
 LONGEST, SHORTEST = 3.0, 1e-3  # change of a field by a step; part of a step
 DESCENT = 1e-4  # of the square of what is left, that a whole step has to take off
 VAIN, GAINS = 3, 0.9  # steps in a row, not solved for by `most` products, that leave more than this part of it: it stands still
-POOR = 8  # steps in a row that leave more than that: of those that lead to an answer none had more than six
 DONE = 1e-9  # of fields: what is left then is for films to tell
 
 
@@ -47,15 +46,14 @@ class CoupledNewton(CoupledResponse):
 
         A step is halved until what the film's Jacobian makes of what is left, which has the size of the fields, gets less.
         """
-        R, vain, poor, before, spent = self._left(self.p, self.r, self.x), 0, 0, np.inf, 0
+        R, vain, before, spent = self._left(self.p, self.r, self.x), 0, np.inf, 0
         while self.products < PRODUCTS:
             try:
                 size = self._size_of(R)
             except LinearSolverError:  # viscosities beyond what factors hold
                 break
-            poor = poor + 1 if size > GAINS * before else 0
-            vain, before = vain + 1 if poor and self.products - spent >= 2 * self.most else 0, size
-            if not DONE**2 < size < np.inf or vain == VAIN or poor == POOR:
+            vain, before = vain + 1 if size > GAINS * before and self.products - spent >= 2 * self.most else 0, size
+            if not DONE**2 < size < np.inf or vain == VAIN:
                 break
             spent, y = self.products, self._settled(-R, 0.0, 0.0)
             t = min(1.0, LONGEST / self.loop.base.reduce.max(np.abs(y[self.n :])))
@@ -102,6 +100,7 @@ def newton(loop: Any, x: Array, watch: Callable[[], None]) -> tuple[float, Array
     if any(not loop.base.reduce.max(np.abs(x - other)) > 0.0 for other in loop.tried):
         return best
     loop.tried.append(x)
+    loop.told.append(f"from film {loop.solves + 1} on by Newton's method for film and effects as one")
     while True:
         loop.start = None
         loop.change, _ = loop.off(x, watch)

@@ -229,7 +229,6 @@ class Loop:
             return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS) if done else 0
 
         def at_once(*places: Array) -> tuple[float, Array]:
-            self.told.append(f"from film {self.solves + 1} on by Newton's method for film and effects as one")
             from .coupled_newton import newton
 
             found = least
