@@ -140,6 +140,15 @@ def test_the_slope_of_a_load_that_was_found():
     assert told == pytest.approx((loads[1] - loads[0]) / 2e-8, rel=0.02) and told < 0.0
 
 
+def test_a_load_is_sought_from_where_the_look_found_it():
+    """On a coarse grid it is found without effects; what they change of it says where the search on the scene's own begins."""
+    scene = {**SCENES["balance"], "n": 3999}
+    with solve(scene) as s, solve(scene, model=",".join(s.settings["model"]["kept"])) as named:
+        assert s.settings["model"]["grid"] == [600]
+        found, told = (one.settings["balance"] for one in (s, named))
+        assert found["solves"] < told["solves"] and found["value"] == pytest.approx(told["value"], rel=1e-5)
+
+
 def test_least_and_named():
     plain = load_scene({**SCENES["cavity"], "fluid": {"mu": 0.02, "p_supply": 1e5}, "temperature": None})
     with solve(plain) as reference, solve(SCENES["cavity"], model="least") as least:
@@ -174,6 +183,7 @@ def test_asked_accuracy_is_the_tolerance():
     "model, message",
     [
         ("temprature", "--model temprature: allowed are auto, full, least.*nearest is temperature"),
+        ("auto,shear", "--model auto, shear: auto goes alone"),
         ("elastic", "has no data for it; it has barus, density, temperature, shear"),
     ],
 )

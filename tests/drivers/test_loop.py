@@ -201,3 +201,13 @@ def test_asperities_that_push_far_more_than_the_film():
     with solve(data, model="full") as s:
         assert s.problem.cells["contact"].max() > 30 * s.problem.p_unit
         assert s.converged and s.settings["details"]["fluid_solves"] < 15, s.message
+
+
+def test_a_load_for_which_the_film_gets_too_hot():
+    """Thinner films would carry it, had they an answer: it is told why they have none."""
+    hot = {"shape": "parabola", "h_min": 1.24e-6, "h_max": 8.75e-6}
+    pad = {"family": "bearing", "L": 2.3e-3, "U": 1.8, "n": 300, "film": [hot], "fluid": {"mu": 0.46, "p_supply": 1e8}}
+    pad |= {"temperature": {"T_in": 290.0, "model": "effective", "beta": 0.005}, "balance": {"load": 2.7e6}}
+    with solve(pad, model="full") as s:
+        assert s.outcome.value == "load_not_carried"
+        assert "has no answer: no steady temperature" in s.message.partition("balance.range was")[2]

@@ -256,8 +256,9 @@ def check_film(scene: Scene) -> Model:
     model = film_of(scene)
     if model is None or motion_of(scene) is not None:
         raise InputError(f"scene {scene.name}: gradients are of films with cavitation that stand still in time")
+    ask = Ask()
     for name, entry in DRIVERS.items():
-        if name not in THROUGH and entry.load().applies(scene, Ask()):
+        if name not in THROUGH and not entry.idle(scene) and entry.load().applies(scene, ask):
             raise InputError(f"scene {scene.name}: derivatives do not go through its '{name}' yet: {entry.line}")
     return model
 

@@ -94,8 +94,13 @@ def newton(loop: Any, x: Array, watch: Callable[[], None]) -> tuple[float, Array
 
     The film's answer at the fields found tells by how much they are off, and is gone on from while that falls to a half.
     No film is started from another, and what is found is logged as films' answers are: a resumed run takes the same steps.
+    Fields that it began from before lead nowhere else.
     """
     best, before = (np.inf, x), np.inf
+    if any(not loop.base.reduce.max(np.abs(x - other)) > 0.0 for other in loop.tried):
+        return best
+    loop.tried.append(x)
+    loop.told.append(f"from film {loop.solves + 1} on by Newton's method for film and effects as one")
     while True:
         loop.start = None
         loop.change, _ = loop.off(x, watch)

@@ -65,33 +65,34 @@ class FirstOrder:
         grid = solution.problem.grid
         self.scene, self.kept = scene if scene.shape == grid.shape else scene.with_shape(grid.shape), list(kept)
         self._fields: dict[tuple[str, ...], Cells] = {}
+        self.names = names = named(scene)
         if found is None:
             found = Implicit([], [], np.zeros((0, 0)), {})
             (keys, conditions), supplied = conditions_of(self.scene, solution), solution.settings.get("supply_pressures")
             if keys == [quantity] and not supplied and (slope := solution.settings.get("load_slope")):  # a search knows it
                 found = Implicit(keys, list(conditions), np.array([[1.0 / slope]]), {})
             elif keys or supplied:
-                law = without(self.scene, [name for name in named(scene) if name != "barus" or name not in kept])
+                law = without(self.scene, [name for name in names if name != "barus" or name not in kept])
                 adjoint = Adjoint(law, solution, [quantity])
                 found = Implicit.of(adjoint)
                 adjoint.destroy()
         self.found, self.quantity = found, quantity
         pressures = [float(P) for P in solution.settings.get("supply_pressures", ())]
         self.scene = placed(self.scene, solution)
-        bare = without(self.scene, named(scene))
+        bare = without(self.scene, names)
         solved = solution.problem.moving  # type: ignore[attr-defined]
         own = getattr(solution.problem, "rigid", None) or (None if self.kept else solution.problem)  # solved without effects
         self.equations = eq = Equations(bare, grid.petsc_comm, pressures, dry=solved.dry, solved=own)
         self.base, (self.p, self.r) = eq.constant, fields_of(solution)
         self.h = self.base.scheme.h.ravel()
         model = (Mirrored(self.scene) if eq.turned else self.scene).model
-        self.whole, acting = model.law or Law(), [name for name in named(scene) if name not in FLUID]
+        self.whole, acting = model.law or Law(), [name for name in names if name not in FLUID]
         self.acts: dict[str, Effect] = dict(zip(acting, model.effects, strict=True))
-        every = self._physics(named(scene))[1]
+        every = self._physics(names)[1]
         if any(getattr(effect, "even_lines", False) for effect in every) and not self.base.grid.even:
             raise InputError(f"scene {scene.name}: an effect of it needs even lines")
         self.cells = {**neutral(every, self.h.size), **solved.cells}
-        if "barus" in named(scene):
+        if "barus" in names:
             self.cells.setdefault("viscosity", np.ones(self.h.size))
         self.law = self._physics(self.kept)[0]
         self.solved = {name: self.cells[name] for name in solved.cells if name in self.cells}
@@ -101,9 +102,9 @@ class FirstOrder:
         else:
             self._film(self.solved)
         self.at = Answer(eq.constant, self.p, self.r, self.cells, self.law, self.base, rough=True)
-        names = [name for name in dict.fromkeys([quantity, *found.conditions]) if name not in found.found]
-        self.numbers = numbers = eq.numbers(self.p, self.r, FORCES if FORCES.issuperset(names) else None)
-        self.parts = {name: eq.partials(numbers, name) for name in names}
+        wanted = [name for name in dict.fromkeys([quantity, *found.conditions]) if name not in found.found]
+        self.numbers = numbers = eq.numbers(self.p, self.r, FORCES if FORCES.issuperset(wanted) else None)
+        self.parts = {name: eq.partials(numbers, name) for name in wanted}
         self.value = eq.report(numbers).get(quantity)
         if quantity in found.found:
             self.value = values_of(self.scene)[quantity]
@@ -172,8 +173,8 @@ class FirstOrder:
 
     def _makes(self, names: Sequence[str], at: Answer) -> Cells:
         """What these effects make of an answer."""
-        out = neutral(self._physics(named(self.scene))[1], self.h.size)
-        if "barus" in named(self.scene):
+        out = neutral(self._physics(self.names)[1], self.h.size)
+        if "barus" in self.names:
             out.setdefault("viscosity", np.ones(self.h.size))
         for effect in self._physics(names)[1]:
             effect.apply(at, out)
@@ -235,7 +236,7 @@ class FirstOrder:
         return {name: free * flow for name, flow in flows.items()}
 
     def _factors(self, cells: Cells, t: float) -> FaceFactors:
-        dense, own = self._physics(named(self.scene))[0], self._physics(self.kept)[0]
+        dense, own = self._physics(self.names)[0], self._physics(self.kept)[0]
         power = 1.0 if own.dowson_higginson else t
         return factors(self.base, cells, [float(dense.density(np.array(p))) ** power for p in self.equations._p_sides])
 

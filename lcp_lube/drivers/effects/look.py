@@ -137,7 +137,7 @@ class Look:
         self.record = {"quantity": quantity, "tolerance": self.ask.accuracy or TOLERANCE, "grid": list(shape)}
         if own and table is None and self.kept == self._free:
             self.solution, self.first = first, None
-        elif own and self.ask.start is None:
+        elif (own or (table is not None and self.ask.accuracy is None and not filed)) and self.ask.start is None:
             first.problem.moving.cells = made = film.made(self.kept)  # type: ignore[attr-defined]
             itself = None if film.found.found else made  # else the loop's first film is at another place
             self.ask = replace(self.ask, start=Start(first.problem, first.fields, self._foretold(first.settings), itself))

@@ -73,8 +73,8 @@ class Loop:
         self.start: Solution | Start | None = ask.start
         self.begun = self.last = np.zeros(0)  # the vectors of fields that the loop began with, and of the last film's
         self.told: list[str] = []  # how it went on where Anderson's method did not settle
-        self.log: list[Array] = []  # what the effects have made of each film's answer
-        self.given: list[Array] = []  # those that were found before, by an earlier run say: they are taken instead of films
+        # What the effects have made of each film's answer; what is taken instead of films; where Newton's method has begun.
+        self.log, self.given, self.tried = list[Array](), list[Array](), list[Array]()
 
     def vector(self, cells: Cells) -> Array:
         """Fields as one vector, in which equal steps are equal relative changes of coefficients."""
@@ -229,7 +229,6 @@ class Loop:
             return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS) if done else 0
 
         def at_once(*places: Array) -> tuple[float, Array]:
-            self.told.append(f"from film {self.solves + 1} on by Newton's method for film and effects as one")
             from .coupled_newton import newton
 
             found = least

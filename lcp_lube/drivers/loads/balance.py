@@ -142,8 +142,10 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     start: Any = near
     steep: float | None = None  # slope of log W at what was found
     times: dict[str, float] = {}
+    refused: dict[float, str] = {}  # where there was no answer on this grid, and why
     for shape in shapes:
         last = shape == shapes[-1]
+        refused.clear()
         search = Search(unknown.low, unknown.high, slope, least=Search.least if last else 1e-2 * COARSE_TOL)
         tol = table.tol if last else max(table.tol, COARSE_TOL)
 
@@ -151,6 +153,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
             trial = as_scene(scene, {unknown.key: unknown.to_value(t)}).with_shape(shape).model_copy(update={"balance": None})
             solution = inner(trial, replace(ask, start=near))
             times.update(added(times, solution.times))
+            refused.update({} if solution.converged else {t: solution.message})
             return solution, lambda W: exact_slope(trial, solution, unknown, t, W)
 
         solution, t, count, found = _on_grid(solve_at, search, t, start, table.load, tol)
@@ -165,6 +168,9 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         solution.outcome = Outcome.LOAD_NOT_CARRIED
         looked = " to ".join(f"{end:.8g}" for end in sorted(map(unknown.to_value, (unknown.low, unknown.high))))
         solution.message = f"{table.load:g} asked for; the nearest of {count} tried: {answer}; balance.range was {looked}"
+        if refused:
+            beside = min(refused, key=lambda one: abs(one - t))
+            solution.message += f"; {unknown.key} = {unknown.to_value(beside):.8g} has no answer: {refused[beside]}"
     solution.times = times
     by_t = (unknown.to_value(t + STEP) - unknown.to_value(t - STEP)) / (2.0 * STEP)
     solution.settings["load_slope"] = None if steep is None else steep * load / by_t  # dW/dvalue, a few digits of it

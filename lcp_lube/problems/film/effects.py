@@ -185,7 +185,7 @@ def framed_by(grid: Grid, values: Array, at_sides: Sequence[float] | None = None
     own = out[1:-1, 1:-1]
     rim = (out[1:-1, :1], out[1:-1, -1:], out[:1, 1:-1], out[-1:, 1:-1])
     edge = (own[:, :1], own[:, -1:], own[:1], own[-1:])
-    at_side = (None,) * 4 if at_sides is None else [side.any() for side in sides(grid)]
+    at_side = (None,) * 4 if at_sides is None else [end == "open" for pair in (*grid.ends, ("", ""))[:2] for end in pair]
     for k, (view, inner) in enumerate(zip(rim, edge, strict=True)):
         np.copyto(view, at_sides[k] if at_side[k] else inner, where=np.isnan(view))  # type: ignore[index]
     return out

@@ -1,6 +1,6 @@
 """Effects by name: which a scene has data for, the scene without some, and a decision on them in words. Loads no table."""
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import Any
 
 from ...errors import InputError, nearest
@@ -27,7 +27,7 @@ def without(scene: Any, names: Iterable[str]) -> Any:
     return scene.model_copy(update=changes)
 
 
-def check_names(names: Iterable[str]) -> None:
+def check_names(names: Collection[str]) -> None:
     """Refuse a name that is no effect's.
 
     Raises
@@ -35,6 +35,8 @@ def check_names(names: Iterable[str]) -> None:
     InputError : with the nearest one.
     """
     for name in names:
+        if name in ("auto", "full", "least"):
+            raise InputError(f"--model {', '.join(names)}: {name} goes alone, without names of effects")
         if name not in RUNGS:
             raise InputError(
                 f"--model {name}: allowed are auto, full, least, or names of {', '.join(RUNGS)}{nearest(name, RUNGS)}"
