@@ -72,7 +72,7 @@ class Series:
         self.path, self.boundary, self._files = path, boundary, list[tuple[float, str]]()
 
     def add(self, moment: Any) -> None:
-        """Write the fields of a step, and the list anew."""
+        """Write the fields of a step, and the list once more with it."""
         comm = moment.problem.grid.comm
         target = self.path.with_name(f"{self.path.stem}_{moment.count:06d}.vts")
         solution = Solution(moment.problem, moment.fields, Outcome.CONVERGED, "", None, [])  # type: ignore[arg-type]

@@ -38,14 +38,14 @@ SHRINK = 0.25  # of a nudge beside the one before: in a lightly loaded bearing a
 
 
 def applies(scene: Solvable, ask: Ask) -> bool:
-    """Whether the scene has pads whose tilts, or a place that, are to be found."""
+    """Whether the scene has pads, and their tilts or the place of what they carry are to be found."""
     return motion_of(scene) is None and bearing_of(scene) is not None
 
 
 def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     """The solution where everything balances; its outcome is LOAD_NOT_CARRIED where no such place was found. Collective.
 
-    From a cold start a coarse grid comes first, which tells too what pads idle; `nested` = False: none does.
+    From a cold start a coarse grid comes first, which also shows which pads idle; `nested` = False: none does.
     """
     bearing = bearing_of(scene)
     assert isinstance(scene, Scene) and bearing is not None  # as `applies` found

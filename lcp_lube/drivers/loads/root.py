@@ -85,7 +85,7 @@ class Search:
         return t + step if a < t + step < b and not slow else 0.5 * (a + b)
 
     def _newton(self, t: float, g: float, step: float) -> float:
-        """The step from the best point by its own slope, bent as that of the next best one tells; else the one given."""
+        """The step from the best point by its own slope, corrected by that of the next best point; else the one given."""
         if not abs(self.slopes.get(t, 0.0)) > min(FLATTEST, abs(g)):  # a step of 1 by the slope itself is no leap
             return step
         to, others = 1.0 / self.slopes[t], [p for p in self.points if p[0] in self.slopes and p[1] != g]

@@ -40,7 +40,7 @@ TOLD = ("load", "force", "moment", "p_max", "min_h", "cavitated_fraction", "fric
 
 @dataclass(frozen=True)
 class Moment:
-    """A step that was taken: what those hear who watch a march. before, place : before it. dry : of the film at t = 0."""
+    """A step that was taken, as `Ask.watch` receives it. before, place : before it. dry : of the film at t = 0."""
 
     t: float
     t_end: float
@@ -111,7 +111,7 @@ class Run:
         return self.table.fill or (1.0 if self.table.start == "full" else None)
 
     def _at(self, t: float, call: Callable[[], Any]) -> Any:
-        """A call's result; bad input is told with the time."""
+        """A call's result; bad input is reported with the time."""
         try:
             return call()
         except InputError as error:

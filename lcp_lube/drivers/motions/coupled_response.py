@@ -150,7 +150,7 @@ class CoupledResponse(OfLine):
         return _slopes(ends, width * t)
 
     def _ends(self, z: Array, x: Array) -> tuple[list[Changes], float]:
-        """The states whose difference tells what a small step changes, and by how many such steps they are apart."""
+        """Two states whose difference shows what a small step changes, and how many such steps they are apart."""
         return [self._system(k * z, self.x + k * x, self.loop.base) for k in (1.0, -1.0)], 2.0
 
     def _settled(self, b: Array, own: Any, nu: float, stored: bool = True, off: Any = 0.0) -> Any:

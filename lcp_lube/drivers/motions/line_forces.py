@@ -43,7 +43,7 @@ def stiffness_of(forces: Sequence[Array | None], steps: Sequence[float]) -> Arra
 
 
 class OfLine:
-    """What all linearised films share: their stiffness, which of a line is that of its own numbers."""
+    """What all linearised films share: their stiffness; for a line that of its own, exact numbers."""
 
     _line: Array | None  # -dF/de of a line, as `stiffness_of` tells; None: of no line
     _slow: Any  # the answers to motions without an end
