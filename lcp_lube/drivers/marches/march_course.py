@@ -9,7 +9,6 @@ import numpy as np
 from ...base.parallel import Array
 from ...errors import InputError
 from ...problems.film.flows import point_weights
-from ...problems.film.forces import PIVOT
 from ...problems.film.stored import Stored, mean_film
 from ...problems.grid import Grid
 from ...scenes.scene import Scene
@@ -100,8 +99,7 @@ class Course:
         self.turned: bool | None = None  # known with the first film
         of = Coordinates(scene, self.table)
         self.free = free = np.flatnonzero(of.free)
-        names = [*(("force_x", "force_y") if of.journal else ("load",)), f"{PIVOT}1", f"{PIVOT}2"]
-        self.forces = [names[k] for k in free]  # on what is free
+        self.forces = [of.pushes[k] for k in free]  # on what is free
         self.reach, self.inertia = of.reach[free], (of.unit * of.mass)[free]
         self.tilts = free >= len(scene.place)
         self.load: Callable[[float], Array] = lambda t: of.loads(t)[free]
