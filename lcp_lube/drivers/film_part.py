@@ -30,7 +30,7 @@ from ..scenes.moving import film_of
 from ..scenes.scene import Derived, Solvable
 
 SAME = 1e-12  # relative difference that coordinates' rounding leaves between two values of one film
-CUBED = 4.0  # times as much between two of its conductances
+CUBED = 4.0  # the same of conductances, in multiples of SAME
 
 SAMPLE = (65, 5)  # columns and lines that are compared first, before anything is built
 

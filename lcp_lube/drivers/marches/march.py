@@ -22,7 +22,7 @@ from ...problems.solution import Fields
 
 LONGEST, SHORTEST, SAFETY = 1.5, 0.2, 0.9  # a step in parts of the one before
 ROUNDED = 2.0**-48  # of what the film could hold: an error of sums of contents that is rounding
-SCARCE = 1e-9  # likewise: a film with less oil has lost all but its roundings
+SCARCE = 1e-9  # likewise: of a film with less oil only rounding is left
 
 
 @dataclass(frozen=True)

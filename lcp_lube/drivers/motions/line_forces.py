@@ -12,7 +12,7 @@ from ...problems.film.known import known_of
 from ...problems.film.lubrication import LubricationProblem
 
 TOLD = ("load", "force_x", "force_y")
-NEAR = 1e-9  # relative: by which motions may differ from sums of those that these numbers are of
+NEAR = 1e-9  # relative: how far a motion may be from a sum of those that these numbers belong to
 
 
 def line_forces(problem: LubricationProblem, changes: Sequence[Array]) -> Array | None:
