@@ -61,7 +61,7 @@ def _reason(error: Exception) -> str:
 
 
 def reserve(file: str, room: int) -> None:
-    """Take room for so many bytes in a file that is there, before many ranks write it together.
+    """Take room for so many bytes in a file that is there, before ranks write it: a full disk shows here.
 
     Raises
     ------
