@@ -1,4 +1,4 @@
-"""Ranks that do not agree: tell whether all have come to the same place, and end the job if not."""
+"""Whether all ranks have reached the same place in the program; where they have not, the job is ended."""
 
 import hashlib
 import os

@@ -64,7 +64,7 @@ def _machine_code(function: Kernel, **how: Any) -> Kernel:
 
 
 def _stamp(function: Callable) -> tuple[Any, ...]:
-    """What a kernel's machine code has in it beside the text of its own file: the pieces and numbers of others."""
+    """What a kernel's machine code depends on besides its own file: constants, and pieces from other files."""
     parts = list[Any]()
     for name in function.__code__.co_names:
         value = function.__globals__.get(name)
@@ -83,7 +83,7 @@ def _text(path: str) -> str:
 
 @cache
 def _announce() -> None:
-    """Have a terminal told once when loops are compiled that no cache has: some 20 s, once for an installation."""
+    """Print a line on a terminal at the first loop that is compiled as no cache has it: some 20 s, once an installation."""
     from numba.core import event
 
     class Told(event.Listener):

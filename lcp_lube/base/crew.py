@@ -1,7 +1,7 @@
-"""Threads of this process for what is done to many lines of a grid: parts that do not depend on one another, or wait inside.
+"""A pool of threads for work on many lines of a grid, in parts that are independent or wait for one another themselves.
 
-The parts do not depend on the number of threads, and neither do the bits of what is made of them: sums are added up in the
-order of the parts.
+How work is split does not depend on the number of threads, and neither do the bits of the result: sums are added in the order
+of the parts.
 """
 
 import os

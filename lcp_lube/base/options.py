@@ -37,7 +37,7 @@ def wants_ksp() -> bool:
 
 @contextmanager
 def recipe(name: str | None) -> Iterator[str | None]:
-    """Set a recipe's options for the duration, but for those that the user gave; yields a name that tells of these.
+    """Set a recipe's options for the duration, except those that the user gave; yields its name with the user's changes.
 
     A user's -ksp_type, -pc_type or -pc_factor_mat_solver_type that differs replaces all that the recipe says of that part:
     its options for it would go unread or clash.
@@ -110,7 +110,7 @@ def known_names() -> list[str]:
 
 
 def explain_error(error: PETSc.Error) -> str:
-    """One line from PETSc's traceback that names the option, where it can be told, and the nearest legal value."""
+    """One line from PETSc's traceback that names the option, where it can be identified, and the nearest legal value."""
     lines = [re.sub(r"^\[\d+\]\s*", "", line).strip() for line in str(error).splitlines()]
     text = next((line for line in reversed(lines) if line and not re.match(r"^\w+\(\) (line|at)", line)), str(error))
     given = PETSc.Options().getAll()

@@ -1,4 +1,4 @@
-"""Who frees PETSc objects: a list of them for the Python object that they were made for, freed in a fixed order."""
+"""Freeing PETSc objects: a list of them for each Python object that they were made for, freed in a fixed order."""
 
 import weakref
 from functools import cached_property

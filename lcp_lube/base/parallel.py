@@ -15,7 +15,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def overflow_is_no_warning(function: Function) -> Function:
-    """The function, with overflow and NaN in its arithmetic left to its results to tell.
+    """The function, without NumPy's warnings about overflow and NaN: its results show both.
 
     Not `np.errstate` as a decorator: calls inside one another would leave NumPy's settings changed.
     """
@@ -50,7 +50,7 @@ class Reduce:
         return self._total(float(np.add.reduce(a, axis=None)))  # what np.sum calls, sooner
 
     def summed(self, own: float, terms: Callable[[], Array]) -> float:
-        """The sum of what is this rank's; terms : the part of each of its points, for those who ask (`drivers.tape`)."""
+        """The sum of all ranks' own numbers; terms : the share of each of its points, which `drivers.tape` records."""
         return self._total(own)
 
     def of_some(self, values: NDArray, at: Any, box: tuple[int, int]) -> float:
@@ -94,7 +94,7 @@ class Reduce:
 
 
 def _of_parts(task: Callable[[NDArray], Any], a: NDArray) -> list[Any]:
-    """What is made of an array, or by several threads of the parts of a large one."""
+    """The task's result for an array, or by several threads those for the parts of a large one."""
     return [task(a)] if a.size < FEWEST else crew().rows(lambda start, end: task(a[start:end]), len(a), a.size)
 
 

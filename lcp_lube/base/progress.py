@@ -1,4 +1,4 @@
-"""How far a long run has come: what loops tell, and a line of it on a terminal with the time that is left."""
+"""Progress of a long run: its loops report it, and a line on a terminal shows it with the time that is left."""
 
 import sys
 from collections.abc import Callable, Iterable, Iterator
@@ -10,9 +10,9 @@ from mpi4py import MPI
 
 Item = TypeVar("Item")
 
-# Told by a loop: its name in ORDER, what it is at in words, and the part of its work that is done, from 0 to 1.
+# Reported by a loop: its name in ORDER, what it is at in words, and the part of its work that is done, from 0 to 1.
 Progress = Callable[[str, str, float], None]
-ORDER = ("sweep", "accuracy", "time", "grids")  # from the outermost in: the first that has told anything knows the time left
+ORDER = ("sweep", "accuracy", "time", "grids")  # from the outermost in: the first that has reported gives the time left
 
 PATIENCE = 2.0  # seconds before anything is shown
 PAUSE = 0.2  # and between two lines
@@ -45,7 +45,7 @@ class Line:
         self._shown = False
 
     def __call__(self, name: str, words: str, part: float) -> None:
-        """Take what a loop tells; show it if it is time to."""
+        """Take a loop's report; show it if it is time to."""
         self._told = {other: told for other, told in self._told.items() if ORDER.index(other) < ORDER.index(name)}
         self._told[name] = (words, part)
         now = self._clock()
@@ -68,7 +68,7 @@ class Line:
     def over(
         self, items: Iterable[Item], words: Callable[[Item], str], kept: Callable[[Item], bool] = lambda _: False
     ) -> Iterator[Item]:
-        """The items, each told before it is worked on; not those whose work was kept from before, which take no time."""
+        """The items, each reported before it is worked on, except those kept from an earlier run, which take no time."""
         items = list(items)
         due, done = [not kept(item) for item in items], 0
         for item, waits in zip(items, due, strict=True):

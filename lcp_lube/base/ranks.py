@@ -1,12 +1,15 @@
-"""`--ranks N` without an mpiexec by hand: the program starts itself again as an MPI job on this machine."""
+"""The program starts itself again: for `--ranks N` as an MPI job on this machine, and as processes beside it."""
 
 import os
 import shutil
 import signal
 import subprocess
 import sys
+from collections.abc import Mapping
+from typing import Any
 
 from ..errors import InputError
+from ..registry import PACKAGE
 from .petsc import launched
 
 # Open MPI wants these said by root, as in a container; nothing is run but this program, with the rights that it has.
@@ -18,6 +21,13 @@ QUIET = {"OMPI_MCA_orte_execute_quiet": "1", "PRTE_MCA_prte_execute_quiet": "1"}
 def cores() -> int:
     """Of this machine, those that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def begin(command: list[str], environment: Mapping[str, str], **streams: Any) -> "subprocess.Popen[str]":
+    """A process that imports this very package, wherever that lies; out of reach of the terminal's interrupts."""
+    path = [str(PACKAGE.parent), environment.get("PYTHONPATH", "")]
+    environment = {**environment, "PYTHONPATH": os.pathsep.join(filter(None, path))}
+    return subprocess.Popen(command, env=environment, text=True, start_new_session=True, **streams)
 
 
 def run_on(ranks: int, words: list[str]) -> int:

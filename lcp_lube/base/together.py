@@ -61,14 +61,14 @@ def _reason(error: Exception) -> str:
 
 
 def reserve(file: str, room: int) -> None:
-    """Take room for so many bytes in a file that is there, before many ranks write it together.
+    """Take room for so many bytes in a file that is there, before ranks write it: a full disk shows here.
 
     Raises
     ------
     OSError : the disk, or this rank's limit, has no such room, or this rank no such file.
     """
     with open(file, "r+b") as opened:
-        if 0 <= resource.getrlimit(resource.RLIMIT_FSIZE)[0] < room:  # of what another rank has taken, no call would tell
+        if 0 <= resource.getrlimit(resource.RLIMIT_FSIZE)[0] < room:  # no call would report what another rank has taken
             raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))
         if hasattr(os, "posix_fallocate"):
             os.posix_fallocate(opened.fileno(), 0, room)

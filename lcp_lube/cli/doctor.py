@@ -21,11 +21,10 @@ from petsc4py import PETSc
 from .. import __version__
 from ..api import solve
 from ..base.progress import Line
-from ..base.ranks import cores
+from ..base.ranks import begin, cores
 from ..base.together import all_come
 from ..output.console import say
 from ..output.table import table
-from ..registry import PACKAGE
 from ..scenes.scene import load_scene
 
 PACKAGES = ("mumps", "superlu", "superlu_dist", "suitesparse", "hypre", "ml", "scalapack", "ptscotch", "metis", "hdf5")
@@ -160,17 +159,8 @@ def two_ranks() -> list[dict[str, Any]]:
     if "OMPI_UNIVERSE_SIZE" in os.environ:  # under mpiexec -n 1, whose settings cannot be told from the user's
         own = (*own, "OMPI_")
     environment = {key: value for key, value in os.environ.items() if not key.startswith(own)} | MAY_START
-    path = [str(PACKAGE.parent), environment.get("PYTHONPATH", "")]
-    environment["PYTHONPATH"] = os.pathsep.join(filter(None, path))
-    job = subprocess.Popen(
-        [mpiexec, "-n", "2", sys.executable, "-m", "lcp_lube.cli.doctor"],
-        env=environment,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
+    command = [mpiexec, "-n", "2", sys.executable, "-m", "lcp_lube.cli.doctor"]
+    job = begin(command, environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     try:
         out, err = job.communicate(timeout=LIMIT)
     except subprocess.TimeoutExpired:

@@ -3,20 +3,19 @@
 import json
 import os
 import signal
-import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from queue import SimpleQueue
+from subprocess import PIPE, Popen
 from threading import Event, Thread
 from typing import Any
 
 from mpi4py import MPI
 
 from ..base.petsc import launched
-from ..base.ranks import cores
+from ..base.ranks import begin, cores
 from ..errors import InputError
-from ..registry import PACKAGE
 
 Row = dict[str, Any]
 Chains = Sequence[Sequence[int]]
@@ -57,7 +56,7 @@ def side_by_side(words: Sequence[str], jobs: int, chains: Chains) -> Iterator[tu
     for chain in [*map(list, chains), *[None] * jobs]:
         waiting.put(chain)
     done: SimpleQueue[tuple[int, Row] | None] = SimpleQueue()
-    workers: list[subprocess.Popen[str]] = []
+    workers: list[Popen[str]] = []
     over = Event()
     threads = [Thread(target=_lead, args=(words, waiting, done, workers, over), daemon=True) for _ in range(jobs)]
     try:
@@ -83,16 +82,17 @@ def _lead(
     words: Sequence[str],
     waiting: "SimpleQueue[list[int] | None]",
     done: "SimpleQueue[tuple[int, Row] | None]",
-    workers: "list[subprocess.Popen[str]]",
+    workers: "list[Popen[str]]",
     over: Event,
 ) -> None:
     """One worker at a time, from chain to chain."""
-    worker: subprocess.Popen[str] | None = None
+    worker: Popen[str] | None = None
+    command = [sys.executable, "-m", "lcp_lube", *words, "--worker"]
     try:
         while (chain := waiting.get()) is not None:
             while chain and not over.is_set():
                 if worker is None or worker.poll() is not None:
-                    worker = _start(words)
+                    worker = begin(command, os.environ, stdin=PIPE, stdout=PIPE)
                     workers.append(worker)
                     if over.is_set():
                         worker.terminate()
@@ -111,17 +111,3 @@ def _lead(
                     done.put((chain.pop(0), {"outcome": "crashed", "converged": False, "message": message}))
     except OSError:
         done.put(None)
-
-
-def _start(words: Sequence[str]) -> "subprocess.Popen[str]":
-    """A worker, out of reach of the terminal's interrupts."""
-    environment = dict(os.environ)  # without what this process's MPI has put into it for itself
-    environment["PYTHONPATH"] = os.pathsep.join(filter(None, [str(PACKAGE.parent), environment.get("PYTHONPATH", "")]))
-    return subprocess.Popen(
-        [sys.executable, "-m", "lcp_lube", *words, "--worker"],
-        env=environment,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )

@@ -40,8 +40,7 @@ def check_options_file(name: str) -> None:
     except InputError:
         raise
     except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "not a text file"
-        raise InputError(f"-options_file {name}: {reason}") from None
+        raise InputError(f"-options_file {name}: {getattr(error, 'strerror', None) or 'not a text file'}") from None
     if Path(name).suffix in (".yml", ".yaml"):
         return
     for number, line in enumerate(lines, start=1):

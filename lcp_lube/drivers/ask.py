@@ -43,7 +43,7 @@ def light(problem: Any) -> Any:
     return other
 
 
-# What attributes may be, and in words: for those who call from Python.
+# The types of attributes, and their names in messages: for callers from Python.
 KINDS: dict[str, tuple[Any, str]] = {
     **dict.fromkeys(("method", "system", "model"), (str, "a text")),
     **dict.fromkeys(("recipe", "quantity"), (str | None, "a text")),
@@ -88,7 +88,7 @@ class Ask:
     direct_below : points up to which a film in 2D is solved directly, where multigrid would do; default `plan.FEW`,
         of the grids of a run to an accuracy none; with 0 a film in 1D is solved by multigrid's loops too.
     monitor : called after every step with its number and record.
-    progress : told by the loops over grids, levels and time steps how far they have come.
+    progress : called by the loops over grids, levels and time steps with how far they have come.
     watch : called after every time step of a march with its `time.Moment`; collective.
     judge : certifies the fields of the problem that is solved in that problem's place: a part's on the whole scene's data.
     times : when a march is to end a step, s, where an error estimate says how long these are.

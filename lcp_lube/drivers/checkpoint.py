@@ -245,12 +245,12 @@ class Checkpoint:
 
     @property
     def failures(self) -> list[tuple[Outcome, str, list[Step]]]:
-        """How the methods ended whose fallback was running."""
+        """How the methods ended that had failed before the one that was running."""
         failed = self.record["failed"]
         return [(Outcome(outcome), message, [Step(*step) for step in steps]) for outcome, message, steps in failed]
 
     def settled(self, ask: Any) -> Any:
-        """The ask with how the run was begun, for what is not given anew: None, 'auto' or nothing.
+        """The ask, with the choices that the run was begun with where it makes none: None, 'auto' or nothing.
 
         Raises
         ------

@@ -15,7 +15,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ..base.parallel import Array
-from ..base.together import on_all_ranks
+from ..base.together import on_all_ranks, reserve
 from ..errors import InputError
 from ..problems.grid import Grid
 
@@ -43,7 +43,8 @@ def write(path: Path, grid: Grid, header: dict[str, Any], arrays: list[tuple[str
     try:
         with on_all_ranks(comm):
             if comm.rank == 0:
-                _reserve(temporary, head, 8 * grid.size * len(arrays))
+                temporary.write_bytes(head)
+                reserve(str(temporary), len(head) + 8 * grid.size * len(arrays))
         with on_all_ranks(comm):
             _transfer(grid, temporary, len(head), [values for _, values in arrays], write=True)
         with on_all_ranks(comm):
@@ -142,15 +143,6 @@ def _transfer(grid: Grid, path: Path, start: int, arrays: list[Array], write: bo
         raise OSError(error.Get_error_string()) from None
     finally:
         box.Free()
-
-
-def _reserve(temporary: Path, head: bytes, rest: int) -> None:
-    """The file with its header and room for the arrays: a full disk shows here."""
-    with temporary.open("wb") as file:
-        file.write(head)
-        file.flush()
-        if hasattr(os, "posix_fallocate"):
-            os.posix_fallocate(file.fileno(), 0, len(head) + rest)
 
 
 def _settle(temporary: Path, path: Path) -> None:

@@ -101,7 +101,7 @@ class Run:
     ----------
     outcome, message, fields, steps : of the last method, on the finest grid; steps of those before it come first.
     method, system, recipe, ksp_type, pc_type : of the last method, the chosen one or the one that took over from it.
-    levels : a record of every grid, coarse to fine. details : what the method tells of itself beyond its steps.
+    levels : a record of every grid, coarse to fine. details : what the method reports beyond its steps.
     """
 
     scene: Solvable
@@ -240,7 +240,7 @@ class Run:
             method.destroy()
 
     def _watching(self, grid: Grid, stopping: Stopping) -> Monitor | None:
-        """The caller's monitor, and what `Ask.progress` is told: the grid, and how far ||F|| has come down on it."""
+        """The caller's monitor, and the report to `Ask.progress`: the grid, and how far ||F|| has come down on it."""
         ask, norms = self.ask, list[float]()
         if ask.progress is None:
             return ask.monitor

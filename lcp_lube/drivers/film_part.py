@@ -30,7 +30,7 @@ from ..scenes.moving import film_of
 from ..scenes.scene import Derived, Solvable
 
 SAME = 1e-12  # relative difference that coordinates' rounding leaves between two values of one film
-CUBED = 4.0  # times as much between two of its conductances
+CUBED = 4.0  # the same of conductances, in multiples of SAME
 
 SAMPLE = (65, 5)  # columns and lines that are compared first, before anything is built
 
@@ -134,7 +134,7 @@ def promising(scene: Solvable) -> bool:
     kinds = [tuple(side.kind for side in model.sides[k : k + 2]) for k in (0, 2)]
     xs, *ys = (some_places(*side) for side in zip(scene.shape, model.lengths, kinds, SAMPLE, strict=False))
     y = ys[0][:, None] if ys else np.zeros((1, 1))
-    with np.errstate(all="ignore"):  # a film that is not positive is told where it is built
+    with np.errstate(all="ignore"):  # a film that is not positive is reported where it is built
         h = np.broadcast_to(model.film(xs[None, :], y), (y.size, xs.size))
         mirrored = model.film(xs[None, :], model.lengths[-1] - y) if ys else np.inf
         return bool(np.all(np.abs(h / h[:1] - 1.0) <= SAME) if ys else np.ptp(h) <= SAME * h.max()) or bool(
@@ -206,7 +206,7 @@ def _is_symmetric(problem: LubricationProblem, faces: bool) -> bool:
     edges = np.unique(jumps_of(problem.film, "y"))
     if not np.allclose(edges, np.sort(mirror - edges), rtol=0.0, atol=SAME * grid.lengths[1]):
         return False
-    some = np.unique(np.linspace(0, grid.box[0] - 1, SAMPLE[1]).round().astype(int))  # most films that are not tell so at once
+    some = np.unique(np.linspace(0, grid.box[0] - 1, SAMPLE[1]).round().astype(int))  # enough to rule out most films
     if not _all_close(problem, [(problem.scheme.h[some], problem.film(grid.x, mirror - grid.y[some]))]):
         return False
     if grid.comm.size == 1:  # what is solved is all here

@@ -119,7 +119,7 @@ def films_of(scene: Solvable, ring: LubricationProblem, fields: Fields) -> Itera
 
 
 def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
-    """The ring's solution from those of its films; the first one that fails tells how the whole ends. Collective.
+    """The ring's solution from those of its films; the first one that fails gives the outcome of the whole. Collective.
 
     On several ranks the films are solved side by side, each by some of the ranks.
     """

@@ -20,7 +20,7 @@ def level_shapes(shape: tuple[int, ...], ranks: int = 1) -> list[tuple[int, ...]
 
 
 def halved(shape: tuple[int, ...], fewest: int, across: int) -> tuple[int, int] | None:
-    """Half of the points along, at least so few, and across where these are so many; None where that saves too little."""
+    """Half of the points along, but at least `fewest`, and across where there are `across`; None if that saves too little."""
     nx, ny = shape
     coarse = max(nx // 2, fewest), ny // 2 | 1 if ny >= across else ny
     return coarse if prod(coarse) <= COARSER * nx * ny else None

@@ -230,7 +230,7 @@ def _gb(size: float) -> str:
 
 
 def look_ahead(facts: Facts, plan: Plan, comm: MPI.Comm) -> None:
-    """Refuse a large scene before it is built; of others building tells. Collective.
+    """Refuse a large scene before it is built; others are checked once they are. Collective.
 
     Raises
     ------

@@ -21,7 +21,7 @@ from ..problems.film.supplies import Supply, supply_flows
 from .motions.linearised import Feed, Linear
 
 CONSTANT = Law()
-SWEEPS = 16  # of a step's film, once some steps have not put its signs right
+SWEEPS = 16  # of a step's film, where some steps have not settled its signs
 
 
 def z_of(near: Any, p_unit: float) -> Array:

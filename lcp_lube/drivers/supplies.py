@@ -31,13 +31,13 @@ from .chain import Chain
 from .compose import Inner
 from .motions.linearised import Feed, Linear
 
-MOST_SOLVES = 40  # the end of a search that goes round: of drawn films with dense fluids those that were found took up to 11
+MOST_SOLVES = 40  # ends a search that goes round in circles; random films with dense fluids took up to 11
 TOLERANCE = 1e-10  # of the largest flow: by how much what a source gives may differ from what the film takes
-DIGITS, ENOUGH = 1e-7, 1e-4  # steps of such parts of the largest pressure may be rounding; the misfit that may be left then
-PATIENCE, GIVE_UP = 2, 8  # such steps that do not halve the misfit, before one that is left is enough; or given up
-DEAF = 1e-9  # of the slope that would end the misfit within P: a flow that follows P less does so by rounding
-LIKELY = 20.0  # times a film's slope, or a part of it: what coefficients that follow make of it
-RETREATS, RETREAT = 5, 0.1  # times, and part of the way from pressures with an answer to ones that have none
+DIGITS, ENOUGH = 1e-7, 1e-4  # a step of this part of the largest pressure may be rounding; the misfit accepted then
+PATIENCE, GIVE_UP = 2, 8  # such steps that do not halve the misfit: from then on ENOUGH is accepted; the search ends
+DEAF = 1e-9  # of the slope at which a change by P ends the misfit: a flow that depends on P less does so by rounding
+LIKELY = 20.0  # largest ratio between slopes with coefficients that follow and the film's own, either way
+RETREATS, RETREAT = 5, 0.1  # how often, and to which part of the way from pressures with an answer to those without
 FIRST = 0.5  # part of p_s behind a restrictor, to begin with
 
 
@@ -140,7 +140,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
             slopes, beside = (secant, secant - slopes) if likely.all() else (slopes, 0.0)
         matrix = misfit[free, 2:] * slopes + np.diag(misfit[free, 1])
         steep = np.abs(misfit[free, 0]) / np.maximum(P[free], model.p_unit * 1e-3)
-        flat = np.diag(matrix) <= DEAF * steep  # a film that is nowhere full hears nothing of P: ten times as much
+        flat = np.diag(matrix) <= DEAF * steep  # a film that is nowhere full does not depend on P: ten times as much
         matrix += np.diag(np.where(flat, steep / 9.0 - np.diag(matrix), 0.0))
         new_P = np.maximum(P[free] + np.linalg.solve(matrix, -misfit[free, 0]), 0.0)
         if new_P.size == 1:  # the misfit grows with P

@@ -27,7 +27,7 @@ SUMMED = 32  # roundings that a term of a balance passes beside those of the sum
 def enclose_fed(problem: LubricationProblem, fields: Fields) -> Enclosure:
     """A band around p and r that provably contains the discrete solution with its supplies' pressures, or why not. Collective.
 
-    Its price are one linear solve and one for each supply whose pressure follows.
+    It costs one linear solve, and one more for each supply whose pressure follows.
     """
     held: Any = problem.held
     if broken := conditions(problem):

@@ -130,7 +130,7 @@ class CavitySystem(System):
         return np.where(downstream < nx, found, -1).ravel()
 
     def _void(self, full: NDArray[np.bool_], balance: Array) -> Array:
-        """dr of the cavitated cells from what A dp leaves of f1: b_C dr adds up along each run."""
+        """dr of the cavitated cells from f1 - A dp: b_C dr adds up along each run."""
         ny, nx = self.problem.grid.box
         cells = full.reshape(ny, nx)
         carried = np.cumsum(np.where(cells, 0.0, balance.reshape(ny, nx)), axis=1)

@@ -11,7 +11,7 @@ from ..base.parallel import Array
 from ..base.together import on_all_ranks
 from .frames import Frames
 from .style import BLUE, GREY, MAPS, NAMES, RED, STYLE, new_figure
-from .units import prefix
+from .units import axis, prefix
 
 DOTS, RATE = 80, 10  # an inch; frames a second
 
@@ -66,7 +66,7 @@ def _maps(frames: Frames, history: list[dict[str, Any]]) -> Any:
     figure = new_figure(8.0, 4.6)
     grid = figure.add_gridspec(2, 2, height_ratios=[2.6, 0.8])
     images: dict[str, Any] = {}
-    (scale_x, label), (scale_y, unit_y) = frames.along, prefix(frames.lengths[1], "m")
+    (scale_x, label), (scale_y, label_y) = frames.along, axis("y", frames.lengths[1])
     box = (0.0, scale_x * frames.lengths[0], 0.0, scale_y * frames.lengths[1])
     for k, name in enumerate(("p", "r")):
         axes = figure.add_subplot(grid[0, k])
@@ -74,7 +74,7 @@ def _maps(frames: Frames, history: list[dict[str, Any]]) -> Any:
         top = factor * _most(frames, "p") if name == "p" else max(_most(frames, "r"), 1e-3)
         shown = {"origin": "lower", "extent": box, "aspect": "auto", "cmap": MAPS[name], "vmin": 0.0, "vmax": top or 1.0}
         images[name] = (axes.imshow(factor * frames.fields[0][name], **shown), factor)  # type: ignore[arg-type]
-        axes.set(xlabel=label, ylabel=f"y ({unit_y})" if k == 0 else "")
+        axes.set(xlabel=label, ylabel=label_y if k == 0 else "")
         figure.colorbar(images[name][0], ax=axes, location="top", label=NAMES[name] + (f" ({unit})" if unit else ""))
     lower = figure.add_subplot(grid[1, :])
 

@@ -9,7 +9,7 @@ from ..errors import InputError
 
 
 def say(text: str) -> None:
-    """Print on rank 0, on a terminal over the line that tells progress (base/progress).
+    """Print on rank 0; on a terminal over the line of progress (base/progress).
 
     Raises
     ------

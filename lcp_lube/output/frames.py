@@ -15,7 +15,7 @@ from ..errors import InputError
 from ..problems.film.fronts import middle_row
 from ..problems.solution import Outcome, Solution
 from .files import check_target, coordinates, gather, save, taken, thinning, write_collection
-from .units import prefix
+from .units import around, axis
 
 MOST = {1: 1000, 2: 160}  # points a direction of a frame
 LINE, LINES = 400, 600  # points, and times, of the middle line
@@ -72,7 +72,7 @@ class Series:
         self.path, self.boundary, self._files = path, boundary, list[tuple[float, str]]()
 
     def add(self, moment: Any) -> None:
-        """Write the fields of a step, and the list anew."""
+        """Write the fields of a step, and the list once more with it."""
         comm = moment.problem.grid.comm
         target = self.path.with_name(f"{self.path.stem}_{moment.count:06d}.vts")
         solution = Solution(moment.problem, moment.fields, Outcome.CONVERGED, "", None, [])  # type: ignore[arg-type]
@@ -99,10 +99,7 @@ class Frames:
     @property
     def along(self) -> tuple[float, str]:
         """By what x is multiplied to be drawn, and the axis' label: degrees round a journal."""
-        if self.journal:
-            return 360.0 / self.lengths[0], "angle from x = 0 (°)"
-        factor, unit = prefix(self.lengths[0], "m")
-        return factor, f"x ({unit})"
+        return around(self.lengths[0]) if self.journal else axis("x", self.lengths[0])
 
     def add(self, moment: Any) -> None:
         """Keep a frame. Collective."""

@@ -16,7 +16,7 @@ from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Solution
 from .files import coordinates, gather, taken, thinning
 from .liquid import NOISE, ahead, void_at_faces
-from .units import prefix, with_unit
+from .units import around, axis, with_unit
 
 FINE = 1201  # points of a line that is drawn from a formula
 MOST_POINTS = {1: 4000, 2: 500}  # a direction; larger fields are thinned before rank 0 gathers them
@@ -64,17 +64,13 @@ class Picture:
         """(factor, label) of the x axis: of a film round a shaft the angle from x = 0, else x in a unit that suits it."""
         grid = self.solution.problem.grid
         if self.is_journal:
-            return 360.0 / grid.lengths[0], "angle from x = 0 (°)"
-        return self._axis("x", max(abs(grid.origin[0]), *grid.lengths))
+            return around(grid.lengths[0])
+        return axis("x", max(abs(grid.origin[0]), *grid.lengths), self.length_unit)
 
     @property
     def across(self) -> tuple[float, str]:
         """(factor, label) of the y axis."""
-        return self._axis("y", self.solution.problem.grid.lengths[1])
-
-    def _axis(self, name: str, size: float) -> tuple[float, str]:
-        factor, unit = prefix(size, self.length_unit)
-        return factor, f"{name} ({unit})" if unit else name
+        return axis("y", self.solution.problem.grid.lengths[1], self.length_unit)
 
     def film(self, row: int | None, x: Array) -> Array:
         """The film of a lubrication problem in metres at x along a row."""

@@ -116,11 +116,11 @@ MEASURES = (
     *("coupling", "energy_residual", "heat_defect", "min_p", "min_r"),
 )
 UNITS = {"min_p": " Pa"}
-MOST_FRONTS = 4  # that are told one by one
+MOST_FRONTS = 4  # that are listed one by one
 
 
 def _bearing_lines(data: dict[str, Any], one_d: bool) -> list[str]:
-    """What the summary tells of a bearing beyond pressure and load: a journal's numbers, fronts, places, losses, flows."""
+    """The summary's lines on a bearing beyond pressure and load: a journal's numbers, fronts, places, losses, flows."""
     per, flow_unit = ("/m", "m2/s") if one_d else ("", "m3/s")
     lines = []
     if data.get("force"):

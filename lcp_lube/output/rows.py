@@ -53,8 +53,7 @@ def to_pandas(source: str | Path | Iterable[Solution]) -> Any:
                 raise InputError(f"{source}: no csv of a sweep: the columns outcome, converged and digest are needed")
             return pandas.read_csv(source)
         except (OSError, UnicodeDecodeError) as error:
-            reason = error.strerror if isinstance(error, OSError) else "not a text file"
-            raise InputError(f"{source}: {reason}") from None
+            raise InputError(f"{source}: {getattr(error, 'strerror', None) or 'not a text file'}") from None
     solutions = list(source)
     frame = pandas.DataFrame([flat(as_dict(solution)) for solution in solutions])
     units: dict[str, str] = {}

@@ -20,6 +20,17 @@ def with_unit(value: float, unit: str, digits: int = 4) -> str:
     return f"{value * factor:.{digits}g} {unit}"
 
 
+def axis(name: str, size: float, unit: str = "m") -> tuple[float, str]:
+    """(factor, label) of an axis along which a length is drawn, in a unit that suits its size."""
+    factor, unit = prefix(size, unit)
+    return factor, f"{name} ({unit})" if unit else name
+
+
+def around(L: float) -> tuple[float, str]:
+    """(factor, label) of an axis round a shaft, on which x goes from 0 to L."""
+    return 360.0 / L, "angle from x = 0 (°)"
+
+
 def place(at: list[float] | None, unit: str = "m") -> str:
     """'x = 43.5 mm, y = 50 mm' from [0.0435, 0.05]; empty for None."""
     return ", ".join(f"{name} = {with_unit(value, unit)}" for name, value in zip("xy", at or [], strict=False))

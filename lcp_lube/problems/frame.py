@@ -1,4 +1,4 @@
-"""A grid's points together with those of its boundary, for whoever asks for fields from side to side."""
+"""A grid's points together with those of its boundary, for fields from side to side."""
 
 import numpy as np
 from petsc4py import PETSc

@@ -98,7 +98,7 @@ class Grid:
     @made
     def dm(self) -> PETSc.DMDA:
         """Deals the points to the ranks."""
-        # Lines of the flow direction stay whole where there are enough of them: what the void does is told along them.
+        # Lines of the flow direction stay whole where there are enough of them: fronts are found along them.
         ranks = self.petsc_comm.size
         try:
             return PETSc.DMDA().create(

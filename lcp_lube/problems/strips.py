@@ -1,4 +1,4 @@
-"""Lines of a grid taken together, a few at a time: what is made of them and not kept fits the cache, and takes no memory."""
+"""Work on a few lines of a grid at a time: temporary arrays then fit the cache, and take no memory."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any

@@ -131,7 +131,7 @@ class BearingScene(RectangleScene, WithEffects):
         return self.fluid.mu or self.temperature.own_mu
 
     def isothermal(self) -> dict[str, Any]:
-        """What changes where the temperature is left out."""
+        """The keys that change where the temperature is left out, and their values."""
         return {"fluid": self.fluid.model_copy(update={"mu": self.mu_0})}
 
     def _pressure(self, name: str) -> float:

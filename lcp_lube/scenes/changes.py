@@ -51,7 +51,7 @@ def changed(data: dict[str, Any], changes: dict[str, Any], prefixes: set[str], k
 
 
 def flat(table: Any, path: str = "") -> Any:
-    """Tables in tables by the paths of their keys, {'film.pocket.depth': ...}; what is no table as it is."""
+    """Nested tables as one, by the paths of their keys, {'film.pocket.depth': ...}; anything else unchanged."""
     if not isinstance(table, Mapping):
         return table
     found: dict[str, Any] = {}

@@ -122,7 +122,7 @@ class FilmScene(Scene):
         return float((temperature.own_mu if temperature is not None else None) or self.mu)  # type: ignore[attr-defined]
 
     def isothermal(self) -> dict[str, Any]:
-        """What changes where the temperature is left out."""
+        """The keys that change where the temperature is left out, and their values."""
         return {"mu": self.mu_0}
 
     @property

@@ -1,4 +1,4 @@
-"""What the march in time asks of a scene that moves, and how the scenes of films answer: as they are at a time."""
+"""What a march in time needs of a scene that moves: its film at any time."""
 
 from __future__ import annotations
 

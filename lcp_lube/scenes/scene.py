@@ -29,7 +29,7 @@ Count = Annotated[int, Field(strict=True, ge=1, le=2**31 - 2)]
 
 @dataclass(frozen=True)
 class Derived:
-    """What a driver makes of a scene: by its name, of its scheme, on its grid unless it says otherwise."""
+    """A scene that a driver derives from another: with its name, scheme and grid, unless a subclass changes them."""
 
     whole: Any
 

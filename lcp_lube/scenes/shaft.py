@@ -1,7 +1,7 @@
 """What journals under a load of given direction share, in one bush with grooves or in pads; 2D, unwrapped round the shaft."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -96,7 +96,6 @@ class ShaftScene(FilmScene):
 
     def _model(self) -> Model:
         turning, ends = self.turning, Side(p=self.p_end)
-        numbers: Callable[[dict[str, Any]], dict[str, Any]] = self.bearing_numbers
         return Model(
             lengths=self.side_lengths,
             sides=(Side("periodic"), Side("periodic"), ends, ends),
@@ -108,7 +107,7 @@ class ShaftScene(FilmScene):
             scheme="face",
             shaft=turning,
             grooves=self.grooves,
-            extras=numbers,
+            extras=self.bearing_numbers,
         )
 
     def bearing_numbers(self, values: dict[str, Any]) -> dict[str, Any]:

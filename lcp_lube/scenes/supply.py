@@ -19,7 +19,7 @@ LATTICE, CLOSER = 101, 12  # values of a formula along a side among which a posi
 
 @dataclass(frozen=True)
 class Place:
-    """What a supply asks of its scene: side lengths (m), whether it closes in x, p_c (Pa absolute), and where angles are."""
+    """What a supply needs of its scene: side lengths (m), whether it closes in x, p_c (Pa absolute), and where angles are."""
 
     lengths: tuple[float, ...]
     ring: bool

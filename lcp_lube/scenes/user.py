@@ -80,7 +80,7 @@ class Complementarity(Scene):
         return (self.n,)
 
     def facts(self, comm: PETSc.Comm | None = None) -> Facts:
-        """Whether J is dense only J itself can tell: it is asked for at the start, once. Collective."""
+        """Only J itself shows whether it is dense: it is evaluated at the start, once. Collective."""
         if self._dense is None:
             with users_own(comm.tompi4py() if comm else MPI.COMM_SELF, "J(x)"), np.errstate(all="ignore"):
                 J = self.J(self.x0)
@@ -136,7 +136,7 @@ class UserProblem(BoxProblem):
         ------
         InputError : F gives no vector of n real numbers.
         """
-        # inf and NaN are told by the outer loop, or avoided by the line search
+        # inf and NaN are reported by the outer loop, or avoided by the line search
         with users_own(self.grid.comm, "F(x)"), np.errstate(all="ignore"):
             F = _vector(self._F(v), "F(x)")
             if F.size != v.size:

@@ -86,7 +86,7 @@ def _check(option: str, name: str, known: Iterable[str]) -> None:
 
 
 def read_off(problem: Problem, data: dict[str, Any]) -> dict[str, float | None]:
-    """What errors are told of: `load`, integral of p - p_c (N or N/m), p_max above p_c (Pa), rupture (m; 2D: middle line)."""
+    """Numbers with errors: `load`, integral of p - p_c (N or N/m), p_max above p_c (Pa), rupture (m; 2D: middle line)."""
     if "load" not in data:
         return {}
     return {

@@ -42,7 +42,7 @@ def short(scene: str) -> str:
 
 
 def sentence(rows: Sequence[Row]) -> str:
-    """Which subsets solve everything, what the default does, and who ends in wrong answers."""
+    """Which subsets solve everything, what the default does, and which end in wrong answers."""
     total = len(groups(rows, ("start", "mu", "problem")))
     won = {subset: [row for row in chosen(rows, conditions=subset) if converged(row)] for subset in unique(rows, "conditions")}
     best = [subset for subset, good in won.items() if len(good) == total]

@@ -7,23 +7,21 @@ from typing import Any
 
 from mpi4py import MPI
 
-from ..output.style import Figure, save_figure
+from ..output.style import STYLE, Figure, save_figure
 
 DOTS = 200  # an inch, in a .png
 WIDTH = 7.2  # inches: a page's text width, so that the type is read at the size it is set
 COLOURS = ("#0072B2", "#009E73", "#D55E00", "#CC79A7", "#E69F00", "#56B4E9")  # Okabe and Ito's, but for black
 MARKERS = ("o", "s", "^", "v", "D", "P", "*", "<", ">")
-STYLE: Any = {
+CHART: Any = {
+    **STYLE,
     "font.size": 8.0,
     "axes.titlesize": 8.5,
     "axes.labelsize": 8.0,
-    "axes.spines.top": False,
     "axes.spines.right": False,
-    "legend.frameon": False,
     "legend.fontsize": 8.0,
     "lines.linewidth": 1.2,
     "lines.markersize": 4.0,
-    "svg.hashsalt": "lcp_lube",  # the same csv gives the same file
 }
 
 
@@ -34,7 +32,7 @@ def look(number: int) -> dict[str, Any]:
 
 def save(build: Callable[[], Figure], path: Path, comm: MPI.Comm) -> None:
     """Draw on rank 0 with the charts' style and replace the picture. Collective."""
-    save_figure(build, path, comm, DOTS, STYLE)
+    save_figure(build, path, comm, DOTS, CHART)
 
 
 def new_figure(height: float, sentence: str) -> Figure:

@@ -59,7 +59,7 @@ def condition(case: Case, steps: Sequence[Step]) -> dict[str, Any]:
 
 
 def sentence(rows: Sequence[Row]) -> str:
-    """By method the loosest tolerance that all inner solvers stand, and for DIN whether (31) tells where it breaks."""
+    """By method the loosest tolerance at which all inner solvers converge, and for DIN whether (31) predicts failures."""
     parts = []
     for (method,), mine in groups(rows, ("method",)).items():
         good = {tol: all(map(converged, here)) for (tol,), here in groups(mine, ("tol",)).items()}

@@ -40,7 +40,7 @@ def _sections(path: Path, name: str, rows: Sequence[Row], text: str, pictures: S
 
 
 def load(rows: Sequence[Row]) -> str:
-    """How busy the machine was, as the rows tell it: what their seconds are worth."""
+    """The machine's load during the runs, which says how far their seconds can be trusted."""
     told = sorted(float(row["load_average"]) for row in rows if row.get("load_average"))
     untold = len(rows) - len(told)
     said = [f"load average {told[0]:g} to {told[-1]:g} in {len(told)} runs"] if told else []

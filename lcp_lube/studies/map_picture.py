@@ -15,7 +15,7 @@ from .drawing import WIDTH, new_figure
 from .experiment import FELL_BACK, KRYLOV_LIMIT
 
 KRYLOV_MOST = 100_000  # of a whole run; what takes more has a colour of its own
-# Of each way to fail: its marker, its label, and what runs that ended so are told as.
+# Of each way to fail: its marker, its label, and the words for such runs in a sentence.
 FAILURES: dict[str, tuple[str, str, str]] = {
     Outcome.MAX_ITERATIONS: ("x", "iteration limit", "at the iteration limit"),
     Outcome.STEP_LENGTH: ("_", "no step length", "without a step length"),

@@ -130,7 +130,7 @@ class Designs:
             last = [design for design in self.known.values() if design.results][-1:]
             so_far = "".join(f", {name} {design.results[name]:.4g}" for design in last for name in self.quantities)
             done = len(self.known)
-            each = (perf_counter() - self._begin) / max(done, 1)  # nobody knows when it ends: after all its steps at the latest
+            each = (perf_counter() - self._begin) / max(done, 1)  # its end is not known: after all its steps at the latest
             left = f", {duration(each * max(self._most - done, 1))} left if it takes all {self._most} steps" if done else ""
             self.ask.tell("sweep", f"design {done + 1}{so_far}{left}", 0.0)
             values = {one.key: one.low + float(t) * (one.high - one.low) for one, t in zip(self.ranges, x, strict=True)}

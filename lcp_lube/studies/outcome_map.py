@@ -151,7 +151,7 @@ def extent(failed: Sequence[Row], rows: Sequence[Row], axis: Axis) -> str:
 
 
 def tallies(rows: Sequence[Row], by: Sequence[str], axes: Sequence[Axis], right: Callable[[Row], bool] = converged) -> str:
-    """`tally` of each group of runs, as one sentence; groups of which all are right and alike are told together."""
+    """`tally` of each group of runs, as one sentence; groups with the same tally are listed together."""
     said: dict[str, list[str]] = {}
     for names, mine in groups(rows, by).items():
         said.setdefault(tally(mine, axes, right), []).append(" ".join(names))
@@ -159,7 +159,7 @@ def tallies(rows: Sequence[Row], by: Sequence[str], axes: Sequence[Axis], right:
 
 
 def judged(rows: Sequence[Row]) -> str:
-    """What the reference says of the certificate: how far apart certified answers were from it, and who had none."""
+    """What the reference says of the certificate: how far certified answers were from it, and how many runs had none."""
     known = [row for row in rows if row["distance"]]
     good = [float(row["distance"]) for row in known if row["outcome"] in ("converged", FELL_BACK)]
     caught = [row for row in known if row["outcome"] == "wrong_solution"]

@@ -155,7 +155,7 @@ def grids(scene: Scene, quick: bool) -> tuple[int, ...]:
 
 
 def film(source: str) -> RectangleScene:
-    """The scene of a name or file, or of VARIANTS, if its load can be told; else InputError."""
+    """The scene of a name or file, or of VARIANTS, if it has a load; else InputError."""
     name, changes = VARIANTS.get(source, (source, {}))
     scene = load_scene(name, **changes, **({"name": source} if changes else {}))
     if not isinstance(scene, RectangleScene):

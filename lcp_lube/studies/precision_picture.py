@@ -173,7 +173,7 @@ def _series(axes: Axes, rows: Sequence[Row], quantity: str, style: dict[str, Any
 
 
 def _answers(axes: Axes, rows: Sequence[Row], quantity: str) -> None:
-    """Lines at the accuracies that are asked for; under the title who reaches them first, and who is on the front."""
+    """Lines at the accuracies asked for; under the title the method that reaches each first, and those on the front."""
     said = []
     for level in ASKED:
         axes.axhline(level, color="0.5", lw=0.7, ls=":", zorder=0)

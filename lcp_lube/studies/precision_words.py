@@ -19,8 +19,8 @@ def seconds(row: Row) -> float:
 
 
 def timed(rows: Sequence[Row]) -> list[Row]:
-    """The rows whose seconds may be compared: by scene those of the machine that made most of them, but for those made while it
-    was busy.
+    """The rows whose seconds may be compared: for each scene those of the machine with the most rows, except those made
+    while it was busy.
 
     Where most were made while it was busy, none is left out.
     """
@@ -40,7 +40,7 @@ def _machine(rows: Sequence[Row]) -> str:
 
 
 def untimed(rows: Sequence[Row]) -> str:
-    """How many rows count for outcomes and iterations alone; where there are several machines, whose seconds are of which."""
+    """How many rows count for outcomes and iterations alone; with several machines, which scenes' seconds are from which."""
     count = len(rows) - len(timed(rows))
     text = f" Seconds are not compared of {count} runs of another or a busy machine." if count else ""
     machines: dict[str, list[str]] = {}
@@ -86,7 +86,7 @@ def front(rows: Sequence[Row], quantity: str) -> list[Row]:
 
 
 def fastest(rows: Sequence[Row], level: float, quantity: str = "load") -> Row | None:
-    """The run of least seconds whose error is at most `level`, of those whose reference is as sure as that."""
+    """The fastest run with an error of at most `level`, of those whose reference is known as accurately."""
     sure = [row for row in rows if float(row.get(f"{quantity}_unsure") or 0.0) <= level]
     good = [row for row in sure if (here := error(row, quantity)) is not None and here <= level]
     return min(good, key=seconds, default=None)

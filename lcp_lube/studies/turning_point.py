@@ -26,7 +26,7 @@ PARTS = (0.1, 0.01, 1e-3, 1e-4, 1e-6, 1e-8)  # of the turning point, below it an
 SIZES = (8, 16, 32, 64)
 MEANS = (1e-3, 1.4)  # of v: near zero, and well beyond the turning point on the upper branch
 
-# Who is tried: the scene, its start, and what `solve` is told.
+# What is tried: the scene, its start, and the arguments of `solve`.
 WAYS = {
     "auto": ("bratu", 0.0, {}),
     "newton from 0, direct": ("bratu", 0.0, {"method": "newton", "recipe": "umfpack"}),

@@ -84,10 +84,10 @@ def test_a_process_that_dies_is_a_row(monkeypatch):
     """And the next one goes on behind it."""
     ends = 'import sys; k = sys.stdin.readline(); print(\'{"outcome": "converged"}\', flush=True); sys.exit(3)'
 
-    def start(words):
+    def start(*_: object, **__: object):
         return subprocess.Popen([sys.executable, "-c", ends], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
-    monkeypatch.setattr(sweep_jobs, "_start", start)
+    monkeypatch.setattr(sweep_jobs, "begin", start)
     found = dict(side_by_side([], 1, [[0, 1, 2]]))
     assert [found[k]["outcome"] for k in range(3)] == ["converged", "crashed", "converged"]
     assert found[1]["message"] == "its process ended with status 3"

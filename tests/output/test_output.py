@@ -21,6 +21,7 @@ from lcp_lube.api import solve
 from lcp_lube.errors import InputError
 from lcp_lube.output import files, panels, picture
 from lcp_lube.output.plot import draw, plot
+from lcp_lube.output.units import prefix
 from lcp_lube.problems.solution import Outcome, Solution
 from lcp_lube.scenes.scene import load_scene
 
@@ -412,7 +413,7 @@ def test_a_stride_takes_points_as_far_from_both_ends(n: int, step: int) -> None:
 
 @given(st.floats(1e-9, 9.99e11))
 def test_a_prefix_brings_numbers_to_three_digits(value: float) -> None:
-    factor, unit = picture.prefix(value, "Pa")
+    factor, unit = prefix(value, "Pa")
     assert 1 - 1e-9 <= value * factor < 1000
     assert unit.endswith("Pa")
 

@@ -19,7 +19,7 @@ from lcp_lube.errors import InputError
 from lcp_lube.registry import METHODS, STABILITY, MethodEntry
 from lcp_lube.scenes.scene import load_scene
 from lcp_lube.studies import experiment, known, precision, turning_point
-from lcp_lube.studies.drawing import STYLE
+from lcp_lube.studies.drawing import CHART
 from lcp_lube.studies.log import NAME, load, write_log
 from lcp_lube.studies.map_picture import Axis, Panels, chosen, converged, tick
 from lcp_lube.studies.map_picture import picture as map_picture
@@ -203,7 +203,7 @@ def test_the_load_of_the_machine_is_told() -> None:
 @pytest.fixture
 def printed() -> Iterator[None]:
     """The charts' own sizes of type."""
-    with matplotlib.rc_context(STYLE):
+    with matplotlib.rc_context(CHART):
         yield
 
 

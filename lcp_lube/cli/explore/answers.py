@@ -142,7 +142,7 @@ class Answers:
         }
 
     def _in_time(self, scene: Scene, ask: Ask, level: int, show: Callable[[dict[str, Any]], None]) -> dict[str, Any]:
-        """A film in time: where it has come to in `FOLLOWS` seconds, or, with answers on the way, all of it."""
+        """A film in time: the state reached in `FOLLOWS` seconds, or all of it, with answers on the way."""
         begin = shown = perf_counter()
         first: dict[str, Any] = {}
         motion = motion_of(scene)

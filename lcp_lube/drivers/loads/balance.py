@@ -32,7 +32,7 @@ RANGE = {"eccentricity": 1e4, "h_offset": 100.0}  # unless one is given: of e/(1
 STEP = 1e-4  # in t, of a difference
 COARSE_TOL = 1e-3  # a coarse grid's load is no better
 FEWEST, NARROWEST = 25, 3  # points of a coarse grid, and across
-MOST_FAILED, LIGHTER = 4, 3.0  # solves without an answer before there is one, and twice the step in t from each to less load
+MOST_FAILED, LIGHTER = 4, 3.0  # solves that may fail before the first answer; twice the step in t from each towards less load
 ONE_GRID = 1_000  # points up to which a coarser grid saves no time
 
 

@@ -3,11 +3,10 @@
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...base.parallel import Array
 from ...problems.film.forces import PIVOT, totals
@@ -49,19 +48,14 @@ class FilmWithModes:
 ModeFilms = SideBySide[FilmWithModes]
 
 
-@dataclass
 class JournalPads:
     """Coordinates: the journal's displacement along the load and ahead of it (m), and a tilt (rad) a pad.
 
     sizes : what counts as a change of each; free : those that are to be found.
     """
 
-    scene: TiltingPadScene
-    sizes: Array = field(init=False)
-    free: NDArray[np.bool_] = field(init=False)
-
-    def __post_init__(self) -> None:
-        scene, n = self.scene, len(self.scene.pivots_deg)
+    def __init__(self, scene: TiltingPadScene):
+        self.scene, n = scene, len(scene.pivots_deg)
         self.sizes = np.array([scene.clearance] * 2 + [2.0 * scene.clearance / scene.D] * n)
         self.free = np.array([scene.balance is not None] * 2 + [scene.tilts is None] * n)
 
@@ -141,17 +135,11 @@ class JournalPads:
         return {"vary": "eccentricity", "value": value, "attitude_deg": math.degrees(math.atan2(q[1], q[0])), "tilts": q[2:]}
 
 
-@dataclass
 class ThrustPads:
-    """Coordinates: the film at the pivot (m), and a pad's pitch and, on a point, roll (rad)."""
+    """Coordinates: the film at the pivot (m), and a pad's pitch and, on a point, roll (rad); `sizes` and `free` as above."""
 
-    scene: ThrustScene
-    sizes: Array = field(init=False)
-    free: NDArray[np.bool_] = field(init=False)
-
-    def __post_init__(self) -> None:
-        scene = self.scene
-        slope = scene.h_min / scene.side_lengths[0]
+    def __init__(self, scene: ThrustScene):
+        self.scene, slope = scene, scene.h_min / scene.side_lengths[0]
         self.sizes = np.array([scene.h_min, slope, slope])
         self.free = np.array([scene.balance is not None, *scene.tilts_found])
 

@@ -31,21 +31,21 @@ MOST_SOLVES = 80  # on a grid: the end of a search that goes round: pads without
 FINE = 7  # points across that are halved
 THINNER, THICKER = 0.7, 3.0  # parts of a film anywhere by which a step may change it
 THINNEST = 1e-5  # film over the clearance, below which no load is looked for: a difference quotient's step is a tenth of it
-ROUNDING = 1e-15  # a step in parts of the coordinates' sizes, of which a film knows nothing
+ROUNDING = 1e-15  # a step, in parts of the coordinates' sizes, too short to change a film
 NEAR = 0.05  # a step in parts of the coordinates' sizes
 NUDGES, NUDGE = 4, 0.5  # of a pad without stiffness: how often its inlet is opened, and by how much of its size of tilt
 SHRINK = 0.25  # of a nudge beside the one before: in a lightly loaded bearing a wide one upsets the other pads
 
 
 def applies(scene: Solvable, ask: Ask) -> bool:
-    """Whether the scene has pads whose tilts, or a place that, are to be found."""
+    """Whether the scene has pads, and their tilts or the place of what they carry are to be found."""
     return motion_of(scene) is None and bearing_of(scene) is not None
 
 
 def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     """The solution where everything balances; its outcome is LOAD_NOT_CARRIED where no such place was found. Collective.
 
-    From a cold start a coarse grid comes first, which tells too what pads idle; `nested` = False: none does.
+    From a cold start a coarse grid comes first, which also shows which pads idle; `nested` = False: none does.
     """
     bearing = bearing_of(scene)
     assert isinstance(scene, Scene) and bearing is not None  # as `applies` found

@@ -33,16 +33,16 @@ from .winding import places
 
 MOST_SOLVES = 25  # on a grid
 COARSEST, COARSE_TOL = (36, 7), 1e-2  # fewest points around and across, and how well a coarse grid's place is worth knowing
-SEEN = 0.5  # a mesh in parts of the stretch sqrt(2 (1 - s)) on which the film is thin, at most
+SEEN = 0.5  # largest mesh, in parts of the stretch sqrt(2 (1 - s)) on which the film is thin
 MOST_COARSE = 8  # solves on a grid that is not the last
 LONGEST = (2.0, 0.4)  # of a step in t and in the attitude (rad)
 MOST_FAILED = 4  # solves without an answer on a grid, from each of which half of the step is taken
 RETREAT = np.array([0.7, 0.0])  # from a first place without an answer: some twice the thinnest film
 SHORTEST = 1e-4  # of a step that was halved
 WIDEST = 14.0  # of t: s from 1e-6 to 1 - 1e-6
-AWRY = 0.7  # rad from the load's line: then the force goes on in a line, not its logarithm
-ACROSS = 0.4  # of such a step, clearances
-HELD = 0.5  # part of a force that is there without eccentricity, from which on it goes on in a line
+AWRY = 0.7  # rad off the load's line, beyond which the force is extrapolated linearly, not its logarithm
+ACROSS = 0.4  # longest such step, clearances
+HELD = 0.5  # part of the force that is there without eccentricity: from that on likewise
 DIRECTIONS = np.linspace(-0.5, 0.5, 2881)[1:-1] * math.pi  # from the attitude, in which the bore may be touched
 
 
@@ -260,7 +260,7 @@ def _on_grid(
 
 
 def _across(scene: Any, t: float, phi: float, K: Array, left: Array) -> Array:
-    """Where the journal's place goes on if forces (N) change in a line, as they do about the place without load."""
+    """The journal's next place if forces (N) change linearly, as they do near the place without load."""
     step = np.linalg.lstsq(K * scene.clearance, left, rcond=None)[0]
     at = eccentricity(scene, t, phi) * np.array([math.cos(phi), math.sin(phi)])
     at += step * min(1.0, ACROSS / float(np.hypot(*step)))

@@ -6,7 +6,7 @@ from math import inf, isfinite
 
 LONGEST_STEP = 2.5  # while there is no bracket
 FLATTEST = 0.05  # slope below which a step is taken as if it were this
-WIDEST_GAP, FINEST_GAP = 1.5, 0.3  # left between what is known, and beside the best point
+WIDEST_GAP, FINEST_GAP = 1.5, 0.3  # largest gaps left between known points, and beside the best point
 PATIENCE = 8  # evaluations without a bracket, after which secant steps are left
 
 
@@ -49,7 +49,7 @@ class Search:
             self.widths.append(bracket[1] - bracket[0])
 
     def leave(self, t: float, back: float) -> None:
-        """g could not be evaluated here: half the way to the nearest point, or if there is none to back, it may be."""
+        """g could not be evaluated here; it may be half-way to the nearest point or, where there is none, to `back`."""
         near = min((point[0] for point in self.points), key=lambda known: abs(known - t), default=back)
         self.low, self.high = (self.low, t) if t > near else (t, self.high)
         self.left.add(t)
@@ -85,7 +85,7 @@ class Search:
         return t + step if a < t + step < b and not slow else 0.5 * (a + b)
 
     def _newton(self, t: float, g: float, step: float) -> float:
-        """The step from the best point by its own slope, bent as that of the next best one tells; else the one given."""
+        """The step from the best point by its own slope, corrected by that of the next best point; else the one given."""
         if not abs(self.slopes.get(t, 0.0)) > min(FLATTEST, abs(g)):  # a step of 1 by the slope itself is no leap
             return step
         to, others = 1.0 / self.slopes[t], [p for p in self.points if p[0] in self.slopes and p[1] != g]

@@ -1,4 +1,4 @@
-"""Where in a bore a journal may be in balance: cells of places all round, about which what is left of the load turns."""
+"""Where in a bore a journal may be in balance: cells between places all round, about which the load left over turns."""
 
 import math
 from collections.abc import Callable

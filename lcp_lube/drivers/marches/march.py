@@ -1,4 +1,4 @@
-"""The memory of a march in time: contents of the film's cells, fields, and what a difference formula makes of them.
+"""The memory of a march in time: contents of the film's cells, fields, and the difference formulas that are applied to them.
 
 Implicit Euler, or BDF2 with steps of any length: with w = dt/(step before)
 
@@ -22,7 +22,7 @@ from ...problems.solution import Fields
 
 LONGEST, SHORTEST, SAFETY = 1.5, 0.2, 0.9  # a step in parts of the one before
 ROUNDED = 2.0**-48  # of what the film could hold: an error of sums of contents that is rounding
-SCARCE = 1e-9  # likewise: a film with less oil has lost all but its roundings
+SCARCE = 1e-9  # likewise: of a film with less oil only rounding is left
 
 
 @dataclass(frozen=True)
@@ -177,7 +177,7 @@ class March:
         return max(filter(None, (found, other)), default=found)
 
     def _rate(self, dt: float, new: Array, before: list[Array]) -> float:
-        """Of what cells come to store, in sum."""
+        """Sum of the rates, in modulus, at which cells store."""
         formula = self.formula(dt)
         return self._sum(np.abs(formula.weight * new - formula.old(before)))
 
@@ -205,7 +205,7 @@ class March:
         return found
 
     def next_step(self, dt: float, error: float | None, tol: float) -> float:
-        """The length of the next step, or of the same once more."""
+        """The length of the next step, or of the same step if it is taken again."""
         if error is None:
             return dt
         power = 1.0 / (2 if self.second else 1)

@@ -27,8 +27,9 @@ from .step import TimeStep
 class Coordinates:
     """Of a scene: first its `place`, behind it the tilts of its pads that follow.
 
-    names : in the history; unit : m or rad of one of each; reach : m of the film that one of each moves; free : those that are
-    to be found; mass : kg or kg m2, of the part of the bearing that is solved.
+    names : in the history; pushes : the integral of the pressure that acts on each; unit : m or rad of one of each; reach : m
+    of the film that one of each moves; free : those that are to be found; mass : kg or kg m2, of the part of the bearing that
+    is solved; first : number of coordinates of the place.
     """
 
     def __init__(self, scene: Any, table: MotionTable):
@@ -36,21 +37,22 @@ class Coordinates:
         journal, follow = scene.turning, scene.pads_follow
         self.journal = journal is not None
         self.pads: Any = None
-        first, tilts = 2 if self.journal else 1, 0
+        place, pushes = (["journal_x", "journal_y"], ["force_x", "force_y"]) if self.journal else (["h_offset"], ["load"])
+        names, reach, found = list[str](), list[float](), list[bool]()
         if follow and self.journal:
-            self.pads, tilts = JournalPads(scene), len(scene.pivots_deg)
-            names, reach, found = [f"tilt_{k + 1}" for k in range(tilts)], [journal.R] * tilts, [True] * tilts
+            self.pads, n = JournalPads(scene), len(scene.pivots_deg)
+            names, reach, found = [f"tilt_{k + 1}" for k in range(n)], [journal.R] * n, [True] * n
         elif follow:
-            self.pads, tilts = ThrustPads(scene), 2
+            self.pads = ThrustPads(scene)
             names, reach, found = ["pitch", "roll"], list(scene.side_lengths), list(scene.tilts_found)
-        else:
-            names, reach, found = [], [], []
-        self.names = [*(("journal_x", "journal_y") if self.journal else ("h_offset",)), *names]
+        self.first, tilts = len(place), len(names)
+        self.names = [*place, *names]
+        self.pushes = [*pushes, *(f"{PIVOT}{k + 1}" for k in range(tilts))]
         self.shares = scene.pads if isinstance(scene, ThrustScene) else 1  # of the load: one sector is solved
-        self.unit = np.array([journal.c if journal else 1.0] * first + [1.0] * tilts)
-        self.reach = np.array([journal.c if journal else 1.0] * first + reach)
-        self.free = np.array([table.free] * first + found, dtype=bool)
-        self.mass = np.array([(table.mass or 0.0) / self.shares] * first + [table.pad_inertia] * tilts)
+        self.unit = np.array([journal.c if journal else 1.0] * self.first + [1.0] * tilts)
+        self.reach = np.array([journal.c if journal else 1.0] * self.first + reach)
+        self.free = np.array([table.free] * self.first + found, dtype=bool)
+        self.mass = np.array([(table.mass or 0.0) / self.shares] * self.first + [table.pad_inertia] * tilts)
 
     @property
     def any(self) -> bool:
@@ -103,9 +105,8 @@ class Coordinates:
     def forces(self, solution: Solution) -> Array:
         """What the film of a solved step does to each, N or N m. Collective."""
         problem: Any = solution.problem
-        told = totals(problem, solution.fields["p"] * problem.p_unit)
-        tilts = [f"{PIVOT}{k + 1}" for k in range(self.unit.size - (2 if self.journal else 1))]
-        return np.array([told[name] for name in (*(("force_x", "force_y") if self.journal else ("load",)), *tilts)])
+        found = totals(problem, solution.fields["p"] * problem.p_unit)
+        return np.array([found[name] for name in self.pushes])
 
     def stiffness(self, step: TimeStep, solution: Solution) -> Array:
         """Minus the derivatives of `forces` by m and rad. Collective."""
@@ -123,6 +124,6 @@ class Coordinates:
 
     def told(self, place: Sequence[float]) -> dict[str, Any]:
         """As numbers of an answer."""
-        found, first = [float(one) for one in place], 2 if self.journal else 1
-        tilts = {"pad_tilts": found[first:]} if self.pads is not None else {}
+        found = [float(one) for one in place]
+        tilts = {"pad_tilts": found[self.first :]} if self.pads is not None else {}
         return {"journal": found[:2]} | tilts if self.journal else {"h_offset": found[0]} | tilts

@@ -9,7 +9,6 @@ import numpy as np
 from ...base.parallel import Array
 from ...errors import InputError
 from ...problems.film.flows import point_weights
-from ...problems.film.forces import PIVOT
 from ...problems.film.stored import Stored, mean_film
 from ...problems.grid import Grid
 from ...scenes.scene import Scene
@@ -19,7 +18,7 @@ from .march_coordinates import Coordinates
 from .marching import Moment, first_film
 from .step import TimeStep, contents
 
-STEP = 1e-3  # of a supply's pressure, in which G and what it is told by are linear
+STEP = 1e-3  # of a supply's pressure, in which G and the numbers reported are linear
 NUDGE = 1e-5  # of the thinnest film: of the journal's place, for differences
 PLACES = ("journal_x", "journal_y", "h_offset", "pitch", "roll")
 
@@ -85,7 +84,7 @@ def check_march(scene: Scene) -> None:
 
 
 class Course:
-    """A march at the times, voids and places of a trace; where U < 0 that of the mirror image, but for what is told.
+    """A march at the times, voids and places of a trace; where U < 0 that of the mirror image, except for the numbers reported.
 
     near : whose grid's edges are followed.
 
@@ -100,8 +99,7 @@ class Course:
         self.turned: bool | None = None  # known with the first film
         of = Coordinates(scene, self.table)
         self.free = free = np.flatnonzero(of.free)
-        names = [*(("force_x", "force_y") if of.journal else ("load",)), f"{PIVOT}1", f"{PIVOT}2"]
-        self.forces = [names[k] for k in free]  # on what is free
+        self.forces = [of.pushes[k] for k in free]  # on what is free
         self.reach, self.inertia = of.reach[free], (of.unit * of.mass)[free]
         self.tilts = free >= len(scene.place)
         self.load: Callable[[float], Array] = lambda t: of.loads(t)[free]
@@ -206,7 +204,7 @@ class Course:
         return found
 
     def by_followed(self, n: int, at: Any, unit: float) -> list[tuple[Array, Array, dict[str, float]]]:
-        """Derivatives of G in a unit of flow, the film and the numbers told, by each place and pressure that follows."""
+        """Derivatives of G in a unit of flow, the film and the numbers reported, by each place and pressure that follows."""
         kept = self.solved(n)
         step = NUDGE * self.grid.reduce.min(mean_film(self.grid, self.film(n).film)) / self.reach
         P, changes = np.array(kept.pressures), [(step[k], {"shift": np.eye(self.free.size)[k]}) for k in at]

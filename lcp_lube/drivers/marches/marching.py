@@ -26,10 +26,10 @@ from .march_file import MarchFile
 from .rotor import Rotor
 from .step import TimeStep, carried, check_content, check_room, contents
 
-SOME = 0.37  # of t_end: when edges are looked at that may have moved
+SOME = 0.37  # of t_end: when edges are compared with those at t = 0
 FIRST = 1e-3  # of t_end: the first step, where an error estimate says how long the others are
 LEAST = 1e-9  # of t_end: the shortest step
-RECENT, MANY, SWEEPS = 10, 2.0, 16  # steps that are looked at, iterations a solve that are many, sweeps that then come first
+RECENT, MANY, SWEEPS = 10, 2.0, 16  # the last steps considered, iterations a solve that are many, sweeps that come first then
 REST = 0.05  # of multigrid's residual in a step's guess may be left: that is far below the error of the step's formula
 EPS1 = 3e-10  # of multigrid: its root bounds what the certificate lets a step leave (other methods' is 1e-4)
 SHARE = 0.01  # of t_end: in shorter steps an error of the rates counts by its part of that time
@@ -40,7 +40,7 @@ TOLD = ("load", "force", "moment", "p_max", "min_h", "cavitated_fraction", "fric
 
 @dataclass(frozen=True)
 class Moment:
-    """A step that was taken: what those hear who watch a march. before, place : before it. dry : of the film at t = 0."""
+    """A step that was taken, as `Ask.watch` receives it. before, place : before it. dry : of the film at t = 0."""
 
     t: float
     t_end: float
@@ -111,7 +111,7 @@ class Run:
         return self.table.fill or (1.0 if self.table.start == "full" else None)
 
     def _at(self, t: float, call: Callable[[], Any]) -> Any:
-        """A call's result; bad input is told with the time."""
+        """A call's result; bad input is reported with the time."""
         try:
             return call()
         except InputError as error:

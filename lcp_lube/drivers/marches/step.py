@@ -42,7 +42,7 @@ class TimeStep(Derived):
 def contents(grid: Grid, model: Model, fields: Fields | None, problem: Any = None) -> Array:
     """h (1 - r) of the owned cells, m, times the density over that at p_c; without fields the full film's. Collective.
 
-    problem : solved by the fields; it knows what its full cells held, of what the film has room for.
+    problem : solved by the fields; it knows how much its full cells hold, in parts of their room.
     """
     h = mean_film(grid, model.film).ravel()
     if fields is None:

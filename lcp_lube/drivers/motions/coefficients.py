@@ -20,10 +20,10 @@ from ...problems.film.known import known_of
 from ...problems.film.lubrication import LubricationProblem
 from ...problems.film.model import Model
 from ...problems.film.turning import Turning
-from ...problems.solution import Fields, Solution
+from ...problems.solution import Solution
 from ...scenes.effects.named import without
 from ...scenes.moving import film_of, motion_of
-from ...scenes.scene import Scene, Solvable
+from ...scenes.scene import Scene
 from ...scenes.thrust import ThrustScene
 from ...scenes.tilting import TiltingPadScene
 from ..grooves import SolvedFilm, films_of
@@ -137,14 +137,23 @@ def has_effects(model: Model) -> bool:
 
 
 def by_film(of: Callable[[Any], Any], scene: Any, solution: Solution, motions: Sequence[Change]) -> Any:
-    """What `of` finds, and frees, of the response to these motions of what is no pad. Collective."""
+    """What `of` finds, and frees, of the response to these motions: of the problem that was solved, or of the films between its
+    grooves side by side. Not of tilting pads: see `_of_pads`. Collective."""
+    ring: Any = solution.problem
     model = supplied(scene.model, solution)
     if has_effects(model):  # as a whole: a ring's films share their oil
         gaps = [lambda e, motion=motion: Moved(model.gap, motion, e, 0.0) for motion in motions]
         return of(CoupledResponse(scene, solution, gaps))
-    symmetric = solution.settings.get("details", {}).get("reduction") == "mirror"
-    ring: Any = solution.problem
-    return summed(of, scene, model, ring, solution.fields, motions, symmetric)
+    halved = solution.settings.get("details", {}).get("reduction") == "mirror"  # solved on half the width
+    if not isinstance(ring, GroovedProblem):
+        return of(Response(ring, model, solution.fields, motions, film=scene if halved else None))
+
+    def found(one: SolvedFilm) -> Any:
+        film = one.film if halved else None
+        return of(Response(one.problem, one.film.model, one.fields, motions, one.first, film=film))
+
+    with films_of(scene, ring, solution.fields) as films:
+        return films.sum(found)
 
 
 def check_film(scene: Any, tilt: bool) -> None:
@@ -215,30 +224,6 @@ def supplied(model: Model, solution: Solution) -> Model:
     if not found:
         return model
     return replace(model, supplies=tuple(replace(one, p=p) for one, p in zip(model.supplies, found, strict=True)))
-
-
-def summed(
-    of: Callable[[Response], Any],
-    scene: Solvable,
-    model: Model,
-    ring: LubricationProblem,
-    fields: Fields,
-    motions: Sequence[Change],
-    symmetric: bool = False,
-) -> Any:
-    """What `of` finds, and frees, of the problem that was solved, or of the films between its grooves side by side.
-
-    Not of tilting pads: see `_of_pads`. symmetric : they were solved on half their width. Collective.
-    """
-    if not isinstance(ring, GroovedProblem):
-        return of(Response(ring, model, fields, motions, film=scene if symmetric else None))
-
-    def found(one: SolvedFilm) -> Any:
-        film = one.film if symmetric else None
-        return of(Response(one.problem, one.film.model, one.fields, motions, one.first, film=film))
-
-    with films_of(scene, ring, fields) as films:
-        return films.sum(found)
 
 
 def stability(K: Array, C: Array) -> tuple[float | None, float | None]:

@@ -36,7 +36,7 @@ from .linearised import Linear, following
 from .response import near
 
 STEP = 1e-4  # of differences: their error is its square
-OF_LINE = 0.1  # of it, where a line's numbers are taken: they have all digits, and thick oils bend them
+OF_LINE = 0.1  # of STEP, for a line's own numbers: they have all digits, and are curved where oil thickens
 RTOL, RESTART, MOST = 1e-8, 150, 1500  # of GMRES; MOST: ten restarts
 Changes = tuple[Array, Array, Array]  # of a state's H and x - X, of Q, and of what supplies give and hold
 
@@ -46,7 +46,7 @@ class CoupledResponse(OfLine):
 
     Parameters
     ----------
-    gaps : the film for each motion, by its coordinate e. flip : points that are about to change count to the other side.
+    gaps : the film for each motion, by its coordinate e. flip : points that are about to change count as changed.
     """
 
     rtol, most = RTOL, MOST  # of GMRES
@@ -150,7 +150,7 @@ class CoupledResponse(OfLine):
         return _slopes(ends, width * t)
 
     def _ends(self, z: Array, x: Array) -> tuple[list[Changes], float]:
-        """The states whose difference tells what a small step changes, and by how many such steps they are apart."""
+        """Two states whose difference shows what a small step changes, and how many such steps they are apart."""
         return [self._system(k * z, self.x + k * x, self.loop.base) for k in (1.0, -1.0)], 2.0
 
     def _settled(self, b: Array, own: Any, nu: float, stored: bool = True, off: Any = 0.0) -> Any:

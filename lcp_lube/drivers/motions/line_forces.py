@@ -12,7 +12,7 @@ from ...problems.film.known import known_of
 from ...problems.film.lubrication import LubricationProblem
 
 TOLD = ("load", "force_x", "force_y")
-NEAR = 1e-9  # relative: by which motions may differ from sums of those that these numbers are of
+NEAR = 1e-9  # relative: how far a motion may be from a sum of those that these numbers belong to
 
 
 def line_forces(problem: LubricationProblem, changes: Sequence[Array]) -> Array | None:
@@ -43,7 +43,7 @@ def stiffness_of(forces: Sequence[Array | None], steps: Sequence[float]) -> Arra
 
 
 class OfLine:
-    """What all linearised films share: their stiffness, which of a line is that of its own numbers."""
+    """What all linearised films share: their stiffness; for a line that of its own, exact numbers."""
 
     _line: Array | None  # -dF/de of a line, as `stiffness_of` tells; None: of no line
     _slow: Any  # the answers to motions without an end

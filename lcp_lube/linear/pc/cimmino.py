@@ -14,6 +14,8 @@ what crosses the ranks. A block never reaches over ranks: its parts count as blo
 makes no difference.
 """
 
+from types import SimpleNamespace
+
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
@@ -161,9 +163,9 @@ class CimminoCG:
             self.sum.refresh(A)
             self._state = A.stateGet()
         if self._ksp is None:
-            self._H = PETSc.Mat().createPython(A.getSizes(), Projections(self.sum), comm=A.comm)
+            self._H = PETSc.Mat().createPython(A.getSizes(), SimpleNamespace(mult=self._multiply), comm=A.comm)
             self._H.setUp()
-            self._b = A.createVecRight()
+            self._b, self._middle = A.createVecs()
             self._ksp = PETSc.KSP().create(A.comm)
             self._ksp.setOptionsPrefix(self._prefix)
             self._ksp.setOperators(self._H)
@@ -171,6 +173,11 @@ class CimminoCG:
             self._ksp.getPC().setType(PETSc.PC.Type.NONE)
             self._ksp.setFromOptions()
         return self._ksp
+
+    def _multiply(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """y = H x = M^-1 A x."""
+        self.sum.A.mult(x, self._middle)
+        self.sum.multiply(self._middle, y)
 
     def solve(self, ksp: PETSc.KSP, b: PETSc.Vec, x: PETSc.Vec) -> None:
         inner = self._refresh(ksp.getOperators()[0])
@@ -184,24 +191,9 @@ class CimminoCG:
 
     def destroy(self, ksp: PETSc.KSP) -> None:
         if self._ksp is not None:
-            for obj in (self._ksp, self._H, self._b):
+            for obj in (self._ksp, self._H, self._b, self._middle):
                 obj.destroy()
         self.sum.destroy()
-
-
-class Projections:
-    """H = M^-1 A as the context of a python matrix."""
-
-    def __init__(self, blocks: Cimmino):
-        self._blocks = blocks
-        self._middle = blocks.A.createVecLeft()
-
-    def mult(self, mat: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        self._blocks.A.mult(x, self._middle)
-        self._blocks.multiply(self._middle, y)
-
-    def destroy(self, mat: PETSc.Mat) -> None:
-        self._middle.destroy()
 
 
 def first_fit(pointers: NDArray[np.int64], columns: NDArray[np.int64]) -> NDArray[np.int64]:
