@@ -49,7 +49,8 @@ def run_solve(args: argparse.Namespace) -> int:
 
     try:
         with Line() as line:
-            solution = solution_of(args, monitor, None if args.monitor else line, watching if moves else None, scene)
+            quiet = args.monitor or moves  # a march has a bar of its own
+            solution = solution_of(args, monitor, None if quiet else line, watching if moves else None, scene)
     finally:
         watching.close()
     try:

@@ -3,6 +3,7 @@
 import argparse
 import csv
 import io
+import sys
 from collections.abc import Callable, Iterable, Iterator, KeysView, Sequence
 from contextlib import closing
 from dataclasses import replace
@@ -13,10 +14,10 @@ from pathlib import Path
 from typing import Any
 
 from mpi4py import MPI
+from tqdm import tqdm
 
 from ..api import solve
 from ..base.options import check_unread
-from ..base.progress import Line
 from ..base.resumable import ResumableCsv
 from ..drivers.accuracy.accuracy import DEFAULT_QUANTITY
 from ..errors import InputError
@@ -70,6 +71,7 @@ def sweep(
     path: Path | None = None,
     warm: bool = True,
     settings: str = "",
+    progress: bool = True,
     jobs: int | None = 1,
     words: Sequence[str] = (),
 ) -> tuple[list[dict[str, Any]], list[str]]:
@@ -103,12 +105,16 @@ def sweep(
         found: Iterator[tuple[int, dict[str, Any]]] = side_by_side(words, jobs, left)
     else:
         found = (one for piece in left for one in solved(piece, reads, scene_at, solve_at, warm))
-    before, due = len(at) - sum(map(len, left)), sum(map(len, left))
-    with closing(found), Line() as line:  # type: ignore[type-var]
-        for done, (k, row) in enumerate(found, start=1):
+    quiet = None if progress and comm.rank == 0 else True
+    with (
+        closing(found),  # type: ignore[type-var]
+        tqdm(total=len(at), initial=len(at) - sum(map(len, left)), unit="point", disable=quiet, file=sys.stderr) as bar,
+    ):
+        for k, row in found:
             made[k] = {**at[k], **row, **_data(scenes[k]), "settings": settings, "digest": digests[k]}
             rows[k] = store.add(made[k]) if store else made[k]
-            line("sweep", f"point {before + done} of {len(at)}: {row['outcome']}", done / due)
+            bar.set_postfix_str(f"{row['outcome']}, {row.get('iterations')} iterations", refresh=False)
+            bar.update()
     if store and jobs > 1:
         store.again([made[k] for k in sorted(made)])
         rows = [store.find(digest=digest) for digest in digests]

@@ -1,8 +1,9 @@
-"""What `solve` keeps while a film goes on in time: a history, fields and frames; and the pictures at its end."""
+"""What `solve` does while a film goes on in time: a bar, a history, fields and frames; and the pictures at its end."""
 
 from __future__ import annotations
 
 import argparse
+import sys
 from bisect import bisect_right
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -37,7 +38,9 @@ class Watching:
             if found := next((f"{name} {value}" for name, value in wanted.items() if value), None):
                 raise InputError(f"{found}: scene {scene.name} does not go on in time (it has no [motion])")
             return
-        from ..output.frames import Frames, HistoryFile, Series  # here: few scenes go on in time
+        from tqdm import tqdm  # here: few scenes go on in time
+
+        from ..output.frames import Frames, HistoryFile, Series
 
         self.gif, self.boundary = gif, args.boundary
         self.times = _times(args.times, self.table.t_end, GIF if gif else FILES)
@@ -48,6 +51,8 @@ class Watching:
         self.history = HistoryFile(Path(args.history), comm, args.resume is not None) if args.history else None
         self.series = [Series(path, args.boundary) for path in series]
         self.frames = Frames() if self.picture is not None else None
+        quiet = None if comm.rank == 0 else True
+        self._bar: Any = tqdm(total=self.table.t_end, unit="s", disable=quiet, file=sys.stderr, bar_format=BAR)
         self._done = 0
 
     def __call__(self, moment: Any) -> None:
@@ -64,11 +69,15 @@ class Watching:
                 self.frames.add(moment)
         if self.frames is not None and not self.gif:
             self.frames.add_line(moment)
+        self._bar.set_postfix_str(f"step {moment.count}, {moment.row['iterations']} iterations", refresh=False)
+        self._bar.update(moment.t - self._bar.n)
 
     def close(self) -> None:
         """The march has ended, one way or the other."""
-        if self.table is not None and self.history is not None:
-            self.history.close()
+        if self.table is not None:
+            self._bar.close()
+            if self.history is not None:
+                self.history.close()
 
     def draw(self, solution: Solution) -> None:
         """The picture that was asked for. Collective."""
@@ -84,6 +93,9 @@ class Watching:
 
             frames, title = self.frames, f"{solution.settings['scene']}, {solution.message}"
             save_figure(lambda: march_figure(frames, solution.history, title), self.picture)
+
+
+BAR = "{l_bar}{bar}| {n:.4g}/{total:.4g} s [{elapsed}<{remaining}, {postfix}]"
 
 
 def _times(text: str | None, end: float, count: int) -> list[float]:

@@ -96,8 +96,6 @@ def test_a_loop_over_items_tells_those_that_are_worked_on() -> None:
         (["table", "3", "--quick", "--results", "here"], b"row 2 of"),
         (["verify"], b" 2 of "),
         (["coefficients", "two_groove_journal", "--speeds", "1000:9000:60"], b"speed 9 of 60"),
-        (["sweep", "problem1", "--vary", "U=1:5:60", "--output", "sweep.csv"], b"point 9 of 60: converged"),
-        (["solve", "squeeze", "--set", "steps=3000"], b"t = 0.0"),
     ],
 )
 def test_long_commands_tell_on_a_terminal(words: list[str], told: bytes, tmp_path: Path) -> None:

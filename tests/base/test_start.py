@@ -91,7 +91,7 @@ def test_superlu_dist_has_one_thread_whatever_the_environment_says():
 
 
 ALL = "import sys; from lcp_lube.__main__ import main; status = main(sys.argv[1:]); print(*sys.modules); sys.exit(status)"
-LATE = {"scipy", "numba", "matplotlib", "difflib", "h5py", "xarray"}  # what small solves do without
+LATE = {"scipy", "numba", "matplotlib", "tqdm", "difflib", "h5py", "xarray"}  # what small solves do without
 
 
 @pytest.mark.parametrize("words", [("problem1",), ("problem4", "--n", "60"), ("problem4", "--n", "60", "--no-reduction")])
