@@ -206,10 +206,10 @@ def summary(data: dict[str, Any]) -> str:
         if data["accuracy_extrapolated"]:  # of what a balance has found it stands nowhere else
             best = data["estimates"][name]["value"]
             own = f"; extrapolated to {best:.6g}, this grid's own is {data['accuracy_grid_value']:.6g}"
-        lines.append(
-            f"{name}: estimated relative error {data['accuracy_estimate']:.1e} "
-            f"({data['accuracy']:g} was asked for), {len(data['levels'])} grid{'s' * (len(data['levels']) > 1)}{own}"
-        )
+        error = data["accuracy_estimate"]
+        known = f"estimated relative error {error:.1e}" if np.isfinite(error) else "its error is not known"
+        grids = f"{len(data['levels'])} grid{'s' * (len(data['levels']) > 1)}"
+        lines.append(f"{name}: {known} ({data['accuracy']:g} was asked for), {grids}{own}")
     if data.get("certified"):
         held = f"; {data['certified_held']}" if data.get("certified_held") else ""
         lines.append(

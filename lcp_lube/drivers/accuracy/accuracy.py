@@ -164,7 +164,8 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     assert solution is not None and quantity is not None  # for the type checker: there is a first grid
     if solution.converged and not best.relative <= tol:
         solution.outcome = Outcome.ACCURACY
-        solution.message = f"{quantity} to {best.relative:.1e} only, {tol:g} was asked for: {end}"
+        known = f"{quantity} to {best.relative:.1e} only" if isfinite(best.relative) else f"the error of {quantity} is not known"
+        solution.message = f"{known}, {tol:g} was asked for: {end}"
     solution.settings |= {
         "accuracy": tol,
         "accuracy_quantity": quantity,
