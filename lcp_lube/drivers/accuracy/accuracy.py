@@ -164,7 +164,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     assert solution is not None and quantity is not None  # for the type checker: there is a first grid
     if solution.converged and not best.relative <= tol:
         solution.outcome = Outcome.ACCURACY
-        known = f"{quantity} to {best.relative:.1e} only" if isfinite(best.relative) else f"the error of {quantity} is not known"
+        known = f"{quantity} to {best.relative:.1e} only" if isfinite(best.relative) else f"{quantity}'s error is not known"
         solution.message = f"{known}, {tol:g} was asked for: {end}"
     solution.settings |= {
         "accuracy": tol,
