@@ -139,12 +139,84 @@ def transposed_sweep(
 
 @kernel
 def transposed_residual(
-    l: Array, full: Mask, free: Mask | None, kx: Array, ky: Array, c: Array, carry: Array | None, out: Array
+    l: Array, full: Mask, free: Mask | None, kx: Array, ky: Array, c: Array, carry: Array | None, over: Array, out: Array
 ) -> None:
-    """c - J' l at all of the rank's points; none where a pressure is held."""
+    """c - J' l at all of the rank's points, times `over`, a number of each; none where a pressure is held."""
+    row = np.zeros(l.shape[2], l.dtype)
     for n in range(l.shape[0]):
         for m in range(1, l.shape[1] - 1):
-            transposed_row(l[n], full, free, kx, ky, c[n], carry, m, out[n, m])
+            transposed_row(l[n], full, free, kx, ky, c[n], carry, m, row)
+            for i in range(1, l.shape[2] - 1):
+                out[n, m, i] = over[n] * row[i]
+
+
+@kernel
+def transposed_misfit(
+    l: Array, full: Mask, free: Mask | None, kx: Array, ky: Array, c: Array, carry: Array | None, z: Array, out: Array
+) -> None:
+    """(c - J' l)' z of each l."""
+    row, sums = np.zeros(l.shape[2], l.dtype), np.zeros(l.shape[2], l.dtype)
+    for n in range(l.shape[0]):
+        sums[:] = 0.0
+        for m in range(1, l.shape[1] - 1):
+            transposed_row(l[n], full, free, kx, ky, c[n], carry, m, row)
+            for i in range(1, l.shape[2] - 1):
+                sums[i] += row[i] * z[m, i]
+        out[n] = sums.sum()
+
+
+@kernel
+def products(c: Array, z: Array, out: Array) -> None:
+    """|c|' |z| of each c."""
+    sums = np.zeros(z.shape[1])
+    for n in range(c.shape[0]):
+        sums[:] = 0.0
+        for m in range(1, z.shape[0] - 1):
+            for i in range(1, z.shape[1] - 1):
+                sums[i] += abs(c[n, m, i] * z[m, i])
+        out[n] = sums.sum()
+
+
+@kernel
+def less(w: Array, V: Array, part: Array) -> None:
+    """w without so much of each of some vectors."""
+    for n in range(w.shape[0]):
+        for m in range(w.shape[1]):
+            for k in range(part.size):
+                for i in range(w.shape[2]):
+                    w[n, m, i] -= part[k] * V[k, n, m, i]
+
+
+@kernel
+def add(x: Array, V: Array, part: Array, unit: Array) -> None:
+    """So much of each of some vectors to x, in units of each answer."""
+    sums = np.zeros(x.shape[2])
+    for n in range(x.shape[0]):
+        for m in range(x.shape[1]):
+            sums[:] = 0.0
+            for k in range(part.size):
+                for i in range(x.shape[2]):
+                    sums[i] += part[k] * V[k, n, m, i]
+            for i in range(x.shape[2]):
+                x[n, m, i] += unit[n] * sums[i]
+
+
+@kernel
+def in_units(values: Array, cavity: Mask, unit: Array, into: bool, out: Array) -> None:
+    """Values, in the cavity in units of their own or, of those that are so, not."""
+    for m in range(values.shape[0]):
+        for i in range(values.shape[1]):
+            part = (1.0 / unit[m, i] if into else unit[m, i]) if cavity[m, i] else 1.0
+            out[m, i] = part * values[m, i]
+
+
+@kernel
+def kept(a: Array, full: Mask) -> None:
+    """Nothing but what is in the full film."""
+    none = a.dtype.type(0)
+    for m in range(a.shape[0]):
+        for i in range(a.shape[1]):
+            a[m, i] = a[m, i] if full[m, i] else none
 
 
 @piece
