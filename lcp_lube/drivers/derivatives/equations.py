@@ -288,7 +288,7 @@ def right_side(slopes_of: Mapping[str, slopes.Slope], weights: Mapping[str, floa
     """dQ/dz of the adjoint equation, of a number that is made of parts with these weights."""
     total: Array | None = None
     for part, w in weights.items():
-        one = np.multiply(w, slopes_of[part].p)
+        one = np.multiply(w, slopes_of[part].p).ravel()
         np.copyto(one, -w * slopes_of[part].r, where=cavity)
         total = one if total is None else np.add(total, one, out=total)
     return np.zeros(cavity.size) if total is None else total

@@ -62,7 +62,8 @@ class Linear:
     def solve_transposed(self, rows: Sequence[Array], z: Array, sizes: Sequence[float] = ()) -> list[Array]:
         """J'^-1 b for each b; z : the solution, p where the film is full and -r where it is not. Collective.
 
-        sizes : of the quantities, which may be small against the terms of b' z, whose own are `terms` then; default as large."""
+        sizes : of the quantities, which may be small against the terms of b' z; default as large. Of cycles' answers the
+        sizes of these terms are `terms` then."""
         found = self.frozen and self.frozen.solve(rows, transposed=True, z=z, sizes=sizes)
         self.terms = self.frozen.terms if self.frozen and found else []
         return found or [self._factors.of_array(b, RTOL, transposed=True)[0] for b in rows]

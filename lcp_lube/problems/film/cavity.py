@@ -7,12 +7,14 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from ...base.compiled import has_numba
 from ...base.crew import crew
 from ...base.parallel import Array, Reduce
+from ...registry import SMALL
 
 VOID = 1e-9  # void fraction up to which a film counts as full: below what any solve resolves, and nothing that one could see
 EMPTY = 1e-2  # void fraction that no full film has within the loosest certificate, however small its pressures are
-BLOCK = 16_384  # points that are looked at together
+BLOCK = 65_536  # points that are looked at together
 
 
 def cavity_sign(reduce: Reduce, p: Array, r: Array) -> Array:
@@ -33,42 +35,32 @@ def cavity_sign(reduce: Reduce, p: Array, r: Array) -> Array:
 def cavitated(reduce: Reduce, p: Array, r: Array) -> NDArray[np.bool_]:
     """Where `cavity_sign` is negative. Collective."""
     p_max = reduce.largest(p)
-    return _looked(p, r, lambda p, r: _dry(p, r, p_max))[0]
+    return _looked(lambda p, r: (r > VOID) & (((p / p_max if p_max > 0 else p) < r) | (r > EMPTY)), p, r)
 
 
 def about_to_change(reduce: Reduce, p: Array, r: Array) -> NDArray[np.bool_]:
     """Where p and r both vanish: full or cavitated, as one likes. Collective."""
-    p_max = reduce.largest(p)
-    return _looked(p, r, lambda p, r: _either(p, r, p_max))[0]
+    small = VOID * reduce.largest(p)
+    return _looked(lambda p, r: (np.abs(p) <= small) & (np.abs(r) <= VOID), p, r)
 
 
-def states(reduce: Reduce, p: Array, r: Array) -> list[NDArray[np.bool_]]:
-    """`cavitated` and `about_to_change`, in one pass. Collective."""
-    p_max = reduce.largest(p)
-    return _looked(p, r, lambda p, r: _dry(p, r, p_max), lambda p, r: _either(p, r, p_max))
+def states(reduce: Reduce, p: Array, r: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """`cavitated` and `about_to_change`, of large films in one pass. Collective."""
+    if p.size < SMALL or not has_numba():
+        return cavitated(reduce, p, r), about_to_change(reduce, p, r)
+    from .cell_loops import loop_states
+
+    cavity, switching = (np.empty(p.shape, dtype=bool) for _ in range(2))
+    loop_states(p, r, reduce.largest(p), VOID, EMPTY, cavity, switching)
+    return cavity, switching
 
 
-def _dry(p: Array, r: Array, p_max: float) -> NDArray[np.bool_]:
-    void = r > VOID
-    if not void.any():
-        return void
-    some = r > EMPTY
-    return some if np.array_equal(some, void) else void & (((p / p_max if p_max > 0 else p) < r) | some)
-
-
-def _either(p: Array, r: Array, p_max: float) -> NDArray[np.bool_]:
-    both = np.abs(p) <= VOID * p_max
-    return both & (np.abs(r) <= VOID) if both.any() else both
-
-
-def _looked(p: Array, r: Array, *looks: Callable[[Array, Array], NDArray[np.bool_]]) -> list[NDArray[np.bool_]]:
+def _looked(look: Callable[[Array, Array], NDArray[np.bool_]], p: Array, r: Array) -> NDArray[np.bool_]:
     """What is found at each point: what lies between stays in the cache, as new memory takes longer than the arithmetic."""
-    blocks = [slice(k, k + BLOCK) for k in range(0, len(p), BLOCK)]
-    out = [np.empty(p.shape, dtype=bool) for _ in looks]
+    out, blocks = np.empty(p.shape, dtype=bool), [slice(k, k + BLOCK) for k in range(0, len(p), BLOCK)]
 
     def put(k: int) -> None:
-        for into, look in zip(out, looks, strict=True):
-            into[blocks[k]] = look(p[blocks[k]], r[blocks[k]])
+        out[blocks[k]] = look(p[blocks[k]], r[blocks[k]])
 
     crew().run(put, len(blocks))
     return out

@@ -76,7 +76,7 @@ class Frozen(Cycles):
     def _transposed(self, rows: Sequence[Array], z: Array | None, sizes: Sequence[float]) -> Any:
         given, box = self.held, self.grid.box
         self._keen = 1.0
-        leaves, cavity = (a.reshape(box) for a in (self.leaves, self.cavity))
+        leaves, cavity = self.leaves.reshape(box), self.cavity.reshape(box)
 
         def put(into: Array, values: Array, units: bool) -> None:
             frozen_kernels.in_units(values.reshape(box), cavity, leaves, units, self.own(into))
@@ -100,8 +100,8 @@ class Frozen(Cycles):
             return None
         x = self._found()
         if given is not None and self._over is not None:
-            b = np.where(self.cavity, 1.0 / self.leaves, 1.0) * np.array(rows)
-            x = np.where(given, self._over * self.rest_of(b, x), x)
+            b = np.array([np.where(self.cavity, row / self.leaves, row) for row in rows])
+            x = np.asarray(np.where(given, self._over * self.rest_of(b, x), x))
         return x
 
     def _found(self) -> Array:
@@ -146,7 +146,7 @@ class Frozen(Cycles):
         return bool(settled)
 
     def _improved(self, sizes: Array, z: Array | None, most: int) -> bool | None:
-        """Add to `at`, in parts of `sizes`, what its rest, which c is, asks for; whether it is good enough, None where cycles stall.
+        """Add to `at`, in parts of `sizes`, what its rest, which c is, asks for; whether it is good enough, None: cycles stall.
 
         In single precision it is at best so good that a part DROP of the start's error is left.
         """

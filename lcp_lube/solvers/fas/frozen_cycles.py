@@ -23,7 +23,11 @@ class Cycles:
     Attributes
     ----------
     work : cycles times right-hand sides so far.
+    asked, at : right-hand sides and answers, with frames.
     """
+
+    asked: Array
+    at: Array
 
     def __init__(
         self,

@@ -224,7 +224,7 @@ def transposed_row(
     l: Array, full: Mask, free: Mask | None, kx: Array, ky: Array, c: Array, carry: Array | None, m: int, out: Array
 ) -> None:
     """The same of one row and right-hand side."""
-    for i in range(1, l.shape[1] - 1):
+    for i in range(np.uint32(1), np.uint32(l.shape[1] - 1)):
         here, east = l[m, i], l[m, i + 1]
         flows = (kx[m, i] * (here - l[m, i - 1]) + kx[m, i + 1] * (here - east)) + (
             ky[m, i] * (here - l[m - 1, i]) + ky[m + 1, i] * (here - l[m + 1, i])
