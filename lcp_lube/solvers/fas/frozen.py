@@ -152,25 +152,22 @@ class Frozen(Cycles):
         """
         rtol, drop = self._keen * TRANSPOSED if self.transposed else RTOL, DROP if self.single else 0.0
         norm, total = self.grid.reduce.norm, self.grid.comm.allreduce
-        V, H = self.basis, np.zeros((MOST + 2, MOST + 1))
-        V[0] = 0.0
+        V, H = [self.z[0]], np.zeros((MOST + 2, MOST + 1))  # vectors apart: large pages are waited for
+        V[0][:] = 0.0
         self.cycle(V[0])
         self.c[0][:] = 0.0
-        flat = V.reshape(len(V), -1)
-        first, y = norm(flat[0]), np.zeros(0)
+        first, y = norm(V[0].ravel()), np.zeros(0)
         if not np.isfinite(first):
             return None
         size = np.hypot.reduce(self._norms(self.at) / sizes) or first  # of the answer
         left_over = np.array([first])  # the residual in the basis V
-        flat[0] /= first or 1.0
+        V[0] /= first or 1.0
         for k in range(MOST + 1):
-            if k + 2 > len(V):
-                self.basis = V = np.concatenate([V, np.empty_like(V)])
-                flat = V.reshape(len(V), -1)
             # One more cycle takes x to x + rest; what it leaves of `rest` is taken to be what it leaves of the basis at most.
             left = np.linalg.norm(left_over) * min(1.0, np.linalg.norm(np.eye(k + 1, k) - H[: k + 1, :k], 2) if k else 1.0)
             if left <= max(rtol * size, drop * first):
-                frozen_kernels.add(self.at, V, np.append(y, 0.0) + left_over, sizes)
+                change = np.append(y, 0.0) + left_over
+                self._add(V, change, sizes)
                 size = min(size, np.hypot.reduce(self._norms(self.at) / sizes))
                 if left <= rtol * size and (z is None or self._agrees(z)):
                     return True
@@ -178,16 +175,17 @@ class Frozen(Cycles):
                     return None
                 if left <= drop * first:
                     return False
-                frozen_kernels.add(self.at, V, -np.append(y, 0.0) - left_over, sizes)
+                self._add(V, -change, sizes)
             if self.work >= most:
                 return None
-            w, some = flat[k + 1], flat[: k + 1]
-            w[:] = flat[k]
+            V.append(V[k].copy())
             self.cycle(V[k + 1])
-            np.subtract(flat[k], w, out=w)
+            w = V[k + 1].ravel()
+            np.subtract(V[k].ravel(), w, out=w)
             for _ in range(2 if k > 8 else 1):  # rounding has left long bases less orthogonal
-                part = total(some @ w)
-                frozen_kernels.less(V[k + 1], V, part)
+                part = total(np.array([np.dot(v.ravel(), w) for v in V[: k + 1]]))
+                for v, one in zip(V, part, strict=False):
+                    frozen_kernels.add(V[k + 1], v, np.full(self.several, -one))
                 H[: k + 1, k] += part
             H[k + 1, k] = norm(w)
             if not np.isfinite(H[k + 1, k]):
@@ -197,6 +195,10 @@ class Frozen(Cycles):
             y = np.linalg.lstsq(H[: k + 2, : k + 1], target, rcond=None)[0]
             left_over = target - H[: k + 2, : k + 1] @ y
         return None
+
+    def _add(self, V: Sequence[Array], parts: Array, sizes: Array) -> None:
+        for v, part in zip(V, parts, strict=True):
+            frozen_kernels.add(self.at, v, part * sizes)
 
     def _agrees(self, z: Array) -> bool:
         """Whether x' (J z) = b' z, each."""

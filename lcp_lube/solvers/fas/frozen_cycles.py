@@ -13,7 +13,6 @@ from ...problems.film.lubrication import LubricationProblem
 from . import finest, frozen_kernels, frozen_transfer, held, levels, transfer
 
 COARSEST = 3  # sweeps of the coarsest grid, in numbers of its points a side, where it has more than FEW points
-MANY = 10  # vectors of a basis that is not a long one
 FEW = 128  # up to which J's inverse is kept: 128 KB
 
 
@@ -72,9 +71,7 @@ class Cycles:
         kind: Any = np.float32 if single else np.float64
         self.several, self.transposed, self.single = several, transposed, single
         shapes = [(several, *level.z.shape) for level in self.levels]
-        self.basis = np.empty((MANY, *shapes[0]), kind)  # of the space in which GMRES looks, and the finest level's iterate
-        self.basis[0] = 0.0
-        self.z = [self.basis[0], *(np.zeros(shape, kind) for shape in shapes[1:])]
+        self.z = [np.zeros(shape, kind) for shape in shapes]
         self.c = [np.zeros(shape, kind) for shape in shapes]
         self.rest = [] if transposed else [np.zeros(shape, kind) for shape in shapes]
         self.k = [(level.kx.astype(kind, copy=False), level.ky.astype(kind, copy=False)) for level in self.levels]

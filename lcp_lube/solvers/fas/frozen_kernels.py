@@ -178,27 +178,13 @@ def products(c: Array, z: Array, out: Array) -> None:
 
 
 @kernel
-def less(w: Array, V: Array, part: Array) -> None:
-    """w without so much of each of some vectors."""
-    for n in range(w.shape[0]):
-        for m in range(w.shape[1]):
-            for k in range(part.size):
-                for i in range(w.shape[2]):
-                    w[n, m, i] -= part[k] * V[k, n, m, i]
-
-
-@kernel
-def add(x: Array, V: Array, part: Array, unit: Array) -> None:
-    """So much of each of some vectors to x, in units of each answer."""
-    sums = np.zeros(x.shape[2])
+def add(x: Array, v: Array, part: Array) -> None:
+    """So much of a vector, a part of each answer, to x."""
     for n in range(x.shape[0]):
+        some = v.dtype.type(part[n])
         for m in range(x.shape[1]):
-            sums[:] = 0.0
-            for k in range(part.size):
-                for i in range(x.shape[2]):
-                    sums[i] += part[k] * V[k, n, m, i]
             for i in range(x.shape[2]):
-                x[n, m, i] += unit[n] * sums[i]
+                x[n, m, i] += some * v[n, m, i]
 
 
 @kernel
