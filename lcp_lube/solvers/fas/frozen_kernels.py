@@ -181,7 +181,7 @@ def products(c: Array, z: Array, out: Array) -> None:
 def add(x: Array, v: Array, part: Array) -> None:
     """So much of a vector, a part of each answer, to x."""
     for n in range(x.shape[0]):
-        some = v.dtype.type(part[n])
+        some = x.dtype.type(part[n])
         for m in range(x.shape[1]):
             for i in range(x.shape[2]):
                 x[n, m, i] += some * v[n, m, i]

@@ -18,7 +18,7 @@ def sides_of(ky: Array, full: Mask, m: int, out: Array, ring: bool) -> None:
     is corrected as the latter.
     """
     fronts = 0
-    for i in range(np.uint32(1), np.uint32(out.size - 1)):
+    for i in range(1, out.size - 1):
         out[i] = share(ky[m, i], ky[m + 1, i], True)
         fronts += full[m, i] & (full[m - 1, i] != full[m + 1, i])
     for i in range(1, out.size - 1 if fronts else 1):
@@ -35,11 +35,6 @@ def correct(
 ) -> None:
     """Add the interpolated coarse grid's answer; with fronts at the full points alone, as `sides_of` says."""
     nx, size, one = z.shape[1] - 2, coarse.shape[1], z.dtype.type(1)
-    if by_x and by_y and not fronts:
-        for m in range(1, z.shape[0] - 1):
-            row, last = coarse_rows(y0 + m - 1, y0, m, by_y)
-            add_row(z, coarse[row], coarse[last], kx, ky, m, last > row)
-        return
     w, (v, south, north) = np.zeros(size - 1, z.dtype), np.zeros((3, nx + 2), z.dtype)
     for m in range(1, z.shape[0] - 1):
         row, last = coarse_rows(y0 + m - 1, y0, m, by_y)
@@ -63,50 +58,27 @@ def correct(
                 z[m, i] += south[i]
 
 
-@piece
-def add_row(z: Array, south: Array, north: Array, kx: Array, ky: Array, m: int, between: bool) -> None:
-    """To row m what interpolation by x and y makes of two coarse lines, or of one, on which it lies: in registers."""
-    one, nx = z.dtype.type(1), z.shape[1] - 2
-    u = share(ky[m, 1], ky[m + 1, 1], True) if between else one
-    w = share(kx[m, 1], kx[m, 2], True)
-    z[m, 1] += u * (w * south[0] + (one - w) * south[1]) + (one - u) * (w * north[0] + (one - w) * north[1])
-    for k in range(np.uint32(1), np.uint32((nx + 1) // 2 if between else 0)):
-        u = share(ky[m, 2 * k], ky[m + 1, 2 * k], True)
-        v = share(ky[m, 2 * k + 1], ky[m + 1, 2 * k + 1], True)
-        w = share(kx[m, 2 * k + 1], kx[m, 2 * k + 2], True)
-        z[m, 2 * k] += u * south[k] + (one - u) * north[k]
-        z[m, 2 * k + 1] += v * (w * south[k] + (one - w) * south[k + 1]) + (one - v) * (w * north[k] + (one - w) * north[k + 1])
-    for k in range(np.uint32(1), np.uint32(0 if between else (nx + 1) // 2)):
-        w = share(kx[m, 2 * k + 1], kx[m, 2 * k + 2], True)
-        z[m, 2 * k] += south[k]
-        z[m, 2 * k + 1] += w * south[k] + (one - w) * south[k + 1]
-    if nx % 2 == 0:
-        k = nx // 2
-        u = share(ky[m, nx], ky[m + 1, nx], True) if between else one
-        z[m, nx] += u * south[k] + (one - u) * north[k]
-
-
 @kernel
 def restrict(
     l: Array, full: Mask, free: Mask | None, kx: Array, ky: Array, c: Array, carry: Array | None,
     out: Array, y0: int, by_x: bool, by_y: bool, ring: bool,
 ) -> None:  # fmt: skip
     """Add to `out` what c - J' l of the full points gives to the coarse ones: `correct` with fronts, transposed."""
-    nx, size, none = l.shape[1] - 2, out.shape[1], l.dtype.type(0)
+    nx, size = l.shape[1] - 2, out.shape[1]
     w, v, here = np.zeros(size - 1, l.dtype), np.zeros(nx + 2, l.dtype), np.zeros(nx + 2, l.dtype)
     for m in range(1, l.shape[0] - 1):
         transposed_row(l, full, free, kx, ky, c, carry, m, here)
         fronts = 0
-        for i in range(np.uint32(1), np.uint32(nx + 1)):
-            here[i] = here[i] if full[m, i] else none
-        for i in range(np.uint32(1), np.uint32(nx + 1)):
+        for i in range(1, nx + 1):
+            here[i] *= full[m, i]
+        for i in range(1, nx + 1):
             fronts += full[m, i] > full[m, i - 1]
         if by_x:
             west_shares(kx, m, True, w)
-            for k in range(np.uint32(nx // 2 if fronts else 0)):
-                moved = here[2 * k + 1] if full[m, 2 * k + 1] & (not full[m, 2 * k]) & full[m, 2 * k + 2] else none
-                here[2 * k + 1] -= moved
-                here[2 * k + 2] += moved
+            for i in range(1, nx if fronts else 1, 2):
+                if full[m, i] and not full[m, i - 1] and full[m, i + 1]:
+                    here[i + 1] += here[i]
+                    here[i] = 0.0
         row, last = coarse_rows(y0 + m - 1, y0, m, by_y)
         if last > row:
             sides_of(ky, full, m, v, ring)
@@ -144,7 +116,7 @@ def deal(r: Array, v: Array, w: Array, by_x: bool, ring: bool, south: Array, nor
             south[i] += half * part
             north[i] += half * (r[i] - part)
         return
-    for k in range(np.uint32(1), np.uint32(south.size - 1)):
+    for k in range(1, south.size - 1):
         west, east = half * (one - w[k - 1]) * r[2 * k - 1], half * w[k] * r[2 * k + 1]
         part = v[2 * k] * (half * r[2 * k]) + (v[2 * k - 1] * west + v[2 * k + 1] * east)
         south[k] += part
@@ -162,7 +134,7 @@ def deal_to_one(r: Array, w: Array, by_x: bool, ring: bool, part: float, out: Ar
     if not by_x:
         out += some * r
         return
-    for k in range(np.uint32(1), np.uint32(out.size - 1)):
+    for k in range(1, out.size - 1):
         out[k] += some * (r[2 * k] + ((one - w[k - 1]) * r[2 * k - 1] + w[k] * r[2 * k + 1]))
     if ring:
         out[-2] += some * w[0] * r[1]
