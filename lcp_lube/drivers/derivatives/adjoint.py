@@ -94,15 +94,17 @@ class Adjoint:
         more = {name + OTHER: right_side(last, parts[name], changed) for name in some}
         self.parts, self.lambdas = parts | {name + OTHER: parts[name] for name in some}, dict[str, Array]()
         sets = [(rows, self.cavity), (more, changed)] if self.switching and some else [(rows | more, self.cavity)]
+        made = dict[str, float]()  # what the rows make of z, in size, where lambda is of cycles
         for of, cavity in sets:  # those with one J together
             sizes = [abs(report[plain(name)]) if plain(name) in quantities else math.inf for name in of]
-            self.lambdas |= zip(of, self._solve(list(of.values()), cavity, sizes), strict=True)
-        self._rows = rows | more
-        met, z = {*self.conditions} - {*quantities}, np.abs(unknowns(self.cavity, p, r, eq.constant.p_unit))
-        made = {name: eq.grid.reduce.dot(np.abs(rows[name]), z) for name in (names if self._cycled else met)}
-        self._least_of = {name: made[name] for name in met}
-        off = {name: CYCLED * min(size, max(abs(report[name]), FINEST * size)) for name, size in made.items()}
-        self._off = off if self._cycled else {}
+            found, terms = self._solve(list(of.values()), cavity, sizes)
+            self.lambdas |= zip(of, found, strict=True)
+            made |= {name: size for name, size in zip(of, terms, strict=False) if name in rows}
+        self._off = {name: CYCLED * min(size, max(abs(report[name]), FINEST * size)) for name, size in made.items()}
+        if (met := {*self.conditions} - {*quantities}) - {*made}:
+            z = np.abs(unknowns(self.cavity, p, r, eq.constant.p_unit))
+            made |= {name: eq.grid.reduce.dot(np.abs(rows[name]), z) for name in met}
+        self._rows, self._least_of = rows | more, {name: made[name] for name in met}
         self.flow_unit = eq.problem(p).scheme.flow_unit
 
     @cached_property
@@ -126,7 +128,8 @@ class Adjoint:
         found = self.near.lagrangians(self.scene)
         return self._here if found is None else found
 
-    def _solve(self, rows: list[Array], cavity: Any, sizes: list[float]) -> list[Array]:
+    def _solve(self, rows: list[Array], cavity: Any, sizes: list[float]) -> tuple[list[Array], list[float]]:
+        """lambda of each row, and where cycles found it the size of what the row makes of z, term by term."""
         eq, law, p = self.equations, self.equations.law, self.p
         free = eq.constant.held is None and eq.held is None
         if law and free and not law.dowson_higginson:  # J's rows by q are those of a constant fluid
@@ -137,9 +140,8 @@ class Adjoint:
         else:
             entries = None if law is None else eq.tangent(p, self.r).entries(problem.scheme)
             linear = Linear(problem, cavity, entries, eq.held, least=self._least)
-        self._cycled = getattr(linear, "frozen", linear) is not None
         try:
-            return linear.solve_transposed(rows, unknowns(cavity, p, self.r, eq.constant.p_unit), sizes)
+            return linear.solve_transposed(rows, unknowns(cavity, p, self.r, eq.constant.p_unit), sizes), linear.terms
         finally:
             linear.destroy()
 

@@ -16,7 +16,7 @@ from petsc4py import PETSc
 from ...base.parallel import Array
 from ...errors import InputError, nearest
 from ...problems.film import slopes
-from ...problems.film.cavity import about_to_change, cavitated
+from ...problems.film.cavity import states
 from ...problems.film.forces import attitude, totals, weights
 from ...problems.film.grooves import GroovedProblem
 from ...problems.film.known import known_fields, known_of
@@ -272,7 +272,7 @@ def fields_of(solution: Solution) -> tuple[Array, Array]:
 
 def cavity_of(equations: Equations, p: Array, r: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Whether a point is cavitated, and whether it is about to change: p and r both vanish there. Collective."""
-    cavity, switching = (find(equations.grid.reduce, p, r) for find in (cavitated, about_to_change))
+    cavity, switching = states(equations.grid.reduce, p, r)
     if equations.given is not None:
         switching &= ~equations.given
         cavity &= ~equations.given
@@ -289,7 +289,7 @@ def right_side(slopes_of: Mapping[str, slopes.Slope], weights: Mapping[str, floa
     """dQ/dz of the adjoint equation, of a number that is made of parts with these weights."""
     total: Array | None = None
     for part, w in weights.items():
-        one = np.multiply(w, slopes_of[part].p)
+        one = np.multiply(w, slopes_of[part].p).ravel()
         np.copyto(one, -w * slopes_of[part].r, where=cavity)
         total = one if total is None else np.add(total, one, out=total)
     return np.zeros(cavity.size) if total is None else total

@@ -6,7 +6,7 @@ symmetric is J_half u = P' b/2 with z = P u, and J' alike.
 
 from collections.abc import Callable, Sequence
 from copy import copy
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,8 @@ import numpy as np
 from ...base.parallel import Array
 from ...problems.film.lubrication import LubricationProblem
 from ...problems.film.reynolds import sides
+from ...problems.grid import Grid
+from ...problems.strips import STRIP
 from ...problems.transfer import Pick, numbers
 from ...scenes.scene import Solvable
 from ..film_part import Part
@@ -29,13 +31,15 @@ class Halved:
         grid, part = problem.grid, Part(film, "mirror")
         self.problem, self.cavity, self.M, self.least = problem, cavity, M, least
         half = self._cut(part) or part.build(grid.petsc_comm)
-        j, i = numbers(half.grid)
-        self._take, self._spread = Pick(grid, half.grid, j, i), Pick(half.grid, grid, *part.places(grid))
-        self._beyond = Pick(grid, half.grid, grid.shape[1] - 1 - j, i)
-        self.half = half.revised(None if problem.dry is None else self._take(problem.dry))
-        self._share = np.broadcast_to(np.where(sides(half.grid, ("mirror",))[3], 0.5, 1.0), half.grid.box).ravel()
-        of_half = None if M is None else self._share * self._take(M)
-        self._small = Linear(self.half, self._take(cavity.astype(float)) > 0.5, M=of_half, least=least)
+        self._lines: Lines | Picks = Lines(grid, half.grid) if grid.comm.size == 1 else Picks(grid, half.grid, part)
+        take = self._lines.take
+        self.half = half.revised(None if problem.dry is None else take(problem.dry))
+        self._on_mirror = np.broadcast_to(sides(half.grid, ("mirror",))[3], half.grid.box)[:, 0]
+        self.terms: list[float] = []
+        of_half = None if M is None else self._shared(take(M))
+        self._small = Linear(
+            self.half, take(cavity.astype(float)) > 0.5 if grid.comm.size > 1 else take(cavity), M=of_half, least=least
+        )
 
     def _cut(self, part: Part) -> LubricationProblem | None:
         """Half of the problem's own coefficients, on one rank."""
@@ -57,7 +61,7 @@ class Halved:
             kx[-2] *= 0.5
             share[-1] = 0.5
         some: dict[str, Any] = {"k_W": k_W, "k_E": k_E, "k_S": k_S, "k_N": k_N}
-        some |= {"b_C": lambda: share * s.b_C, "b_W": lambda: share * s.b_W}  # whole, and mostly the first alone
+        some |= {name: partial(_times, share, vars(s)[name]) for name in ("b_C", "b_W")}  # whole, and mostly the first alone
         half.scheme, half.held, half.shares_grid = s.changed(**some), None, False
         return half
 
@@ -65,19 +69,18 @@ class Halved:
     def _whole(self) -> Linear:
         return Linear(self.problem, self.cavity, M=self.M, least=self.least)
 
-    def _of(self, change: Callable[[Array], Array], a: Any) -> Any:
-        return change(a.real) + 1j * change(a.imag) if np.iscomplexobj(a) else change(a)
+    def _shared(self, half: Any) -> Any:
+        """Half of what a line on the mirror has, as its cells are halved."""
+        out = half.copy()
+        out.reshape(self.half.grid.box)[self._on_mirror] *= 0.5
+        return out
 
     def _solved(self, ask: Callable[[Linear, list[Any], Callable[[Any], Any]], list[Any]], rows: Sequence[Any]) -> list[Any]:
-        halves = [self._of(self._take, b) for b in rows]
-        largest = lambda a: self.problem.reduce.largest(a.view(float))  # noqa: E731
-        even = all(
-            largest(self._of(self._beyond, b) - half) <= EVEN * largest(half) for b, half in zip(rows, halves, strict=True)
-        )
+        even = all(off <= EVEN * size for off, size in map(self._lines.compared, rows))
         if not even or self.half.scheme.flow_unit != self.problem.scheme.flow_unit:
             return ask(self._whole, list(rows), lambda a: a)
-        found = ask(self._small, [self._share * half for half in halves], self._take)
-        return [self._of(self._spread, one) for one in found]
+        found = ask(self._small, [self._shared(self._lines.take(row)) for row in rows], self._lines.take)
+        return [self._lines.spread(one) for one in found]
 
     def solve(self, rows: Sequence[Array]) -> list[Array]:
         return self._solved(lambda linear, some, _: linear.solve(some), rows)
@@ -85,7 +88,9 @@ class Halved:
     def solve_transposed(self, rows: Sequence[Array], z: Array, sizes: Sequence[float] = ()) -> list[Array]:
         def ask(linear: Linear, some: list[Any], on: Callable[[Any], Any]) -> list[Any]:
             share = 1.0 if linear.problem is self.problem else 0.5
-            return linear.solve_transposed(some, on(z), [share * size for size in sizes])
+            found = linear.solve_transposed(some, on(z), [share * size for size in sizes])
+            self.terms = [size / share for size in linear.terms]
+            return found
 
         return self._solved(ask, rows)
 
@@ -95,5 +100,68 @@ class Halved:
     def destroy(self) -> None:
         if "_whole" in self.__dict__:
             self._whole.destroy()
-        for one in (self._small, self._take, self._beyond, self._spread, self.half):
+        for one in (self._small, self._lines, self.half):
+            one.destroy()
+
+
+def _times(share: Array, made: Any) -> Array:
+    return np.asarray(share * (made() if callable(made) else made))
+
+
+class Lines:
+    """Fields on half of the lines, and on all, of one rank."""
+
+    def __init__(self, whole: Grid, half: Grid):
+        self.shape, self.size = whole.shape, half.size
+
+    def take(self, field: Any) -> Any:
+        """The half's values, no copy."""
+        return field[: self.size]
+
+    def compared(self, field: Any) -> tuple[float, float]:
+        """By how much a field is another beyond the mirror, at most, and the largest value."""
+        nx, ny = self.shape
+        first, beyond = field.reshape(ny, nx)[: ny // 2], field.reshape(ny, nx)[::-1][: ny // 2]
+        most, lines = [[0.0], [0.0]], max(1, STRIP // nx)
+        for some in (slice(j, j + lines) for j in range(0, ny // 2, lines)):  # what lies between stays in the cache
+            most[0].append(np.abs(first[some] - beyond[some]).max())
+            most[1].append(np.abs(first[some]).max())
+        return float(np.max(most[0])), float(np.max(most[1]))
+
+    def spread(self, half: Any) -> Any:
+        """The half's values on all lines."""
+        nx, ny = self.shape
+        whole = np.empty(ny * nx, half.dtype)
+        whole[: half.size] = half
+        whole[half.size :] = half.reshape(-1, nx)[: ny // 2][::-1].ravel()
+        return whole
+
+    def destroy(self) -> None:
+        """Nothing to do."""
+
+
+class Picks:
+    """As `Lines`, dealt to several ranks. Collective, as its methods."""
+
+    def __init__(self, whole: Grid, half: Grid, part: Part):
+        j, i = numbers(half)
+        self._take, self._spread = Pick(whole, half, j, i), Pick(half, whole, *part.places(whole))
+        self._beyond, self._largest = Pick(whole, half, whole.shape[1] - 1 - j, i), whole.reduce.largest
+
+    def _of(self, change: Callable[[Array], Array], a: Any) -> Any:
+        return change(a.real) + 1j * change(a.imag) if np.iscomplexobj(a) else change(a)
+
+    def take(self, field: Any) -> Any:
+        return self._of(self._take, field)
+
+    def compared(self, field: Any) -> tuple[float, float]:
+        half = self.take(field)
+        off = self._of(self._beyond, field) - half
+        return self._largest(off.view(float)), self._largest(half.view(float))
+
+    def spread(self, half: Any) -> Any:
+        return self._of(self._spread, half)
+
+    def destroy(self) -> None:
+        for one in (self._take, self._beyond, self._spread):
             one.destroy()

@@ -47,6 +47,7 @@ class Linear:
             entries = problem.tangent.entries(problem.scheme)
         self.problem, self.cavity, self.entries, self.given, self.M = problem, cavity, entries, given, M
         grid, self.frozen = problem.grid, None
+        self.terms: list[float] = []
         apart = entries is None and not factored and (given is None or problem.held is None)
         if apart and grid.dim == 2 and grid.size > (least or SMALL) and has_numba():
             from ...solvers.fas.frozen import Frozen  # here: numba starts with it
@@ -61,8 +62,10 @@ class Linear:
     def solve_transposed(self, rows: Sequence[Array], z: Array, sizes: Sequence[float] = ()) -> list[Array]:
         """J'^-1 b for each b; z : the solution, p where the film is full and -r where it is not. Collective.
 
-        sizes : of the quantities, which may be small against the terms of b' z; default as large."""
+        sizes : of the quantities, which may be small against the terms of b' z; default as large. Of cycles' answers the
+        sizes of these terms are `terms` then."""
         found = self.frozen and self.frozen.solve(rows, transposed=True, z=z, sizes=sizes)
+        self.terms = self.frozen.terms if self.frozen and found else []
         return found or [self._factors.of_array(b, RTOL, transposed=True)[0] for b in rows]
 
     def at(self, nu: float, rows: Sequence[Any], stored: bool = True) -> list[Any]:

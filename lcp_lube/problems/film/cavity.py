@@ -7,8 +7,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from ...base.compiled import has_numba
 from ...base.crew import crew
 from ...base.parallel import Array, Reduce
+from ...registry import SMALL
 
 VOID = 1e-9  # void fraction up to which a film counts as full: below what any solve resolves, and nothing that one could see
 EMPTY = 1e-2  # void fraction that no full film has within the loosest certificate, however small its pressures are
@@ -40,6 +42,17 @@ def about_to_change(reduce: Reduce, p: Array, r: Array) -> NDArray[np.bool_]:
     """Where p and r both vanish: full or cavitated, as one likes. Collective."""
     small = VOID * reduce.largest(p)
     return _looked(lambda p, r: (np.abs(p) <= small) & (np.abs(r) <= VOID), p, r)
+
+
+def states(reduce: Reduce, p: Array, r: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """`cavitated` and `about_to_change`, of large films in one pass. Collective."""
+    if p.size < SMALL or not has_numba():
+        return cavitated(reduce, p, r), about_to_change(reduce, p, r)
+    from .cell_loops import loop_states
+
+    cavity, switching = (np.empty(p.shape, dtype=bool) for _ in range(2))
+    loop_states(p, r, reduce.largest(p), VOID, EMPTY, cavity, switching)
+    return cavity, switching
 
 
 def _looked(look: Callable[[Array, Array], NDArray[np.bool_]], p: Array, r: Array) -> NDArray[np.bool_]:

@@ -3,12 +3,15 @@
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...base.compiled import kernel, piece
 from ...base.parallel import Array
 from .certify import cell_misfit
 from .face_lines import Rows
 from .flows import face_drag, linear
+
+Mask = NDArray[np.bool_]
 
 
 @piece
@@ -202,3 +205,12 @@ def loop_by_faces(
             across[j, i] = ((w[m - 1, i] if m > 0 else 0.0) - w[m, i]) * (p[j, i + one] - p[a, i + one])
         for i in range(np.uint32(nx if m == lines - 1 else 0)):
             across[a, i] = w[m, i] * (p[a, i + one] - p[a + 1, i + one])
+
+
+@kernel
+def loop_states(p: Array, r: Array, p_max: float, void: float, empty: float, cavity: Mask, switching: Mask) -> None:
+    """`cavity.states` of points, with its bounds."""
+    unit = p_max if p_max > 0.0 else 1.0
+    for i in range(np.uint64(p.size)):
+        cavity[i] = (r[i] > void) & ((p[i] / unit < r[i]) | (r[i] > empty))
+        switching[i] = (abs(p[i]) <= void * p_max) & (abs(r[i]) <= void)

@@ -31,8 +31,10 @@ TIE = 1e-9  # relative: pressures so near the largest one are as large
 
 @dataclass(frozen=True)
 class Slope:
-    """dQ/dp, p in p_unit, and dQ/dr (0: at all) of a number at the owned points. ties : points that could as well have it.
-    value : the number itself, where one pass has both, else NaN."""
+    """dQ/dp, p in p_unit, flat or on the grid's box, and dQ/dr (0: at all) of a number at the owned points.
+
+    ties : points that could as well have it. value : the number itself, where one pass has both, else NaN.
+    """
 
     p: Array
     r: Array | float
@@ -89,7 +91,7 @@ def slope(problem: LubricationProblem, tangent: Tangent | None, p_pa: Array, r: 
     if (weight := weights(problem).get(name)) is not None:
         grid = problem.grid
         lines = grid.cell * problem.p_unit * stream_weights(grid)
-        return Slope(np.broadcast_to(weight(grid.x, grid.y) * grid.widths(0) * lines, grid.box).ravel(), 0.0)
+        return Slope(np.broadcast_to(weight(grid.x, grid.y) * grid.widths(0) * lines, grid.box), 0.0)
     if name == "p_max":
         return _largest(problem, p_pa / problem.p_unit, last)
     if name == "min_h":

@@ -13,7 +13,7 @@ from ...problems.film.lubrication import LubricationProblem
 from . import finest, frozen_kernels, frozen_transfer, held, levels, transfer
 
 COARSEST = 3  # sweeps of the coarsest grid, in numbers of its points a side, where it has more than FEW points
-FEW = 64  # up to which J's inverse is kept: 32 KB
+FEW = 128  # up to which J's inverse is kept: 128 KB
 
 
 class Cycles:
@@ -22,7 +22,11 @@ class Cycles:
     Attributes
     ----------
     work : cycles times right-hand sides so far.
+    asked, at : right-hand sides and answers, with frames.
     """
+
+    asked: Array
+    at: Array
 
     def __init__(
         self,
@@ -44,7 +48,9 @@ class Cycles:
         self._over = (
             None if self.held is None else np.where(self.held, 1.0 / scheme.diagonal.ravel() if given is None else 1.0, 0.0)
         )
-        self.leaves = -problem.scheme.b_C.ravel()  # q of a unit of void, with what a time step stores of it
+        self.leaves = np.empty(grid.local_size)  # q of a unit of void, with what a time step stores of it
+        for lines, some in scheme.in_strips(grid):
+            np.negative(some.b_C, out=self.leaves.reshape(grid.box)[lines])
         self.stored = M = M if first.void is None else None
         if M is not None:
             first.void = np.zeros((3, *first.z.shape))
@@ -64,9 +70,10 @@ class Cycles:
         """Take so many right-hand sides, 1 or 2; at nu > 0 they are one, real and imaginary. single : precision of cycles."""
         kind: Any = np.float32 if single else np.float64
         self.several, self.transposed, self.single = several, transposed, single
-        self.z, self.c = ([np.zeros((several, *level.z.shape), kind) for level in self.levels] for _ in range(2))
-        self.rest = [] if transposed else [np.zeros_like(z) for z in self.z]
-        self.at, self.asked, self.left = (np.zeros((several, *self.levels[0].z.shape)) for _ in range(3))
+        shapes = [(several, *level.z.shape) for level in self.levels]
+        self.z = [np.zeros(shape, kind) for shape in shapes]
+        self.c = [np.zeros(shape, kind) for shape in shapes]
+        self.rest = [] if transposed else [np.zeros(shape, kind) for shape in shapes]
         self.k = [(level.kx.astype(kind, copy=False), level.ky.astype(kind, copy=False)) for level in self.levels]
         self.passed: list[tuple[Array | None, Array | None]] = [(None, None)] * len(self.levels)
         if self.stored is None:
@@ -97,7 +104,7 @@ class Cycles:
         out, free, none = np.zeros_like(units), self.free[-1], np.zeros_like(units)
         data = units, self.full[-1], free, level.kx, level.ky, none, self._carry(-1)
         if self.transposed:
-            frozen_kernels.transposed_residual(*data, out)
+            frozen_kernels.transposed_residual(*data, np.ones(n), out)
         else:
             frozen_kernels.residual(*data, None, out)
         J = -out[:, 1:-1, 1:-1].reshape(n, n).T
@@ -112,40 +119,76 @@ class Cycles:
                 return None
         return inverse if np.isfinite(inverse).all() else None
 
-    def change(self, x: Array | None, out: Array | None = None) -> Array:
-        """What a cycle adds to x: M (c - J x), or M (c - J' x); None: to nothing."""
-        if x is None:
-            self.z[0][:] = 0.0
-        else:
-            self._put(self.z[0], x)
+    def cycle(self, x: Array) -> None:
+        """One more F cycle from x, which is changed in place; of what is in its frame nothing is left."""
+        self.z[0] = self._known(x)
         self._run(0, "F")
         self.work += self.several
-        out = self._own(self.z[0], out)
-        if x is not None:
-            out -= x
-        return out
+        self.bare(x)
 
-    def _put(self, into: Array, values: Array) -> None:
-        for one, part in zip(into, values.reshape(self.several, -1), strict=True):
-            finest.put(self.levels[0], self.grid, one, part)
+    def bare(self, a: Array) -> Array:
+        """Nothing but this rank's points, for dots of arrays with their frames. a : of the finest level."""
+        rows, columns = self._owned
+        for beside in (a[..., : rows.start, :], a[..., rows.stop :, :], a[..., : columns.start], a[..., columns.stop :]):
+            beside[:] = 0.0
+        return a
 
-    def _own(self, a: Array, out: Array | None = None) -> Array:
-        out = np.empty(len(a) * self.grid.local_size, a.dtype) if out is None else out
-        for one, into in zip(a, out.reshape(len(a), *self.grid.box), strict=True):
-            into[:] = finest.own(self.levels[0], self.grid, one)
-        return out
+    @property
+    def _owned(self) -> tuple[slice, slice]:
+        grid, level = self.grid, self.levels[0]
+        y0, y1 = (grid.y_start, grid.y_end) if level.comm is None else (0, level.y1 - level.y0)
+        return slice(y0 + 1, y1 + 1), slice(grid.x_start + 1, grid.x_end + 1)
 
-    def _rest(self, b: Array, x: Array, free: NDArray[np.bool_] | None) -> Array:
-        """b - J x or b - J' x, at free points."""
-        self._put(self.asked, b)
-        self._put(self.at, x)
+    def own(self, a: Array) -> Array:
+        """This rank's points of arrays of the finest level."""
+        rows, columns = self._owned
+        return a[..., rows, columns]
+
+    def _known(self, a: Array) -> Array:
+        """What stands in the place of other ranks' points, and in the frame, brought up to date. Collective."""
+        level, grid = self.levels[0], self.grid
+        for one in a:
+            if level.comm is None and grid.comm.size > 1:
+                one[1:-1, 1:-1] = finest.whole(grid, self.own(one))
+            level.share(one)
+        return a
+
+    def put(self, into: Array, values: Array) -> None:
+        """This rank's values of each right-hand side or answer into an array with a frame. Collective."""
+        for one, part in zip(into, values.reshape(self.several, *self.grid.box), strict=True):
+            self.own(one)[:] = part
+        self._known(into)
+
+    def left(self, over: Array, out: Array) -> None:
+        """c - J' l of `asked` and `at` at free points, times a number of each. out : with a frame. Collective."""
         level = self.levels[0]
-        data = self.at, self.full[0], free, level.kx, level.ky, self.asked
+        data = self._known(self.at), self.full[0], self.free[0], level.kx, level.ky, self.asked
+        frozen_kernels.transposed_residual(*data, self._carry(0), over, out)
+
+    def misfits(self, z: Array) -> Array:
+        """(c - J' l)' z of the same. z : `bare`. Collective."""
+        level, out = self.levels[0], np.zeros(self.several)
+        data = self._known(self.at), self.full[0], self.free[0], level.kx, level.ky, self.asked
+        frozen_kernels.transposed_misfit(*data, self._carry(0), z, out)
+        return np.asarray(self.grid.comm.allreduce(out))
+
+    def products(self, z: Array) -> Array:
+        """|c|' |z| of `asked`. z : `bare`. Collective."""
+        out = np.zeros(self.several)
+        frozen_kernels.products(self.asked, z, out)
+        return np.asarray(self.grid.comm.allreduce(out))
+
+    def rest_of(self, b: Array, x: Array) -> Array:
+        """b - J x or b - J' x, as if no pressure were held. Collective."""
+        self.put(self.asked, b)
+        self.put(self.at, x)
+        level, out = self.levels[0], np.zeros_like(self.at)
+        data = self.at, self.full[0], None, level.kx, level.ky, self.asked
         if self.transposed:
-            frozen_kernels.transposed_residual(*data, self._carry(0), self.left)
+            frozen_kernels.transposed_residual(*data, self._carry(0), np.ones(self.several), out)
         else:
-            frozen_kernels.residual(*data, *self.passed[0], self.left)
-        return self._own(self.left).reshape(b.shape)
+            frozen_kernels.residual(*data, *self.passed[0], out)
+        return self.own(out).reshape(b.shape)
 
     def _run(self, k: int, kind: str) -> None:
         level, z = self.levels[k], self.z[k]
@@ -182,7 +225,7 @@ class Cycles:
                 data = self.full[k], self.free[k], kx, ky, self.c[k][n], self.passed[k][0]
                 frozen_transfer.restrict(z[n], *data, into, *where, level.periodic[0])
                 coarse.collect(c[n])
-                c[n] *= self.full[k + 1]
+                frozen_kernels.kept(c[n], self.full[k + 1])
             else:
                 transfer.restrict(z[n], kx, ky, self.rest[k][n], into, *where, True, level.periodic[0], False, None)
                 coarse.collect(c[n])
@@ -198,10 +241,9 @@ class Cycles:
                 z[n][level.held] = 0.0
             level.share(z[n])
 
-    def nested(self, b: Array) -> Array:
-        """A first answer to J' l = b: those of the coarser grids, from the coarsest up."""
+    def nested(self) -> Array:
+        """A first answer to J' l = c of the finest level: those of the coarser grids, from the coarsest up."""
         last = len(self.levels) - 1
-        self._put(self.c[0], b)
         for k in range(last):
             self.z[k][:] = 0.0
             self._descend(k)
@@ -214,7 +256,7 @@ class Cycles:
             if k:
                 self._run(k, "V")
         self._sweep(0, True)
-        return self._own(self.z[0])
+        return self.z[0]
 
     def _hand_on(self, k: int) -> None:
         """What level k's cavities ask for is asked of the coarser one's."""

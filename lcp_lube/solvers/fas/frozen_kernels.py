@@ -139,12 +139,70 @@ def transposed_sweep(
 
 @kernel
 def transposed_residual(
-    l: Array, full: Mask, free: Mask | None, kx: Array, ky: Array, c: Array, carry: Array | None, out: Array
+    l: Array, full: Mask, free: Mask | None, kx: Array, ky: Array, c: Array, carry: Array | None, over: Array, out: Array
 ) -> None:
-    """c - J' l at all of the rank's points; none where a pressure is held."""
+    """c - J' l at all of the rank's points, times `over`, a number of each; none where a pressure is held."""
+    row = np.zeros(l.shape[2], l.dtype)
     for n in range(l.shape[0]):
         for m in range(1, l.shape[1] - 1):
-            transposed_row(l[n], full, free, kx, ky, c[n], carry, m, out[n, m])
+            transposed_row(l[n], full, free, kx, ky, c[n], carry, m, row)
+            for i in range(1, l.shape[2] - 1):
+                out[n, m, i] = over[n] * row[i]
+
+
+@kernel
+def transposed_misfit(
+    l: Array, full: Mask, free: Mask | None, kx: Array, ky: Array, c: Array, carry: Array | None, z: Array, out: Array
+) -> None:
+    """(c - J' l)' z of each l."""
+    row, sums = np.zeros(l.shape[2], l.dtype), np.zeros(l.shape[2], l.dtype)
+    for n in range(l.shape[0]):
+        sums[:] = 0.0
+        for m in range(1, l.shape[1] - 1):
+            transposed_row(l[n], full, free, kx, ky, c[n], carry, m, row)
+            for i in range(1, l.shape[2] - 1):
+                sums[i] += row[i] * z[m, i]
+        out[n] = sums.sum()
+
+
+@kernel
+def products(c: Array, z: Array, out: Array) -> None:
+    """|c|' |z| of each c."""
+    sums = np.zeros(z.shape[1])
+    for n in range(c.shape[0]):
+        sums[:] = 0.0
+        for m in range(1, z.shape[0] - 1):
+            for i in range(1, z.shape[1] - 1):
+                sums[i] += abs(c[n, m, i] * z[m, i])
+        out[n] = sums.sum()
+
+
+@kernel
+def add(x: Array, v: Array, part: Array) -> None:
+    """So much of a vector, a part of each answer, to x."""
+    for n in range(x.shape[0]):
+        some = x.dtype.type(part[n])
+        for m in range(x.shape[1]):
+            for i in range(x.shape[2]):
+                x[n, m, i] += some * v[n, m, i]
+
+
+@kernel
+def in_units(values: Array, cavity: Mask, unit: Array, into: bool, out: Array) -> None:
+    """Values, in the cavity in units of their own or, of those that are so, not."""
+    for m in range(values.shape[0]):
+        for i in range(values.shape[1]):
+            part = (1.0 / unit[m, i] if into else unit[m, i]) if cavity[m, i] else 1.0
+            out[m, i] = part * values[m, i]
+
+
+@kernel
+def kept(a: Array, full: Mask) -> None:
+    """Nothing but what is in the full film."""
+    none = a.dtype.type(0)
+    for m in range(a.shape[0]):
+        for i in range(a.shape[1]):
+            a[m, i] = a[m, i] if full[m, i] else none
 
 
 @piece
@@ -152,7 +210,7 @@ def transposed_row(
     l: Array, full: Mask, free: Mask | None, kx: Array, ky: Array, c: Array, carry: Array | None, m: int, out: Array
 ) -> None:
     """The same of one row and right-hand side."""
-    for i in range(1, l.shape[1] - 1):
+    for i in range(np.uint32(1), np.uint32(l.shape[1] - 1)):
         here, east = l[m, i], l[m, i + 1]
         flows = (kx[m, i] * (here - l[m, i - 1]) + kx[m, i + 1] * (here - east)) + (
             ky[m, i] * (here - l[m - 1, i]) + ky[m + 1, i] * (here - l[m + 1, i])
