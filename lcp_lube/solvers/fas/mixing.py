@@ -1,0 +1,145 @@
+"""Iterates of slow cycles mixed so that their residuals cancel: what Krylov's methods do for cycles that are linear.
+
+Deep pockets that coarse grids do not see leave a few slow modes, one pressure for each pocket's full part, while hardly a sign
+still changes. The mixture is that of the last iterates with the least residual, at the points whose signs all of them share.
+Others stay, and what that does to the balances beside them front sweeps put right. It is kept if ||G|| is less after these.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.compiled import kernel, piece
+from ...base.crew import crew
+from ...base.parallel import Array
+from . import held
+from .kernels import balance_at
+
+KEPT = 5  # iterates, the newest among them
+GAIN = 0.5  # part of ||G|| that a mixture has to promise: what it costs, and what fronts take of it
+RANK = 1e-12  # of the differences' inner products, relative: less is rounding
+
+
+class Mixing:
+    """The last iterates of a level, and their residuals. They are not a part of a checkpoint: a run taken up again begins anew."""
+
+    def __init__(self, level: Any, sweep_fronts: Callable[[], None]):
+        self._level, self._sweep_fronts = level, sweep_fronts
+        self._room = np.zeros((0, 2, 0, 0))  # z and residual, each with its frame; one more for a mixture
+        self._order: list[int] = []  # where iterates lie, the newest last
+
+    def forget(self) -> None:
+        self._room, self._order = np.zeros((0, 2, 0, 0)), []
+
+    def improve(self) -> bool:
+        """Put a mixture of the iterates so far and the level's z in its place, if it is better. Collective."""
+        level, z = self._level, self._level.z
+        if not self._room.size:
+            self._room = np.empty((KEPT + 1, 2, *z.shape))
+        spare = next(k for k in range(KEPT + 1) if k not in self._order)
+        own = self._look(spare)
+        self._order = [*self._order[1 - KEPT :], spare]
+        if len(self._order) < 2:
+            return False
+        weights, promised = self._weights()
+        if not promised <= GAIN**2 * own:
+            return False
+        order = np.array(self._order)
+        _by_rows(lambda start, end: mix(z, self._room, order, weights, start, end), z)
+        level.share(z)
+        self._sweep_fronts()
+        spare = next(k for k in range(KEPT + 1) if k not in self._order)
+        if self._look(spare) < own:
+            self._order[-1] = spare
+            return True
+        z[:] = self._room[self._order[-1], 0]
+        return False
+
+    def _look(self, k: int) -> float:
+        """Keep z and its residual; the sum of this one's squares."""
+        level = self._level
+        held.settle(level)
+        into = self._room[k]
+        given = level.z, level.kx, level.ky, level.c, level.carry, into
+        level.work += level.nx * (level.z.shape[0] - 2)
+        return float(self._sum(_by_rows(lambda start, end: np.array(look(*given, start, end)), level.z)))
+
+    def _weights(self) -> tuple[Array, float]:
+        """Of all iterates but the newest, which has the rest of 1; and what they leave where all signs agree."""
+        level, order = self._level, np.array(self._order)
+        n = len(order) - 1
+        found = self._sum(_by_rows(lambda start, end: products(self._room, order, start, end), level.z))
+        level.work += level.nx * (level.z.shape[0] - 2)
+        A, b = found[:n, :n], found[:n, n]
+        scale = np.sqrt(np.diag(A)) + np.finfo(float).tiny
+        weights = -np.linalg.lstsq(A / np.outer(scale, scale), b / scale, rcond=RANK)[0] / scale
+        return weights, float(found[n, n] + 2.0 * weights @ b + weights @ A @ weights)
+
+    def _sum(self, parts: list[Array]) -> Array:
+        total, level = np.sum(parts, axis=0), self._level
+        return total if level.comm is None else level.comm.allreduce(total)
+
+
+def _by_rows(task: Callable[[int, int], Any], z: Array) -> list[Any]:
+    return crew().rows(lambda start, end: task(start + 1, end + 1), z.shape[0] - 2, z.size)
+
+
+@kernel
+def look(z: Array, kx: Array, ky: Array, c: Array, carry: Array | None, out: Array, start: int, end: int) -> float:
+    """Into out z and c - G(z) of rows start to end - 1; the sum of this one's squares."""
+    squares = np.zeros(z.shape[1])
+    for m in range(start, end):
+        for i in range(np.uint32(1), np.uint32(z.shape[1] - 1)):
+            rest = c[m, i] - balance_at(z, kx, ky, m, i, carry)
+            out[0, m, i], out[1, m, i] = z[m, i], rest
+            squares[i] += rest * rest
+    return squares.sum()
+
+
+@piece
+def agreeing(room: Array, order: NDArray[np.int64], m: int, out: Array) -> None:
+    """1 where all iterates are full in row m, -1 where all are cavitated, else 0."""
+    for i in range(np.uint32(1), np.uint32(room.shape[3] - 1)):
+        out[i] = 1.0 if room[order[0], 0, m, i] > 0.0 else -1.0
+    for k in order[1:]:
+        for i in range(np.uint32(1), np.uint32(room.shape[3] - 1)):
+            out[i] = out[i] if (room[k, 0, m, i] > 0.0) == (out[i] > 0.0) else 0.0
+
+
+@kernel
+def products(room: Array, order: NDArray[np.int64], start: int, end: int) -> Array:
+    """Inner products of the residuals' differences from the newest one, and of that, over points whose signs agree."""
+    n, width = order.size - 1, room.shape[3]
+    signs, d, sums = np.zeros(width), np.zeros((n + 1, width)), np.zeros((n + 1, n + 1, width))
+    for m in range(start, end):
+        agreeing(room, order, m, signs)
+        for i in range(np.uint32(1), np.uint32(width - 1)):
+            d[n, i] = room[order[n], 1, m, i] if signs[i] != 0.0 else 0.0
+        for k in range(n):
+            for i in range(np.uint32(1), np.uint32(width - 1)):
+                d[k, i] = room[order[k], 1, m, i] - d[n, i] if signs[i] != 0.0 else 0.0
+        for k in range(n + 1):
+            for q in range(k + 1):
+                for i in range(np.uint32(1), np.uint32(width - 1)):
+                    sums[k, q, i] += d[k, i] * d[q, i]
+    out = np.zeros((n + 1, n + 1))
+    for k in range(n + 1):
+        for q in range(k + 1):
+            out[k, q] = out[q, k] = sums[k, q].sum()
+    return out
+
+
+@kernel
+def mix(z: Array, room: Array, order: NDArray[np.int64], weights: Array, start: int, end: int) -> None:
+    """The newest iterate plus weights times the others' differences from it, where no sign is another then."""
+    signs, new = np.zeros(z.shape[1]), np.zeros(z.shape[1])
+    for m in range(start, end):
+        agreeing(room, order, m, signs)
+        new[:] = z[m]
+        for k in range(weights.size):
+            for i in range(np.uint32(1), np.uint32(z.shape[1] - 1)):
+                new[i] += weights[k] * (room[order[k], 0, m, i] - z[m, i])
+        for i in range(np.uint32(1), np.uint32(z.shape[1] - 1)):
+            z[m, i] = new[i] if signs[i] != 0.0 and (new[i] > 0.0) == (signs[i] > 0.0) else z[m, i]
