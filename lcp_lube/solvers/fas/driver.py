@@ -65,9 +65,9 @@ class Fas(FilmCycles):
         super().__init__(job)
         problem, options, start = self.problem, self.options, job.start
         # numba starts with this import, 0.4 s: only where the method is used.
-        from . import finest, following, kernels, levels, loops, mixing
+        from . import coarsest, finest, following, kernels, levels, loops, mixing
 
-        self._kernels, self._loops, self._tools, self._finest = kernels, loops, levels, finest
+        self._kernels, self._loops, self._tools, self._finest, self._coarsest = kernels, loops, levels, finest, coarsest
         self._harmonic, self._truncation = options.weights == "harmonic", TRUNCATIONS[options.truncation]
         follows = start is not None and following.foreseen(problem, start["p"])
         with self.stages("assembly"):
@@ -177,8 +177,9 @@ class Fas(FilmCycles):
                 if pressures is not None:
                     self._following.put(pressures)
             self.norm = self._norm()
-            if self._mixing and self._rest < self.norm < inf and self.norm > SLOW * self._recent[-1]:
-                self.norm = self._norm() if self._mixing.improve() else self.norm
+            slow = max(SLOW * self._recent[-1], self._rest) < self.norm < inf
+            if slow and self._mixing and level.z.size and self._mixing.improve():
+                self.norm = self._norm()
         if not np.isfinite(self.norm):
             self.z = np.zeros(self.problem.grid.local_size)  # as above
         self._first = self.norm if self._taken == 1 else self._first

@@ -17,7 +17,7 @@ from ...base.parallel import Array
 from . import held
 from .kernels import balance_at
 
-KEPT = 5  # iterates, the newest among them
+KEPT = 4  # iterates, the newest among them
 GAIN = 0.5  # part of ||G|| that a mixture has to promise: what it costs, and what fronts take of it
 RANK = 1e-12  # of the differences' inner products, relative: less is rounding
 
@@ -27,20 +27,18 @@ class Mixing:
 
     def __init__(self, level: Any, sweep_fronts: Callable[[], None]):
         self._level, self._sweep_fronts = level, sweep_fronts
-        self._room = np.zeros((0, 2, 0, 0))  # z and residual, each with its frame; one more for a mixture
+        self._room = np.zeros((0, 2, 0, 0))  # z and residual of each, with frames
         self._order: list[int] = []  # where iterates lie, the newest last
 
     def forget(self) -> None:
-        self._room, self._order = np.zeros((0, 2, 0, 0)), []
+        self._order = []
 
     def improve(self) -> bool:
         """Put a mixture of the iterates so far and the level's z in its place, if it is better. Collective."""
         level, z = self._level, self._level.z
         if not self._room.size:
-            self._room = np.empty((KEPT + 1, 2, *z.shape))
-        spare = next(k for k in range(KEPT + 1) if k not in self._order)
-        own = self._look(spare)
-        self._order = [*self._order[1 - KEPT :], spare]
+            self._room = np.empty((KEPT, 2, *z.shape))
+        own = self._look()
         if len(self._order) < 2:
             return False
         weights, promised = self._weights()
@@ -50,19 +48,20 @@ class Mixing:
         _by_rows(lambda start, end: mix(z, self._room, order, weights, start, end), z)
         level.share(z)
         self._sweep_fronts()
-        spare = next(k for k in range(KEPT + 1) if k not in self._order)
-        if self._look(spare) < own:
-            self._order[-1] = spare
+        if self._look() < own:
+            del self._order[-2]
             return True
-        z[:] = self._room[self._order[-1], 0]
+        z[:] = self._room[self._order[-2], 0]
+        self._order.pop()
         return False
 
-    def _look(self, k: int) -> float:
-        """Keep z and its residual; the sum of this one's squares."""
+    def _look(self) -> float:
+        """Keep z and its residual, in the oldest one's place if there is no other; the sum of this one's squares."""
         level = self._level
         held.settle(level)
-        into = self._room[k]
-        given = level.z, level.kx, level.ky, level.c, level.carry, into
+        self._order = self._order[1 - KEPT :]
+        self._order.append(next(k for k in range(KEPT) if k not in self._order))
+        given = level.z, level.kx, level.ky, level.c, level.carry, self._room[self._order[-1]]
         level.work += level.nx * (level.z.shape[0] - 2)
         return float(self._sum(_by_rows(lambda start, end: np.array(look(*given, start, end)), level.z)))
 
@@ -73,7 +72,7 @@ class Mixing:
         found = self._sum(_by_rows(lambda start, end: products(self._room, order, start, end), level.z))
         level.work += level.nx * (level.z.shape[0] - 2)
         A, b = found[:n, :n], found[:n, n]
-        scale = np.sqrt(np.diag(A)) + np.finfo(float).tiny
+        scale = np.where(np.diag(A) > 0.0, np.sqrt(np.diag(A)), 1.0)
         weights = -np.linalg.lstsq(A / np.outer(scale, scale), b / scale, rcond=RANK)[0] / scale
         return weights, float(found[n, n] + 2.0 * weights @ b + weights @ A @ weights)
 
@@ -89,12 +88,12 @@ def _by_rows(task: Callable[[int, int], Any], z: Array) -> list[Any]:
 @kernel
 def look(z: Array, kx: Array, ky: Array, c: Array, carry: Array | None, out: Array, start: int, end: int) -> float:
     """Into out z and c - G(z) of rows start to end - 1; the sum of this one's squares."""
-    squares = np.zeros(z.shape[1])
+    squares, rest = np.zeros(z.shape[1]), np.zeros(z.shape[1])
     for m in range(start, end):
         for i in range(np.uint32(1), np.uint32(z.shape[1] - 1)):
-            rest = c[m, i] - balance_at(z, kx, ky, m, i, carry)
-            out[0, m, i], out[1, m, i] = z[m, i], rest
-            squares[i] += rest * rest
+            rest[i] = c[m, i] - balance_at(z, kx, ky, m, i, carry)
+            squares[i] += rest[i] * rest[i]
+        out[0, m], out[1, m] = z[m], rest
     return squares.sum()
 
 
