@@ -19,11 +19,12 @@ from .kernels import balance_at
 
 KEPT = 4  # iterates, the newest among them
 GAIN = 0.5  # part of ||G|| that a mixture has to promise: what it costs, and what fronts take of it
+SETTLED = 1e-3  # part of the points at which signs may differ
 RANK = 1e-12  # of the differences' inner products, relative: less is rounding
 
 
 class Mixing:
-    """The last iterates of a level, and their residuals. They are not a part of a checkpoint: a run taken up again begins anew."""
+    """The last iterates of a level, and their residuals. A checkpoint has none of them: a run taken up again begins anew."""
 
     def __init__(self, level: Any, sweep_fronts: Callable[[], None]):
         self._level, self._sweep_fronts = level, sweep_fronts
@@ -41,7 +42,10 @@ class Mixing:
         own = self._look()
         if len(self._order) < 2:
             return False
-        weights, promised = self._weights()
+        weights, promised, unsettled = self._weights()
+        if unsettled > SETTLED * level.nx * level.ny:
+            self._order = self._order[-1:]
+            return False
         if not promised <= GAIN**2 * own:
             return False
         order = np.array(self._order)
@@ -65,8 +69,9 @@ class Mixing:
         level.work += level.nx * (level.z.shape[0] - 2)
         return float(self._sum(_by_rows(lambda start, end: np.array(look(*given, start, end)), level.z)))
 
-    def _weights(self) -> tuple[Array, float]:
-        """Of all iterates but the newest, which has the rest of 1; and what they leave where all signs agree."""
+    def _weights(self) -> tuple[Array, float, float]:
+        """Of all iterates but the newest, which has the rest of 1; what they leave where all signs agree; and at how many
+        points these do not."""
         level, order = self._level, np.array(self._order)
         n = len(order) - 1
         found = self._sum(_by_rows(lambda start, end: products(self._room, order, start, end), level.z))
@@ -74,7 +79,7 @@ class Mixing:
         A, b = found[:n, :n], found[:n, n]
         scale = np.where(np.diag(A) > 0.0, np.sqrt(np.diag(A)), 1.0)
         weights = -np.linalg.lstsq(A / np.outer(scale, scale), b / scale, rcond=RANK)[0] / scale
-        return weights, float(found[n, n] + 2.0 * weights @ b + weights @ A @ weights)
+        return weights, float(found[n, n] + 2.0 * weights @ b + weights @ A @ weights), float(found[n + 1, 0])
 
     def _sum(self, parts: list[Array]) -> Array:
         total, level = np.sum(parts, axis=0), self._level
@@ -109,11 +114,14 @@ def agreeing(room: Array, order: NDArray[np.int64], m: int, out: Array) -> None:
 
 @kernel
 def products(room: Array, order: NDArray[np.int64], start: int, end: int) -> Array:
-    """Inner products of the residuals' differences from the newest one, and of that, over points whose signs agree."""
-    n, width = order.size - 1, room.shape[3]
+    """Inner products of the residuals' differences from the newest one, and of that, over points whose signs agree; and, below
+    them, how many do not."""
+    n, width, unsettled = order.size - 1, room.shape[3], 0
     signs, d, sums = np.zeros(width), np.zeros((n + 1, width)), np.zeros((n + 1, n + 1, width))
     for m in range(start, end):
         agreeing(room, order, m, signs)
+        for i in range(np.uint32(1), np.uint32(width - 1)):
+            unsettled += signs[i] == 0.0
         for i in range(np.uint32(1), np.uint32(width - 1)):
             d[n, i] = room[order[n], 1, m, i] if signs[i] != 0.0 else 0.0
         for k in range(n):
@@ -123,7 +131,8 @@ def products(room: Array, order: NDArray[np.int64], start: int, end: int) -> Arr
             for q in range(k + 1):
                 for i in range(np.uint32(1), np.uint32(width - 1)):
                     sums[k, q, i] += d[k, i] * d[q, i]
-    out = np.zeros((n + 1, n + 1))
+    out = np.zeros((n + 2, n + 1))
+    out[n + 1, 0] = unsettled
     for k in range(n + 1):
         for q in range(k + 1):
             out[k, q] = out[q, k] = sums[k, q].sum()
