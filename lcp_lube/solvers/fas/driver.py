@@ -86,7 +86,7 @@ class Fas(FilmCycles):
         if start is not None:
             self.z = start["p"] + problem.scheme.b_C.ravel() * start["r"]
         self._following: Any = following.Following(problem, self._levels, self.fields) if follows else None
-        plain = first.carry is None and not follows
+        plain = first.carry is None and first.held is None
         self._mixing = mixing.Mixing(first, lambda: self._relax_fronts(first)) if plain else None
         self.norm = self._first = 1.0 if follows and problem.scheme.storage is None else self._norm()  # it knows no sources
         if start is not None and problem.scheme.storage is not None and options.rest:

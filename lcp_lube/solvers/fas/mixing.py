@@ -28,7 +28,7 @@ class Mixing:
 
     def __init__(self, level: Any, sweep_fronts: Callable[[], None]):
         self._level, self._sweep_fronts = level, sweep_fronts
-        self._room = np.zeros((0, 2, 0, 0))  # z and residual of each, with frames
+        self._room = np.zeros((0, 2, 0, 0))  # z and residual of each; rows of the frame are not kept
         self._order: list[int] = []  # where iterates lie, the newest last
 
     def forget(self) -> None:
@@ -55,7 +55,8 @@ class Mixing:
         if self._look() < own:
             del self._order[-2]
             return True
-        z[:] = self._room[self._order[-2], 0]
+        z[1:-1] = self._room[self._order[-2], 0, 1:-1]
+        level.share(z)
         self._order.pop()
         return False
 
