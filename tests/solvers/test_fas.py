@@ -122,6 +122,34 @@ def test_deep_dimples_are_not_handed_over(changes):
     other.destroy()
 
 
+@pytest.mark.parametrize("K", [8, 20])
+def test_slow_modes_of_deep_dimples_are_mixed_away(K):
+    """Film ratio 10 at 255 a side: 26 and 24 cycles where iterates are not mixed, and coarse grids left when cycles stall."""
+    changes = {"K": K, "n": 255, "depth": 135e-6}
+    with run("textured_slider", changes, stopping={"eps1": 1e-10}) as solution:
+        assert solution.converged and solution.settings["took_over"] is None, solution.message
+        assert solution.settings["details"]["cycles"] <= 20
+        assert solution.settings["details"]["convergence_factor"] <= 0.4
+
+
+def test_a_mixture_is_that_of_least_residual():
+    """Two iterates whose residuals are opposite at all points but one, whose sign they do not share."""
+    from lcp_lube.solvers.fas import mixing
+
+    random, rest = np.random.default_rng(5), np.ones((2, 8, 9))
+    room = np.stack(
+        [np.stack([1.0 + random.random((8, 9)), sign * part]) for sign, part in zip((1.0, -3.0), rest, strict=True)]
+    )
+    room[0, 0, 4, 4], room[1, 1, 4, 4] = -1.0, 100.0
+    found = mixing.products(room, np.array([0, 1]), 1, 7)
+    assert found[2, 0] == 1 and found[1, 1] == 9.0 * 41 and found[0, 0] == 16.0 * 41
+    z = room[1, 0].copy()
+    mixing.mix(z, room, np.array([0, 1]), np.array([0.75]), 1, 7)
+    expected = 0.75 * room[0, 0] + 0.25 * room[1, 0]
+    expected[4, 4] = room[1, 0, 4, 4]
+    np.testing.assert_allclose(z[1:7, 1:8], expected[1:7, 1:8], rtol=1e-15)
+
+
 @pytest.mark.parametrize("name, n, most", [("problem4", 1023, 1), ("journal", 127, 1)])
 def test_one_cycle_after_full_multigrid_does(name, n, most):
     """A cubic start and overrelaxed strips at the fronts: to 1e-6 smooth films took two cycles."""
@@ -236,7 +264,15 @@ def test_the_coarsest_grid_is_solved_exactly(rings):
             ky[ny + 1] = ky[1]
         z[1:-1, 1:-1] = random.standard_normal((ny, nx))
         exact.wrap(z, *rings)
-        assert exact.solve(z, kx, ky, c, *rings)
+        signs = np.zeros(z.shape, dtype=np.int8)
+        factors = np.full((nx * ny, exact.entries(nx, ny, *rings)), np.nan)
+        assert exact.solve(z, kx, ky, c, *rings, None, None, factors, signs)
+        again = z * (1.0 + 1e-3 * random.random(z.shape))  # of the same signs: by the factors that are there
+        exact.wrap(again, *rings)
+        kept = factors.copy()
+        assert exact.solve(again, kx, ky, c, *rings, None, None, factors, signs)
+        np.testing.assert_array_equal(factors, kept)
+        np.testing.assert_allclose(again, z, rtol=1e-9, atol=1e-12 * np.abs(z).max())
         terms = (np.abs(c) ** 2).sum() + (kx.max() * np.abs(z).max()) ** 2
         assert exact.residual_square(z, kx, ky, c) < 1e-24 * terms
 

@@ -35,6 +35,7 @@ EXTREME = 1000.0  # film ratio above which a small ||G|| says little of p, and t
 SETTLED = 1e-8  # of the largest pressure, or eps1 where that is more: what they may then be in the mean
 CLOSE = 1e-6  # ||G|| below which a ring that is hardly fed is not what has stalled
 FED = 3e-5  # of the certificate's tolerance: the flow that a film with supplies may lose, 3e-12 in parts of what flows
+SLOW, EARLY = 0.15, 0.16  # a cycle whose iterates are mixed leaves more than that; two cycles, where coarse grids mislead
 SLOWER, LEAST_FALL = 2.5, (0.04, 0.2)  # times what an F cycle leaves is what a V cycle does in its place; at least, in time too
 
 
@@ -64,9 +65,9 @@ class Fas(FilmCycles):
         super().__init__(job)
         problem, options, start = self.problem, self.options, job.start
         # numba starts with this import, 0.4 s: only where the method is used.
-        from . import finest, following, kernels, levels, loops
+        from . import coarsest, finest, following, kernels, levels, loops, mixing
 
-        self._kernels, self._loops, self._tools, self._finest = kernels, loops, levels, finest
+        self._kernels, self._loops, self._tools, self._finest, self._coarsest = kernels, loops, levels, finest, coarsest
         self._harmonic, self._truncation = options.weights == "harmonic", TRUNCATIONS[options.truncation]
         follows = start is not None and following.foreseen(problem, start["p"])
         with self.stages("assembly"):
@@ -85,6 +86,8 @@ class Fas(FilmCycles):
         if start is not None:
             self.z = start["p"] + problem.scheme.b_C.ravel() * start["r"]
         self._following: Any = following.Following(problem, self._levels, self.fields) if follows else None
+        plain = first.carry is None and first.held is None
+        self._mixing = mixing.Mixing(first, lambda: self._relax_fronts(first)) if plain else None
         self.norm = self._first = 1.0 if follows and problem.scheme.storage is None else self._norm()  # it knows no sources
         if start is not None and problem.scheme.storage is not None and options.rest:
             lapse = problem.stored.lapse * problem.reduce.norm(problem.scheme.kept) / (self._c_norm or 1.0)  # type: ignore[arg-type]
@@ -155,6 +158,8 @@ class Fas(FilmCycles):
                 told = f"||G|| is at {self.norm:.1e} of ||c|| after {self._taken} cycles and has stalled (fas.stall)"
                 raise StalledError(told)
             anew = not self.norm < self._first
+        elif self._slow and self.norm > self.eps1:
+            self._retreat()
         with self.stages("cycles"):
             if self._taken == 1 and level.carry is not None:
                 self._relax_fronts(level)
@@ -172,6 +177,9 @@ class Fas(FilmCycles):
                 if pressures is not None:
                     self._following.put(pressures)
             self.norm = self._norm()
+            slow = max(SLOW * self._recent[-1], self._rest) < self.norm < inf
+            if slow and self._mixing and level.z.size and self._mixing.improve():
+                self.norm = self._norm()
         if not np.isfinite(self.norm):
             self.z = np.zeros(self.problem.grid.local_size)  # as above
         self._first = self.norm if self._taken == 1 else self._first
@@ -182,6 +190,12 @@ class Fas(FilmCycles):
             if whole > 0.0 and ((self._extreme and not anew) or whole < self._unit * self._c_norm):
                 self.norm = max(self.norm, size / whole * min(self.eps1 / SETTLED, 1.0))
         return Step(self.norm, size, 1.0, enough=self._rest > self.eps1 and self.norm <= self._rest)
+
+    @property
+    def _slow(self) -> bool:
+        """Whether coarse grids mislead, as where they do not see deep pockets, of a grid too large to be solved itself."""
+        level = self._levels[0]
+        return self._mixing is not None and level.nx * level.ny > OWN and self.norm > EARLY * self._recent[1]
 
     def _kind(self) -> str:
         """Of the next cycle: a V cycle in place of an F cycle where that will do, as the last one."""
@@ -207,5 +221,7 @@ class Fas(FilmCycles):
             for k, level in enumerate(self._levels[: self._depth - 1]):
                 if level.nx * level.ny <= points:
                     self._depth, self._recent = k + 1, (inf,) * WINDOW
+                    if self._mixing:
+                        self._mixing.forget()
                     return True
         return False

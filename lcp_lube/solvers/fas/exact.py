@@ -29,17 +29,23 @@ def solve(
     ring_y: bool,
     carry: Array | None = None,
     held: NDArray[np.bool_] | None = None,
+    factors: Array | None = None,
+    signs: NDArray[np.int8] | None = None,
 ) -> bool:
     """Solve G(z) = c in place, arrays as in `kernels`; returns whether the signs of z settled.
 
     Each step is followed by sweeps, which bring order into the signs where steps alone cycle. Where the signs do not settle,
-    z is the best that was met.
+    z is the best that was met. factors, signs : J's factors, where they are kept from one call to the next, of `entries`
+    numbers, and the signs of z they are of; 0 where they are of none.
     """
+    b = entries(z.shape[1] - 2, z.shape[0] - 2, ring_x, ring_y)
+    J = np.zeros(((z.shape[0] - 2) * (z.shape[1] - 2), b)) if factors is None else factors
+    known = np.zeros(z.shape, dtype=np.int8) if signs is None else signs
     spans = free_spans(np.zeros(z.shape, dtype=np.bool_) if held is None else held)
     best, least, stalled, rescue, singular = z.copy(), np.inf, 0, RESCUE_SWEEPS, 0
     for _ in range(MOST_STEPS):
         full = z > 0.0
-        stepped = newton_step(z, kx, ky, c, ring_x, ring_y, carry, held)
+        stepped = newton_step(z, kx, ky, c, ring_x, ring_y, carry, held, J, known)
         wrap(z, ring_x, ring_y)
         if stepped and (full == (z > 0.0)).all():
             return True
@@ -93,6 +99,14 @@ def place(a: int, n: int, ring: bool) -> int:
 
 
 @piece
+def entries(nx: int, ny: int, ring_x: bool, ring_y: bool) -> int:
+    """Of a row of J within its band. The shorter direction runs fastest, so that the band is narrow."""
+    by_columns = ny * (2 if ring_x else 1) <= nx * (2 if ring_y else 1)
+    fast, ring = (ny, ring_x) if by_columns else (nx, ring_y)
+    return 2 * min(2 * fast if ring else fast, nx * ny - 1) + 1
+
+
+@piece
 def newton_step(
     z: Array,
     kx: Array,
@@ -100,46 +114,38 @@ def newton_step(
     c: Array,
     ring_x: bool,
     ring_y: bool,
-    carry: Array | None = None,
-    held: NDArray[np.bool_] | None = None,
+    carry: Array | None,
+    held: NDArray[np.bool_] | None,
+    J: Array,
+    known: NDArray[np.int8],
 ) -> bool:
     """z += J^-1 (c - G(z)) for the signs of z; False where J is singular: a line is cavitated all the way round.
 
-    J is column diagonally dominant: no pivoting is needed. The shorter direction runs fastest, so that the band is narrow.
+    J is column diagonally dominant: no pivoting is needed. J, known : its factors and the signs of z they are of, made anew
+    where these are others.
     """
     ny, nx = z.shape[0] - 2, z.shape[1] - 2
     by_columns = ny * (2 if ring_x else 1) <= nx * (2 if ring_y else 1)
     fast, slow, ring = (ny, nx, ring_x) if by_columns else (nx, ny, ring_y)
-    n, b = nx * ny, min(2 * fast if ring else fast, nx * ny - 1)
-    J, d = np.zeros((n, 2 * b + 1)), np.zeros(n)  # J[row, column - row + b]
+    b, d = J.shape[1] // 2, np.zeros(nx * ny)
     at = np.empty((ny + 2, nx + 2), dtype=np.int64)
+    anew = False
     for m in range(1, ny + 1):
         for i in range(1, nx + 1):
             s, f = (i - 1, m - 1) if by_columns else (m - 1, i - 1)
             at[m, i] = place(s, slow, ring) * fast + f
-    for m in range(1, ny + 1):
-        for i in range(1, nx + 1):
-            here, full = at[m, i], z[m, i] > 0.0
-            if held is not None and held[m, i]:
-                J[here, b] = 1.0
-                continue
-            d[here] = c[m, i] - balance_at(z, kx, ky, m, i, carry)
-            k_W, k_E, k_S, k_N = kx[m, i], kx[m, i + 1], ky[m, i], ky[m + 1, i]
-            J[here, b] += k_W + k_E + k_S + k_N + (0.0 if carry is None else carry[1, m, i]) if full else 1.0
-            if i < nx or ring_x:
-                to = at[m, i + 1 if i < nx else 1]
-                J[to, here - to + b] -= k_E if full else 1.0 if carry is None else carry[0, m, i]
-            if full and (i > 1 or ring_x):
-                to = at[m, i - 1 if i > 1 else nx]
-                J[to, here - to + b] -= k_W
-            if full and (m < ny or ring_y):
-                to = at[m + 1 if m < ny else 1, i]
-                J[to, here - to + b] -= k_N
-            if full and (m > 1 or ring_y):
-                to = at[m - 1 if m > 1 else ny, i]
-                J[to, here - to + b] -= k_S
-    if not eliminate(J, d, b):
-        return False
+            if held is None or not held[m, i]:
+                d[at[m, i]] = c[m, i] - balance_at(z, kx, ky, m, i, carry)
+            anew = anew or known[m, i] != (1 if z[m, i] > 0.0 else -1)
+    if anew:
+        assemble(z, kx, ky, at, ring_x, ring_y, carry, held, J)
+        done = factor(J, b)
+        for m in range(1, ny + 1):
+            for i in range(1, nx + 1):
+                known[m, i] = 0 if not done else 1 if z[m, i] > 0.0 else -1
+        if not done:
+            return False
+    substitute(J, d, b)
     for m in range(1, ny + 1):
         for i in range(1, nx + 1):
             if held is not None and held[m, i]:
@@ -154,9 +160,46 @@ def newton_step(
 
 
 @piece
-def eliminate(J: Array, d: Array, b: int) -> bool:
-    """d = J^-1 d for a matrix of half bandwidth b without pivoting; J is overwritten. False at a pivot that is rounding."""
-    n = d.size
+def assemble(
+    z: Array,
+    kx: Array,
+    ky: Array,
+    at: NDArray[np.int64],
+    ring_x: bool,
+    ring_y: bool,
+    carry: Array | None,
+    held: NDArray[np.bool_] | None,
+    J: Array,
+) -> None:
+    """J[row, column - row + b] for the signs of z; at : rows by place."""
+    ny, nx, b = z.shape[0] - 2, z.shape[1] - 2, J.shape[1] // 2
+    J[:] = 0.0
+    for m in range(1, ny + 1):
+        for i in range(1, nx + 1):
+            here, full = at[m, i], z[m, i] > 0.0
+            if held is not None and held[m, i]:
+                J[here, b] = 1.0
+                continue
+            k_W, k_E, k_S, k_N = kx[m, i], kx[m, i + 1], ky[m, i], ky[m + 1, i]
+            J[here, b] += k_W + k_E + k_S + k_N + (0.0 if carry is None else carry[1, m, i]) if full else 1.0
+            if i < nx or ring_x:
+                to = at[m, i + 1 if i < nx else 1]
+                J[to, here - to + b] -= k_E if full else 1.0 if carry is None else carry[0, m, i]
+            if full and (i > 1 or ring_x):
+                to = at[m, i - 1 if i > 1 else nx]
+                J[to, here - to + b] -= k_W
+            if full and (m < ny or ring_y):
+                to = at[m + 1 if m < ny else 1, i]
+                J[to, here - to + b] -= k_N
+            if full and (m > 1 or ring_y):
+                to = at[m - 1 if m > 1 else ny, i]
+                J[to, here - to + b] -= k_S
+
+
+@piece
+def factor(J: Array, b: int) -> bool:
+    """J = L U in place for a matrix of half bandwidth b, without pivoting. False at a pivot that is rounding."""
+    n = J.shape[0]
     least = 1e-14 * J[:, b]
     for k in range(n):
         pivot = J[k, b]
@@ -164,16 +207,27 @@ def eliminate(J: Array, d: Array, b: int) -> bool:
             return False
         end = min(b, n - 1 - k)
         for r in range(1, end + 1):
-            factor = J[k + r, b - r]
-            if factor != 0.0:
-                factor /= pivot
+            part = J[k + r, b - r]
+            if part != 0.0:
+                part /= pivot
+                J[k + r, b - r] = part
                 above, below = J[k], J[k + r]
                 for q in range(1, end + 1):
-                    below[b - r + q] -= factor * above[b + q]
-                d[k + r] -= factor * d[k]
+                    below[b - r + q] -= part * above[b + q]
+    return True
+
+
+@piece
+def substitute(J: Array, d: Array, b: int) -> None:
+    """d = (L U)^-1 d."""
+    n = d.size
+    for k in range(n):
+        total = d[k]
+        for r in range(1, min(b, k) + 1):
+            total -= J[k, b - r] * d[k - r]
+        d[k] = total
     for k in range(n - 1, -1, -1):
         total = d[k]
         for r in range(1, min(b, n - 1 - k) + 1):
             total -= J[k, b + r] * d[k + r]
         d[k] = total / J[k, b]
-    return True

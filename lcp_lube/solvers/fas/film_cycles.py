@@ -17,6 +17,7 @@ class FilmCycles(Cycles):
     _kernels: Any
     _loops: Any
     _tools: Any
+    _coarsest: Any
     _finest: Any
     _following: Any  # supplies whose pressures are unknowns too, if any
     _harmonic: bool
@@ -38,7 +39,7 @@ class FilmCycles(Cycles):
 
     def _solve_coarsest(self, k: int) -> None:
         level, self._correction = self._levels[k], 0.0
-        if not self._tools.solve(level):
+        if not self._coarsest.solve(level):
             for s in range(2):
                 self._relax(level, max(level.nx, level.ny), s == 1)
         elif self._following:

@@ -63,7 +63,7 @@ def renewed(level: Level, problem: LubricationProblem, follow: Any) -> None:
     fields = loops.pressure_and_void(own(level, problem.grid, level.z), problem.scheme, problem.grid)
     renew(problem, fields["p"])
     new = finest(problem)
-    level.kx, level.ky, level.c, level.void, level.carry = new.kx, new.ky, new.c, new.void, new.carry
+    level.kx, level.ky, level.c, level.void, level.carry, level.factors = new.kx, new.ky, new.c, new.void, new.carry, None
     put(level, problem.grid, level.z, fields["p"] + problem.scheme.b_C.ravel() * fields["r"])
     if follow is not None:
         follow.begin(fields)

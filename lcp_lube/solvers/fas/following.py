@@ -18,6 +18,7 @@ from ...problems.film.lubrication import LubricationProblem
 from ...problems.film.sources import balanced
 from ...problems.film.supplies import Held, Supply, supply_flows
 from ...problems.solution import Fields
+from . import coarsest
 from . import levels as tools
 from .kernels import balance_at
 
@@ -122,14 +123,14 @@ class Following:
                 more = P.copy()
                 more[t] *= 1.0 + STEP
                 self.shift(k, more)
-                tools.solve(self.levels[k])
+                coarsest.solve(self.levels[k])
                 columns.append((self.taken(k) - flows) / (more[t] - P[t]))
                 z[:], self.P[k] = here, P
             self.slopes = np.stack(columns, axis=1)
         for _ in range(ROUNDS):
             new, P = self.found(self.P[k], self.taken(k), self.slopes), self.P[k]
             self.shift(k, new)
-            tools.solve(self.levels[k])
+            coarsest.solve(self.levels[k])
             if np.max(np.abs(new - P)) <= SAME * np.max(P):
                 break
 

@@ -9,11 +9,10 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ...base.parallel import Array
-from . import exact, held, loops
+from . import held, loops
 
 FEWEST = 3  # points a side of the coarsest grid, at least
 FEWEST_LINES = 16  # of a rank; grids with fewer are held whole by every rank. With 8 a dimpled pad stalls on three
-MOST_ENTRIES = 9_000_000  # of a banded matrix that is eliminated
 # Times the mean conductance of the other direction: then points are left out in the strong one alone. 8 costs 6 % less work on
 # six stretched films and 6 cycles more, on a rough one above all; 64 doubles both (benchmarks/constants.py).
 STRONG = 4.0
@@ -37,6 +36,7 @@ class Level:
         store more by p = 1; scale : z of a cavitated cell over that of the finer grid's, which is smaller.
     held, owner, given, spans, slips : of a film with supplies (`held`): which points are held, by which supply (from 1 on),
         their pressures, the runs of free points, and the held points that the next coarser grid sees beside their place.
+    factors : of the coarsest grid's Jacobian, and the signs of z that they are of (`coarsest`).
     """
 
     nx: int
@@ -62,6 +62,7 @@ class Level:
     given: Array = field(default_factory=lambda: np.zeros(0))
     spans: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int32))
     slips: NDArray[np.bool_] | None = None
+    factors: tuple[Array, NDArray[np.int8]] | None = None
     visits: int = 0
     seconds: float = 0.0
     work: float = 0.0  # relaxed points
@@ -268,25 +269,6 @@ def smooth(level: Level) -> bool:
     """Whether the film has no steps that this grid sees (`starts.smooth`). Collective."""
     found = loops.smooth(level.kx, level.ky)
     return found if level.comm is None else level.comm.allreduce(found, MPI.LAND)
-
-
-def solve(level: Level) -> bool:
-    """Newton's method (`exact`) on a level, on every rank if it is dealt to several; whether it settled. Collective."""
-    comm, n = level.comm, level.ny
-    if level.nx * n * (4 * min(level.nx, n) + 1) > MOST_ENTRIES:  # odd numbers of points between periodic sides
-        return False
-    if comm is None or not level.split:
-        return exact.solve(level.z, level.kx, level.ky, level.c, *level.periodic, level.carry, level.held)
-    whole = empty(level.nx, n, 0, n, None, False, level.periodic)
-    whole.carry = None if level.carry is None else np.zeros((2, *whole.z.shape))
-    whole.held = None if level.held is None else np.zeros(whole.z.shape, dtype=bool)
-    for name in ("z", "c", "kx", "ky", *(name for name in ("carry", "held") if getattr(whole, name) is not None)):
-        mine, out = getattr(level, name), getattr(whole, name)
-        rows = mine[..., 1 if level.y0 else 0 : level.y1 - level.y0 + 1 if level.y1 < n else None, :]
-        np.concatenate(comm.allgather(np.ascontiguousarray(rows)), axis=-2, out=out)
-    settled = exact.solve(whole.z, whole.kx, whole.ky, whole.c, *level.periodic, whole.carry, whole.held)
-    level.z[:] = whole.z[level.y0 : level.y1 + 2]
-    return settled
 
 
 def restrict(fine: Level, coarse: Level, out: Array, harmonic: bool, given: Array | None = None) -> None:
