@@ -87,7 +87,7 @@ class Fas(FilmCycles):
             self.z = start["p"] + problem.scheme.b_C.ravel() * start["r"]
         self._following: Any = following.Following(problem, self._levels, self.fields) if follows else None
         plain = first.carry is None and first.held is None
-        self._mixing = mixing.Mixing(first, lambda: self._relax_fronts(first)) if plain else None
+        self._mixing = mixing.Mixing(first) if plain else None
         self.norm = self._first = 1.0 if follows and problem.scheme.storage is None else self._norm()  # it knows no sources
         if start is not None and problem.scheme.storage is not None and options.rest:
             lapse = problem.stored.lapse * problem.reduce.norm(problem.scheme.kept) / (self._c_norm or 1.0)  # type: ignore[arg-type]
@@ -178,7 +178,7 @@ class Fas(FilmCycles):
                     self._following.put(pressures)
             self.norm = self._norm()
             slow = max(SLOW * self._recent[-1], self._rest) < self.norm < inf
-            if slow and self._mixing and level.z.size and self._mixing.improve():
+            if slow and self._mixing and level.z.size and self._mixing.improve(self._relax_fronts):
                 self.norm = self._norm()
         if not np.isfinite(self.norm):
             self.z = np.zeros(self.problem.grid.local_size)  # as above

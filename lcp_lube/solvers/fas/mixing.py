@@ -26,15 +26,15 @@ RANK = 1e-12  # of the differences' inner products, relative: less is rounding
 class Mixing:
     """The last iterates of a level, and their residuals. A checkpoint has none of them: a run taken up again begins anew."""
 
-    def __init__(self, level: Any, sweep_fronts: Callable[[], None]):
-        self._level, self._sweep_fronts = level, sweep_fronts
+    def __init__(self, level: Any):
+        self._level = level
         self._room = np.zeros((0, 2, 0, 0))  # z and residual of each; rows of the frame are not kept
         self._order: list[int] = []  # where iterates lie, the newest last
 
     def forget(self) -> None:
         self._order = []
 
-    def improve(self) -> bool:
+    def improve(self, sweep_fronts: Callable[[Any], None]) -> bool:
         """Put a mixture of the iterates so far and the level's z in its place, if it is better. Collective."""
         level, z = self._level, self._level.z
         if not self._room.size:
@@ -51,7 +51,7 @@ class Mixing:
         order = np.array(self._order)
         _by_rows(lambda start, end: mix(z, self._room, order, weights, start, end), z)
         level.share(z)
-        self._sweep_fronts()
+        sweep_fronts(level)
         if self._look() < own:
             del self._order[-2]
             return True
