@@ -133,14 +133,15 @@ def test_a_load_that_nearly_cancels_has_an_adjoint_that_is_as_good(monkeypatch):
     with solve(scene, method="fas") as solution:
         for _ in range(2):
             adjoint = Adjoint(scene, solution, ["load"])
-            slopes = [adjoint.slopes(key)[0]["load"] for key in ("L", "U", "fluid.mu", "film.constant.h", "film.dimples.depth")]
-            found.append(np.array(slopes))
+            keys = ("L", "U", "fluid.mu", "film.constant.h", "film.dimples.depth")
+            found.append(np.array([adjoint.slopes(key)[0]["load"] * adjoint.value(key) for key in keys]))
             adjoint.destroy()
             monkeypatch.setattr(adjoint_module, "FEWER", 10**9)  # factors
             monkeypatch.setattr(adjoint_module, "SMALL", 10**9)
         load, carried = solution.numbers["load"], solution.numbers["pressure_integral"]
     assert abs(load) < 0.02 * carried
-    assert found[0] == pytest.approx(found[1], rel=5e-6)  # 3e-4 where lambda is as good as of other loads
+    # Elasticities, of which one is small itself: 2e-7 on some processors, 5e-6 of the load where lambda is as good as of others.
+    assert np.abs(found[0] - found[1]).max() <= 1e-6 * abs(load)
 
 
 def test_a_fluid_that_grows_thicker_with_pressure_is_told_by_the_adjoint_s_own_equation(monkeypatch):
