@@ -173,7 +173,7 @@ def test_a_film_beyond_roelands_limit_is_told_by_its_first_films(beside):
 def test_and_beside_what_may_change_it_yet_after_some_more(beside, films):
     """Heat and soft walls have had their say by then; Eyring's law leaves the logarithm of what grows, which has no limit.
 
-    Between soft walls rounding decides at which of the looks, after 24, 34, 48 films ..., an iterate shows it: 26 to 50 here."""
+    Between soft walls rounding decides at which of the looks, after 24, 34, 48 films, an iterate shows it: 26 to 50 here."""
     data = hot_line(60, FILM[0], L=0.1, U=300.0, fluid={"mu": 0.2}, roelands={"z": 0.8}) | beside
     with solve(data, model="full") as s:
         assert s.outcome == "max_iterations" and "Roelands" in s.message

@@ -140,7 +140,7 @@ def test_a_load_that_nearly_cancels_has_an_adjoint_that_is_as_good(monkeypatch):
             monkeypatch.setattr(adjoint_module, "SMALL", 10**9)
         load, carried = solution.numbers["load"], solution.numbers["pressure_integral"]
     assert abs(load) < 0.02 * carried
-    # Elasticities, of which one is small itself: 2e-7 on some processors, 5e-6 of the load where lambda is as good as of others.
+    # Elasticities, of which one is small itself: 2e-7 on some processors, 5e-6 where lambda is as good as of other loads.
     assert np.abs(found[0] - found[1]).max() <= 1e-6 * abs(load)
 
 

@@ -289,7 +289,8 @@ class Loop:
         # Others may change it yet, soft walls longest; alone, it is sure after a film with all else as it is without effects.
         after = 1 if self.alone else 3 * FIRST if "lift" in self.names else FIRST
         far = self.base.reduce.max(np.abs(x - self.log[-1])) > NEAR and (plain or not self.alone)
-        if has and far and self.solves in (round(after * 2 ** (k / 2)) for k in range(11)):  # an iterate may hide it
+        due = any(abs(self.solves - after * 2 ** (k / 2)) < 0.5 for k in range(11))  # again and again: an iterate may hide it
+        if has and far and due:
             from .nonlinear import beyond  # here, as above
 
             solves, own = self.solves, self.own
