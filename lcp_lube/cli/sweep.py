@@ -187,19 +187,20 @@ def run(args: argparse.Namespace) -> int:
         writer.writerows(rows)
         say(text.getvalue().rstrip("\n"))
     if args.plot is not None:
-        _draw(args, rows, [axis.key for axis in axes])
+        _draw(args, rows, [axis.key for axis in axes], scene_at(points(axes, read=True)[0]))
     failed = sum(row["outcome"] != Outcome.CONVERGED for row in rows)
     steps = sum(int(row.get("iterations") or 0) for row in rows)
     note(f"sweep: {len(rows)} points, {failed} failed, {steps} iterations")
     return 1 if failed else 0
 
 
-def _draw(args: argparse.Namespace, rows: list[dict[str, Any]], keys: list[str]) -> None:
+def _draw(args: argparse.Namespace, rows: list[dict[str, Any]], keys: list[str], scene: Scene) -> None:
     """The picture of --plot. Collective."""
     from ..output.style import save_figure
     from ..output.sweep_picture import check_names, figure_of
 
-    names = args.quantity.split(",") if args.quantity else [next((q for q in DEFAULT_QUANTITY if q in rows[0]), "load")]
+    usual = (name for name in DEFAULT_QUANTITY if any(name in row for row in rows))
+    names = args.quantity.split(",") if args.quantity else [next(usual, "load")]
     check_names(rows, names)
-    units = film_units(len(scene_of(args, {}).shape))
-    save_figure(lambda: figure_of(rows, keys, names, units, args.scene), args.plot)
+    units = film_units(len(scene.shape))
+    save_figure(lambda: figure_of(rows, keys, names, units, scene.name), args.plot)

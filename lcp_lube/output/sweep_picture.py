@@ -8,7 +8,7 @@ import numpy as np
 from ..base.parallel import Array
 from ..errors import InputError, nearest
 from .style import BLUE, GREY, RED, new_figure
-from .units import prefix
+from .units import axis
 
 LOOKS = [(colour, dashes) for dashes in ("-", "--", ":", "-.") for colour in (BLUE, RED, GREY)]
 SAME = 1e-2  # relative: steps, or ratios, that are even but for rounded values
@@ -46,15 +46,15 @@ def figure_of(
     for axes, name in zip(figure.subplots(1, len(names), squeeze=False)[0], names, strict=True):
         found = np.array([_value(row, name) for row in rows])
         largest = float(np.nanmax(np.abs(found), initial=0.0))
-        factor, unit = prefix(largest, units.get(name, ""))
+        factor, label = axis(name, largest, units.get(name, ""))
         for k, (values, group) in enumerate(groups.items()):
             x = _places([row[keys[-1]] for row in group])
             colour, dashes = LOOKS[k % len(LOOKS)]
-            label = ", ".join(f"{key} = {value}" for key, value in zip(keys, values, strict=False))
-            axes.plot(x, [factor * _value(row, name) for row in group], color=colour, ls=dashes, marker="o", ms=3, label=label)
+            line = ", ".join(f"{key} = {value}" for key, value in zip(keys, values, strict=False))
+            axes.plot(x, [factor * _value(row, name) for row in group], color=colour, ls=dashes, marker="o", ms=3, label=line)
             if failed := [at for at, row in zip(x, group, strict=True) if np.isnan(_value(row, name))]:
                 axes.plot(failed, np.zeros(len(failed)), "x", color=colour, transform=axes.get_xaxis_transform(), clip_on=False)
-        axes.set(xlabel=keys[-1], title=f"{name} ({unit})" if unit else name)
+        axes.set(xlabel=keys[-1], title=label)
         if by_ratios(_places(list(dict.fromkeys(row[keys[-1]] for row in rows)))):
             axes.set_xscale("log")
         sizes = found[np.isfinite(found)]
@@ -88,8 +88,8 @@ def _places(values: Sequence[Any]) -> list[Any]:
 
 def _number(row: Mapping[str, Any], name: str) -> bool:
     try:
-        return not isinstance(row.get(name), bool) and np.isfinite(float(row.get(name) or "nan"))
-    except (TypeError, ValueError):
+        return not isinstance(row[name], bool) and bool(np.isfinite(float(row[name])))
+    except (KeyError, TypeError, ValueError):
         return False
 
 

@@ -16,7 +16,7 @@ from lcp_lube.cli.axes import Axis, chains, parse_axis, points
 from lcp_lube.cli.sweep import run as run_command
 from lcp_lube.cli.sweep import sweep
 from lcp_lube.errors import InputError
-from lcp_lube.output.sweep_picture import by_ratios
+from lcp_lube.output.sweep_picture import by_ratios, figure_of
 from lcp_lube.problems.solution import Outcome
 from lcp_lube.scenes.scene import load_scene
 
@@ -263,6 +263,15 @@ def test_picture(cli, tmp_path):
     assert refused.status == 2 and "p_max" in refused.err and not (tmp_path / "t.png").exists()
     failing = cli(*words[:-2], "--method", "din", "--max-it", 12, "--no-rescue", "--plot", "u.png")
     assert failing.status == 1 and (tmp_path / "u.png").exists()
+
+
+def test_a_number_that_is_zero_is_drawn():
+    """From a file, as a text, and as it was made; what did not converge, and no number, are not."""
+    rows = [{"U": 1.0, "r": r, "converged": True} for r in (0.0, "0.0", "", None, True)] + [
+        {"U": 1.0, "r": 0.0, "converged": False}
+    ]
+    line = figure_of([dict(row, U=float(k)) for k, row in enumerate(rows)], ["U"], ["r"], {}, "").axes[0].lines[0]
+    assert list(np.isfinite(np.asarray(line.get_ydata(), dtype=float))) == [True, True, False, False, False, False]
 
 
 def test_values_at_equal_ratios():

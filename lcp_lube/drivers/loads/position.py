@@ -213,11 +213,10 @@ def _on_grid(
                 return solution, q, count, False
             solution.destroy()
             chain = Chain(replace(ask, start=None), inner)
-            if before is None:  # the film alone was taken to carry the load: asperities may, farther from the bore
-                q = q - RETREAT
-            else:
+            if before is not None:
                 before = (before[0], before[1], 0.5 * before[2])
-                q = before[0] + before[2]
+            # At first the film alone was taken to carry the load: asperities may, farther from the bore.
+            q = q - RETREAT if before is None else before[0] + before[2]
             continue
         force = np.array(solution.problem.quantities(solution.fields)["force"])
         best.add(q, force, load, given)
