@@ -16,6 +16,8 @@ LATE = {"log_view", "options_left", "options_view", "malloc_dump", "malloc_view"
 VALUED = re.compile(r"(_type|_[ard]tol|divtol|_max_it|_levels|_restart|_overlap|_omega|_its|_blocks|_icntl_\d+|_pcs)$")
 # Options that only a linear solver reads: giving one selects a method that has one.
 LINEAR = re.compile(r"ksp_|pc_|sub_|mg_|fieldsplit_|redundant_|mat_(type|mumps_|superlu|umfpack_|solver)")
+# What later releases call an option of the recipes; the old name still works there, with a warning.
+RENAMED = {"ksp_gmres_modifiedgramschmidt": ((3, 26), "ksp_orthogonalization", "mgs")}
 # What PETSc says of a word that it does not know.
 KINDS = (
     (r"requested (KSP type) (\S+)", PETSc.KSP.Type),
@@ -52,7 +54,7 @@ def recipe(name: str | None) -> Iterator[str | None]:
         if not value and VALUED.search(key):
             raise InputError(f"-{key}: a value is needed")
     given = set(user)
-    own = read_recipe(name) if name is not None else {}
+    own = _renamed(read_recipe(name)) if name is not None else {}
     chosen = own
     parts = {
         "ksp_type": lambda key: key.startswith("ksp_"),
@@ -71,6 +73,15 @@ def recipe(name: str | None) -> Iterator[str | None]:
     finally:
         for key in added:
             options.delValue(key)
+
+
+def _renamed(options: dict[str, str]) -> dict[str, str]:
+    """Options by their names in this release of PETSc."""
+    version, new = PETSc.Sys.getVersion(), {}
+    for name, value in options.items():
+        since, later, setting = RENAMED.get(name, (version, name, value))
+        new |= {later: setting} if version >= since else {name: value}
+    return new
 
 
 def unread() -> list[str]:
