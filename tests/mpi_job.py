@@ -114,8 +114,8 @@ def main(out: Path) -> None:
         record[name], found = run(*case)
         fields |= {f"{name}_{field}": values for field, values in found.items()}
     if MPI.COMM_WORLD.size == 2:
-        # A few steps: whether every option is read shows in the first; convergence is tested on one rank, and below. With three,
-        # another method takes over from the active set with GAMG of PETSc 3.26.
+        # A few steps: whether every option is read shows in the first; convergence is tested on one rank, and below.
+        # With three, another method takes over from the active set with GAMG of PETSc 3.26.
         record["recipes"] = {name: attempt(name, max_it=5) for name in recipe_names() if not one_rank(name)}
     for name, system in ITERATIVE.items():
         record[name] = run("problem4", {"nx": 23, "ny": 17}, "din", name, system)[0]
