@@ -54,7 +54,7 @@ SPAN = 12.0  # over the square of finest over coarsest grid: factor of n
 ENOUGH = 3.9  # finest over coarsest of grids that are enough without those before
 INTEGRALS = ("load", "pressure_integral")  # whose change from grid to grid is at most that of the pressure
 FULL = 1.0  # in the place of PAIR for the first two grids of a film without cavities: a linear problem, of clean second order
-RIMS = 0.8  # of a film with cavities beside rims that cut faces, whose error is of first order
+RIMS = 0.8  # of a film whose rims cut faces, each of which errs by first order with either sign
 PAIR, BESIDE, SHARE = 1.4, 3.0, 0.3  # factors of an error from two grids, of these and of others, and of the pressure's change
 CLEAN = 0.01  # what moves of w leave over the last correction
 QUADRATURE = 1e-9  # relative: what a line's quadrature may leave
@@ -145,7 +145,7 @@ def of_pair(
     ----------
     values, misplaced, finer : as in `estimate`. change : that sum over the quantity, or for a quantity that is no integral of p
         the integral of |p_k - p_j| over that of p. other : number of the grid j that the last one is compared with.
-    full : whether nothing is cavitated. rims : whether cavities lie beside faces that rims cut.
+    full : whether nothing is cavitated. rims : whether rims cut faces, each of which errs by first order with either sign.
     """
     if name in NOISY or len(values) < 2:
         return Estimate(values[-1], inf)

@@ -22,6 +22,7 @@ LEAST_PAIR = 0.25  # weight of the estimate of two grids beside that of all: in 
 FEWER = {True: 0.5, False: 0.75}
 APART = 1.8  # spacings of two grids over one another, at least, where two such are there: nearer ones tell little
 BLOCKS = 6  # parts of a side over which the change of the pressure is integrated
+CLOSE = 32  # points a side of a grid whose cells are looked at in some 500 places along each line
 LARGE = 1_000_000  # points beyond which a grid is not kept until its numbers are asked for
 
 
@@ -68,8 +69,9 @@ class Values:
         self.quantity, self._converged = quantity, solution.converged
         self._own.append(value if solution.converged else np.nan)
         self._sizes.append(size)
-        # Of what quadrature does not tell nothing is known.
-        self._misplaced.append(misplaced_film(problem) if self.line is None else inf)
+        # Of what quadrature does not tell nothing is known; what a grid saw all of, looked at closely, a finer one sees too.
+        seen = before is not None and self._misplaced[-1] == 0.0 and min(before.problem.grid.shape) >= CLOSE
+        self._misplaced.append(inf if self.line is not None else 0.0 if seen else misplaced_film(problem))
         self._other = -3 if earlier is not None and size < APART * self._sizes[-2] else -2
         other = earlier if self._other == -3 else before
         self._change = _change(solution, other, quantity, self._own[self._other]) if other and self._pairs else (inf, inf)
