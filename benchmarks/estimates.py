@@ -2,7 +2,7 @@
 
 python benchmarks/estimates.py 888 40            # seed and number of films
 python benchmarks/estimates.py 777 60 strange    # of films unlike those that the constants were taken from
-python benchmarks/estimates.py 2 144 unlike      # of films unlike these again: runs for the pressure's integral alone
+python benchmarks/estimates.py 3 120 unlike      # of films unlike these again: runs for the pressure's integral alone
 
 Each film is solved with 10 to 16 points a side and on grids of twice the points, below 300 a side; from the third grid on, up
 to 140 a side, the best value and its error (drivers/accuracy/estimate.py) are compared with the limit of the finest grids. The
@@ -30,7 +30,8 @@ MAIN = NAMES[:3]
 TOLERANCES = (1e-1, 3e-2, 1e-2, 3e-3, 1e-3)
 KINDS = ("wedge", "parabola", "waves", "pocket", "square", "round", "dome", "step", "rough")
 UNLIKE = ("taper", "ramp", "square", "round", "dome", "ripple", "pockets", "step", "dam", "journal", "oblique", "crown")
-REFERENCES = (511, 767)  # points a side
+REFERENCES, FEW = (511, 767), {"max_it": 50}  # points a side; a film that takes more cycles is left out
+WANTED: dict[str, Any] = {"quantity": "pressure_integral", "finest": (1023, 1023)}
 LEAST = 1e-10  # relative: below it a number is exact
 
 
@@ -129,7 +130,7 @@ def unlike(seed: int, count: int) -> Iterator[tuple[str, dict[str, Any]]]:
     for kind in islice(cycle(UNLIKE), count):
         L = float(10 ** some(-2.7, -1.0))
         W, h = L * float(10 ** some(-0.6, 0.6)), L * float(10 ** some(-4.2, -3.0))
-        ends = ((some(1, 3), 1.0), (1.0, 1.0), (1.0, some(1, 1.6)))[rng.integers(3)]
+        ends = ((some(1, 3), 1.0), (some(1, 1.2), 1.0), (1.0, some(1, 1.6)))[rng.integers(3)]
         film: list[dict[str, Any]] = [{"shape": "linear", "h_start": h * ends[0], "h_end": h * ends[1]}]
         depth, x, y = h * float(10 ** some(-0.6, 0.6)), f"x/{L!r}", f"y/{W!r}"
         along, formula = str(rng.choice(["x", "x", "y"])), ""
@@ -177,19 +178,20 @@ def unlike(seed: int, count: int) -> Iterator[tuple[str, dict[str, Any]]]:
 
 def of_unlike(seed: int, count: int) -> None:
     """Runs of the program on films of `unlike`: how many are right, and how far below the estimate the error is."""
-    rows: list[tuple[float, str, float, float, int]] = []
+    rows: list[tuple[float, str, float, float]] = []
     for kind, data in unlike(seed, count):
+        before = len(rows)
         try:
             a, b = (_integral({**data, "n": n}) for n in REFERENCES)
             limit = b + 0.9 * (b - a) / (((REFERENCES[1] + 1) / (REFERENCES[0] + 1)) ** 2 - 1.0)
             for tol in TOLERANCES[2:]:
                 if abs(b - a) < 0.5 * tol * abs(limit):
-                    with solve(load_scene({**data, "n": 95}), accuracy=tol, quantity="pressure_integral") as run:
+                    with solve(load_scene({**data, "n": 95}), accuracy=tol, rescue=False, stopping=FEW, **WANTED) as run:
                         error = abs(run.numbers["pressure_integral"] / limit - 1)
-                        points = sum(level["nx"] * level["ny"] for level in run.levels)
-                        rows += [(tol, kind, error, run.settings["accuracy_estimate"], points)] if run.converged else []
+                        rows += [(tol, kind, error, run.settings["accuracy_estimate"])] if run.converged else []
         except InputError as refused:
             print(kind, refused)
+        print(kind, *(f"{tol:g}: {error:.1e} of {told:.1e}" for tol, _, error, told in rows[before:]), flush=True)
     for tol in TOLERANCES[2:]:
         mine = [row for row in rows if row[0] == tol]
         ratio = float(np.median([row[3] / max(row[2], LEAST) for row in mine]))
@@ -202,7 +204,7 @@ def of_unlike(seed: int, count: int) -> None:
 
 
 def _integral(data: dict[str, Any]) -> float:
-    with solve(load_scene(data), stopping={"eps1": 1e-9}) as solution:
+    with solve(load_scene(data), stopping={"eps1": 1e-9, **FEW}, rescue=False) as solution:
         return float(solution.numbers["pressure_integral"]) if solution.converged else np.nan
 
 
