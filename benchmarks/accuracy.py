@@ -1,10 +1,12 @@
-"""How good the estimate behind --accuracy is, and what a load to 1 % costs.
+"""How good the estimate behind --accuracy is, and what it costs beside one grid that is as good.
 
-Random 1D films with exact solutions (straight, smooth, stepped; tests/films.py), random films over a square against a grid
-with 1023 points a side (no finer one than 511 is allowed: runs that would need it are not reached), then the milliseconds of
-problem4 and the journal. Estimate over error: 1 and more is an estimate that holds.
+Random 1D films with exact solutions (straight, smooth, stepped; tests/films.py), and random films over a square against a grid
+with 1023 points a side (no finer one than 511 is allowed: runs that would need it are not reached). Estimate over error: 1 and
+more is an estimate that holds. Then the scenes of the chart of speed against accuracy, scheme `face`: milliseconds of the
+processor of a run to a tolerance and of the fastest one grid of multigrid that is as good, in turn in one process, medians.
+That grid is the least of a ladder from which on all are as good; in parentheses any that is, by chance too.
 
-    python benchmarks/accuracy.py [--films 90] [--planes 18] [--seed 0]
+    python benchmarks/accuracy.py [--films 90] [--planes 18] [--seed 0] [--turns 9] [--scenes journal problem4]
 """
 
 import argparse
@@ -13,7 +15,7 @@ from collections.abc import Iterator
 from itertools import product
 from pathlib import Path
 from statistics import median
-from time import perf_counter, process_time
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -26,6 +28,13 @@ from films import FilmScene, Knots, L, Pieces, random_films  # noqa: E402
 
 from lcp_lube.api import solve  # noqa: E402
 from lcp_lube.scenes.scene import Scene, load_scene  # noqa: E402
+from lcp_lube.solvers.newton import Stopping  # noqa: E402
+from lcp_lube.studies.precision import SCENES, VARIANTS  # noqa: E402
+
+TOLERANCES = (1e-2, 1e-3, 1e-4)
+ASKED = {"quantity": "pressure_integral"}
+LADDER = {1: (12, 25, 50, 100, 200), 2: (31, 39, 47, 55, 63, 79, 95, 127, 159, 191, 255, 319, 383, 447, 511)}
+REFERENCES = (1279, 2047)  # points a side
 
 
 def planes(count: int, seed: int) -> Iterator[Scene]:
@@ -59,11 +68,53 @@ def report(name: str, runs: list[tuple[float, float]], missed: int) -> None:
     )
 
 
+def clocked(scene: Scene, **how: Any) -> tuple[float, float]:
+    """The pressure's integral, and milliseconds of the processor that the solve took."""
+    begin = process_time()
+    solution = solve(scene, **how)
+    took = 1e3 * (process_time() - begin)
+    with solution:
+        return float(solution.numbers["pressure_integral"]) if solution.converged else np.nan, took
+
+
+def cost(name: str, turns: int) -> None:
+    """Print what runs to TOLERANCES cost, and the one grid that is as good."""
+    source, changes = VARIANTS.get(name, (name, {}))
+    scene: Any = load_scene(source, **changes, scheme="face")
+    dim = len(scene.shape)
+    if (exact := scene.exact()) is not None:
+        truth, unsure = exact.load, 0.0
+    else:
+        a, b = (clocked(scene.with_shape((n, n)), method="fas", stopping={"eps1": 1e-10})[0] for n in REFERENCES)
+        truth = b + (b - a) / ((REFERENCES[1] / REFERENCES[0]) ** 2 - 1.0)
+        unsure = abs(truth / b - 1)
+    jobs: dict[Any, tuple[Scene, dict[str, Any]]] = {tol: (scene, {"accuracy": tol, **ASKED}) for tol in TOLERANCES}
+    for n in LADDER[dim]:
+        jobs[n] = scene.with_shape((n,) * dim), {"method": "fas", "nested": False, "stopping": Stopping(1e-4, 1e-4)}
+    runs: dict[Any, list[tuple[float, float]]] = {key: [] for key in jobs}
+    for _, (key, (what, how)) in product(range(turns + 1), jobs.items()):  # the first turn loads what is compiled
+        runs[key].append(clocked(what, **how))
+    off = {key: abs(mine[-1][0] / truth - 1) for key, mine in runs.items()}
+    took = {key: median(ms for _, ms in mine[1:]) for key, mine in runs.items()}
+    for tol in TOLERANCES:
+        if unsure > tol:
+            continue
+        good = {n for n in LADDER[dim] if off[n] <= tol}
+        sure = [n for n in good if all(m in good for m in LADDER[dim] if m > n)]
+        one, chance = (min(grids, key=took.__getitem__, default=None) for grids in (sure, good))
+        beside = f"{one}: {took[one]:.1f} ms, {took[tol] / took[one]:.1f}" if one else "no grid"
+        if chance and chance != one:
+            beside += f" ({chance}: {took[chance]:.1f} ms, {took[tol] / took[chance]:.1f})"
+        print(f"{name:<18} {tol:g}: off by {off[tol]:.1e}, {took[tol]:.1f} ms; {beside}", flush=True)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--films", type=int, default=90)
     parser.add_argument("--planes", type=int, default=18)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--turns", type=int, default=9, help="of which the median counts")
+    parser.add_argument("--scenes", nargs="*", default=SCENES, help="whose cost is measured")
     args = parser.parse_args()
     films = [(scene, exact) for scene, exact in random_films(args.films, args.seed) if exact.load > 0]
     for quantity, tol in product(("load", "p_max"), (1e-2, 1e-3, 1e-4)):
@@ -87,14 +138,8 @@ def main() -> None:
             if reached and reference[quantity] > 0:
                 runs.append((estimate, abs(found / reference[quantity] - 1)))
         report(f"2D, {quantity} to {tol:g}", runs, missed)
-    for name in ("problem4", "journal", "problem1", "long_journal"):
-        built_in, seconds, cpu = load_scene(name), [], []
-        for _ in range(9):
-            start, cpu_start = perf_counter(), process_time()
-            value(built_in, "load", 1e-2)
-            seconds.append(perf_counter() - start)
-            cpu.append(process_time() - cpu_start)
-        print(f"{name:<24} load to 1 %: {1e3 * median(seconds):.1f} ms, {1e3 * median(cpu):.1f} ms of them computing")
+    for name in args.scenes:
+        cost(name, args.turns)
 
 
 if __name__ == "__main__":

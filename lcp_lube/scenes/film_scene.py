@@ -212,6 +212,13 @@ class RectangleScene(FilmScene):
         nx = self.nx or self.n
         return (nx,) if self.dimension == 1 else (nx, self.ny or self.n)
 
+    def with_shape(self, shape: tuple[int, ...]) -> Self:
+        """The film that has been made is that of any grid, unless its lines are graded."""
+        scene, made = self.model_copy(update=dict(zip(("nx", "ny"), shape, strict=False))), self._made
+        if made is not None and made[0] == vars(self) and made[2].places is None and not made[2].effects:
+            scene._made = dict(vars(scene)), *made[1:]
+        return scene
+
     @property
     def side_lengths(self) -> tuple[float, ...]:
         return (self.L,) if self.dimension == 1 else (self.L, self.width or self.L)

@@ -282,7 +282,8 @@ def test_estimate_of_two_grids():
     found = of_pair([1.0, 1.3], [0.0, 0.0], [16.0, 32.0], 0.1, "load")
     assert found.value == pytest.approx(1.375) and found.error == pytest.approx(1.4 * 0.3 / 3) and found.extrapolated
     assert of_pair([1.0, 1.0], [0.0, 0.0], [16.0, 32.0], 0.1, "load").error == pytest.approx(1.4 * 0.1 / 3)
-    assert of_pair([1.0, 1.3], [0.0, 0.0], [16.0, 32.0], 0.1, "load", rims=True).error == pytest.approx(2.3 * 0.3 / 3)
+    assert of_pair([1.0, 1.3], [0.0, 0.0], [16.0, 32.0], 0.1, "load", rims=True).error == pytest.approx(0.8 * 0.3)
+    assert of_pair([1.0, 1.3], [0.0, 0.0], [16.0, 96.0], 0.1, "load", rims=True).error == pytest.approx(0.8 * 0.3 / 5)
     far = of_pair([1.0, 1.2, 1.3], [0.0] * 3, [16.0, 23.0, 32.0], 0.1, "load", -3)  # with the grid of twice the spacing
     assert far.value == found.value and far.error == found.error
     assert of_pair([1.0, 1.0], [0.0, 0.0], [16.0, 32.0], 0.1, "friction").error == pytest.approx(3 * 0.03 / 3)

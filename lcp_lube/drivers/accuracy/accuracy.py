@@ -106,7 +106,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     shape = finer(first, meshes, rung, unit)
     solution: Solution | None = None
     before: Solution | None = None
-    told = Values(line, pairs, ALGEBRAIC * tol)
+    told = Values(line, pairs, ALGEBRAIC * tol, cut)
     levels: list[dict[str, Any]] = []
     times: dict[str, float] = {}
     # A program that goes on loads multigrid's loops once; for one run they pay where its last grid will be one for multigrid
@@ -153,7 +153,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         if not end and len(values) > 1 and max(map(abs, values)) <= rounding:
             noise = f"below {rounding:.0e} N, which is rounding beside what wall and sides could carry"
             end = f"it is {noise if rounding else 0}"
-        ups = 0 if end else rungs_up(estimates, tol, told.line is not None, len(first), pairs, told.rims)
+        ups = 0 if end else rungs_up(estimates, tol, told.line is not None, len(first), pairs, cut)
         for up in range(ups, 0, -1):
             shape = finer(first, meshes, rung + up, unit)
             if not (end := _no_room(solution, shape, finest, best.relative, tol)):

@@ -54,7 +54,7 @@ SPAN = 12.0  # over the square of finest over coarsest grid: factor of n
 ENOUGH = 3.9  # finest over coarsest of grids that are enough without those before
 INTEGRALS = ("load", "pressure_integral")  # whose change from grid to grid is at most that of the pressure
 FULL = 1.0  # in the place of PAIR for the first two grids of a film without cavities: a linear problem, of clean second order
-RIMS = 2.3  # of a film with cavities beside rims that cut faces, whose error is of first order
+RIMS = 0.8  # of a film whose rims cut faces, each of which errs by first order with either sign
 PAIR, BESIDE, SHARE = 1.4, 3.0, 0.3  # factors of an error from two grids, of these and of others, and of the pressure's change
 CLEAN = 0.01  # what moves of w leave over the last correction
 QUADRATURE = 1e-9  # relative: what a line's quadrature may leave
@@ -145,14 +145,16 @@ def of_pair(
     ----------
     values, misplaced, finer : as in `estimate`. change : that sum over the quantity, or for a quantity that is no integral of p
         the integral of |p_k - p_j| over that of p. other : number of the grid j that the last one is compared with.
-    full : whether nothing is cavitated. rims : whether cavities lie beside faces that rims cut.
+    full : whether nothing is cavitated. rims : whether rims cut faces, each of which errs by first order with either sign.
     """
     if name in NOISY or len(values) < 2:
         return Estimate(values[-1], inf)
     of_integral = RIMS if rims else FULL if full and len(values) == 2 else PAIR
     factor, least = (of_integral, 1.0) if name in INTEGRALS else (BESIDE, SHARE)
-    step, to_come = values[-1] - values[other], 1.0 / ((finer[-1] / finer[other]) ** 2 - 1.0)
-    error = factor * to_come * max(abs(step), least * change * abs(values[-1]))
+    step, ratio = values[-1] - values[other], finer[-1] / finer[other]
+    to_come = 1.0 / (ratio**2 - 1.0)
+    fall = ratio ** (1.0 if rims else 2.0) - 1.0
+    error = factor / fall * max(abs(step), least * change * abs(values[-1]))
     film = _of_film(np.abs(np.diff(values)), misplaced, values[-1])
     return (
         Estimate(values[-1] + PART * to_come * step, max(error, film), True) if isfinite(error) else Estimate(values[-1], inf)

@@ -22,6 +22,7 @@ LEAST_PAIR = 0.25  # weight of the estimate of two grids beside that of all: in 
 FEWER = {True: 0.5, False: 0.75}
 APART = 1.8  # spacings of two grids over one another, at least, where two such are there: nearer ones tell little
 BLOCKS = 6  # parts of a side over which the change of the pressure is integrated
+CLOSE = 32  # points a side of a grid whose cells are looked at in some 500 places along each line
 LARGE = 1_000_000  # points beyond which a grid is not kept until its numbers are asked for
 
 
@@ -32,14 +33,14 @@ class Values:
     ----------
     line : whether the film is known by quadrature (`estimate.is_known`). pairs : whether an integral of the pressure is
         estimated from each two grids (`estimate.of_pair`). least : relative error that the solves may leave on any grid.
+    rims : whether rims cut faces.
 
     Attributes
     ----------
     line : a problem and its fields that have the numbers of a line that is known; None of other films.
-    rims : whether the last grid has cavities beside faces that rims cut.
     """
 
-    def __init__(self, line: bool, pairs: bool, least: float):
+    def __init__(self, line: bool, pairs: bool, least: float, rims: bool):
         self.line: tuple[LubricationProblem, Fields] | None = None
         self._known: Mapping[str, float] | None = None  # all numbers of it
         self.quantity, self.best = "", Estimate(np.nan, inf)
@@ -51,7 +52,7 @@ class Values:
         self._misplaced: list[float] = []
         self._converged = False  # on the last grid
         self._other, self._change = -2, (inf, inf)  # of the pressure from that grid on: `_change`
-        self._full, self.rims = False, False  # _full: nothing is cavitated
+        self._full, self._rims = False, rims  # _full: nothing is cavitated, and second order clean
 
     def add(
         self, solution: Solution, before: Solution | None, earlier: Solution | None, size: float, quantity: str, value: float
@@ -68,13 +69,13 @@ class Values:
         self.quantity, self._converged = quantity, solution.converged
         self._own.append(value if solution.converged else np.nan)
         self._sizes.append(size)
-        # Of what quadrature does not tell nothing is known.
-        self._misplaced.append(misplaced_film(problem) if self.line is None else inf)
+        # Of what quadrature does not tell nothing is known; what a grid saw all of, looked at closely, a finer one sees too.
+        seen = before is not None and self._misplaced[-1] == 0.0 and min(before.problem.grid.shape) >= CLOSE
+        self._misplaced.append(inf if self.line is not None else 0.0 if seen else misplaced_film(problem))
         self._other = -3 if earlier is not None and size < APART * self._sizes[-2] else -2
         other = earlier if self._other == -3 else before
         self._change = _change(solution, other, quantity, self._own[self._other]) if other and self._pairs else (inf, inf)
-        self._full = self._pairs and not problem.reduce.max(solution.fields["r"]) > 0.0
-        self.rims = "revised" in solution.settings.get("details", {})
+        self._full = self._pairs and not self._rims and not problem.reduce.max(solution.fields["r"]) > 0.0
         self.best = self._best(quantity, self._own)
         return self.best
 
@@ -88,7 +89,7 @@ class Values:
         if not isfinite(by_load) or (name not in INTEGRALS and len(values) > 2):
             return of_all
         change = by_load if name in INTEGRALS else by_all
-        pair = of_pair(values, self._misplaced, self._sizes, change, name, self._other, self._full, self.rims)
+        pair = of_pair(values, self._misplaced, self._sizes, change, name, self._other, self._full, self._rims)
         weight = max(FEWER[self._full] ** (len(values) - 2), LEAST_PAIR)
         error = pair.error**weight * min(of_all.error, pair.error) ** (1.0 - weight)
         return replace(pair, error=max(error, self._least * abs(value)))
