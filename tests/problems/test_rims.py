@@ -101,7 +101,7 @@ TINY = {
     "heat": {"temperature": {"model": "energy", "T_in": 300.0, "beta": 1e-12}},
     "roughness": {"roughness": {"sigma": 1e-13}, "U": -1.0},
     "supply": {"supply": [SUPPLY]},
-    "time": {"motion": {"t_end": 1e-8, "steps": 2}, "shear": {"law": "eyring", "tau_0": 1e15}},
+    "time": {"motion": {"t_end": 1e-5, "steps": 2}, "shear": {"law": "eyring", "tau_0": 1e15}},
 }
 
 

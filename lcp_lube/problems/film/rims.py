@@ -28,6 +28,7 @@ LOOKS = 32  # between the two points of a face
 WIDE = 8, 16  # lines side by side across the width of a face across the flow beside a cavity, and looks along each
 TOGETHER = 2000  # faces that are looked at together, in cache
 REACH, FAR = 1.5, 4.0  # cells from a slanted edge to where it changes faces; that far, by both widths, it is looked for
+CROSSED = 0.6  # that far an edge may lie where it crosses a face; beyond there is one film
 STEP, STEEP = 1e-3, 0.1  # of a cell, for the distance's slopes; the least 2 a b of the edge's normal (a, b) in cells
 THIN = 1 / 3  # of the way from the thinnest to the thickest film of a face: what is below is the film outside a recess
 
@@ -54,7 +55,7 @@ def cut_faces(
     a, d = nodes[:-1], np.diff(nodes)
     d = np.where(d < 0.0, d + period, d)
     middle = a + 0.5 * d
-    cut, wide = np.zeros((2, lines.size, d.size), dtype=bool)
+    cut, crossed, wide = np.zeros((3, lines.size, d.size), dtype=bool)
     oblique = np.zeros(cut.shape)
     if not along_flow:
         (reforms, near), cavity = _beside_cavities(cavity), cavity[1:]
@@ -62,14 +63,16 @@ def cut_faces(
     for rim in rims:
         if depth := depth_of(rim):
             beside.append((depth, *_beside(rim, middle, d, lines, widths, along_flow)))
-            by_rim = np.abs(beside[-1][1]) < REACH
+            away = np.abs(beside[-1][1])
+            by_rim, across = away < REACH, away < CROSSED
         else:
             away = np.abs(rim(middle[None, :], lines[:, None]))
             by_rim = away <= 0.5 * d
             if not along_flow:
                 by_rim |= (side := near & (away <= 0.5 * np.hypot(d, widths[:, None])))
                 wide |= side
-        cut |= by_rim
+            across = by_rim
+        cut, crossed = cut | by_rim, crossed | across
         if not along_flow:
             j, i = np.nonzero(by_rim & reforms & (d > 0.0))
             oblique[j, i] = _normal(rim, middle[i], d[i], lines[j], widths[j], False)[1]
@@ -77,8 +80,8 @@ def cut_faces(
     kind = np.asarray(film(nodes[:1], lines[:1])).dtype  # complex, where a derivative is asked for
     cubes, films = np.zeros((2, np.count_nonzero(cut)), dtype=kind)
     j, i = np.nonzero(cut)
-    for which, (sides, looks) in ((~wide[j, i], (1, LOOKS)), (wide[j, i], WIDE)):
-        of = np.flatnonzero(which)
+    for which, (sides, looks) in ((~crossed, (1, 1)), (crossed & ~wide, (1, LOOKS)), (wide, WIDE)):
+        of = np.flatnonzero(which[j, i])
         for k in (of[first : first + TOGETHER] for first in range(0, of.size, TOGETHER)):
             at, row = i[k], j[k]
             dry = cavity[row, at], cavity[row, at + 1]
