@@ -6,7 +6,7 @@ ends: only the film before it resists, and carries, and what lies behind would b
 the cell, an error of first order. A fixed coefficient cannot know; the answer does. So a problem with such faces is solved, its
 cavities are looked at, and it is solved once more, from the answer on, with the cut faces made for them
 (`drivers.rims`). Where a film reforms before a rim it is full for but a cell or so, and the pressure in it runs along the rim:
-faces across the flow lead there as layers do that lie so. Either problem is of the one form, with positive conductances that
+faces across the flow lead there as layers do that lie so. Those beside a cavity are looked at across their whole width. Either problem is of the one form, with positive conductances that
 both cells share and Couette flows that leave one cell and enter the next: its solution is unique, and certificate and bands
 hold as ever (docs/accuracy.md).
 """
@@ -68,7 +68,7 @@ def cut_faces(
         else:
             away = np.abs(rim(middle[None, :], lines[:, None]))
             by_rim = away <= 0.5 * d
-            if not along_flow:
+            if not along_flow and _jumps(rim):
                 by_rim |= (side := near & (away <= 0.5 * np.hypot(d, widths[:, None])))
                 wide |= side
             across = by_rim
@@ -135,8 +135,17 @@ def _normal(rim: Shape, t: Array, d: Array, s: Array, w: Array, along_flow: bool
 
 def depth_of(rim: Any) -> float:
     """By how much the film jumps at a slanted edge, m; 0 at other rims, and where a film has any depth there."""
+    return float(getattr(_own(rim), "depth", 0.0))
+
+
+def _jumps(rim: Any) -> bool:
+    """Whether the film jumps at a round rim: at a dome's it does not, and drawn films with domes lose by lines side by side."""
+    return bool(getattr(getattr(_own(rim), "__self__", None), "oblique", True))
+
+
+def _own(rim: Any) -> Any:
     rim = rim.args[0] if isinstance(rim, partial) else rim
-    return depth_of(rim.film) if hasattr(rim, "film") else float(getattr(rim, "depth", 0.0))
+    return _own(rim.film) if hasattr(rim, "film") else rim
 
 
 def _beside(rim: Shape, t: Array, d: Array, lines: Array, widths: Array, along_flow: bool) -> tuple[Array, Array]:
