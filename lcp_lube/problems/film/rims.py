@@ -1,14 +1,14 @@
 """Faces that a curved edge of the film cuts: round dimples, whose rims no straight grid line can follow.
 
-Between two points the film is told by the line between them, on which it resists in series (`edges`): a rim is where that line
-crosses it. That is right where the film is full. Where a dimple is cavitated its rim is where the pressure
-ends: only the film before it resists, and carries, and what lies behind would be a length that varies with the rim's place in
-the cell, an error of first order. A fixed coefficient cannot know; the answer does. So a problem with such faces is solved, its
-cavities are looked at, and it is solved once more, from the answer on, with the cut faces made for them
-(`drivers.rims`). Where a film reforms before a rim it is full for but a cell or so, and the pressure in it runs along the rim:
-faces across the flow lead there as layers do that lie so. Those beside a cavity are looked at across their whole width. Either problem is of the one form, with positive conductances that
-both cells share and Couette flows that leave one cell and enter the next: its solution is unique, and certificate and bands
-hold as ever (docs/accuracy.md).
+Between two points the film is told by the line between them, on which it resists in series (`edges`): a rim is where that
+line crosses it. That is right where the film is full. Where a dimple is cavitated its rim is where the pressure ends: only
+the film before it resists, and carries, and what lies behind would be a length that varies with the rim's place in the
+cell, an error of first order. A fixed coefficient cannot know; the answer does. So a problem with such faces is solved, its
+cavities are looked at, and it is solved once more, from the answer on, with the cut faces made for them (`drivers.rims`).
+Where a film reforms before a rim it is full for but a cell or so, and the pressure in it runs along the rim: faces across
+the flow lead there as layers do that lie so. Those beside a cavity are looked at across their whole width. Either problem
+is of the one form, with positive conductances that both cells share and Couette flows that leave one cell and enter the
+next: its solution is unique, and certificate and bands hold as ever (docs/accuracy.md).
 """
 
 from collections.abc import Callable, Sequence
