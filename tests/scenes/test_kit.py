@@ -71,7 +71,7 @@ def test_concentric_herringbone_pumps_and_pushes_nowhere():
 
 
 def test_a_herringbone_on_few_points():
-    """Load and integral of the pressure, N, to 0.5 % on 20 points a groove and land (limits of 576 points around); with the film
+    """Load and integral of the pressure, N, to 0.5 % on 20 points a groove and land (limits: 576 points around); with the film
     at the faces' middle 0.7 and 6 %."""
     values = numbers("herringbone_journal", nx=240, ny=79)
     assert values["load"] == pytest.approx(2227.5, rel=5e-3)
