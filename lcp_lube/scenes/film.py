@@ -9,7 +9,8 @@ from pydantic import Field
 
 from ..errors import InputError
 from ..problems.film.profile import read_profile
-from ..problems.film.shapes import Along, Block, DimpleArray, Herringbone, Journal, RandomSurface, Shape
+from ..problems.film.shapes import Along, Block, DimpleArray, Journal, RandomSurface, Shape
+from ..problems.film.slanted import Herringbone
 from ..problems.film.views import Scaled, Travelling
 from ..registry import SHAPES
 from .film_scene import Extent

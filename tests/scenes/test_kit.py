@@ -70,6 +70,14 @@ def test_concentric_herringbone_pumps_and_pushes_nowhere():
     assert inward["pressure_integral"] > 2.0 * outward["pressure_integral"]
 
 
+def test_a_herringbone_on_few_points():
+    """Load and integral of the pressure, N, to 0.5 % on 20 points a groove and land (limits: 576 points around); with the film
+    at the faces' middle 0.7 and 6 %."""
+    values = numbers("herringbone_journal", nx=240, ny=79)
+    assert values["load"] == pytest.approx(2227.5, rel=5e-3)
+    assert values["pressure_integral"] == pytest.approx(6640.0, rel=5e-3)
+
+
 def test_barrel_is_a_parabola_on_top():
     barrel = numbers("two_groove_journal", **AT, barrel=2e-5)
     film = [{"shape": "parabola", "along": "y", "h_min": 0.0, "h_max": 2e-5}]

@@ -129,23 +129,22 @@ def test_many_spirals_are_the_narrow_groove_theory():
     assert 2 * found[60] - found[30] == pytest.approx(np.abs(theory), rel=5e-3)
 
 
+@pytest.mark.parametrize("rows", [0.87, 1.15])
 @pytest.mark.parametrize("angle", [20.0, 45.0])
-def test_many_grooves_of_a_herringbone_are_the_narrow_groove_theory(angle):
-    """Pressure rises to the middle of the width along straight lines; pitches of 1/32 and 1/64 of it, extrapolated: 1 %."""
-    width, film, depth, mu, U = 0.04, 1e-5, 2e-5, 0.01, 10.0
+def test_many_grooves_of_a_herringbone_are_the_narrow_groove_theory(angle, rows):
+    """Pressure rises to the middle of the width along straight lines; pitches of 1/32 and 1/64 of it, extrapolated: 0.5 % with
+    12 points a groove and land, 2 % with the film at the faces' middle. rows : rows by which an edge moves on by a column."""
+    width, film, depth, mu, U, nx = 0.04, 1e-5, 2e-5, 0.01, 10.0, 12
     found = {}
     for grooves in (32, 64):
-        for nx in (12, 24):
-            L = width / grooves
-            groove = {"shape": "herringbone", "depth": depth, "count": 1, "angle_deg": angle, "ratio": 0.5}
-            scene = {"family": "bearing", "dimension": 2, "L": L, "width": width, "U": U, "nx": nx}
-            scene |= {"ny": round(nx * grooves / math.tan(math.radians(angle))), "scheme": "face"}
-            scene |= {"film": [{"shape": "constant", "h": film}, groove], "fluid": {"mu": mu, "p_supply": 1e6}}
-            values = numbers({**scene, "sides": {"west": "periodic", "east": "periodic"}})
-            found[grooves, nx] = values["load"] / L
-    many, fewer = (2 * found[grooves, 24] - found[grooves, 12] for grooves in (64, 32))
+        L = width / grooves
+        groove = {"shape": "herringbone", "depth": depth, "count": 1, "angle_deg": angle, "ratio": 0.5}
+        scene = {"family": "bearing", "dimension": 2, "L": L, "width": width, "U": U, "nx": nx}
+        scene |= {"ny": round(rows * nx * grooves / math.tan(math.radians(angle))), "scheme": "face"}
+        scene |= {"film": [{"shape": "constant", "h": film}, groove], "fluid": {"mu": mu, "p_supply": 1e6}}
+        found[grooves] = numbers({**scene, "sides": {"west": "periodic", "east": "periodic"}})["load"] / L
     rise = 6 * mu * U * muijderman(film / (film + depth), math.radians(angle), 0.5) / film**2
-    assert 2 * many - fewer == pytest.approx(rise * width**2 / 4, rel=0.01)
+    assert 2 * found[64] - found[32] == pytest.approx(rise * width**2 / 4, rel=5e-3)
 
 
 @pytest.mark.parametrize("method", ["active-set", "din", "fas", "monotone"])

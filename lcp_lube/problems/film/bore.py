@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from ...base.parallel import Array
 from .edges import jumps_of, level
 from .lines import SAME
-from .shapes import Shape
+from .shapes import Shape, rims_of
 from .turning import Turning
+from .views import Travelling
 
 
 @dataclass(frozen=True)
@@ -76,6 +77,11 @@ class Bore:
         if self.dam is not None and axis == "y":
             found += [0.5 * (self.turning.B - self.dam.width), 0.5 * (self.turning.B + self.dam.width)]
         return tuple(float(t) for t in found)
+
+    @property
+    def rims(self) -> tuple[Shape, ...]:
+        """Distances (m) from edges of its shapes that are curved or slanted."""
+        return tuple(Travelling(rim, 0.0, self.turning.length) for rim in rims_of(self.parts))
 
     @property
     def level(self) -> bool:

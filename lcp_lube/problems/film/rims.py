@@ -1,14 +1,14 @@
 """Faces that a curved edge of the film cuts: round dimples, whose rims no straight grid line can follow.
 
-Between two points the film is told by the line between them, on which it resists in series (`edges`): a rim is where that line
-crosses it. That is right where the film is full. Where a dimple is cavitated its rim is where the pressure
-ends: only the film before it resists, and carries, and what lies behind would be a length that varies with the rim's place in
-the cell, an error of first order. A fixed coefficient cannot know; the answer does. So a problem with such faces is solved, its
-cavities are looked at, and it is solved once more, from the answer on, with the cut faces made for them
-(`drivers.rims`). Where a film reforms before a rim it is full for but a cell or so, and the pressure in it runs along the rim:
-faces across the flow lead there as layers do that lie so. Either problem is of the one form, with positive conductances that
-both cells share and Couette flows that leave one cell and enter the next: its solution is unique, and certificate and bands
-hold as ever (docs/accuracy.md).
+Between two points the film is told by the line between them, on which it resists in series (`edges`): a rim is where that
+line crosses it. That is right where the film is full. Where a dimple is cavitated its rim is where the pressure ends: only
+the film before it resists, and carries, and what lies behind would be a length that varies with the rim's place in the
+cell, an error of first order. A fixed coefficient cannot know; the answer does. So a problem with such faces is solved, its
+cavities are looked at, and it is solved once more, from the answer on, with the cut faces made for them (`drivers.rims`).
+Where a film reforms before a rim it is full for but a cell or so, and the pressure in it runs along the rim: faces across
+the flow lead there as layers do that lie so. Those beside a cavity are looked at across their whole width. Either problem
+is of the one form, with positive conductances that both cells share and Couette flows that leave one cell and enter the
+next: its solution is unique, and certificate and bands hold as ever (docs/accuracy.md).
 """
 
 from collections.abc import Callable, Sequence
@@ -25,8 +25,10 @@ from .edges import pairs
 Flags = NDArray[np.bool_]
 Shape = Callable[[Array, Array], Array]
 LOOKS = 32  # between the two points of a face
+WIDE = 8, 16  # lines side by side across the width of a face across the flow beside a cavity, and looks along each
 TOGETHER = 2000  # faces that are looked at together, in cache
 REACH, FAR = 1.5, 4.0  # cells from a slanted edge to where it changes faces; that far, by both widths, it is looked for
+CROSSED = 0.6  # that far an edge may lie where it crosses a face; beyond there is one film
 STEP, STEEP = 1e-3, 0.1  # of a cell, for the distance's slopes; the least 2 a b of the edge's normal (a, b) in cells
 THIN = 1 / 3  # of the way from the thinnest to the thickest film of a face: what is below is the film outside a recess
 
@@ -52,58 +54,98 @@ def cut_faces(
     """
     a, d = nodes[:-1], np.diff(nodes)
     d = np.where(d < 0.0, d + period, d)
-    cut = np.zeros((lines.size, d.size), dtype=bool)
+    middle = a + 0.5 * d
+    cut, crossed, wide = np.zeros((3, lines.size, d.size), dtype=bool)
     oblique = np.zeros(cut.shape)
     if not along_flow:
-        reforms, cavity = _reforms(cavity), cavity[1:]
+        (reforms, near), cavity = _beside_cavities(cavity), cavity[1:]
     beside = []
     for rim in rims:
         if depth := depth_of(rim):
-            beside.append((depth, *_beside(rim, a + 0.5 * d, d, lines, widths, along_flow)))
-            by_rim = np.abs(beside[-1][1]) < REACH
+            beside.append((depth, *_beside(rim, middle, d, lines, widths, along_flow)))
+            away = np.abs(beside[-1][1])
+            by_rim, across = away < REACH, away < CROSSED
         else:
-            by_rim = np.abs(rim((a + 0.5 * d)[None, :], lines[:, None])) <= 0.5 * d
-        cut |= by_rim
+            away = np.abs(rim(middle[None, :], lines[:, None]))
+            by_rim = away <= 0.5 * d
+            if not along_flow and _jumps(rim):
+                by_rim |= (side := near & (away <= 0.5 * np.hypot(d, widths[:, None])))
+                wide |= side
+            across = by_rim
+        cut, crossed = cut | by_rim, crossed | across
         if not along_flow:
             j, i = np.nonzero(by_rim & reforms & (d > 0.0))
-            oblique[j, i] = 1.0 - _slope(rim, a[i] + 0.5 * d[i], d[i], lines[j]) ** 2
+            oblique[j, i] = _normal(rim, middle[i], d[i], lines[j], widths[j], False)[1]
     cut &= d > 0.0
     kind = np.asarray(film(nodes[:1], lines[:1])).dtype  # complex, where a derivative is asked for
     cubes, films = np.zeros((2, np.count_nonzero(cut)), dtype=kind)
     j, i = np.nonzero(cut)
-    places = np.array([0.0, *(np.arange(LOOKS) + 0.5) / LOOKS, 1.0])[:, None]  # the points too
-    for some in (slice(k, k + TOGETHER) for k in range(0, j.size, TOGETHER)):
-        at, line = i[some], lines[j[some]]
-        h = np.broadcast_to(film(a[at] + d[at] * places, line), (places.size, at.size))
-        resists = _resists(np.real(h), cavity[j[some], at], cavity[j[some], at + 1], along_flow)
-        inverse = 1.0 / h[1:-1]
-        drag = np.where(resists[1:-1], inverse * inverse, 0.0)
-        resistance = np.mean(drag * inverse, axis=0)
-        cubes[some], films[some] = 1.0 / resistance, np.mean(drag, axis=0) / resistance
-        part = oblique[j[some], at]
-        if (k := np.flatnonzero(part)).size:
-            cubes[some.start + k] += part[k] * (np.mean(h[1:-1, k] ** 3, axis=0) - cubes[some.start + k])
+    for which, (sides, looks) in ((~crossed, (1, 1)), (crossed & ~wide, (1, LOOKS)), (wide, WIDE)):
+        of = np.flatnonzero(which[j, i])
+        for k in (of[first : first + TOGETHER] for first in range(0, of.size, TOGETHER)):
+            at, row = i[k], j[k]
+            dry = cavity[row, at], cavity[row, at + 1]
+            places = (lines[row] + share * widths[row] for share in (np.arange(sides) + 0.5) / sides - 0.5)
+            parts = [_looked(film, a[at], d[at], line, looks, *dry, along_flow) for line in places]
+            cubes[k], films[k], along = np.mean(parts, axis=0)
+            cubes[k] += oblique[row, at] * (along - cubes[k])
     for depth, away, length in beside:
-        more, slope = _layer(depth, away[j, i], length[j, i], film(a[i] + 0.5 * d[i], lines[j]))
+        more, slope = _layer(depth, away[j, i], length[j, i], film(middle[i], lines[j]))
         cubes, films = cubes + more, films + slope * more
     return cut, cubes, films
 
 
-def _reforms(cavity: Flags) -> Flags:
-    """Which faces across the flow lie where a film has just reformed: both points full, one a cell before them cavitated."""
+def _looked(
+    film: Shape, a: Array, d: Array, lines: Array, looks: int, dry_first: Flags, dry_last: Flags, along_flow: bool
+) -> tuple[Array, Array, Array]:
+    """C and H of faces of these lengths from a on along lines, of what resists there; and the mean of h^3."""
+    places = np.array([0.0, *(np.arange(looks) + 0.5) / looks, 1.0])[:, None]  # the points too
+    h = np.broadcast_to(film(a + d * places, lines), (places.size, a.size))
+    resists = _resists(np.real(h), dry_first, dry_last, along_flow)
+    inverse = 1.0 / h[1:-1]
+    drag = np.where(resists[1:-1], inverse * inverse, 0.0)
+    resistance = np.mean(drag * inverse, axis=0)
+    return 1.0 / resistance, np.mean(drag, axis=0) / resistance, np.mean(h[1:-1] ** 3, axis=0)
+
+
+def _beside_cavities(cavity: Flags) -> tuple[Flags, Flags]:
+    """Which faces across the flow lie where a film has just reformed: both points full, one a cell before them cavitated;
+    and which lie there or have a cavitated point."""
     dry = cavity[:, :-1] | cavity[:, 1:]
-    return dry[:-1] & ~dry[1:]
+    return dry[:-1] & ~dry[1:], dry[:-1] | dry[1:]
 
 
-def _slope(rim: Shape, t: Array, d: Array, s: Array) -> Array:
-    """By how much the distance grows with a length t: the normal's part along it, at most 1 in size."""
-    return np.clip(np.real(rim(t + STEP * d, s) - rim(t - STEP * d, s)) / (2.0 * STEP * d), -1.0, 1.0)
+def _normal(rim: Shape, t: Array, d: Array, s: Array, w: Array, along_flow: bool) -> tuple[Array, Array, Array, Array]:
+    """Squares of a rim's normal along t and along s; and by how much the distance grows over a cell each way, without sign.
+
+    Where the rim has a fold the slopes are those of either side, not the mean of both.
+    """
+    here = rim(t, s)
+
+    def grows(t_step: Any, s_step: Any) -> Array:
+        ways = [np.abs(rim(t + way * t_step, s + way * s_step) - here) / STEP for way in (-1.0, 1.0)]
+        return np.maximum(*(np.nan_to_num(one, nan=0.0, posinf=0.0) for one in ways))
+
+    with np.errstate(invalid="ignore"):
+        by_t, by_s = grows(STEP * d, 0.0), grows(0.0, STEP * w)
+    # y is a length, x in a sector is not: the normal's parts by the former.
+    n_y = np.minimum((by_s / w if along_flow else by_t / d) ** 2, 1.0)
+    return (1.0 - n_y, n_y, by_t, by_s) if along_flow else (n_y, 1.0 - n_y, by_t, by_s)
 
 
 def depth_of(rim: Any) -> float:
     """By how much the film jumps at a slanted edge, m; 0 at other rims, and where a film has any depth there."""
+    return float(getattr(_own(rim), "depth", 0.0))
+
+
+def _jumps(rim: Any) -> bool:
+    """Whether the film jumps at a round rim: at a dome's it does not, and drawn films with domes lose by lines side by side."""
+    return bool(getattr(getattr(_own(rim), "__self__", None), "oblique", True))
+
+
+def _own(rim: Any) -> Any:
     rim = rim.args[0] if isinstance(rim, partial) else rim
-    return depth_of(rim.film) if hasattr(rim, "film") else float(getattr(rim, "depth", 0.0))
+    return _own(rim.film) if hasattr(rim, "film") else rim
 
 
 def _beside(rim: Shape, t: Array, d: Array, lines: Array, widths: Array, along_flow: bool) -> tuple[Array, Array]:
@@ -113,16 +155,11 @@ def _beside(rim: Shape, t: Array, d: Array, lines: Array, widths: Array, along_f
     found = rim(t, s)
     j, i = np.nonzero(np.abs(found) < FAR * (d[None, :] + widths[:, None]))
     t, s, d, w = t[j, i], s[j, i], d[i], widths[j]
-    by_t, by_s = rim(t + STEP * d, s) - rim(t - STEP * d, s), rim(t, s + STEP * w) - rim(t, s - STEP * w)
-    with np.errstate(invalid="ignore"):
-        by_t, by_s = (np.abs(np.nan_to_num(a, nan=0.0, posinf=0.0, neginf=0.0)) / (2.0 * STEP) for a in (by_t, by_s))
-    # y is a length, x in a sector is not: the normal's parts by the former.
-    n_y = np.minimum((by_s / w if along_flow else by_t / d) ** 2, 1.0)
-    of_t, of_s = (n_y, 1.0 - n_y) if along_flow else (1.0 - n_y, n_y)
+    n_t, n_s, by_t, by_s = _normal(rim, t, d, s, w, along_flow)
     cell = np.hypot(by_t, by_s)
     cell = np.where(cell > 0.0, cell, np.inf)
     steep = np.maximum(2.0 * by_t * by_s / cell**2, STEEP)
-    away[j, i], length[j, i] = found[j, i] / cell, (of_t * by_t + of_s * by_s) / cell * steep**-0.6
+    away[j, i], length[j, i] = found[j, i] / cell, (n_s * by_t + n_t * by_s) / cell * steep**-0.6
     return away, length
 
 

@@ -156,30 +156,6 @@ class Journal:
 
 
 @dataclass(frozen=True)
-class Herringbone:
-    """`count` grooves of a depth, inclined by `angle` (rad) against the motion, that meet in the middle of the width.
-
-    ratio : width of a groove over groove and land. land : share of the width in the middle that has none. The grooves pump
-    towards the middle where the wall runs from the ends of their V to its point; a negative angle turns them round.
-    """
-
-    depth: float
-    count: int
-    angle: float
-    ratio: float
-    land: float
-    lengths: tuple[float, float]
-
-    oblique: ClassVar[bool] = True
-
-    def __call__(self, x: Array, y: Array) -> Array:
-        L, width = self.lengths
-        off = np.abs(y - 0.5 * width)
-        phase = np.remainder(((x + off / np.tan(self.angle)) / L + EDGE) * self.count, 1.0)
-        return np.where((phase < self.ratio) & (off >= 0.5 * self.land * width), self.depth, 0.0)
-
-
-@dataclass(frozen=True)
 class RandomSurface:
     """Cubic B-spline through normal numbers on a lattice of `cells` meshes a side: the same surface on every grid.
 
@@ -228,10 +204,8 @@ class Sum:
 
     @property
     def rims(self) -> tuple[Shape, ...]:
-        """Distances (m) from edges that are curved or slanted, as functions of x and y; negative inside."""
-        found = (part for part in self.parts if isinstance(part, DimpleArray) and part.form != "square")
-        slanted = (part.slanted for part in self.parts if hasattr(part, "slanted"))
-        return *(part.rim for part in found if np.isfinite(part.y).all()), *slanted
+        """Distances (m) from its edges that are curved or slanted."""
+        return rims_of(self.parts)
 
     def marks(self) -> tuple[float, ...]:
         return tuple(t for part in self.parts for t in marks_of(part))
@@ -258,6 +232,13 @@ class Sum:
                 low, high = t[k - 1], t[k + 1]
             out.append(0.5 * (low + high))
         return out
+
+
+def rims_of(parts: Sequence[Shape]) -> tuple[Shape, ...]:
+    """Distances (m) from edges of parts that are curved or slanted, as functions of x and y; negative inside."""
+    found = (part for part in parts if isinstance(part, DimpleArray) and part.form != "square")
+    slanted = (part.slanted for part in parts if hasattr(part, "slanted"))
+    return *(part.rim for part in found if np.isfinite(part.y).all()), *slanted
 
 
 def within(t: Array, start: float, end: float) -> NDArray[np.bool_] | np.bool_:

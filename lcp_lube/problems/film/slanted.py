@@ -1,4 +1,4 @@
-"""Grooves along spirals, a part of a film as those of `shapes`; their edges run across the lines of points."""
+"""Grooves whose edges run across the lines of points, spirals and herringbones: parts of a film as those of `shapes`."""
 
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -13,7 +13,7 @@ from .shapes import EDGE, within
 class Slanted:
     """Distance (m) from the slanted edges of grooves, negative inside them, as a function of x and y."""
 
-    grooves: "SpiralGrooves"
+    grooves: "Grooves"
 
     @property
     def depth(self) -> float:
@@ -26,19 +26,16 @@ class Slanted:
 
 
 @dataclass(frozen=True)
-class SpiralGrooves:
-    """`count` logarithmic spirals on a full turn, of a depth, between two radii; inclined by `angle` (rad) against the motion.
+class Grooves:
+    """`count` grooves of a depth, inclined by `angle` (rad) against the motion.
 
-    They pump inwards, and outwards where the angle is negative. polar : radius at y = 0 (there a groove begins at x = 0), and
-    that on which x is measured, m.
+    ratio : width of a groove over groove and land.
     """
 
     depth: float
     count: int
     angle: float
     ratio: float
-    between: tuple[float, float]
-    polar: tuple[float, float]
 
     oblique: ClassVar[bool] = True
 
@@ -48,11 +45,25 @@ class SpiralGrooves:
 
     @property
     def slanted(self) -> Slanted:
-        """Distance from its spirals, m."""
+        """Distance from its slanted edges, m."""
         return Slanted(self)
 
     def laid(self, x: Array, y: Array) -> tuple[Array, Any, Any]:
         """How far on from an edge that opens a groove to the next one, from 0 to 1; their distance, m; where grooves are."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class SpiralGrooves(Grooves):
+    """Logarithmic spirals on a full turn, between two radii; they pump inwards, and outwards where the angle is negative.
+
+    polar : radius at y = 0 (there a groove begins at x = 0), and that on which x is measured, m.
+    """
+
+    between: tuple[float, float]
+    polar: tuple[float, float]
+
+    def laid(self, x: Array, y: Array) -> tuple[Array, Any, Any]:
         theta, r = x / self.polar[1], self.polar[0] + y
         turns = (theta + np.log(r / self.polar[0]) / np.tan(self.angle)) / (2.0 * np.pi)
         phase = np.remainder((turns + EDGE) * self.count, 1.0)
@@ -60,3 +71,25 @@ class SpiralGrooves:
 
     def jumps(self, axis: str) -> tuple[float, ...]:
         return tuple(r - self.polar[0] for r in self.between) if axis == "y" else ()
+
+
+@dataclass(frozen=True)
+class Herringbone(Grooves):
+    """Grooves that meet in the middle of the width.
+
+    land : share of the width in the middle that has none. The grooves pump towards the middle where the wall runs from the ends
+    of their V to its point; a negative angle turns them round.
+    """
+
+    land: float
+    lengths: tuple[float, float]
+
+    def laid(self, x: Array, y: Array) -> tuple[Array, Any, Any]:
+        L, width = self.lengths
+        off = np.abs(y - 0.5 * width)
+        phase = np.remainder(((x + off / np.tan(self.angle)) / L + EDGE) * self.count, 1.0)
+        return phase, L / self.count * abs(np.sin(self.angle)), off >= 0.5 * self.land * width
+
+    def jumps(self, axis: str) -> tuple[float, ...]:
+        width, land = self.lengths[1], self.land
+        return (0.5 * width * (1.0 - land), 0.5 * width * (1.0 + land)) if axis == "y" and land else ()
