@@ -41,6 +41,28 @@ CASES: dict[str, tuple[Any, dict[str, Any]]] = {
         {"nx": 50, "ny": 61, "v_upper": 0.3, "v_lower": "0.28 - 10*((x - 0.2)^2 + (y - 0.2)^2)"},
     ),
     "pad": ("dimpled_pad", {"nx": 101, "ny": 101}),
+    "pockets": (
+        {
+            "family": "bearing",
+            "dimension": 2,
+            "L_mm": 100,
+            "width_mm": 80,
+            "U": 1.0,
+            "nx": 83,
+            "ny": 70,
+            "scheme": "nodal",
+            "fluid": {"mu": 0.015},
+            "sides": {"west": 1e5, "east": 1e5, "south": 1e5, "north": 1e5},
+            "film": [
+                {"shape": "linear", "h_start": 2e-5, "h_end": 1e-5},
+                *(
+                    {"shape": "pocket", "depth": 5e-5, "x_mm": [x, x + 2.5], "y_mm": [y, y + 2.2]}
+                    for x, y in ((20, 26), (31, 26), (40.3, 27.1), (51, 53.2), (60, 54.1), (76.6, 53.1), (33, 70), (12, 9))
+                ),
+            ],
+        },
+        {},
+    ),
     "hard": ("textured_slider", {"K": 3, "nx": 60, "ny": 64, "depth": 135e-6}),
 }
 

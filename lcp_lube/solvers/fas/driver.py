@@ -34,6 +34,7 @@ OWN = 17_000  # points of a problem that is then solved so itself
 EXTREME = 1000.0  # film ratio above which a small ||G|| says little of p, and the corrections have to be small too
 SETTLED = 1e-8  # of the largest pressure, or eps1 where that is more: what they may then be in the mean
 CLOSE = 1e-6  # ||G|| below which a ring that is hardly fed is not what has stalled
+FEW = 0.05  # part of a ring's line that is full, below which it is hardly fed
 FED = 3e-5  # of the certificate's tolerance: the flow that a film with supplies may lose, 3e-12 in parts of what flows
 SLOW, EARLY = 0.15, 0.16  # a cycle whose iterates are mixed leaves more than that; two cycles, where coarse grids mislead
 SLOWER, LEAST_FALL = 2.5, (0.04, 0.2)  # times what an F cycle leaves is what a V cycle does in its place; at least, in time too
@@ -204,6 +205,11 @@ class Fas(FilmCycles):
         last = expected <= self._rest and (level.carry is not None or level.held is None)
         return "V" if last and self.options.cycle == "F" else self.options.cycle
 
+    @property
+    def _hardly_fed(self) -> bool:
+        """Whether a line has next to no points of full film, which are what fixes the void that goes round. Collective."""
+        return self.problem.reduce.min((self._levels[0].z[1:-1, 1:-1] > 0.0).mean(axis=1)) < FEW
+
     def destroy(self) -> None:
         super().destroy()
         self._levels, self._fields = [], None
@@ -215,7 +221,7 @@ class Fas(FilmCycles):
         """
         own = self._levels[0].nx * self._levels[0].ny
         around = self._levels[0].periodic[0] and own > OWN and self.norm > CLOSE  # what goes round has no coarse grid
-        if around or self._following is not None:
+        if (around and self._hardly_fed) or self._following is not None:
             return False
         for points in EXACT if own > OWN else (OWN,):
             for k, level in enumerate(self._levels[: self._depth - 1]):

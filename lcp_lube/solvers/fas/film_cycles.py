@@ -68,8 +68,13 @@ class FilmCycles(Cycles):
         if self._following:
             self._following.ascend(k)
         at_supplies = None if level.held is None else level.z[level.held]
-        rules = (level.first, level.by_x, level.by_y, self._harmonic, self._truncation, level.periodic[0], self._unit)
-        self._correction = self._loops.correct(level.z, new, old, level.kx, level.ky, *rules)
+        given = (level.z, new, old, level.kx, level.ky)
+        if level.ways is None:
+            rules = (level.first, level.by_x, level.by_y, self._harmonic, self._truncation, level.periodic[0], self._unit)
+            self._correction = self._loops.correct(*given, *rules)
+        else:
+            rule = (level.ways, level.first, self._truncation, level.periodic[0])
+            self._correction = self._loops.correct_steps(*given, *rule)
         if level.held is not None:
             level.z[level.held] = at_supplies
         level.share(level.z)

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -36,6 +37,7 @@ class Level:
         store more by p = 1; scale : z of a cavitated cell over that of the finer grid's, which is smaller.
     held, owner, given, spans, slips : of a film with supplies (`held`): which points are held, by which supply (from 1 on),
         their pressures, the runs of free points, and the held points that the next coarser grid sees beside their place.
+    even : whether this grid sees no steps in the film, once that is known; ways : weights of interpolation else (`steps`).
     factors : of the coarsest grid's Jacobian, and the signs of z that they are of (`coarsest`).
     """
 
@@ -62,6 +64,8 @@ class Level:
     given: Array = field(default_factory=lambda: np.zeros(0))
     spans: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int32))
     slips: NDArray[np.bool_] | None = None
+    ways: NDArray[np.float32] | None = None
+    even: bool | None = None
     factors: tuple[Array, NDArray[np.int8]] | None = None
     visits: int = 0
     seconds: float = 0.0
@@ -90,7 +94,7 @@ class Level:
             return a
         return a[self.y0 : self.y1 + 2 + (a.shape[0] - self.ny - 2)]
 
-    def share(self, a: Array) -> Array:
+    def share(self, a: Any) -> Any:
         """Bring the frame up to date: rows of the neighbouring ranks, and beyond periodic sides. Collective."""
         n = self.ny if self.comm is None or self.whole else self.y1 - self.y0
         rows, columns = a.shape[0] - n - 1, a.shape[1] - self.nx - 1  # of the frame behind the last point: 1, of faces 2
@@ -145,14 +149,15 @@ class Level:
         below = rank - 1 if rank else (size - 1 if ring else MPI.PROC_NULL)
         return below, rank + 1 if rank < size - 1 else (0 if ring else MPI.PROC_NULL)
 
-    def collect(self, a: Array) -> Array:
-        """Add up what the ranks have put into each other's rows, in `part(a)` of an array that was zero. Collective."""
+    def collect(self, a: Array, faces: bool = False) -> Array:
+        """Add up what the ranks have put into each other's rows, in `part(a)` of an array that was zero; faces : of y faces, of
+        which the last one is the first of the next rank. Collective."""
         if self.comm is not None and self.whole:
             self.comm.Allreduce(MPI.IN_PLACE, a)
         if self.comm is not None and not self.whole:
             below, above = self._neighbours(self.comm)
             from_below, from_above = np.zeros_like(a[0]), np.zeros_like(a[0])
-            self.comm.Sendrecv(a[-1].copy(), above, recvbuf=from_below, source=below)
+            self.comm.Sendrecv(a[-2 if faces else -1].copy(), above, recvbuf=from_below, source=below)
             self.comm.Sendrecv(a[0].copy(), below, recvbuf=from_above, source=above)
             a[1] += from_below
             a[-2] += from_above
@@ -232,12 +237,21 @@ def _coarser(fine: Level, harmonic: bool) -> Level | None:
     last = fine.comm is None or fine.whole or fine.y1 == fine.ny
     beyond_x = by_x and fine.nx % 2 == 0 and not fine.periodic[0]
     beyond_y = by_y and fine.ny % 2 == 0 and not fine.periodic[1] and last
-    flags = (fine.first, by_x, by_y, harmonic)
-    marked = (fine.kx, fine.ky) if fine.held is None else held.marked(fine)
-    of_x, of_y = (marked[0], fine.ky, coarse.part(coarse.kx)), (fine.kx, marked[1], coarse.part(coarse.ky))
-    loops.coarsen((*of_x, beyond_x), (*of_y, beyond_y), *flags)
-    for a in (coarse.kx, coarse.ky):
-        coarse.gather(a)
+    into_x, into_y = coarse.part(coarse.kx), coarse.part(coarse.ky)
+    if harmonic and fine.held is None and by_x and by_y and not smooth(fine):
+        fine.ways = np.full((fine.kx.shape[0], fine.ky.shape[1]), 0.5, dtype=np.float32)
+        loops.make_ways(fine.kx, fine.ky, fine.ways, fine.first)
+        fine.share(fine.ways)
+        flags = (fine.first, beyond_x, beyond_y, fine.periodic[0])
+        loops.coarsen_steps(fine.kx, fine.ky, fine.ways, into_x, into_y, *flags)
+        coarse.share(coarse.collect(coarse.kx))
+        coarse.share(coarse.collect(coarse.ky, faces=True))
+    else:
+        marked = (fine.kx, fine.ky) if fine.held is None else held.marked(fine)
+        of_x, of_y = (marked[0], fine.ky, into_x, beyond_x), (fine.kx, marked[1], into_y, beyond_y)
+        loops.coarsen(of_x, of_y, fine.first, by_x, by_y, harmonic)
+        for a in (coarse.kx, coarse.ky):
+            coarse.gather(a)
     if fine.held is not None:
         held.coarser(fine, coarse)
     if fine.void is not None:
@@ -267,8 +281,10 @@ def right_sides(levels: Sequence[Level], harmonic: bool) -> None:
 
 def smooth(level: Level) -> bool:
     """Whether the film has no steps that this grid sees (`starts.smooth`). Collective."""
-    found = loops.smooth(level.kx, level.ky)
-    return found if level.comm is None else level.comm.allreduce(found, MPI.LAND)
+    if level.even is None:
+        found = loops.smooth(level.kx, level.ky)
+        level.even = found if level.comm is None else level.comm.allreduce(found, MPI.LAND)
+    return level.even
 
 
 def restrict(fine: Level, coarse: Level, out: Array, harmonic: bool, given: Array | None = None) -> None:
@@ -277,5 +293,5 @@ def restrict(fine: Level, coarse: Level, out: Array, harmonic: bool, given: Arra
         out[:] = 0.0
     where = (fine.first, fine.by_x, fine.by_y, harmonic, fine.periodic[0], given is None)
     c = fine.c if given is None else given
-    loops.restrict(fine.z, fine.kx, fine.ky, c, coarse.part(out), *where, fine.carry)
+    loops.restrict(fine.z, fine.kx, fine.ky, c, coarse.part(out), *where, fine.carry, fine.ways)
     coarse.collect(out)

@@ -16,7 +16,7 @@ from ...problems.grid import Grid
 from ...problems.solution import Fields
 from ...problems.strips import each_strip
 from . import coarsen as coarsening
-from . import fronts, kernels, starts, transfer
+from . import fronts, kernels, starts, steps, transfer
 from .waiting import LINE, SLOTS
 
 COLUMNS = 128  # of a part of a line, at least
@@ -64,6 +64,16 @@ def coarsen(x_faces: Any, y_faces: Any, *flags: Any) -> None:
         _into(out, kx, loop, kx, ky, out, *flags, beyond)
 
 
+def make_ways(kx: Array, ky: Array, out: Any, y0: int) -> None:
+    _into(out, kx, steps.make_ways, kx, ky, out, y0)
+
+
+def coarsen_steps(kx: Array, ky: Array, ways: Any, out_x: Array, out_y: Array, *flags: Any) -> None:
+    """`steps.coarsen`, dealt out by the rows that are written to."""
+    given = (kx, ky, ways, out_x, out_y, *flags)
+    crew().rows(lambda start, end: steps.coarsen(*(*given, start, end)), out_x.shape[0], kx.size)
+
+
 def smooth(kx: Array, ky: Array) -> bool:
     """`starts.smooth` of all rows."""
     return all(_by_rows(lambda start, end: starts.smooth(*(kx, ky, start, end)), kx))
@@ -75,6 +85,11 @@ def add_balance(z: Array, *others: Any) -> None:
 
 def correct(z: Array, *others: Any) -> float:
     return sum(_by_rows(lambda start, end: transfer.correct(*(z, *others, start, end)), z))
+
+
+def correct_steps(z: Array, *others: Any) -> float:
+    """`steps.correct` of all rows."""
+    return sum(_by_rows(lambda start, end: steps.correct(*(z, *others, start, end)), z))
 
 
 def interpolate(z: Array, *others: Any) -> None:

@@ -1,11 +1,14 @@
 """Between a grid and the next coarser one: residuals and corrections; arrays as in `kernels`."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...base.compiled import kernel, piece
 from ...base.parallel import Array
 from .fronts import reforms
 from .kernels import balance_at
+
+Ways = NDArray[np.float32]
 
 
 @piece
@@ -23,6 +26,23 @@ def west_shares(kx: Array, m: int, harmonic: bool, out: Array) -> None:
     out[n:] = 0.5
 
 
+@piece
+def stored_shares(ways: Ways, m: int, out: Array) -> None:
+    """The same as `steps` has made them."""
+    n = min(out.size, ways.shape[1] // 2)
+    for k in range(n):
+        out[k] = ways[m, 2 * k + 1]
+    out[n:] = 0.5
+
+
+@piece
+def centre(W: float, E: float, S: float, N: float) -> tuple[float, float, float, float]:
+    """Weights of the four neighbours of a point between four coarse ones, by the conductances to them."""
+    total = W + E + S + N
+    over = 1.0 / total if total > 0.0 else 0.0
+    return W * over, E * over, S * over, N * over
+
+
 @kernel
 def restrict(
     z: Array,
@@ -37,6 +57,7 @@ def restrict(
     wrap: bool,
     residual: bool,
     carry: Array | None = None,
+    ways: Ways | None = None,
     start: int = 0,
     end: int = 0,
 ) -> None:
@@ -44,19 +65,32 @@ def restrict(
 
     That is the transposed interpolation, halved where lines are coarsened: a row is a balance per unit width. Coarse points
     stand at the odd rows and columns, counted from 0 over the whole grid; the rank's first row is y0, and row 0 of `out` is
-    the coarse line y0 // 2 - 1.
+    the coarse line y0 // 2 - 1. ways : of a film with steps (`steps`).
     """
     ny, nx = z.shape[0] - 2, z.shape[1] - 2
     n_coarse, end = out.shape[1] - 2, end if end else out.shape[0]
     first, last = (2 * (start - 1 + y0 // 2) - y0 + 1, 2 * (end - 1 + y0 // 2) - y0 + 1) if by_y else (start, end - 1)
+    parts = np.zeros((2, nx + 2))
     r, w, coarse, south = np.zeros(nx + 2), np.zeros(n_coarse + 1), np.zeros(n_coarse + 2), np.zeros(n_coarse + 2)
     for m in range(max(first, 1), min(last, ny) + 1):
         for i in range(np.uint32(1), np.uint32(nx + 1)):
             r[i] = c[m, i] - balance_at(z, kx, ky, m, i, carry) if residual else c[m, i]
-        if by_x:
+        j = y0 + m - 1
+        if ways is not None and j % 2 == 0:
+            row = j // 2 - y0 // 2
+            to_sides(r, kx, ky, ways, m, wrap, parts)
+            for n in range(2):
+                if start <= row + n < end:
+                    stored_shares(ways, m - 1 + 2 * n, w)
+                    restrict_row(parts[n], w, by_x, wrap, coarse)
+                    for k in range(1, n_coarse + 1):
+                        out[row + n, k] += 0.5 * coarse[k]
+            continue
+        if ways is not None:
+            stored_shares(ways, m, w)
+        elif by_x:
             west_shares(kx, m, harmonic, w)
         restrict_row(r, w, by_x, wrap, coarse)
-        j = y0 + m - 1
         if not by_y:
             for k in range(1, n_coarse + 1):
                 out[m, k] += coarse[k]
@@ -79,6 +113,21 @@ def restrict(
                     out[row, k] += part
                 if row + 1 < end:
                     out[row + 1, k] += 0.5 * coarse[k] - part
+
+
+@piece
+def to_sides(r: Array, kx: Array, ky: Array, ways: Ways, m: int, wrap: bool, parts: Array) -> None:
+    """Into parts what r of row m, between two coarse lines, gives to the points of the southern and of the northern one."""
+    nx = r.size - 2
+    for i in range(1, nx + 1, 2):
+        W, E, S, N = centre(kx[m, i], kx[m, i + 1], ky[m, i], ky[m + 1, i])
+        parts[0, i], parts[1, i] = S * r[i], N * r[i]
+        if i > 1 or wrap:
+            r[i - 1 if i > 1 else nx] += W * r[i]
+        r[i + 1] += E * r[i]
+    for i in range(2, nx + 1, 2):
+        parts[0, i] = ways[m, i] * r[i]
+        parts[1, i] = r[i] - parts[0, i]
 
 
 @piece
@@ -147,35 +196,61 @@ def correct(
                 d[k] = alike(new[last, k], unit) - alike(old[last, k], unit)
             interpolate_row(d, w, by_x, north)
             mix(south, north, ky, m, harmonic, e)
-            if truncation == 1 and differ(z, m - 1, m + 1):
-                for i in range(1, nx + 1):
-                    if z[m, i] > 0.0:
-                        if z[m - 1, i] <= 0.0 and z[m + 1, i] > 0.0 and reforms(z, m - 1, i, ring):
-                            e[i] = north[i]
-                        elif z[m + 1, i] <= 0.0 and z[m - 1, i] > 0.0 and reforms(z, m + 1, i, ring):
-                            e[i] = south[i]
+            if truncation == 1:
+                follow_across(z, m, south, north, ring, e)
         else:
             e[:] = south
         if truncation == 1 and by_x:
-            for i in range(1, nx + 1, 2):
-                if z[m, i] > 0.0 and z[m, i - 1] <= 0.0 and z[m, i + 1] > 0.0:
-                    e[i] = e[i + 1]
+            follow_along(z, m, e)
         if truncation == 2:
-            for i in range(1, nx + 1):
-                left, right = (i // 2, (i + 1) // 2) if by_x else (i, i)
-                full = z[m, i] > 0.0
-                for J in (row, last):
-                    for k in (left, right):
-                        if ((new[J, k] > 0.0) != full or (old[J, k] > 0.0) != full) and new[J, k] != old[J, k]:
-                            e[i] = 0.0
+            drop(z, m, new, old, row, last, by_x, e)
         for i in range(1, nx + 1):
             here = z[m, i]
-            moved = here + (e[i] if here > 0.0 else e[i] / unit)
-            if truncation > 0 and (moved > 0.0) != (here > 0.0):
-                moved = here if truncation == 2 else 1e-300 if here > 0.0 else 0.0
-            z[m, i] = moved
-            added[i] += (moved - here) ** 2
+            z[m, i] = moved(here, e[i] if here > 0.0 else e[i] / unit, truncation)
+            added[i] += (z[m, i] - here) ** 2
     return added.sum()
+
+
+@piece
+def follow_across(z: Array, m: int, south: Array, north: Array, ring: bool, e: Array) -> None:
+    """Where the film reforms, points of row m corrected as the coarse line in full film beside it is."""
+    if not differ(z, m - 1, m + 1):
+        return
+    for i in range(1, z.shape[1] - 1):
+        if z[m, i] > 0.0:
+            if z[m - 1, i] <= 0.0 and z[m + 1, i] > 0.0 and reforms(z, m - 1, i, ring):
+                e[i] = north[i]
+            elif z[m + 1, i] <= 0.0 and z[m - 1, i] > 0.0 and reforms(z, m + 1, i, ring):
+                e[i] = south[i]
+
+
+@piece
+def follow_along(z: Array, m: int, e: Array) -> None:
+    """The same of points behind a cavitated one, by the next point to the east."""
+    for i in range(1, z.shape[1] - 1, 2):
+        if z[m, i] > 0.0 and z[m, i - 1] <= 0.0 and z[m, i + 1] > 0.0:
+            e[i] = e[i + 1]
+
+
+@piece
+def drop(z: Array, m: int, new: Array, old: Array, row: int, last: int, by_x: bool, e: Array) -> None:
+    """No correction of points with a coarse neighbour that lies, or lay, on the other side of the front."""
+    for i in range(1, z.shape[1] - 1):
+        left, right = (i // 2, (i + 1) // 2) if by_x else (i, i)
+        full = z[m, i] > 0.0
+        for J in (row, last):
+            for k in (left, right):
+                if ((new[J, k] > 0.0) != full or (old[J, k] > 0.0) != full) and new[J, k] != old[J, k]:
+                    e[i] = 0.0
+
+
+@piece
+def moved(here: float, by: float, truncation: int) -> float:
+    """z after a correction, which stops at a front, or is none there (`correct`)."""
+    there = here + by
+    if truncation > 0 and (there > 0.0) != (here > 0.0):
+        return here if truncation == 2 else 1e-300 if here > 0.0 else -1e-300
+    return there
 
 
 @piece
