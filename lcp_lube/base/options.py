@@ -77,11 +77,9 @@ def recipe(name: str | None) -> Iterator[str | None]:
 
 def _renamed(options: dict[str, str]) -> dict[str, str]:
     """Options by their names in this release of PETSc."""
-    version, new = PETSc.Sys.getVersion(), {}
-    for name, value in options.items():
-        since, later, setting = RENAMED.get(name, (version, name, value))
-        new |= {later: setting} if version >= since else {name: value}
-    return new
+    version = PETSc.Sys.getVersion()
+    found = ((key, value, *RENAMED.get(key, (version, key, value))) for key, value in options.items())
+    return dict((later, setting) if version >= since else (key, value) for key, value, since, later, setting in found)
 
 
 def unread() -> list[str]:
