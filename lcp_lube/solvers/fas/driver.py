@@ -37,6 +37,7 @@ CLOSE = 1e-6  # ||G|| below which a ring that is hardly fed is not what has stal
 FEW = 0.05  # part of a ring's line that is full, below which it is hardly fed
 FED = 3e-5  # of the certificate's tolerance: the flow that a film with supplies may lose, 3e-12 in parts of what flows
 SLOW, EARLY = 0.15, 0.16  # a cycle whose iterates are mixed leaves more than that; two cycles, where coarse grids mislead
+VAIN = 0.5  # and two cycles, where it is corrections that are cut off at fronts
 SLOWER, LEAST_FALL = 2.5, (0.04, 0.2)  # times what an F cycle leaves is what a V cycle does in its place; at least, in time too
 
 
@@ -60,7 +61,7 @@ class Fas(FilmCycles):
 
     Options = FasOptions
     problem: LubricationProblem
-    state = ("z", "norm", "_recent", "_taken", "_first", "_depth")
+    state = ("z", "norm", "_recent", "_taken", "_first", "_depth", "_truncation")
 
     def __init__(self, job: Job):
         super().__init__(job)
@@ -215,19 +216,30 @@ class Fas(FilmCycles):
         self._levels, self._fields = [], None
 
     def _retreat(self) -> bool:
-        """Do without the coarsest grids, on which the film's cavities are too small to be seen; false if that has been tried.
+        """Do without the coarsest grids, or where little is gained correct points beyond their front; false if all is done.
 
-        The finest grid that can be solved exactly takes their place: the problem's own one if it is small.
+        On the coarsest grids the film's cavities may be too small to be seen. The finest grid that can be solved exactly takes
+        their place: the problem's own one if it is small. Where a front crosses a deep dimple, corrections that stop at it
+        overshoot there, this way and that from cycle to cycle.
         """
         own = self._levels[0].nx * self._levels[0].ny
         around = self._levels[0].periodic[0] and own > OWN and self.norm > CLOSE  # what goes round has no coarse grid
         if (around and self._hardly_fed) or self._following is not None:
             return False
-        for points in EXACT if own > OWN else (OWN,):
-            for k, level in enumerate(self._levels[: self._depth - 1]):
-                if level.nx * level.ny <= points:
-                    self._depth, self._recent = k + 1, (inf,) * WINDOW
-                    if self._mixing:
-                        self._mixing.forget()
-                    return True
-        return False
+        if self._mixing and self._truncation == TRUNCATIONS["clip"] and self.norm > VAIN * self._recent[1]:
+            self._truncation = TRUNCATIONS["none"]
+        elif (depth := self._less_deep()) is not None:
+            self._depth = depth
+        else:
+            return False
+        self._recent = (inf,) * WINDOW
+        if self._mixing:
+            self._mixing.forget()
+        return True
+
+    def _less_deep(self) -> int | None:
+        """How many grids are left without the next coarsest ones; None if no fewer can do."""
+        own = self._levels[0].nx * self._levels[0].ny
+        sizes = [level.nx * level.ny for level in self._levels[: self._depth - 1]]
+        found = (k + 1 for points in (EXACT if own > OWN else (OWN,)) for k, size in enumerate(sizes) if size <= points)
+        return next(found, None)
