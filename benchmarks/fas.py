@@ -5,7 +5,7 @@
 Experiments: factors, linear, points, bytes, options, ranks, threads, small (see EXPERIMENTS); rows go to
 benchmarks/results/fas.csv, and cases that stand there already are not run again: another --results begins anew. Every case
 is a process of its own. Seconds are medians, by the clock and of the processor; on a machine that others use (`load`) the
-second ones are to be trusted. --tables prints the rows of the tables in docs/nonlinear_multigrid.md.
+second ones are to be trusted. --tables prints the rows of the tables in docs/nonlinear_multigrid_measured.md.
 """
 
 import argparse
@@ -323,7 +323,7 @@ def child(experiment: str, case: tuple[str, int, str], repeats: int) -> Values:
 
 
 def tables(rows: list[dict[str, str]]) -> Iterator[str]:
-    """Lines of the two tables of docs/nonlinear_multigrid.md that follow from rows by film and grid."""
+    """Lines of the two tables of docs/nonlinear_multigrid_measured.md that follow from rows by film and grid."""
     of = {(row["experiment"], row["film"], int(row["n"])): row for row in rows}
     for film in FILMS:
         found = [of.get(("factors", film, n)) for n in (127, 255, 511, 1023, 2047, 4095)]
