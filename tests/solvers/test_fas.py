@@ -471,7 +471,7 @@ def test_rings_take_hardly_more_cycles_than_open_films(scene):
 
 
 def test_fronts_through_dimples_four_times_as_deep_as_the_film():
-    """Corrections that stop at them overshoot this way and that: after two such cycles none is cut off (factor 1.0, now 0.4)."""
+    """Corrections that stop at them overshoot this way and that: after two such cycles none is cut off (1.0, now 0.4)."""
     with run("textured_slider", {"K": 5, "depth": 60e-6, "n": 255}, stopping={"eps1": 1e-8}) as solution:
         assert solution.converged and solution.took_over is None
         assert solution.settings["details"]["convergence_factor"] < 0.5
