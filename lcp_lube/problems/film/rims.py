@@ -56,7 +56,7 @@ def cut_faces(
     d = np.where(d < 0.0, d + period, d)
     middle = a + 0.5 * d
     cut, crossed, wide = np.zeros((3, lines.size, d.size), dtype=bool)
-    oblique = np.zeros(cut.shape)
+    oblique, jump = np.zeros((2, *cut.shape))
     if not along_flow:
         (reforms, near), cavity = _beside_cavities(cavity), cavity[1:]
     beside = []
@@ -73,6 +73,7 @@ def cut_faces(
                 wide |= side
             across = by_rim
         cut, crossed = cut | by_rim, crossed | across
+        jump[across] = np.maximum(jump[across], jump_of(rim))
         if not along_flow:
             j, i = np.nonzero(by_rim & reforms & (d > 0.0))
             oblique[j, i] = _normal(rim, middle[i], d[i], lines[j], widths[j], False)[1]
@@ -86,7 +87,7 @@ def cut_faces(
             at, row = i[k], j[k]
             dry = cavity[row, at], cavity[row, at + 1]
             places = (lines[row] + share * widths[row] for share in (np.arange(sides) + 0.5) / sides - 0.5)
-            parts = [_looked(film, a[at], d[at], line, looks, *dry, along_flow) for line in places]
+            parts = [_looked(film, a[at], d[at], line, looks, jump[row, at], *dry, along_flow) for line in places]
             cubes[k], films[k], along = np.mean(parts, axis=0)
             cubes[k] += oblique[row, at] * (along - cubes[k])
     for depth, away, length in beside:
@@ -96,12 +97,12 @@ def cut_faces(
 
 
 def _looked(
-    film: Shape, a: Array, d: Array, lines: Array, looks: int, dry_first: Flags, dry_last: Flags, along_flow: bool
+    film: Shape, a: Array, d: Array, lines: Array, looks: int, jump: Array, dry_first: Flags, dry_last: Flags, along_flow: bool
 ) -> tuple[Array, Array, Array]:
     """C and H of faces of these lengths from a on along lines, of what resists there; and the mean of h^3."""
     places = np.array([0.0, *(np.arange(looks) + 0.5) / looks, 1.0])[:, None]  # the points too
     h = np.broadcast_to(film(a + d * places, lines), (places.size, a.size))
-    resists = _resists(np.real(h), dry_first, dry_last, along_flow)
+    resists = _resists(np.real(h), jump, dry_first, dry_last, along_flow)
     inverse = 1.0 / h[1:-1]
     drag = np.where(resists[1:-1], inverse * inverse, 0.0)
     resistance = np.mean(drag * inverse, axis=0)
@@ -136,6 +137,12 @@ def _normal(rim: Shape, t: Array, d: Array, s: Array, w: Array, along_flow: bool
 def depth_of(rim: Any) -> float:
     """By how much the film jumps at a slanted edge, m; 0 at other rims, and where a film has any depth there."""
     return float(getattr(_own(rim), "depth", 0.0))
+
+
+def jump_of(rim: Any) -> float:
+    """By how much the film jumps at a slanted edge or a round rim, m, without sign; 0 at a dome's and where it is not known."""
+    dimples = getattr(_own(rim), "__self__", None)
+    return abs(depth_of(rim)) if dimples is None else abs(float(np.real(dimples.depth))) * dimples.oblique
 
 
 def _jumps(rim: Any) -> bool:
@@ -178,13 +185,14 @@ def _layer(depth: float, away: Array, length: Array, h: Array) -> tuple[Array, A
     return part * hat * K * K / (K + K_other), 1.0 / (h * h + h * other + other * other)
 
 
-def _resists(h: Array, dry_first: Flags, dry_last: Flags, along_flow: bool) -> Flags:
+def _resists(h: Array, jump: Array, dry_first: Flags, dry_last: Flags, along_flow: bool) -> Flags:
     """Which part of faces resists, from the film at their looks, shape (looks, faces): before a cavity the thin film alone.
 
+    jump : by how much the film does where their rim is. Looks that differ by less than half of it all lie on one side.
     dry_first, dry_last : whether the points at their ends, the first and last looks, are cavitated.
     """
     thinnest, thickest = h.min(axis=0), h.max(axis=0)
-    thin = h <= thinnest + THIN * (thickest - thinnest)
+    thin = (h <= thinnest + THIN * (thickest - thinnest)) | (thickest - thinnest < 0.5 * jump)
     first, last = ~thin[0], ~thin[-1]  # whether the points lie in the recess
     void = np.where(first == last, dry_first & dry_last, np.where(last, dry_last, dry_first & np.bool_(not along_flow)))
     if along_flow:  # the film before the first place where it becomes thick
