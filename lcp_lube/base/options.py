@@ -78,8 +78,8 @@ def recipe(name: str | None) -> Iterator[str | None]:
 def _renamed(options: dict[str, str]) -> dict[str, str]:
     """Options by their names in this release of PETSc."""
     version = PETSc.Sys.getVersion()
-    found = ((key, value, *RENAMED.get(key, (version, key, value))) for key, value in options.items())
-    return dict((later, setting) if version >= since else (key, value) for key, value, since, later, setting in found)
+    later = {old: (new, value) for old, (since, new, value) in RENAMED.items() if version >= since}
+    return dict(later.get(name, (name, value)) for name, value in options.items())
 
 
 def unread() -> list[str]:

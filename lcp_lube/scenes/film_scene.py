@@ -214,7 +214,8 @@ class RectangleScene(FilmScene):
 
     def with_shape(self, shape: tuple[int, ...]) -> Self:
         """The film that has been made is that of any grid, unless its lines are graded."""
-        scene, made = self.model_copy(update=dict(zip(("nx", "ny"), shape, strict=False))), self._made
+        scene: Any = super().with_shape(shape)
+        made = self._made
         if made is not None and made[0] == vars(self) and made[2].places is None and not made[2].effects:
             scene._made = dict(vars(scene)), *made[1:]
         return scene

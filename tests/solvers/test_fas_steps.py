@@ -1,5 +1,7 @@
 """Multigrid's grids of films with steps: what corrections cost, transposed transfers, pockets with corners between points."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 
@@ -60,12 +62,18 @@ def transfers(fine, coarse):
     return columns(fine, coarse, interpolated), columns(coarse, fine, restricted)
 
 
-@pytest.mark.parametrize("nx, ny", [(15, 15), (14, 15), (15, 14), (14, 12)])
-@pytest.mark.parametrize("ring", [(False, False), (True, False), (False, True), (True, True)])
+# Between periodic sides an odd number of points is not coarsened.
+COARSENED = [
+    (nx, ny, ring)
+    for nx, ny in ((15, 15), (14, 15), (15, 14), (14, 12))
+    for ring in product((False, True), repeat=2)
+    if not (ring[0] and nx % 2) and not (ring[1] and ny % 2)
+]
+
+
+@pytest.mark.parametrize("nx, ny, ring", COARSENED)
 def test_no_correction_costs_less_than_half_of_what_it_should(nx, ny, ring):
     """x' P' A P x <= 2 x' A_H x, with restriction the transposed interpolation, for any conductances."""
-    if (ring[0] and nx % 2) or (ring[1] and ny % 2):
-        pytest.skip("not coarsened")
     rng = np.random.default_rng(nx + 20 * ny)
     fine = level_of(nx, ny, ring, lambda shape: 1e6 ** rng.random(shape))
     coarse = _coarser(fine, True)

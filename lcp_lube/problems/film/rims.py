@@ -87,9 +87,9 @@ def cut_faces(
             at, row = i[k], j[k]
             dry = cavity[row, at], cavity[row, at + 1]
             places = (lines[row] + share * widths[row] for share in (np.arange(sides) + 0.5) / sides - 0.5)
-            parts = [_looked(film, a[at], d[at], line, looks, jump[row, at], *dry, along_flow) for line in places]
-            cubes[k], films[k], along = np.mean(parts, axis=0)
-            cubes[k] += oblique[row, at] * (along - cubes[k])
+            edges = jump[row, at], oblique[row, at]
+            parts = [_looked(film, a[at], d[at], line, looks, *edges, *dry, along_flow) for line in places]
+            cubes[k], films[k] = np.mean(parts, axis=0)
     for depth, away, length in beside:
         more, slope = _layer(depth, away[j, i], length[j, i], film(middle[i], lines[j]))
         cubes, films = cubes + more, films + slope * more
@@ -97,16 +97,20 @@ def cut_faces(
 
 
 def _looked(
-    film: Shape, a: Array, d: Array, lines: Array, looks: int, jump: Array, dry_first: Flags, dry_last: Flags, along_flow: bool
-) -> tuple[Array, Array, Array]:
-    """C and H of faces of these lengths from a on along lines, of what resists there; and the mean of h^3."""
+    film: Shape, a: Array, d: Array, lines: Array, looks: int,
+    jump: Array, oblique: Array, dry_first: Flags, dry_last: Flags, along_flow: bool,
+) -> tuple[Array, Array]:  # fmt: skip
+    """C and H of faces of lengths d from a on, of what resists there; oblique : the part that leads side by side."""
     places = np.array([0.0, *(np.arange(looks) + 0.5) / looks, 1.0])[:, None]  # the points too
     h = np.broadcast_to(film(a + d * places, lines), (places.size, a.size))
     resists = _resists(np.real(h), jump, dry_first, dry_last, along_flow)
     inverse = 1.0 / h[1:-1]
     drag = np.where(resists[1:-1], inverse * inverse, 0.0)
     resistance = np.mean(drag * inverse, axis=0)
-    return 1.0 / resistance, np.mean(drag, axis=0) / resistance, np.mean(h[1:-1] ** 3, axis=0)
+    cubes, films = 1.0 / resistance, np.mean(drag, axis=0) / resistance
+    if (k := np.flatnonzero(oblique)).size:
+        cubes[k] += oblique[k] * (np.mean(h[1:-1, k] ** 3, axis=0) - cubes[k])
+    return cubes, films
 
 
 def _beside_cavities(cavity: Flags) -> tuple[Flags, Flags]:
@@ -141,13 +145,18 @@ def depth_of(rim: Any) -> float:
 
 def jump_of(rim: Any) -> float:
     """By how much the film jumps at a slanted edge or a round rim, m, without sign; 0 at a dome's and where it is not known."""
-    dimples = getattr(_own(rim), "__self__", None)
+    dimples = _dimples_of(rim)
     return abs(depth_of(rim)) if dimples is None else abs(float(np.real(dimples.depth))) * dimples.oblique
 
 
 def _jumps(rim: Any) -> bool:
     """Whether the film jumps at a round rim: at a dome's it does not, and drawn films with domes lose by lines side by side."""
-    return bool(getattr(getattr(_own(rim), "__self__", None), "oblique", True))
+    return bool(getattr(_dimples_of(rim), "oblique", True))
+
+
+def _dimples_of(rim: Any) -> Any:
+    """Whose rim it is, if it is that of round recesses."""
+    return getattr(_own(rim), "__self__", None)
 
 
 def _own(rim: Any) -> Any:
