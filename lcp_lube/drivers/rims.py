@@ -11,9 +11,9 @@ from typing import Any
 from petsc4py import PETSc
 
 from ..problems.facts import Facts
-from ..problems.film.cavity import cavitated
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
+from ..problems.film.rims import state_of
 from ..problems.film.stored import Dry
 from ..problems.solution import Solution
 from ..scenes.moving import film_of
@@ -59,11 +59,11 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     problem: Any = first.problem
     if not first.converged:
         return first
-    dry = cavitated(problem.reduce, first.fields["p"], first.fields["r"]).astype(float)
-    count = int(problem.reduce.sum(dry))
+    state = state_of(problem, first.fields["p"], first.fields["r"])
+    count = int(problem.reduce.sum((state > 0.0).astype(float)))
     again = replace(ask, start=first, nested=False, monitor=None, checkpoint=None, resume=None)
     second = (
-        inner(Revised(scene, Dry(dry, problem.grid)) if count else scene, again)
+        inner(Revised(scene, Dry(state, problem.grid)) if count else scene, again)
         if count or ask.certify or ask.cavities
         else first
     )

@@ -1,5 +1,7 @@
 """Round edges: faces that they cut, for full and for cavitated dimples."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -56,6 +58,31 @@ def test_beside_a_cavity_faces_across_the_flow_have_the_film_of_their_whole_widt
     np.testing.assert_allclose(cubes, np.full(np.count_nonzero(cut), C), rtol=1e-9)
 
 
+def dome_face(start: float, end: float, states: list[float]) -> tuple[Any, Any, Any]:
+    """C and H of the face between two points on the middle line of a dome of radius 0.6 around 1, and the film there."""
+    dome = DimpleArray("dome", 2.0, 1.2, 1, 1, (0.0, 2.0), (0.0, 2.0))
+    film = lambda t, s: 1.0 + dome(t, s)  # noqa: E731
+    state = np.array([states])
+    _, cubes, films = cut_faces(film, [dome.rim], np.array([start, end]), np.ones(1), np.full(1, 0.2), state, True)
+    return cubes, films, film(start + (end - start) * (np.arange(10_000) + 0.5) / 10_000, np.ones(1))
+
+
+@pytest.mark.parametrize("driven", [0.0, 1e-3, 0.01, 0.1, 1.0])
+@pytest.mark.parametrize("start", [0.3, 0.33, 0.39])
+def test_into_a_cavity_a_dome_lets_through_what_its_front_does(start, driven):
+    """Of all places where the film may end, p = 0 there, the front lets the least through; driven: p/(6 mu U)."""
+    cubes, films, h = dome_face(start, start + 0.2, [-driven, 1.0])
+    least = np.min((driven + np.cumsum(h**-2) * 2e-5) / (np.cumsum(h**-3) * 2e-5))
+    assert films[0] + cubes[0] * driven / 0.2 == pytest.approx(least, rel=3e-3)
+
+
+def test_in_a_dome_the_film_resists_in_series_where_both_points_are_full():
+    cubes, films, h = dome_face(1.2, 1.4, [-1.0, -2.0])
+    assert cubes == pytest.approx(1.0 / np.mean(h**-3), rel=1e-3)
+    assert films == pytest.approx(np.mean(h**-2) / np.mean(h**-3), rel=1e-3)
+    assert dome_face(1.2, 1.4, [1.0, -1.0])[0].size == 0
+
+
 def test_distance_from_the_rim():
     dimples = DimpleArray("round", 1e-6, 1.2, 2, 1, (0.0, 4.0), (0.0, 2.0))
     found = dimples.rim(np.array([1.0, 1.6, 3.0, 2.0]), np.array([1.0, 1.0, 0.0, 1.0]))
@@ -76,15 +103,16 @@ def test_round_dimples(form, value):
         solution.destroy()
 
 
-def test_the_load_over_many_grids():
-    """Its error's root mean square, in % of the load above p_c, near 80, 160 and 320 points a side; 0.43, 0.19, 0.09 before
-    faces across the flow were looked at side by side beside cavities."""
-    for sizes, most in ((range(76, 85), 0.36), (range(152, 169, 2), 0.18), (range(300, 341, 5), 0.075)):
+@pytest.mark.parametrize("form, value, most", [("round", 7.0775, (0.36, 0.18, 0.075)), ("dome", 7.2370, (0.21, 0.07, 0.036))])
+def test_the_load_over_many_grids(form, value, most):
+    """Its error's root mean square, in % of the load above p_c, near 80, 160 and 320 points a side; 0.43, 0.19, 0.09 (round)
+    before faces across the flow were looked at side by side beside cavities, 0.93, 0.28, 0.10 (domes) without their fronts."""
+    for sizes, limit in zip((range(76, 85), range(152, 169, 2), range(300, 341, 5)), most, strict=True):
         errors = []
         for n in sizes:
-            with solve(pad(n)) as solution:
-                errors.append(100.0 * (solution.numbers["pressure_integral"] / 7.0775 - 1.0))
-        assert np.sqrt(np.mean(np.square(errors))) < most, errors
+            with solve(pad(n, form)) as solution:
+                errors.append(100.0 * (solution.numbers["pressure_integral"] / value - 1.0))
+        assert np.sqrt(np.mean(np.square(errors))) < limit, errors
 
 
 def test_a_full_film_is_left_as_it_is():

@@ -26,7 +26,7 @@ from .flows import SIDES, line_shares
 from .fluid import Law
 from .lubrication import LubricationProblem
 from .reynolds import sides
-from .rims import across_flow, dry_of, made_along
+from .rims import across_flow, frame_of, made_along
 from .strip import line_weights
 
 EQUAL = 1e-12  # relative: widths of lines of one run, from places that are rounded
@@ -112,7 +112,7 @@ class ByFaces:
             q, r = q.reshape(grid.box), r.reshape(grid.box)
             self._through = columns, -columns * np.array([np.full(ny, enters), r[:, -1]]), columns * q[:, [0, -1]].T
             self._off = rims, rims * q[[0, -1]]
-        self._dry = None if problem.coefficients_for is None else dry_of(grid, problem.dry)  # where round edges cut faces
+        self._state = None if problem.coefficients_for is None else frame_of(grid, problem.dry)  # where round edges cut faces
         self._known: dict[tuple[int, bytes], tuple[Array, Array]] = {}
         self._own: dict[tuple[bool, tuple[float, ...]], Laid] = {}
 
@@ -127,10 +127,10 @@ class ByFaces:
         balances, at = out[: self.count], self._laid(grid, level(film), tuple(cut[1]))
         for some, rows in _strips(at.lines, grid.box[1]):
             C, H, before = at.along(film, rows, cut)
-            if self._dry is not None:
+            if self._state is not None:
                 C, H = np.array(C), np.array(H)
                 widths = 0.5 * at.across[:, rows].sum(axis=0)
-                made_along(film, at.x_places[0], at.y[rows], widths, self._dry[1:-1][rows], (C, H), film.period(0))
+                made_along(film, at.x_places[0], at.y[rows], widths, self._state[1:-1][rows], (C, H), film.period(0))
             positive = positive and all(bool((a > 0.0).all()) for a in (C, H, before))
             if self.drags and positive:
                 films = self._sheared(film, at, rows, before / H)
@@ -147,11 +147,11 @@ class ByFaces:
                 out[first:, :4] += np.einsum("fkal,al->fk", at.of_flows[:, :, :, some], outer)
         for some, rows in _strips(at.faces, grid.box[1]):
             C = np.array(at.over(film, rows, cut))
-            if self._dry is not None:
+            if self._state is not None:
                 ends = slice(rows[0], rows[-1] + 2)
-                dry = across_flow(grid, self._dry[ends])
+                state = across_flow(grid, self._state[ends])
                 widths = 0.5 * pairs(at.steps).sum(axis=0)
-                made_along(film, at.y_places[0][ends], at.x_places[0][1:-1], widths, dry, (C.T,), film.period(1), across=True)
+                made_along(film, at.y_places[0][ends], at.x_places[0][1:-1], widths, state, (C.T,), film.period(1), across=True)
             C *= at.widths
             positive = positive and bool((C > 0.0).all())
             balances[:, 0] += _total(at.of_faces, some, C)

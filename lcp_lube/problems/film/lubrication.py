@@ -79,7 +79,7 @@ class LubricationProblem:
         self.mu, self.U, self.p_unit, self.p_sides, self.p_c = mu, U, p_unit, p_sides, p_c
         self.exact, self.shaft, self.r_in, self.held, self.integrals = exact, shaft, r_in, held, integrals
         self.coefficients_for: Callable[[Array], tuple[BoxScheme, Any]] | None = None  # of a film with rims, by its cavities
-        self.dry: Array | None = None  # the points for which they have been made, 1 or 0; None: those of a full film
+        self.dry: Array | None = None  # for what they have been made (`rims.state_of`); None: those of a full film
         self.extras: Callable[[dict[str, Any]], dict[str, Any]] | None = None
         self.more, self.more_fields = dict[str, Any](), dict[str, tuple[Array, str]]()  # of what is solved beside p and r
         self.more_measures: dict[str, float] = {}  # of its equations, for the certificate
@@ -261,7 +261,7 @@ class LubricationProblem:
         return {"p": 0.5 * P * (root + z), "r": 0.5 * R * (root - z)}
 
     def revised(self, dry: Array | None) -> "LubricationProblem":
-        """The film with faces at round edges (`rims`), if any, made for these points, if any: 1 where cavitated. Collective."""
+        """The film with faces at round edges (`rims`), if any, made for these points, if any (`rims.state_of`). Collective."""
         if dry is None or self.coefficients_for is None:
             return self
         (other := copy(self)).dry, other.scheme = dry, pressed(self.coefficients_for(dry)[0], self.held, self.p_unit)

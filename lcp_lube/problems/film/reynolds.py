@@ -213,7 +213,7 @@ def coefficients(
     p_unit : pressure unit in Pa; p in the equations is measured in it.
     mean_cubes : take h^3 at a face as the mean of the nodal values (scene 5) instead of the film at the face.
     r_in : void fraction that enters at an open west side.
-    cavity : 1 at the owned points that are taken to be cavitated where round edges cut a face (`rims`), else 0; default 0.
+    cavity : `rims.state_of` the owned points, where round edges cut a face; default 0, of a full film.
     stored : what the cells store, in a time step.
     integrals : of a line's film (1D): fluxes between its points are exact for a full film; default: from the film at the faces.
     """

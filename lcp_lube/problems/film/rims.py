@@ -6,9 +6,10 @@ the film before it resists, and carries, and what lies behind would be a length 
 cell, an error of first order. A fixed coefficient cannot know; the answer does. So a problem with such faces is solved, its
 cavities are looked at, and it is solved once more, from the answer on, with the cut faces made for them (`drivers.rims`).
 Where a film reforms before a rim it is full for but a cell or so, and the pressure in it runs along the rim: faces across
-the flow lead there as layers do that lie so. Those beside a cavity are looked at across their whole width. Either problem
-is of the one form, with positive conductances that both cells share and Couette flows that leave one cell and enter the
-next: its solution is unique, and certificate and bands hold as ever (docs/accuracy.md).
+the flow lead there as layers do that lie so. Those beside a cavity are looked at across their whole width. In a dome, with
+a kink at the rim and no jump, films rupture and reform inside: of a face into a cavity what lies before the front resists,
+of others the whole. Either problem is of the one form, with positive conductances that both cells share and Couette flows
+that leave one cell and enter the next: its solution is unique, certificate and bands hold as ever (docs/accuracy.md).
 """
 
 from collections.abc import Callable, Sequence
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 
 from ...base.parallel import Array
 from ..grid import Grid
+from .cavity import cavitated
 from .edges import pairs
 
 Flags = NDArray[np.bool_]
@@ -30,6 +32,7 @@ TOGETHER = 2000  # faces that are looked at together, in cache
 REACH, FAR = 1.5, 4.0  # cells from a slanted edge to where it changes faces; that far, by both widths, it is looked for
 CROSSED = 0.6  # that far an edge may lie where it crosses a face; beyond there is one film
 STEP, STEEP = 1e-3, 0.1  # of a cell, for the distance's slopes; the least 2 a b of the edge's normal (a, b) in cells
+SAME = 1e-9  # of a flow: least flows that differ by less are one
 THIN = 1 / 3  # of the way from the thinnest to the thickest film of a face: what is below is the film outside a recess
 
 
@@ -39,7 +42,7 @@ def cut_faces(
     nodes: Array,
     lines: Array,
     widths: Array,
-    cavity: Flags,
+    state: Array,
     along_flow: bool,
     period: float = 0.0,
 ) -> tuple[Flags, Array, Array]:
@@ -49,16 +52,16 @@ def cut_faces(
     ----------
     film : h(t, s) in m. rims : distances to edges at (t, s), m, negative inside. nodes : t of the points, one more than faces.
     lines : s of the lines of points. widths : of their cells, m.
-    cavity : whether the points are cavitated, shape (lines, nodes); of faces across the flow with the line before the first.
+    state : of the points, as `state_of` has it, shape (lines, nodes); of faces across the flow with the line before the first.
     along_flow : whether the flow goes to larger t. period : round a ring, whose last point lies before the first.
     """
     a, d = nodes[:-1], np.diff(nodes)
     d = np.where(d < 0.0, d + period, d)
     middle = a + 0.5 * d
-    cut, crossed, wide = np.zeros((3, lines.size, d.size), dtype=bool)
+    cut, crossed, wide, domed = np.zeros((4, lines.size, d.size), dtype=bool)
     oblique, jump = np.zeros((2, *cut.shape))
     if not along_flow:
-        (reforms, near), cavity = _beside_cavities(cavity), cavity[1:]
+        (reforms, near), state = _beside_cavities(state > 0.0), state[1:]
     beside = []
     for rim in rims:
         if depth := depth_of(rim):
@@ -66,10 +69,14 @@ def cut_faces(
             away = np.abs(beside[-1][1])
             by_rim, across = away < REACH, away < CROSSED
         else:
-            away = np.abs(rim(middle[None, :], lines[:, None]))
-            by_rim = away <= 0.5 * d
-            if not along_flow and _jumps(rim):
-                by_rim |= (side := near & (away <= 0.5 * np.hypot(d, widths[:, None])))
+            away = rim(middle[None, :], lines[:, None])
+            by_rim = np.abs(away) <= 0.5 * d
+            if not _jumps(rim):
+                if along_flow:
+                    by_rim |= (away < 0.0) & (state[:, :-1] <= 0.0) & (state[:, 1:] <= 0.0)
+                domed |= by_rim
+            elif not along_flow:
+                by_rim |= (side := near & (np.abs(away) <= 0.5 * np.hypot(d, widths[:, None])))
                 wide |= side
             across = by_rim
         cut, crossed = cut | by_rim, crossed | across
@@ -77,7 +84,7 @@ def cut_faces(
         if not along_flow:
             j, i = np.nonzero(by_rim & reforms & (d > 0.0))
             oblique[j, i] = _normal(rim, middle[i], d[i], lines[j], widths[j], False)[1]
-    cut &= d > 0.0
+    cut, domed = cut & (d > 0.0), domed & (jump == 0.0)
     kind = np.asarray(film(nodes[:1], lines[:1])).dtype  # complex, where a derivative is asked for
     cubes, films = np.zeros((2, np.count_nonzero(cut)), dtype=kind)
     j, i = np.nonzero(cut)
@@ -85,10 +92,10 @@ def cut_faces(
         of = np.flatnonzero(which[j, i])
         for k in (of[first : first + TOGETHER] for first in range(0, of.size, TOGETHER)):
             at, row = i[k], j[k]
-            dry = cavity[row, at], cavity[row, at + 1]
+            ends = state[row, at], state[row, at + 1]
             places = (lines[row] + share * widths[row] for share in (np.arange(sides) + 0.5) / sides - 0.5)
-            edges = jump[row, at], oblique[row, at]
-            parts = [_looked(film, a[at], d[at], line, looks, *edges, *dry, along_flow) for line in places]
+            edges = jump[row, at], oblique[row, at], domed[row, at]
+            parts = [_looked(film, a[at], d[at], line, looks, *edges, *ends, along_flow) for line in places]
             cubes[k], films[k] = np.mean(parts, axis=0)
     for depth, away, length in beside:
         more, slope = _layer(depth, away[j, i], length[j, i], film(middle[i], lines[j]))
@@ -98,12 +105,17 @@ def cut_faces(
 
 def _looked(
     film: Shape, a: Array, d: Array, lines: Array, looks: int,
-    jump: Array, oblique: Array, dry_first: Flags, dry_last: Flags, along_flow: bool,
+    jump: Array, oblique: Array, domed: Flags, first: Array, last: Array, along_flow: bool,
 ) -> tuple[Array, Array]:  # fmt: skip
-    """C and H of faces of lengths d from a on, of what resists there; oblique : the part that leads side by side."""
+    """C and H of faces of lengths d from a on, of what resists there; oblique : the part that leads side by side.
+
+    domed : whether the film has a kink there and no jump. first, last : states of the points at the ends.
+    """
     places = np.array([0.0, *(np.arange(looks) + 0.5) / looks, 1.0])[:, None]  # the points too
     h = np.broadcast_to(film(a + d * places, lines), (places.size, a.size))
-    resists = _resists(np.real(h), jump, dry_first, dry_last, along_flow)
+    resists = domed | _resists(np.real(h), jump, first > 0.0, last > 0.0, along_flow)
+    if along_flow and (k := np.flatnonzero(domed & (last > 0.0))).size:
+        resists[1:-1, k] = _before_front(np.real(h[1:-1, k]), np.maximum(-first[k], 0.0) * looks / d[k])
     inverse = 1.0 / h[1:-1]
     drag = np.where(resists[1:-1], inverse * inverse, 0.0)
     resistance = np.mean(drag * inverse, axis=0)
@@ -111,6 +123,17 @@ def _looked(
     if (k := np.flatnonzero(oblique)).size:
         cubes[k] += oblique[k] * (np.mean(h[1:-1, k] ** 3, axis=0) - cubes[k])
     return cubes, films
+
+
+def _before_front(h: Array, driven: Array) -> Flags:
+    """Which looks, shape (looks, faces), a film that ruptures has before its front: as many as let the least flow through.
+
+    driven : by the pressure at the first point, in looks' parts of what the wall drags, 1/m2. A full film up to a place where
+    p = 0 has one flow, and of all such places the front has the least. So C and H change by second order with the front.
+    """
+    flow = (driven + np.cumsum(h**-2.0, axis=0)) / np.cumsum(h**-3.0, axis=0)
+    least = flow <= (1.0 + SAME) * flow.min(axis=0)
+    return np.logical_or.accumulate(least[::-1], axis=0)[::-1]  # up to the last one of equals
 
 
 def _beside_cavities(cavity: Flags) -> tuple[Flags, Flags]:
@@ -150,7 +173,7 @@ def jump_of(rim: Any) -> float:
 
 
 def _jumps(rim: Any) -> bool:
-    """Whether the film jumps at a round rim: at a dome's it does not, and drawn films with domes lose by lines side by side."""
+    """Whether the film jumps at a rim: at a dome's it does not."""
     return bool(getattr(_dimples_of(rim), "oblique", True))
 
 
@@ -211,18 +234,12 @@ def _resists(h: Array, jump: Array, dry_first: Flags, dry_last: Flags, along_flo
 
 
 def rims_across_x(
-    grid: Grid,
-    film: Shape,
-    rims: Sequence[Shape],
-    cavity: Array | None,
-    cubes: Array,
-    films: Array,
-    period: float,
+    grid: Grid, film: Shape, rims: Sequence[Shape], cavity: Array | None, cubes: Array, films: Array, period: float
 ) -> tuple[Array, Array]:
-    """C and H of the x faces, those that rims cut made anew; cavity: 1 at the owned points that are cavitated. Collective."""
+    """C and H of the x faces, those that rims cut made anew; cavity: `state_of` the owned points. Collective."""
     nodes, _ = grid.nodes_and_faces(0)
     cut, cut_cubes, cut_films = cut_faces(
-        film, rims, nodes, grid.y[:, 0], _widths(grid, 1), dry_of(grid, cavity)[1:-1], True, period
+        film, rims, nodes, grid.y[:, 0], _widths(grid, 1), frame_of(grid, cavity)[1:-1], True, period
     )
     cubes, films = np.array(cubes), np.array(films)
     cubes[cut], films[cut] = cut_cubes, cut_films
@@ -234,7 +251,7 @@ def rims_across_y(grid: Grid, film: Shape, rims: Sequence[Shape], cavity: Array 
     nodes, _ = grid.nodes_and_faces(1)
     turned = [partial(_swapped, rim) for rim in (film, *rims)]
     cut, cut_cubes, _ = cut_faces(
-        turned[0], turned[1:], nodes, grid.x[0], _widths(grid, 0), across_flow(grid, dry_of(grid, cavity)), False, period
+        turned[0], turned[1:], nodes, grid.x[0], _widths(grid, 0), across_flow(grid, frame_of(grid, cavity)), False, period
     )
     cubes = np.array(cubes)
     cubes.T[cut] = cut_cubes
@@ -242,15 +259,15 @@ def rims_across_y(grid: Grid, film: Shape, rims: Sequence[Shape], cavity: Array 
 
 
 def made_along(
-    film: Any, nodes: Array, lines: Array, widths: Array, dry: Flags, of: Sequence[Array], period: float, across: bool = False
+    film: Any, nodes: Array, lines: Array, widths: Array, state: Array, of: Sequence[Array], period: float, across: bool = False
 ) -> None:
     """Put C, or C and H, of the cut faces of some lines, shape (lines, faces), in the places of those of whole films.
 
-    film : with its `rims` (`edges.Around`). dry : whether the lines' nodes are cavitated, as `cut_faces` has it.
+    film : with its `rims` (`edges.Around`). state : of the lines' nodes, as `cut_faces` has it.
     across : faces along y, lines of x.
     """
     shapes = [partial(_swapped, one) if across else one for one in (film, *film.rims)]
-    cut, *found = cut_faces(shapes[0], shapes[1:], nodes, lines, widths, dry, not across, period)
+    cut, *found = cut_faces(shapes[0], shapes[1:], nodes, lines, widths, state, not across, period)
     for a, values in zip(of, found, strict=False):
         a[cut] = values
 
@@ -263,11 +280,17 @@ def _widths(grid: Grid, side: int) -> Array:
     return 0.5 * pairs(grid.steps(side)).sum(axis=0)
 
 
-def dry_of(grid: Grid, cavity: Array | None) -> Flags:
-    return grid.ghosted(np.zeros(grid.local_size) if cavity is None else cavity, outside=0.0) > 0.0
+def state_of(problem: Any, p: Array, r: Array) -> Array:
+    """What faces are made for: 1 at cavitated points, at others -p/(6 mu U), 1/m: less what the pressure drives. Collective."""
+    driven = np.maximum(p, 0.0) * problem.p_unit / np.ravel(6.0 * problem.mu * abs(problem.U)) if problem.U else 0.0
+    return np.where(cavitated(problem.reduce, p, r), 1.0, -driven)
 
 
-def across_flow(grid: Grid, dry: Flags) -> Flags:
+def frame_of(grid: Grid, state: Array | None) -> Array:
+    return grid.ghosted(np.zeros(grid.local_size) if state is None else state, outside=0.0)
+
+
+def across_flow(grid: Grid, state: Array) -> Array:
     """Of the points of a frame those that `cut_faces` asks for across the flow: line by line, the one before the first too."""
-    before = dry[:, -2:-1] & grid.periodic[0]
-    return np.concatenate([before, dry[:, 1:-1]], axis=1).T
+    before = state[:, -2:-1] * grid.periodic[0]
+    return np.concatenate([before, state[:, 1:-1]], axis=1).T

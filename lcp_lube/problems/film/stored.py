@@ -66,7 +66,7 @@ class Stored:
 
 @dataclass(frozen=True)
 class Dry:
-    """Which points of a film are cavitated, 1 or 0 at this rank's ones of its grid; a part begins at its column `first`."""
+    """Which points of a film are cavitated, as `rims.state_of` tells, on this rank; a part begins at its column `first`."""
 
     values: Array
     grid: Grid
