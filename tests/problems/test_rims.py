@@ -78,7 +78,7 @@ def test_into_a_cavity_a_dome_lets_through_what_its_front_does(start, driven):
 
 def test_in_a_dome_the_film_resists_in_series_where_both_points_are_full():
     cubes, films, h = dome_face(1.2, 1.4, [-1.0, -2.0])
-    assert cubes == pytest.approx(1.0 / np.mean(h**-3), rel=1e-3)
+    assert cubes == pytest.approx(1.0 / np.mean(h**-3), rel=2e-3)
     assert films == pytest.approx(np.mean(h**-2) / np.mean(h**-3), rel=1e-3)
     assert dome_face(1.2, 1.4, [1.0, -1.0])[0].size == 0
 

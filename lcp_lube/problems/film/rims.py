@@ -26,7 +26,7 @@ from .edges import pairs
 
 Flags = NDArray[np.bool_]
 Shape = Callable[[Array, Array], Array]
-LOOKS = 32  # between the two points of a face
+LOOKS, FEW = 32, 8  # between the two points of a face, and where the film is smooth
 WIDE = 8, 16  # lines side by side across the width of a face across the flow beside a cavity, and looks along each
 TOGETHER = 2000  # faces that are looked at together, in cache
 REACH, FAR = 1.5, 4.0  # cells from a slanted edge to where it changes faces; that far, by both widths, it is looked for
@@ -70,15 +70,14 @@ def cut_faces(
             by_rim, across = away < REACH, away < CROSSED
         else:
             away = rim(middle[None, :], lines[:, None])
-            by_rim = np.abs(away) <= 0.5 * d
+            across = by_rim = np.abs(away) <= 0.5 * d
             if not _jumps(rim):
                 if along_flow:
-                    by_rim |= (away < 0.0) & (state[:, :-1] <= 0.0) & (state[:, 1:] <= 0.0)
+                    by_rim = across | ((away < 0.0) & (state[:, :-1] <= 0.0) & (state[:, 1:] <= 0.0))
                 domed |= by_rim
             elif not along_flow:
                 by_rim |= (side := near & (np.abs(away) <= 0.5 * np.hypot(d, widths[:, None])))
                 wide |= side
-            across = by_rim
         cut, crossed = cut | by_rim, crossed | across
         jump[across] = np.maximum(jump[across], jump_of(rim))
         if not along_flow:
@@ -88,7 +87,8 @@ def cut_faces(
     kind = np.asarray(film(nodes[:1], lines[:1])).dtype  # complex, where a derivative is asked for
     cubes, films = np.zeros((2, np.count_nonzero(cut)), dtype=kind)
     j, i = np.nonzero(cut)
-    for which, (sides, looks) in ((~crossed, (1, 1)), (crossed & ~wide, (1, LOOKS)), (wide, WIDE)):
+    kinds = (~crossed & ~domed, (1, 1)), (~crossed & domed, (1, FEW)), (crossed & ~wide, (1, LOOKS)), (wide, WIDE)
+    for which, (sides, looks) in kinds:
         of = np.flatnonzero(which[j, i])
         for k in (of[first : first + TOGETHER] for first in range(0, of.size, TOGETHER)):
             at, row = i[k], j[k]
