@@ -1,12 +1,10 @@
 """Every notebook of the site runs from its first cell to its last, as a program."""
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
-from conftest import ENVIRONMENT
+from conftest import start
 
 FOLDER = Path(__file__).parents[2] / "docs" / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.md"))
@@ -20,12 +18,9 @@ def cells(path: Path) -> list[str]:
 def test_notebook_runs(path: Path, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     assert path.read_text(encoding="utf-8").startswith("---\njupytext:") and len(cells(path)) >= 3
-    program = "\n\n".join(cells(path))
-    environment = {**ENVIRONMENT, "MPLBACKEND": "Agg"}
-    done = subprocess.run(
-        [sys.executable, "-c", program], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=240, check=False
-    )
-    assert done.returncode == 0, f"{done.stdout}\n{done.stderr}"
+    program = "\n\n".join(["import matplotlib\n\nmatplotlib.use('Agg')", *cells(path)])
+    done = start(["-c", program], 1, tmp_path, timeout=240)
+    assert done.status == 0, f"{done.out}\n{done.err}"
 
 
 def test_there_are_some() -> None:
