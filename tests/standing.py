@@ -130,13 +130,15 @@ def load_loops() -> None:
     LLVM would take all of it down again when a command ends, 0.3 s: what is left of C's streams is written, and that is all.
     """
     import ctypes
+    from typing import Any
 
     try:
         from numba.core.dispatcher import Dispatcher
     except ImportError:
         return
     own = [vars(module) for name, module in sys.modules.items() if name.startswith("lcp_lube.")]
-    for loop in {value for names in own for value in names.values() if isinstance(value, Dispatcher)}:
+    loops: set[Any] = {value for names in own for value in names.values() if isinstance(value, Dispatcher)}
+    for loop in loops:
         cache, codegen = loop._cache, loop.targetctx.codegen()
         for key in cache._cache_file._load_index() if hasattr(cache, "_cache_file") else ():
             if key == cache._index_key(key[0], codegen):  # made for this processor

@@ -39,8 +39,12 @@ SCENES = (
     "textured_slider",
     "dimpled_pad",
     "dimpled_pad_round",
+    "textured_slider_face",
 )
-VARIANTS = {"dimpled_pad_round": ("dimpled_pad", {"film.dimples.form": "round"})}  # scenes of this chart alone
+VARIANTS: dict[str, tuple[str, dict[str, Any]]] = {  # scenes of this chart alone
+    "dimpled_pad_round": ("dimpled_pad", {"film.dimples.form": "round"}),
+    "textured_slider_face": ("textured_slider", {"scheme": "face"}),  # the benchmark's own scheme is of first order
+}
 SIZES = {1: (50, 100, 200, 500, 1000, 2000, 5000), 2: (31, 63, 127, 255, 511)}  # points a side by dimension
 QUICK_SIZES = {1: (50, 100), 2: (15, 31)}
 TOLERANCES = (1e-4, 1e-8)  # eps1 = eps2
