@@ -4,6 +4,8 @@ In the order in which they are looked for:
 
 constant : the pressure is the same at every open side, and the film is everywhere the same, or the wall at rest: that pressure
     is the answer.
+unpressed : no side has a pressure, and the film is nowhere narrower than where its oil comes in: there is none inside either,
+    and the void is what flow is missing.
 line : film and sides do not depend on y (both sides along the flow closed or periodic): one line is solved in 1D.
 mirror : the film is symmetric about the middle of the width, and the sides south and north are alike: half the width is solved,
     with a closed side in the middle. For an odd number of lines the middle one lies on that side and has half cells.
@@ -14,11 +16,13 @@ from math import prod
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from ..base.parallel import Array
 from ..problems.facts import Facts
+from ..problems.film.cavity import missing_flow
 from ..problems.film.edges import jumps_of
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model, Side
@@ -36,6 +40,7 @@ SAMPLE = (65, 5)  # columns and lines that are compared first, before anything i
 
 SENTENCES = {
     "constant": "nothing to solve: the pressure is the same at every side, and nothing else moves the fluid",
+    "unpressed": "nothing to solve: the film is nowhere narrower than where its oil comes in, and needs no pressure",
     "line": "solved in 1D: neither the film nor the sides depend on y",
     "mirror": "half the width is solved: the film and the sides are symmetric about its middle",
 }
@@ -104,10 +109,14 @@ class Part(Derived):
 
     def answer(self, problem: Problem) -> Fields | None:
         """The whole problem's fields, where there is nothing to solve."""
-        if self.kind != "constant":
+        if self.kind not in ("constant", "unpressed"):
             return None
         model = model_of(self.whole)
         assert model is not None and isinstance(problem, LubricationProblem)  # as `part_of` found
+        if self.kind == "unpressed":
+            missing = missing_flow(problem.scheme.c)
+            assert missing is not None  # as `part_of` found
+            return {"p": np.zeros(missing.size), "r": (missing / problem.scheme.b_C).ravel()}
         p = next(side.p for side in model.sides if side.kind == "open") / problem.p_unit
         n = problem.grid.local_size
         return {"p": np.full(n, p), "r": np.zeros(n)}
@@ -136,10 +145,18 @@ def promising(scene: Solvable) -> bool:
     y = ys[0][:, None] if ys else np.zeros((1, 1))
     with np.errstate(all="ignore"):  # a film that is not positive is reported where it is built
         h = np.broadcast_to(model.film(xs[None, :], y), (y.size, xs.size))
+        if _unfed(model) and np.all(h >= h[:, :1] * (1.0 - SAME)):
+            return True
         mirrored = model.film(xs[None, :], model.lengths[-1] - y) if ys else np.inf
         return bool(np.all(np.abs(h / h[:1] - 1.0) <= SAME) if ys else np.ptp(h) <= SAME * h.max()) or bool(
             np.all(np.abs(mirrored / h - 1.0) <= SAME)
         )
+
+
+def _unfed(model: Model) -> bool:
+    """Whether nothing but the wall moves the oil, from one side to the other."""
+    given = any(side.p for side in model.sides[: 2 * len(model.lengths)] if side.kind == "open")
+    return not (given or model.supplies or model.stored is not None or model.sides[0].kind == "periodic")
 
 
 def _at_rest(model: Model) -> bool:
@@ -166,6 +183,8 @@ def part_of(scene: Solvable, problem: Problem) -> Part | None:
     still = model.stored is None and not model.supplies and not west.r and "closed" not in (west.kind, east.kind) and not rims
     if len(pressures) == 1 and still and _is_constant(problem):
         return Part(scene, "constant")
+    if _unfed(model) and _needs_no_pressure(problem):
+        return Part(scene, "unpressed")
     if grid.dim == 1:
         return None
     if "open" not in (ends[0].kind, ends[1].kind) and not model.supplies and not rims and _all_lines_are_one(problem):
@@ -182,6 +201,12 @@ def _is_constant(problem: LubricationProblem) -> bool:
         return False  # between points, where no one looks
     h, largest = problem.scheme.h, problem.reduce.max(problem.scheme.h)
     return _all_close(problem, [(h, largest)]) and _all_close(problem, [(faces, largest) for faces in _films(problem)])
+
+
+def _needs_no_pressure(problem: LubricationProblem) -> bool:
+    """Whether the wall drags all oil on that comes in, on lines that this rank has whole. Collective."""
+    grid = problem.grid
+    return grid.comm.allreduce(grid.box[1] == grid.shape[0] and missing_flow(problem.scheme.c) is not None, MPI.LAND)
 
 
 def _all_lines_are_one(problem: LubricationProblem) -> bool:

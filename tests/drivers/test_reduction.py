@@ -221,3 +221,22 @@ def test_numpys_settings_are_the_callers():
     before = np.geterr()
     solve(load_scene("problem4", {"n": 12})).destroy()
     assert np.geterr() == before
+
+
+@pytest.mark.parametrize("shape", [{"ny": 12}, {"ny": 13, "sides": {"south": "closed"}}, {"dimension": 1, "width": None}])
+def test_a_flat_texture_needs_no_pressure(shape):
+    """No side has one, and the film is nowhere narrower than at its inlet: p = 0 and 1 - r = h_in/h, by any method."""
+    pits = {"shape": "pocket", "x_mm": [2, 7], "depth_um": 5} | ({"y_mm": [1, 5]} if "ny" in shape else {})
+    keys = {"nx": 29, "fluid": {"mu": 0.01}, **shape}
+    flat = bearing([{"shape": "constant", "h_um": 10}, pits], **keys)
+    assert kind(flat) == "unpressed"
+    with solve(flat) as least, solve(flat, reduction=False) as whole:
+        assert (least.method, least.converged, whole.converged) == ("none", True, True)
+        assert least.fields["p"].max() == 0.0 and max(least.numbers["p_max"], whole.numbers["p_max"]) < 1e-6
+        assert np.abs(least.fields["r"] - whole.fields["r"]).max() < 1e-9
+        assert least.fields["r"].max() == pytest.approx(1 / 3, rel=1e-9)
+    assert kind(bearing([{"shape": "linear", "h_start_um": 11, "h_end_um": 10}, pits], **keys)) != "unpressed"
+    assert (
+        kind(bearing([{"shape": "constant", "h_um": 10}, pits], **keys | {"fluid": {"mu": 0.01, "p_supply": 1e5}}))
+        != "unpressed"
+    )

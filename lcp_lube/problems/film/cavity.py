@@ -14,6 +14,7 @@ from ...registry import SMALL
 
 VOID = 1e-9  # void fraction up to which a film counts as full: below what any solve resolves, and nothing that one could see
 EMPTY = 1e-2  # void fraction that no full film has within the loosest certificate, however small its pressures are
+SHARP = 1e-12  # of the largest flow of void: less is rounding
 BLOCK = 65_536  # points that are looked at together
 
 
@@ -42,6 +43,19 @@ def about_to_change(reduce: Reduce, p: Array, r: Array) -> NDArray[np.bool_]:
     """Where p and r both vanish: full or cavitated, as one likes. Collective."""
     small = VOID * reduce.largest(p)
     return _looked(lambda p, r: (np.abs(p) <= small) & (np.abs(r) <= VOID), p, r)
+
+
+def missing_flow(c: Array) -> Array | None:
+    """b_C r of a film that needs no pressure, from the right-hand sides of whole lines of points; None of any other film.
+
+    Such a film is nowhere narrower than where its oil comes in, and no pressure is given beside it: p = 0, and its void is what
+    flow is missing.
+    """
+    for step in (max(1, len(c) // 4), 1):  # some lines tell most other films
+        missing = np.cumsum(c[::step], axis=1)
+        if not missing.max(initial=0.0) <= SHARP * -missing.min(initial=0.0):
+            return None
+    return np.minimum(missing, 0.0)
 
 
 def states(reduce: Reduce, p: Array, r: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:

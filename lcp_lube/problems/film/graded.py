@@ -82,13 +82,19 @@ class Pivots:
     chance, and at last the last one alone, and of such steps no set comes twice. On closed and periodic lines, where a blend
     may be singular, that is no proof. Collective.
 
+    Parameters
+    ----------
+    noisy : what the wall drags is known to one rounding, and a pressure whose sign hangs on that is none that is wrong: with
+        what the rounding makes of it, it is the answer to data that are as good (`noise`).
+
     Attributes
     ----------
     p, r : complementary but for signs; wrong : number of cells whose sign is wrong, beyond rounding of what flows there.
+    noise : pressures that one rounding of the wall's flow makes in the full cells of the last step, if `noisy`; else 0.
     """
 
-    def __init__(self, problem: "LubricationProblem", p: Array, r: Array):
-        s, self.problem = problem.scheme, problem
+    def __init__(self, problem: "LubricationProblem", p: Array, r: Array, noisy: bool = False):
+        s, self.problem, self._noisy, self.noise = problem.scheme, problem, noisy, np.zeros_like(p)
         self._a, self._b = s.diagonal.ravel(), -s.b_C.ravel()
         self.full = self._a * p >= self._b * r
         self.p, self.r = np.maximum(p, 0.0), np.maximum(r, 0.0)
@@ -119,8 +125,10 @@ class Pivots:
                 break
             last = size
         p_max, self.wrong = reduce.max(np.abs(p.astype(float))), 0
+        if self._noisy:
+            self.noise = np.where(self.full, jacobian.solve(self._rounded()), 0.0)
         for least in (UNIT, unit) if self._driven else ():  # what is surely wrong, and only then what may be
-            bad = np.where(self.full, p < -8 * least * p_max, r < -8 * least)
+            bad = np.where(self.full, p < -np.maximum(8 * least * p_max, self.noise), r < -8 * least)
             self.wrong = int(reduce.sum(bad.astype(float)))
             if self.wrong:
                 break
@@ -143,6 +151,13 @@ class Pivots:
             self.full = self.full ^ bad
             self._part()
         return reduce.max(np.abs(self.p - before))
+
+    def _rounded(self) -> Array:
+        """What one rounding of all that the wall drags through a cell's faces, oil and void, adds up to."""
+        scheme, void = self.problem.scheme, ~self.full * 1.0
+        from_west = self.problem.grid.ghosted(void, outside=0.0)[1:-1, :-2]
+        carried = self._b * void + (scheme.entering * from_west).ravel()
+        return 4 * UNIT * (2 * carried + (np.abs(scheme.couette_W) + np.abs(scheme.couette_E)).ravel())
 
     def _part(self) -> None:
         """No void in the full cells, no pressure in the others.

@@ -82,7 +82,7 @@ class GroovedProblem(LubricationProblem):
         balance, unit = self.face_flows(p, r), volume_unit(self)
         return [unit * self.reduce.sum(np.where(inside, balance, 0.0)) for inside in self.columns]
 
-    def certify(self, fields: Fields, eps1: float) -> Certificate:
+    def certify(self, fields: Fields, eps1: float, closely: bool = True) -> Certificate:
         """As for any film, over the points outside the grooves; inside, that they hold their pressure. Collective."""
         red, p, r = self.reduce, fields["p"], fields["r"]
         columns = self.columns

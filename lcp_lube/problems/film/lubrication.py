@@ -183,9 +183,9 @@ class LubricationProblem:
         self.held = held = replace(cast(Held, self.held), supplies=tuple(found))
         self.scheme = pressed(self.scheme, held, self.p_unit)
 
-    def certify(self, fields: Fields, eps1: float) -> Certificate:
+    def certify(self, fields: Fields, eps1: float, closely: bool = True) -> Certificate:
         """Certificate of the fields p and r for a run whose tolerance was eps1 (`film.certify`). Collective."""
-        found = certify(self, fields["p"], fields["r"], eps1)
+        found = certify(self, fields["p"], fields["r"], eps1, closely)
         return replace(found, measures=found.measures | self.more_measures)
 
     def boundary_flows(self, p: Array, r: Array) -> tuple[float, float, float, float]:

@@ -78,8 +78,8 @@ class TurnedProblem(LubricationProblem):
     def balance(self, p: Array, r: Array) -> Array:
         return self._here(self.moving.balance(self._there(p), self._there(r)))
 
-    def certify(self, fields: Fields, eps1: float) -> Certificate:
-        return self.moving.certify(self.there(fields), eps1)
+    def certify(self, fields: Fields, eps1: float, closely: bool = True) -> Certificate:
+        return self.moving.certify(self.there(fields), eps1, closely)
 
     def boundary_flows(self, p: Array, r: Array) -> tuple[float, float, float, float]:
         west, east, south, north = self.moving.boundary_flows(self._there(p), self._there(r))

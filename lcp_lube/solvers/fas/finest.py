@@ -6,6 +6,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ...base.parallel import Array
+from ...problems.film.cavity import missing_flow
 from ...problems.film.lubrication import LubricationProblem
 from ...problems.film.strip import frames
 from ...problems.film.tangent import renew
@@ -13,8 +14,6 @@ from ...problems.grid import Grid
 from ...problems.solution import Fields
 from . import held, kernels, loops
 from .levels import FEWEST_LINES, Level, carried
-
-SHARP = 1e-12  # of the largest flow of void: less is rounding
 
 
 def finest(problem: LubricationProblem) -> Level:
@@ -36,19 +35,17 @@ def finest(problem: LubricationProblem) -> Level:
 
 
 def unpressed(level: Level) -> bool:
-    """Put in the answer of a film that needs no pressure, if it is one; whether it is. Collective.
+    """Put in the answer of a film that needs no pressure, if it is one (`missing_flow`); whether it is. Collective.
 
-    Such a film is nowhere narrower than where its oil comes in. Its void is what flow is missing, and each of its cavities ends
-    just where it is full again, at places that coarse grids have elsewhere: cycles do not settle there.
+    Each of its cavities ends just where it is full again, at places that coarse grids have elsewhere: cycles do not settle.
     """
-    found = level.held is None and level.carry is None and not level.periodic[0]
-    for step in (max(1, level.c.shape[0] // 4), 1):  # some lines tell most other films
-        missing = np.cumsum(level.c[1:-1:step, 1:-1], axis=1) if found else np.zeros((1, 1))
-        found = found and bool(missing.max(initial=0.0) <= SHARP * -missing.min(initial=0.0))
+    plain = level.held is None and level.carry is None and not level.periodic[0]
+    missing = missing_flow(level.c[1:-1, 1:-1]) if plain else None
+    found = missing is not None
     if level.comm is not None:
         found = level.comm.allreduce(found, MPI.LAND)
     if found:
-        np.minimum(missing, 0.0, out=level.z[1:-1, 1:-1])
+        level.z[1:-1, 1:-1] = missing
         level.share(level.z)
     return found
 
