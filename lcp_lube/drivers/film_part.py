@@ -116,7 +116,7 @@ class Part(Derived):
         if self.kind == "unpressed":
             missing = missing_flow(problem.scheme.c)
             assert missing is not None  # as `part_of` found
-            return {"p": np.zeros(missing.size), "r": (missing / problem.scheme.b_C).ravel()}
+            return {"p": np.zeros(missing.size), "r": np.abs(missing / problem.scheme.b_C).ravel()}
         p = next(side.p for side in model.sides if side.kind == "open") / problem.p_unit
         n = problem.grid.local_size
         return {"p": np.full(n, p), "r": np.zeros(n)}
