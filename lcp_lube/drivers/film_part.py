@@ -145,7 +145,7 @@ def promising(scene: Solvable) -> bool:
     y = ys[0][:, None] if ys else np.zeros((1, 1))
     with np.errstate(all="ignore"):  # a film that is not positive is reported where it is built
         h = np.broadcast_to(model.film(xs[None, :], y), (y.size, xs.size))
-        if _unfed(model) and np.all(h >= h[:, :1] * (1.0 - SAME)):
+        if _dragged_alone(model) and np.all(h >= h[:, :1] * (1.0 - SAME)):
             return True
         mirrored = model.film(xs[None, :], model.lengths[-1] - y) if ys else np.inf
         return bool(np.all(np.abs(h / h[:1] - 1.0) <= SAME) if ys else np.ptp(h) <= SAME * h.max()) or bool(
@@ -153,7 +153,7 @@ def promising(scene: Solvable) -> bool:
         )
 
 
-def _unfed(model: Model) -> bool:
+def _dragged_alone(model: Model) -> bool:
     """Whether nothing but the wall moves the oil, from one side to the other."""
     given = any(side.p for side in model.sides[: 2 * len(model.lengths)] if side.kind == "open")
     return not (given or model.supplies or model.stored is not None or model.sides[0].kind == "periodic")
@@ -183,7 +183,7 @@ def part_of(scene: Solvable, problem: Problem) -> Part | None:
     still = model.stored is None and not model.supplies and not west.r and "closed" not in (west.kind, east.kind) and not rims
     if len(pressures) == 1 and still and _is_constant(problem):
         return Part(scene, "constant")
-    if _unfed(model) and _needs_no_pressure(problem):
+    if _dragged_alone(model) and _needs_no_pressure(problem):
         return Part(scene, "unpressed")
     if grid.dim == 1:
         return None

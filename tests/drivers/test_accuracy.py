@@ -429,3 +429,12 @@ def test_a_line_in_which_nothing_happens_ends_early_and_says_so(more):
         assert abs(found.load) < 1e-9
         assert len(found.levels) == 2
         assert found.outcome == "accuracy_not_reached"
+
+
+def test_upwind_is_of_first_order():
+    """Its textures' loads go up and down by per cents from grid to grid: two that agree by chance once told 0.6 % of 5."""
+    sizes = [10.0, 20.0, 40.0, 80.0]
+    best = estimate([3.0 + 1.0 / size for size in sizes], [0.0] * 4, sizes, order=1.0)
+    assert best.extrapolated and best.value == pytest.approx(3.0, abs=1e-12)
+    with solve("textured_slider", accuracy=1e-2, finest=(500, 500)) as solution:
+        assert solution.outcome == "accuracy_not_reached" and solution.settings["accuracy_estimate"] > 0.02

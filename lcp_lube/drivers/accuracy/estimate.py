@@ -87,7 +87,9 @@ class Estimate:
         return self.error / abs(self.value) if self.value and isfinite(self.value) else inf
 
 
-def estimate(values: Sequence[float], misplaced: Sequence[float], finer: Sequence[float], name: str = "") -> Estimate:
+def estimate(
+    values: Sequence[float], misplaced: Sequence[float], finer: Sequence[float], name: str = "", order: float = 2.0
+) -> Estimate:
     """The best value of a quantity and its error, from its values on grids from coarse to fine.
 
     Parameters
@@ -95,7 +97,7 @@ def estimate(values: Sequence[float], misplaced: Sequence[float], finer: Sequenc
     values : NaN where a grid gave none.
     misplaced : `misplaced_film` on the same grids.
     finer : how fine they are: meshes a side, over any number.
-    name : of the quantity, which may be one of NOISY.
+    name : of the quantity, which may be one of NOISY. order : of the scheme: of `upwind` the first, in the place of two above.
     """
     v, m = np.array(values, dtype=float), np.array(finer, dtype=float)
     usable = np.flatnonzero(np.isnan(v))
@@ -107,15 +109,15 @@ def estimate(values: Sequence[float], misplaced: Sequence[float], finer: Sequenc
     if len(v) < 3:
         return Estimate(last, inf)
     steps = np.diff(v)
-    corrections = steps / ((m[1:] / m[:-1]) ** 2 - 1.0)
+    corrections = steps / ((m[1:] / m[:-1]) ** order - 1.0)
     w = v[1:] + corrections
-    shrink = ((m[1:-1] / m[-1]) ** 2)[-2:]  # of the two grids before the last
+    shrink = ((m[1:-1] / m[-1]) ** order)[-2:]  # of the two grids before the last
     if name in NOISY:
         moves = (steps * (m[1:] / m[-1]) ** NOISY[name] / ((m[1:] / m[:-1]) ** NOISY[name] - 1.0))[-LAST:]
         error = SPREAD * float(np.sqrt(np.mean(moves * moves)))
         return Estimate(max(0.0, last + HALF * float(moves[-1])), max(error, _of_film(np.abs(steps), misplaced, last)), True)
     few = max(1.0, SPAN * (m[0] / m[-1]) ** 2)
-    left = few * float(np.max(np.abs(w[-1] - w[:-1][-2:]) * np.minimum(1.0, 4.0 * shrink)))
+    left = few * float(np.max(np.abs(w[-1] - w[:-1][-2:]) * np.minimum(1.0, 2.0**order * shrink)))
     noise = max(left, few * EXPECTED * float(np.max(np.abs(corrections[:-1][-2:]) * shrink)))
     correction = float(corrections[-1])
     whole, film = abs(correction), _of_film(np.abs(steps), misplaced, last)

@@ -33,14 +33,14 @@ class Values:
     ----------
     line : whether the film is known by quadrature (`estimate.is_known`). pairs : whether an integral of the pressure is
         estimated from each two grids (`estimate.of_pair`). least : relative error that the solves may leave on any grid.
-    rims : whether rims cut faces.
+    rims : whether rims cut faces. order : of the scheme.
 
     Attributes
     ----------
     line : a problem and its fields that have the numbers of a line that is known; None of other films.
     """
 
-    def __init__(self, line: bool, pairs: bool, least: float, rims: bool):
+    def __init__(self, line: bool, pairs: bool, least: float, rims: bool, order: float):
         self.line: tuple[LubricationProblem, Fields] | None = None
         self._known: Mapping[str, float] | None = None  # all numbers of it
         self.quantity, self.best = "", Estimate(np.nan, inf)
@@ -52,7 +52,7 @@ class Values:
         self._misplaced: list[float] = []
         self._converged = False  # on the last grid
         self._other, self._change = -2, (inf, inf)  # of the pressure from that grid on: `_change`
-        self._full, self._rims = False, rims  # _full: nothing is cavitated, and second order clean
+        self._order, self._full, self._rims = order, False, rims  # _full: nothing is cavitated, and second order clean
 
     def add(
         self, solution: Solution, before: Solution | None, earlier: Solution | None, size: float, quantity: str, value: float
@@ -85,7 +85,7 @@ class Values:
         if np.isfinite(truth):
             above = max(1.0, abs(value / truth)) if truth else 1.0  # relative to the truth, not to a value that is too large
             return Estimate(value, above * abs(value - truth) + QUADRATURE * abs(value))
-        of_all, (by_load, by_all) = estimate(values, self._misplaced, self._sizes, name), self._change
+        of_all, (by_load, by_all) = estimate(values, self._misplaced, self._sizes, name, self._order), self._change
         if not isfinite(by_load) or (name not in INTEGRALS and len(values) > 2):
             return of_all
         change = by_load if name in INTEGRALS else by_all
