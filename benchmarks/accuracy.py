@@ -4,7 +4,8 @@ Random 1D films with exact solutions (straight, smooth, stepped; tests/films.py)
 with 1023 points a side (no finer one than 511 is allowed: runs that would need it are not reached). Estimate over error: 1 and
 more is an estimate that holds. Then the scenes of the chart of speed against accuracy, scheme `face`: milliseconds of the
 processor of a run to a tolerance and of the fastest one grid of multigrid that is as good, in turn in one process, medians.
-That grid is the least of a ladder from which on all are as good; in parentheses any that is, by chance too.
+That grid is the least of a ladder from which on all are as good; in parentheses any that is, by chance too. Last the fastest that
+errs by no more than the run did, which is mostly less than its tolerance.
 
     python benchmarks/accuracy.py [--films 90] [--planes 18] [--seed 0] [--turns 9] [--scenes journal problem4]
 """
@@ -80,7 +81,7 @@ def clocked(scene: Scene, **how: Any) -> tuple[float, float]:
 def cost(name: str, turns: int) -> None:
     """Print what runs to TOLERANCES cost, and the one grid that is as good."""
     source, changes = VARIANTS.get(name, (name, {}))
-    scene: Any = load_scene(source, **changes, scheme="face")
+    scene: Any = load_scene(source, **changes | {"scheme": "face"})
     dim = len(scene.shape)
     if (exact := scene.exact()) is not None:
         truth, unsure = exact.load, 0.0
@@ -105,6 +106,8 @@ def cost(name: str, turns: int) -> None:
         beside = f"{one}: {took[one]:.1f} ms, {took[tol] / took[one]:.1f}" if one else "no grid"
         if chance and chance != one:
             beside += f" ({chance}: {took[chance]:.1f} ms, {took[tol] / took[chance]:.1f})"
+        same = min((n for n in LADDER[dim] if off[n] <= off[tol]), key=took.__getitem__, default=None)
+        beside += f"; same error {same}: {took[tol] / took[same]:.1f}" if same else "; none with this error"
         print(f"{name:<18} {tol:g}: off by {off[tol]:.1e}, {took[tol]:.1f} ms; {beside}", flush=True)
 
 
