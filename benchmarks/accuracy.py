@@ -4,8 +4,8 @@ Random 1D films with exact solutions (straight, smooth, stepped; tests/films.py)
 with 1023 points a side (no finer one than 511 is allowed: runs that would need it are not reached). Estimate over error: 1 and
 more is an estimate that holds. Then the scenes of the chart of speed against accuracy, scheme `face`: milliseconds of the
 processor of a run to a tolerance and of the fastest one grid of multigrid that is as good, in turn in one process, medians.
-That grid is the least of a ladder from which on all are as good; in parentheses any that is, by chance too. Last the fastest that
-errs by no more than the run did, which is mostly less than its tolerance.
+That grid is the least of a ladder from which on all are as good; in parentheses any that is, by chance too. Last the fastest
+that errs by no more than the run did, which is mostly less than its tolerance.
 
     python benchmarks/accuracy.py [--films 90] [--planes 18] [--seed 0] [--turns 9] [--scenes journal problem4]
 """
