@@ -153,20 +153,20 @@ def promising(scene: Solvable) -> bool:
         )
 
 
+def _given_pressures(model: Model) -> set[float]:
+    """Those of the open sides."""
+    return {side.p for side in model.sides[: 2 * len(model.lengths)] if side.kind == "open"}
+
+
 def _dragged_alone(model: Model) -> bool:
     """Whether nothing but the wall moves the oil, from one side to the other."""
-    given = any(side.p for side in model.sides[: 2 * len(model.lengths)] if side.kind == "open")
-    return not (given or model.supplies or model.stored is not None or model.sides[0].kind == "periodic")
+    moved = any(_given_pressures(model)) or model.supplies or model.stored is not None
+    return not (moved or model.sides[0].kind == "periodic")
 
 
 def _at_rest(model: Model) -> bool:
     """Whether neither the wall, nor its motion, nor a difference of pressures moves the fluid."""
-    return (
-        not model.U
-        and not model.supplies
-        and model.stored is None
-        and len({side.p for side in model.sides[: 2 * len(model.lengths)] if side.kind == "open"}) == 1
-    )
+    return not model.U and not model.supplies and model.stored is None and len(_given_pressures(model)) == 1
 
 
 def part_of(scene: Solvable, problem: Problem) -> Part | None:
@@ -176,12 +176,11 @@ def part_of(scene: Solvable, problem: Problem) -> Part | None:
         return None
     grid = problem.grid
     west, east, *ends = model.sides
-    pressures = {side.p for side in model.sides[: 2 * grid.dim] if side.kind == "open"}
     if _at_rest(model):
         return Part(scene, "constant")
     rims = model.cut  # faces see round edges that no point or middle of a face may lie in
     still = model.stored is None and not model.supplies and not west.r and "closed" not in (west.kind, east.kind) and not rims
-    if len(pressures) == 1 and still and _is_constant(problem):
+    if len(_given_pressures(model)) == 1 and still and _is_constant(problem):
         return Part(scene, "constant")
     if _dragged_alone(model) and _needs_no_pressure(problem):
         return Part(scene, "unpressed")

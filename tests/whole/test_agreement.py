@@ -47,14 +47,13 @@ def reference(name):
 
 
 def cases():
-    """Scene, method, system: all that the registry says can be; scenes of many solves, each like others', on one matrix."""
+    """Scene, method, system: all that the registry says can be."""
     for name in scene_names():
-        scene = load_scene(name)
-        kind, many = scene.facts().kind, bool(named(scene) or motion_of(scene))
+        kind = load_scene(name).facts().kind
         for method, entry in METHODS.items():
             entry = entry.of(kind)
             if kind in entry.kinds:
-                for system in (entry.systems or [""])[: 1 if many else None]:
+                for system in entry.systems or [""]:
                     yield name, method, system
 
 

@@ -9,7 +9,7 @@ from wild_films import judge, scene_of
 
 from lcp_lube.api import solve
 
-COUNT = 300
+COUNT = 500
 
 
 def test_films_that_nobody_tuned_for(tmp_path, capsys):

@@ -83,10 +83,10 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     assert tol is not None
     begin = perf_counter()
     fewest = model.fewest_meshes() if (model := film_of(scene)) is not None else ()
-    line, given = is_known(scene), given_film(scene)
+    line = is_known(scene)
     order = 1.0 if model is not None and (model.scheme == "upwind" or model.mean_cubes) else 2.0
     # Of the load in the plane each two grids give an estimate (`estimate.of_pair`).
-    pairs = quantity in (None, *INTEGRALS) and len(scene.shape) == 2 and given is not None and order > 1.0
+    pairs = quantity in (None, *INTEGRALS) and len(scene.shape) == 2 and order > 1.0 and given_film(scene) is not None
     few = FEW_KNOWN if line else FEW_PAIRS if pairs else None
     first = first_shape(scene.shape, fewest, finest, few)
     pairs = pairs and first == first_shape(scene.shape, (), finest, few)  # else its cells are as wide as what they show

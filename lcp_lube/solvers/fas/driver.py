@@ -166,12 +166,11 @@ class Fas(FilmCycles):
         with self.stages("cycles"):
             if self._taken == 1 and level.carry is not None:
                 self._relax_fronts(level)
-            if self._taken < 2 and self._finest.unpressed(level):  # to which a start is as far as none
-                pass
-            elif anew:
+            known = self._taken < 2 and self._finest.unpressed(level)  # whatever it starts from
+            if anew and not known:
                 self._tools.right_sides(self._levels[: self._depth], self._harmonic)
                 self._full_multigrid()
-            else:
+            elif not known:
                 self._cycle(0, self._kind())
         self._count()
         with self.stages("norm"):
