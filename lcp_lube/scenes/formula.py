@@ -66,10 +66,10 @@ class Formula:
 
     def __call__(self, x: Array, y: Array, t: float = 0.0) -> Array:
         """Values on the points where x and y meet (they broadcast); NaN or inf where the formula has no value."""
-        x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
-        with np.errstate(all="ignore"):
+        x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+        with np.errstate(all="ignore"):  # parts of x alone are made once for all y
             values = self._function({"x": x, "y": y, "t": np.float64(t)})
-            return np.array(np.broadcast_to(values, x.shape), dtype=float)
+            return np.array(np.broadcast_to(values, np.broadcast_shapes(x.shape, y.shape)), dtype=float)
 
     def __repr__(self) -> str:
         return f"Formula({self.text!r})"

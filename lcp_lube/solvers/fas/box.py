@@ -6,6 +6,7 @@ what a correction takes beyond a bound is cut off, and some sweeps near the edge
 which the coarse grid knows to its own mesh only. In FASCD (Bueler and Farrell) the bounds are split over the grids instead.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -39,7 +40,7 @@ class _Grid:
     def __init__(self, level: Any, bounds: Array, m: Array, x: Array, y: Array):
         self.level, self.bounds, self.m, self.x, self.y = level, bounds, m, x, y
         self.prepared, self.forces = (np.zeros((2, *level.z.shape)) for _ in range(2))
-        self.g, self.slope = (np.zeros_like(level.z) for _ in range(2))
+        self.touching = np.zeros_like(level.z)  # which points bounds hold, as `clip` tells
 
 
 class BoxFas(Cycles):
@@ -55,10 +56,10 @@ class BoxFas(Cycles):
     def __init__(self, job: Job):
         super().__init__(job)
         problem, start = self.problem, job.start
-        from . import box_kernels, finest, front_points, levels, transfer
+        from . import box_kernels, finest, front_points, levels, loops, transfer
 
-        self._kernels, self._fronts, self._transfer, self._tools = box_kernels, front_points, transfer, levels
-        self._finest = finest
+        self._kernels, self._fronts, self._transfer, self._loops = box_kernels, front_points, transfer, loops
+        self._finest, self._tools = finest, levels
         if not isinstance(problem, ObstacleProblem):
             raise InputError("--method fas: for obstacle problems on a rectangle; use active-set")
         self._source = problem.semilinear.source
@@ -67,7 +68,7 @@ class BoxFas(Cycles):
         self._levels = [grid.level for grid in self._grids]
         self._begin(start is not None)
         self.v = problem.v0 if start is None else np.clip(start["v"], problem.lower, problem.upper)
-        self.norm = self._first = self._residual(self._grids[0])
+        self.norm = self._first = self._norm()
 
     def _hierarchy(self, semilinear: SemilinearProblem) -> list[_Grid]:
         grid, tools = self.problem.grid, self._tools
@@ -125,43 +126,35 @@ class BoxFas(Cycles):
             else:
                 self._cycle(0, self.options.cycle)
         self._count()
-        self.norm = self._residual(self._grids[0])
+        self.norm = self._norm()
         if self._taken == 1:
             self._first = self.norm
         reduce, after = self.problem.reduce, self.v
-        size = max(reduce.max(np.abs(after)), self.problem.idle[0]) or 1.0
-        return Step(self.norm, reduce.max(np.abs(after - before)) / size, 1.0)
+        size = max(reduce.largest(after), self.problem.idle[0]) or 1.0
+        return Step(self.norm, reduce.largest(np.subtract(after, before, out=before)) / size, 1.0)
 
-    def _evaluate(self, grid: _Grid, slope: bool = False) -> None:
-        """g, and its slope if wanted, at v."""
-        v, x, y = grid.level.z[1:-1, 1:-1], grid.x[None, :], grid.y[:, None]
-        grid.g[1:-1, 1:-1] = self._source.value(x, y, v)
-        if slope:
-            grid.slope[1:-1, 1:-1] = self._source.slope(x, y, v)
+    def _evaluated(self, grid: _Grid, of: Callable[[Array, Array, Array], Any]) -> Any:
+        """g, or what else the source tells, at v of the points."""
+        return of(grid.x[None, :], grid.y[:, None], grid.level.z[1:-1, 1:-1])
 
-    def _residual(self, grid: _Grid) -> float:
-        """Fill `forces` with the residual, free and held; returns the finest grid's norm. Collective."""
-        level, reduce = grid.level, self.problem.reduce
-        self._evaluate(grid)
-        largest, terms = self._kernels.residual(
-            level.z, level.kx, level.ky, level.c, grid.m, grid.g, grid.bounds, grid.forces[0], grid.forces[1]
-        )
-        if level is not self._grids[0].level:
-            return largest
+    def _norm(self) -> float:
+        """The finest grid's. Collective."""
+        grid, reduce = self._grids[0], self.problem.reduce
+        level, g = grid.level, self._evaluated(grid, self._source.value)
+        largest, terms = self._kernels.norms(level.z, level.kx, level.ky, level.c, grid.m, g, grid.bounds)
         terms = reduce.sum(np.array([terms])) if level.comm is not None else terms
         return reduce.max(np.array([largest])) / (max(terms / self.problem.unknowns, self.problem.idle[1]) or 1.0)
 
     def _relax(self, grid: _Grid, sweeps: int, down: bool, near: bool = False) -> None:
         """Linearise at v and sweep, at first the points near the edges of the contact if wanted. Collective."""
         level, o = grid.level, self.options
-        self._evaluate(grid, slope=True)
-        self._kernels.linearise(
-            level.z, level.kx, level.ky, level.c, grid.m, grid.g, grid.slope, grid.prepared[0], grid.prepared[1]
-        )
+        g, slope = self._evaluated(grid, self._source.both)
+        self._kernels.linearise(level.z, level.kx, level.ky, level.c, grid.m, g, slope, grid.prepared[0], grid.prepared[1])
         arrays = (level.z, level.kx, level.ky, grid.bounds, grid.prepared)
         if near and o.front:
-            touching = np.where((level.z <= grid.bounds[0]) | (level.z >= grid.bounds[1]), -1.0, 1.0)
-            spans, found = self._fronts.front_spans(touching, o.width)
+            spans, found = self._fronts.front_spans(
+                grid.touching, o.width, False, 1, 0
+            )  # what is left out takes longer to look up
             level.work += o.front * self._kernels.sweep_spans(*arrays, spans, found, o.front)
             level.share(level.z)
         for count in [1] * sweeps if level.split else [sweeps] * bool(sweeps):
@@ -190,11 +183,12 @@ class BoxFas(Cycles):
     def _add(self, level: Any, coarse: Any, old: Array) -> None:
         """Add the interpolated difference of the coarse grid's v and `old`."""
         arrays = (level.z, coarse.part(coarse.z), old, level.kx, level.ky)
-        self._transfer.correct(*arrays, level.first, level.by_x, level.by_y, False, 0)
+        self._loops.correct(*arrays, level.first, level.by_x, level.by_y, False, 0, False, 1.0)
 
     def _clip(self, grid: _Grid) -> None:
-        np.clip(grid.level.z, grid.bounds[0], grid.bounds[1], out=grid.level.z)
-        grid.level.share(grid.level.z)
+        self._kernels.clip(grid.level.z, grid.bounds, grid.touching)
+        for a in (grid.level.z, grid.touching):
+            grid.level.share(a)
 
     def _solve_coarsest(self, k: int) -> None:
         level = self._levels[k]
@@ -206,16 +200,17 @@ class BoxFas(Cycles):
         level, lower = grid.level, coarse.level
         lower.work_on()
         self._relax(grid, self.options.pre, False)
-        self._residual(grid)
+        g = self._evaluated(grid, self._source.value)
+        self._kernels.forces(level.z, level.kx, level.ky, level.c, grid.m, g, grid.bounds, grid.forces[0], grid.forces[1])
         for part in range(2):
             level.share(grid.forces[part])
             self._tools.restrict(level, lower, coarse.forces[part], False, grid.forces[part])
             lower.share(coarse.forces[part])
         self._inject(grid, coarse, lower.old)
         lower.z[:] = lower.old
-        self._evaluate(coarse)
+        g = self._evaluated(coarse, self._source.value)
         self._kernels.coarse_right_side(
-            lower.z, lower.kx, lower.ky, coarse.m, coarse.g, coarse.bounds, coarse.forces[0], coarse.forces[1], lower.c
+            lower.z, lower.kx, lower.ky, coarse.m, g, coarse.bounds, coarse.forces[0], coarse.forces[1], lower.c
         )
 
     def _ascend(self, k: int) -> None:

@@ -1,6 +1,7 @@
 """Loops of the obstacle problem's multigrid over one rank's points, compiled when this module is imported.
 
-Arrays as in `kernels`, all with a frame. f(v)_i = sum of k (v_i - v_neighbour) - m g(v_i) - c_i; m is the area of the cell.
+Arrays as in `kernels`, with a frame, but for g and its slope, which have the points alone.
+f(v)_i = sum of k (v_i - v_neighbour) - m g(v_i) - c_i; m is the area of the cell.
 """
 
 import numpy as np
@@ -8,6 +9,17 @@ from numpy.typing import NDArray
 
 from ...base.compiled import kernel, piece
 from ...base.parallel import Array
+
+
+@kernel
+def clip(v: Array, bounds: Array, touching: Array) -> None:
+    """v within the bounds; touching : -1 at points on one of them, 1 at others, as `front_points` tells full from cavitated."""
+    for j in range(v.shape[0]):
+        for i in range(v.shape[1]):
+            here, lower, upper = v[j, i], bounds[0, j, i], bounds[1, j, i]
+            here = lower if here < lower else here  # NaN stays NaN
+            here = upper if here > upper else here
+            v[j, i], touching[j, i] = here, -1.0 if here <= lower or here >= upper else 1.0
 
 
 @kernel
@@ -20,9 +32,9 @@ def linearise(v: Array, kx: Array, ky: Array, c: Array, m: Array, g: Array, slop
     for j in range(1, v.shape[0] - 1):
         for i in range(1, v.shape[1] - 1):
             total = kx[j, i] + kx[j, i + 1] + ky[j, i] + ky[j + 1, i]
-            diagonal = max(total - m[j, i] * slope[j, i], 0.5 * total)
+            diagonal = max(total - m[j, i] * slope[j - 1, i - 1], 0.5 * total)
             over[j, i] = 1.0 / diagonal
-            source[j, i] = c[j, i] + m[j, i] * g[j, i] + (diagonal - total) * v[j, i]
+            source[j, i] = c[j, i] + m[j, i] * g[j - 1, i - 1] + (diagonal - total) * v[j, i]
 
 
 @piece
@@ -37,13 +49,54 @@ def relax(v: Array, kx: Array, ky: Array, bounds: Array, prepared: Array, j: int
         v[j, i] = west
 
 
+@piece
+def known_of_line(v: Array, kx: Array, ky: Array, prepared: Array, j: int, known: Array) -> None:
+    """What no point to the west has a say in of the relaxed points of row j, and what each takes of its western neighbour: made
+    first, by vector instructions."""
+    for i in range(1, v.shape[1] - 1):
+        t = prepared[0, j, i] + kx[j, i + 1] * v[j, i + 1] + ky[j, i] * v[j - 1, i] + ky[j + 1, i] * v[j + 1, i]
+        known[0, i] = prepared[1, j, i] * t
+        known[1, i] = prepared[1, j, i] * kx[j, i]
+
+
+@piece
+def relaxed(known: Array, bounds: Array, j: int, i: int, west: float) -> float:
+    """Point i of row j."""
+    t = known[0, i] + known[1, i] * west
+    t = t if t > bounds[0, j, i] else bounds[0, j, i]
+    return t if t < bounds[1, j, i] else bounds[1, j, i]
+
+
 @kernel
 def sweep(v: Array, kx: Array, ky: Array, bounds: Array, prepared: Array, count: int, down: bool) -> None:
-    """`count` sweeps over all points, lines upwards or down."""
+    """`count` sweeps over all points, lines upwards or down.
+
+    Two at a time: the second one follows two lines behind. The values are those of sweeps one after the other, but memory is
+    passed over once, and two chains of dependent operations overlap.
+    """
     ny, nx = v.shape[0] - 2, v.shape[1] - 2
-    for _ in range(count):
-        for line in range(ny):
-            relax(v, kx, ky, bounds, prepared, ny - line if down else line + 1, 1, nx + 1)
+    first, step = (ny, -1) if down else (1, 1)
+    known = np.empty((2, 2, nx + 2))
+    for before in range(0, count, 2):
+        both = before + 1 < count
+        for s in range(ny + 2 if both else ny):
+            m, n = first + step * s, first + step * (s - 2)
+            leads, follows = s < ny, both and s >= 2
+            if leads:
+                known_of_line(v, kx, ky, prepared, m, known[0])
+            if follows:
+                known_of_line(v, kx, ky, prepared, n, known[1])
+            if leads and follows:
+                here, behind = v[m, 0], v[n, 0]
+                for i in range(1, nx + 1):
+                    here, behind = relaxed(known[0], bounds, m, i, here), relaxed(known[1], bounds, n, i, behind)
+                    v[m, i], v[n, i] = here, behind
+                continue
+            line, k = (m, 0) if leads else (n, 1)
+            west = v[line, 0]
+            for i in range(1, nx + 1):
+                west = relaxed(known[k], bounds, line, i, west)
+                v[line, i] = west
 
 
 @kernel
@@ -61,29 +114,37 @@ def sweep_spans(
     return points
 
 
-@kernel
-def residual(
-    v: Array, kx: Array, ky: Array, c: Array, m: Array, g: Array, bounds: Array, free: Array, held: Array
-) -> tuple[float, float]:
-    """-f(v), where no bound holds v against it into `free`, where one does into `held`, 0 elsewhere.
+@piece
+def terms_of_f(v: Array, kx: Array, ky: Array, c: Array, m: Array, g: Array, j: int, i: int) -> tuple[float, float, float]:
+    """A v - b, m g(v) and the diagonal of A at a point."""
+    here = v[j, i]
+    k_W, k_E, k_S, k_N = kx[j, i], kx[j, i + 1], ky[j, i], ky[j + 1, i]
+    flow = k_W * (here - v[j, i - 1]) + k_E * (here - v[j, i + 1])
+    flow += k_S * (here - v[j - 1, i]) + k_N * (here - v[j + 1, i]) - c[j, i]
+    return flow, m[j, i] * g[j - 1, i - 1], k_W + k_E + k_S + k_N
 
-    Returns the largest part of the natural residual mid(diagonal (v - u), f, diagonal (v - l)), and the sum of |A v - b| and
-    |m g|, whose mean a residual is measured by.
-    """
+
+@kernel
+def forces(v: Array, kx: Array, ky: Array, c: Array, m: Array, g: Array, bounds: Array, free: Array, held: Array) -> None:
+    """-f(v), where no bound holds v against it into `free`, where one does into `held`, 0 elsewhere."""
+    for j in range(1, v.shape[0] - 1):
+        for i in range(1, v.shape[1] - 1):
+            flow, supply, _ = terms_of_f(v, kx, ky, c, m, g, j, i)
+            f = flow - supply
+            holds = (v[j, i] <= bounds[0, j, i] and f > 0.0) or (v[j, i] >= bounds[1, j, i] and f < 0.0)
+            free[j, i], held[j, i] = (0.0, -f) if holds else (-f, 0.0)
+
+
+@kernel
+def norms(v: Array, kx: Array, ky: Array, c: Array, m: Array, g: Array, bounds: Array) -> tuple[float, float]:
+    """The largest part of the natural residual mid(diagonal (v - u), f, diagonal (v - l)), and the sum of |A v - b| and |m g|,
+    whose mean a residual is measured by."""
     largest, terms = 0.0, 0.0
     for j in range(1, v.shape[0] - 1):
         for i in range(1, v.shape[1] - 1):
-            here = v[j, i]
-            k_W, k_E, k_S, k_N = kx[j, i], kx[j, i + 1], ky[j, i], ky[j + 1, i]
-            flow = k_W * (here - v[j, i - 1]) + k_E * (here - v[j, i + 1])
-            flow += k_S * (here - v[j - 1, i]) + k_N * (here - v[j + 1, i]) - c[j, i]
-            supply = m[j, i] * g[j, i]
-            f = flow - supply
-            holds = (here <= bounds[0, j, i] and f > 0.0) or (here >= bounds[1, j, i] and f < 0.0)
-            free[j, i], held[j, i] = (0.0, -f) if holds else (-f, 0.0)
-            diagonal = k_W + k_E + k_S + k_N
-            natural = max(min(f, diagonal * (here - bounds[0, j, i])), diagonal * (here - bounds[1, j, i]))
-            largest = max(largest, abs(natural))
+            flow, supply, diagonal = terms_of_f(v, kx, ky, c, m, g, j, i)
+            natural = min(flow - supply, diagonal * (v[j, i] - bounds[0, j, i]))
+            largest = max(largest, abs(max(natural, diagonal * (v[j, i] - bounds[1, j, i]))))
             terms += abs(flow) + abs(supply)
     return largest, terms
 
@@ -98,6 +159,6 @@ def coarse_right_side(
             here = v[j, i]
             flow = kx[j, i] * (here - v[j, i - 1]) + kx[j, i + 1] * (here - v[j, i + 1])
             flow += ky[j, i] * (here - v[j - 1, i]) + ky[j + 1, i] * (here - v[j + 1, i])
-            c[j, i] = flow - m[j, i] * g[j, i] + free[j, i]
+            c[j, i] = flow - m[j, i] * g[j - 1, i - 1] + free[j, i]
             if here <= bounds[0, j, i] or here >= bounds[1, j, i]:
                 c[j, i] += held[j, i]
