@@ -395,6 +395,26 @@ def test_fused_sweeps_are_sweeps_one_after_the_other(count, down, ring):
         np.testing.assert_allclose(z, expected, rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.parametrize("count", [1, 2, 3, 5])
+@pytest.mark.parametrize("down", [False, True])
+@pytest.mark.parametrize("ny, nx", [(1, 4), (2, 3), (3, 1), (13, 9)])
+def test_fused_sweeps_between_bounds_are_sweeps_one_after_the_other(count, down, ny, nx):
+    """The obstacle problem's, which two at a time go over; frames are left alone."""
+    from lcp_lube.solvers.fas.box_kernels import sweep
+
+    rng = np.random.default_rng(4)
+    v, kx, ky = rng.normal(size=(ny + 2, nx + 2)), rng.random((ny + 2, nx + 3)), rng.random((ny + 3, nx + 2))
+    bounds = np.sort(rng.normal(size=(2, ny + 2, nx + 2)), axis=0)
+    prepared = np.array([rng.normal(size=v.shape), rng.uniform(0.1, 0.3, v.shape)])
+    fused, single = v.copy(), v.copy()
+    sweep(fused, kx, ky, bounds, prepared, count, down)
+    for _ in range(count):
+        sweep(single, kx, ky, bounds, prepared, 1, down)
+    np.testing.assert_allclose(fused, single, rtol=1e-12, atol=1e-12)
+    assert not np.array_equal(fused, v)
+    assert np.array_equal(fused[[0, -1]], v[[0, -1]]) and np.array_equal(fused[:, [0, -1]], v[:, [0, -1]])
+
+
 OBSTACLES = {
     "both bounds": ("obstacle_bratu", {"v_upper": 0.3, "v_lower": "0.28 - 10*((x - 0.2)^2 + (y - 0.2)^2)"}),
     "no contact": ("obstacle_bratu", {}),
@@ -403,7 +423,7 @@ OBSTACLES = {
 }
 
 
-@pytest.mark.parametrize("shape", [(63, 63), (50, 71), (5, 4)])
+@pytest.mark.parametrize("shape", [(63, 63), (50, 71), (5, 4), (9, 1)])
 @pytest.mark.parametrize("case", OBSTACLES)
 def test_obstacle_problems(case, shape):
     """The active set's answer, within the bounds, at a bounded factor."""

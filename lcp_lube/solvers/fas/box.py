@@ -119,7 +119,7 @@ class BoxFas(Cycles):
         """
         if self._stalled:
             raise StalledError(f"the residual is at {self.norm:.1e} after {self._taken} cycles and has stalled (fas.stall)")
-        before = self.v
+        before = self.v.copy()  # of one line the points themselves
         with self.stages("cycles"):
             if self._taken == 0:
                 self._full_multigrid()
@@ -152,9 +152,8 @@ class BoxFas(Cycles):
         self._kernels.linearise(level.z, level.kx, level.ky, level.c, grid.m, g, slope, grid.prepared[0], grid.prepared[1])
         arrays = (level.z, level.kx, level.ky, grid.bounds, grid.prepared)
         if near and o.front:
-            spans, found = self._fronts.front_spans(
-                grid.touching, o.width, False, 1, 0
-            )  # what is left out takes longer to look up
+            # All arguments: where some are left out, a call takes a quarter of a millisecond more.
+            spans, found = self._fronts.front_spans(grid.touching, o.width, False, 1, 0)
             level.work += o.front * self._kernels.sweep_spans(*arrays, spans, found, o.front)
             level.share(level.z)
         for count in [1] * sweeps if level.split else [sweeps] * bool(sweeps):

@@ -86,6 +86,8 @@ def sweep(v: Array, kx: Array, ky: Array, bounds: Array, prepared: Array, count:
                 known_of_line(v, kx, ky, prepared, m, known[0])
             if follows:
                 known_of_line(v, kx, ky, prepared, n, known[1])
+            if not (leads or follows):  # one line alone
+                continue
             if leads and follows:
                 here, behind = v[m, 0], v[n, 0]
                 for i in range(1, nx + 1):
