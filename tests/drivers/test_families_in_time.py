@@ -115,9 +115,9 @@ def test_pads_answer_small_motions_as_their_coefficients_say():
     nu, c, a = scene.omega, scene.clearance, 1e-4
     steady = solve(scene)
     Z = next(iter(coefficients(scene, steady, [nu])))
-    x = load_scene(scene, {"motion": {"t_end": 4 * math.pi / nu, "steps": 80, "journal": [f"0.3+{a}*sin({nu}*t)", "0"]}})
+    x = load_scene(scene, {"motion": {"t_end": 3 * math.pi / nu, "steps": 60, "journal": [f"0.3+{a}*sin({nu}*t)", "0"]}})
     with solve(x) as s:
-        rows = s.history[40:]
+        rows = s.history[20:]  # the last turn: pads have forgotten the start after half of one
     steady.destroy()
     t, force = np.array([row["t"] for row in rows]), np.array([row["force_x"] for row in rows])
     in_phase, across = (2 * np.mean(force * wave(nu * t)) / (a * c) for wave in (np.sin, np.cos))

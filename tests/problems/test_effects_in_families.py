@@ -12,7 +12,7 @@ SMALL = {
     "tapered_land": {"nx": 24, "ny": 11},
     "spiral_groove": {"nx": 24, "ny": 12},
     "tilting_pad_thrust": {"nx": 19, "ny": 9},
-    "tilting_pad_journal": {"nx": 120, "ny": 5},
+    "tilting_pad_journal": {"nx": 60, "ny": 5},
     "misaligned_journal": {"nx": 72, "ny": 6},
     "hybrid_journal": {"nx": 48, "ny": 12},
     "herringbone_journal": {"nx": 48, "ny": 12},
