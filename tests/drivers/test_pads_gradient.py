@@ -11,7 +11,7 @@ from lcp_lube.scenes.values import values_of, with_values
 
 TIGHT = {"eps1": 1e-11, "max_it": 200}
 THRUST = {"nx": 19, "ny": 9, "balance.tol": 1e-11}
-JOURNAL = {"nx": 80, "ny": 5, "balance.tol": 1e-11}
+JOURNAL = {"nx": 60, "ny": 5, "balance.tol": 1e-11}
 
 
 def answer(scene, near=None):
