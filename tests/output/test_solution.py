@@ -45,7 +45,7 @@ def test_a_misspelt_argument_is_said_to_be_one() -> None:
 
 
 def small(name: str) -> Solution:
-    lobes = {"nx": 90, "ny": 5} if name in ("three_lobe_journal", "tilting_pad_journal") else {"n": 24}  # they need whole pads
+    lobes = {"nx": 60, "ny": 5} if name in ("three_lobe_journal", "tilting_pad_journal") else {"n": 24}  # they need whole pads
     return solve(name, **{**lobes, **marches.SMALL.get(name, {})})
 
 
