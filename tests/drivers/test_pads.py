@@ -11,7 +11,7 @@ from lcp_lube.drivers.ask import Ask
 from lcp_lube.drivers.loads.pad_coordinates import JournalPads, ThrustPads
 from lcp_lube.drivers.motions.coefficients import coefficients
 
-SMALL = {"nx": 60, "ny": 5}  # whole meshes from pivot to pivot, and in a pad
+SMALL = {"nx": 90, "ny": 5}  # whole meshes from pivot to pivot, and in a pad
 FLAT = {"nx": 29, "ny": 15}
 
 
