@@ -90,6 +90,7 @@ class Ask:
     monitor : called after every step with its number and record.
     progress : called by the loops over grids, levels and time steps with how far they have come.
     watch : called after every time step of a march with its `time.Moment`; collective.
+    alone : whether this film is asked for, not one of those that a search goes through (loads, pads): see `rims`.
     judge : certifies the fields of the problem that is solved in that problem's place: a part's on the whole scene's data.
     times : when a march is to end a step, s, where an error estimate says how long these are.
     comm : communicator of petsc4py or mpi4py; default all ranks.
@@ -115,6 +116,7 @@ class Ask:
     reduction: bool = True
     memory_check: bool = True
     implied: bool = False
+    alone: bool = True
     direct_below: int | None = None
     monitor: Monitor | None = None
     progress: Progress | None = None

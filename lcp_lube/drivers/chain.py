@@ -24,7 +24,7 @@ class Chain:
     """
 
     def __init__(self, ask: Ask, inner: Inner):
-        self._ask, self._inner = ask, inner
+        self._ask, self._inner = replace(ask, alone=False), inner
         self._last: Solution | None = None
         self.steps: list[Step] = []
         self._times: dict[str, float] = {}

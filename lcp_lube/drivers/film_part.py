@@ -178,7 +178,7 @@ def part_of(scene: Solvable, problem: Problem) -> Part | None:
     west, east, *ends = model.sides
     if _at_rest(model):
         return Part(scene, "constant")
-    rims = model.cut  # faces see round edges that no point or middle of a face may lie in
+    rims = model.cut or model.dry is not None  # faces see round edges that no point or middle of a face may lie in
     still = model.stored is None and not model.supplies and not west.r and "closed" not in (west.kind, east.kind) and not rims
     if len(_given_pressures(model)) == 1 and still and _is_constant(problem):
         return Part(scene, "constant")

@@ -1,26 +1,32 @@
-"""Films with round edges: solved, and solved once more with the faces that these cut made for the cavities found.
+"""Films with round edges, or that rupture where they come in: solved, and solved once more with faces made for the cavities.
 
 Whatever acts on the film, its supplies and effects settle both times, on faces that are held: those of a full film first, and
 then those of its cavities (`problems/film/rims`). So each of the two is one discrete problem, with its certificate and its
 derivatives, nothing goes round in circles, and what an effect changes goes to nothing with the effect.
+
+Faces at the side that a film comes in by (`problems/film/inlets`) are made so for films that stand by themselves: one that a
+search or a march moves on would jump where its first cavity comes and goes.
 """
 
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
 from petsc4py import PETSc
 
 from ..problems.facts import Facts
+from ..problems.film.inlets import ruptured
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.rims import state_of
 from ..problems.film.stored import Dry
 from ..problems.solution import Solution
-from ..scenes.moving import film_of
-from ..scenes.scene import Derived, Solvable
+from ..scenes.moving import film_of, motion_of
+from ..scenes.scene import Derived, Scene, Solvable
 from .ask import Ask
 from .chain import added
 from .compose import Inner
+from .turned import Mirrored
 
 # Settings of the second solve:
 LAST = ("eps1", "method", "took_over", "system", "recipe", "ksp_type", "pc_type", "supply_pressures")
@@ -47,20 +53,30 @@ class Revised(Derived):
 
 
 def applies(scene: Solvable, ask: Ask) -> bool:
-    """Whether the scene is a film whose round edges cut faces."""
+    """Whether the scene is a film whose round edges cut faces, or which may rupture where it comes in."""
     model = film_of(scene)
-    return model is not None and model.cut and model.dry is None
+    return model is not None and model.dry is None and (model.cut or (ask.alone and _by_itself(scene, model)))
+
+
+def _by_itself(scene: Any, model: Model) -> bool:
+    """Whether the film may rupture where it comes in, and nothing moves or changes it."""
+    plain = isinstance(scene.whole if isinstance(scene, Mirrored) else scene, Scene) and motion_of(scene) is None
+    return plain and model.inlet and not (model.effects or model.law or model.supplies)
 
 
 def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     """The second solution; the first where nothing is cavitated, or where there is no second one. Collective."""
+    cut = film_of(scene).cut  # type: ignore[union-attr]
     loose = ask.stopping if ask.cavities is None else {**(ask.stopping or {}), "eps1": ask.cavities}  # type: ignore[dict-item]
-    first = inner(scene, replace(ask, certify=False, stopping=loose))
+    first = inner(scene, replace(ask, certify=False, stopping=loose) if cut else ask)
     problem: Any = first.problem
     if not first.converged:
         return first
     state = state_of(problem, first.fields["p"], first.fields["r"])
-    count = int(problem.reduce.sum((state > 0.0).astype(float)))
+    found = state > 0.0 if cut else ruptured(problem.grid, state)
+    count = int(problem.reduce.sum(np.zeros(1) if found is None else found.astype(float)))
+    if not (cut or count):
+        return first
     again = replace(ask, start=first, nested=False, monitor=None, checkpoint=None, resume=None)
     second = (
         inner(Revised(scene, Dry(state, problem.grid)) if count else scene, again)

@@ -151,7 +151,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
 
         def solve_at(t: float, near: Any, shape: tuple[int, ...] = shape) -> tuple[Solution, Callable[[float], float | None]]:
             trial = as_scene(scene, {unknown.key: unknown.to_value(t)}).with_shape(shape).model_copy(update={"balance": None})
-            solution = inner(trial, replace(ask, start=near))
+            solution = inner(trial, replace(ask, start=near, alone=False))
             times.update(added(times, solution.times))
             refused.update({} if solution.converged else {t: solution.message})
             return solution, lambda W: exact_slope(trial, solution, unknown, t, W)

@@ -58,6 +58,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     -------
     Solution : settings['balance'] as of any balance; where no place carries the load, outcome LOAD_NOT_CARRIED.
     """
+    ask = replace(ask, alone=False)
     assert isinstance(scene, GroovedJournalScene) and scene.balance is not None  # as `applies` found
     table, known = scene.balance, ask.start.settings if ask.start is not None else {}
     guess = half_film_eccentricity(scene.turning, scene.mu_0, table.load)

@@ -24,6 +24,7 @@ from .effects import framed_by
 from .face_lines import FaceLines, Rows, line_factors
 from .flows import SIDES, line_shares
 from .fluid import Law
+from .inlets import made_at_inlet, ruptured
 from .lubrication import LubricationProblem
 from .reynolds import sides
 from .rims import across_flow, frame_of, made_along
@@ -112,7 +113,9 @@ class ByFaces:
             q, r = q.reshape(grid.box), r.reshape(grid.box)
             self._through = columns, -columns * np.array([np.full(ny, enters), r[:, -1]]), columns * q[:, [0, -1]].T
             self._off = rims, rims * q[[0, -1]]
-        self._state = None if problem.coefficients_for is None else frame_of(grid, problem.dry)  # where round edges cut faces
+        self._state = frame_of(grid, problem.dry) if problem.made else None  # where round edges cut faces
+        self._first = ruptured(grid, problem.dry) if problem.made and problem.U else None
+        self._driven = 0.0 if self._first is None else problem.p_sides[0] / (6.0 * float(problem.mu) * problem.U)
         self._known: dict[tuple[int, bytes], tuple[Array, Array]] = {}
         self._own: dict[tuple[bool, tuple[float, ...]], Laid] = {}
 
@@ -124,13 +127,15 @@ class ByFaces:
         cut = [film.edges(side) for side in range(2)]
         first = self.count + len(self.drags)
         out, positive = np.zeros((first + len(self.flows), 6)), True
-        balances, at = out[: self.count], self._laid(grid, level(film), tuple(cut[1]))
+        balances, at = out[: self.count], self._laid(grid, level(film) and self._first is None, tuple(cut[1]))
         for some, rows in _strips(at.lines, grid.box[1]):
             C, H, before = at.along(film, rows, cut)
-            if self._state is not None:
+            if self._state is not None and film.rims:
                 C, H = np.array(C), np.array(H)
                 widths = 0.5 * at.across[:, rows].sum(axis=0)
                 made_along(film, at.x_places[0], at.y[rows], widths, self._state[1:-1][rows], (C, H), film.period(0))
+            if self._first is not None:
+                C, H = made_at_inlet(film, at.x_places[0], at.y[rows], self._first[rows], self._driven, C, H)
             positive = positive and all(bool((a > 0.0).all()) for a in (C, H, before))
             if self.drags and positive:
                 films = self._sheared(film, at, rows, before / H)
@@ -147,7 +152,7 @@ class ByFaces:
                 out[first:, :4] += np.einsum("fkal,al->fk", at.of_flows[:, :, :, some], outer)
         for some, rows in _strips(at.faces, grid.box[1]):
             C = np.array(at.over(film, rows, cut))
-            if self._state is not None:
+            if self._state is not None and film.rims:
                 ends = slice(rows[0], rows[-1] + 2)
                 state = across_flow(grid, self._state[ends])
                 widths = 0.5 * pairs(at.steps).sum(axis=0)

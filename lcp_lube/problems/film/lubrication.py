@@ -80,6 +80,7 @@ class LubricationProblem:
         self.exact, self.shaft, self.r_in, self.held, self.integrals = exact, shaft, r_in, held, integrals
         self.coefficients_for: Callable[[Array], tuple[BoxScheme, Any]] | None = None  # of a film with rims, by its cavities
         self.dry: Array | None = None  # for what they have been made (`rims.state_of`); None: those of a full film
+        self.made = False  # whether it has such faces
         self.extras: Callable[[dict[str, Any]], dict[str, Any]] | None = None
         self.more, self.more_fields = dict[str, Any](), dict[str, tuple[Array, str]]()  # of what is solved beside p and r
         self.more_measures: dict[str, float] = {}  # of its equations, for the certificate
@@ -264,7 +265,8 @@ class LubricationProblem:
         """The film with faces at round edges (`rims`), if any, made for these points, if any (`rims.state_of`). Collective."""
         if dry is None or self.coefficients_for is None:
             return self
-        (other := copy(self)).dry, other.scheme = dry, pressed(self.coefficients_for(dry)[0], self.held, self.p_unit)
+        (other := copy(self)).dry, other.made = dry, True
+        other.scheme = pressed(self.coefficients_for(dry)[0], self.held, self.p_unit)
         return other
 
     def with_scheme(

@@ -13,6 +13,7 @@ from ...errors import InputError
 from ..grid import Grid
 from ..strips import each_strip, in_strips, places_of
 from .edges import Around
+from .inlets import ruptured
 from .integrals import LineIntegrals, check_film
 from .stored import Stored
 from .strip import coefficients_of, dragged, entering, entering_at, leaving, leaving_at, line_weights, lines_of, stream_weights
@@ -213,7 +214,8 @@ def coefficients(
     p_unit : pressure unit in Pa; p in the equations is measured in it.
     mean_cubes : take h^3 at a face as the mean of the nodal values (scene 5) instead of the film at the face.
     r_in : void fraction that enters at an open west side.
-    cavity : `rims.state_of` the owned points, where round edges cut a face; default 0, of a full film.
+    cavity : `rims.state_of` the owned points, where round edges cut a face, or the film ruptures behind the west side
+        (`inlets`); default 0, of a full film.
     stored : what the cells store, in a time step.
     integrals : of a line's film (1D): fluxes between its points are exact for a full film; default: from the film at the faces.
     """
@@ -221,16 +223,19 @@ def coefficients(
     rims = [] if mean_cubes or scheme != "face" or grid.dim == 1 else getattr(film, "rims", [])
     # The void is dragged as the film at the points, or as what the wall drags through the faces, which are stored anyway.
     nodal, weight = scheme != "face" and U != 0.0, None
+    known = scheme == "face" and not mean_cubes and stored is None and np.real(U) > 0.0
+    first = ruptured(grid, cavity) if known else None
     # With a frame of neighbours, as sweeps want them (`solvers.fas.levels`).
     frames = ((ny + 2, nx + 3), (ny + 3, nx + 2), (ny + 2, nx + 2))
     kind = np.asarray(film(grid.x[:, :1], grid.y[:1])).dtype
     kx, ky, c_frame = (np.zeros(shape, dtype=kind) for shape in frames)
-    films, wall = lines_of(grid, film, bool(rims), kind)
+    films, wall = lines_of(grid, film, bool(rims) or first is not None, kind)
     void = films if nodal else wall if U else np.zeros_like(wall)
 
     def make(rows: slice) -> None:
         strip = grid if rims else places_of(grid, rows)
-        parts = coefficients_of(strip, film, p_unit / (6.0 * mu), U or 1.0, scheme, mean_cubes, rims, cavity, integrals)
+        inlet = None if first is None else (first[rows], float(np.real(p_sides[0] / (6.0 * mu * U))))
+        parts = coefficients_of(strip, film, p_unit / (6.0 * mu), U or 1.0, scheme, mean_cubes, rims, cavity, inlet, integrals)
         kx[1:-1, 1:-1][rows], films[rows] = parts[0], parts[2]
         if grid.dim == 2:
             ky[1:-1, 1:-1][rows.start : rows.stop + 1] = parts[1]
