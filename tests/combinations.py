@@ -18,6 +18,7 @@ from mpi4py import MPI
 
 from lcp_lube import InputError, load_scene, solve
 from lcp_lube.output.files import gather
+from lcp_lube.problems.film.rims import state_of
 from lcp_lube.registry import METHODS, recipe_names
 
 SHAPES = ((23, 17), (7, 5), (41, 3), (3, 41), (9, 1), (1, 9), (1, 1))  # nx, ny
@@ -100,6 +101,15 @@ def reference(sides: str, shape: tuple[int, int], film: int) -> tuple[np.ndarray
     """p and r on this process alone, by dense policy iteration, checked against the conditions themselves."""
     scene = load_scene(Combination("", "", "", sides, 1, shape, film).scene())
     problem = scene.build(MPI.COMM_SELF)
+    p, r = by_policies(problem, f"{sides}, {shape}, film {film}")
+    open_west = problem.grid.ends[0][0] == "open" and not problem.p_sides[0] and scene.scheme == "face"
+    if open_west and (r.reshape(problem.grid.box)[:, 0] > 0).any():  # its first faces are made for that
+        p, r = by_policies(problem.revised(state_of(problem, p, r)), f"{sides}, {shape}, film {film}, once more")
+    problem.destroy()
+    return p, r
+
+
+def by_policies(problem: Any, name: str) -> tuple[np.ndarray, np.ndarray]:
     A, B = (dense(mat) for mat in (problem.A, problem.B))
     c, rng = problem.c, np.random.default_rng(0)
     full, k = np.ones(c.size, dtype=bool), 0
@@ -111,11 +121,11 @@ def reference(sides: str, shape: tuple[int, int], film: int) -> tuple[np.ndarray
             break
         k += 1
         full ^= wrong & (rng.random(c.size) < (1.0 if k < 30 else 0.5))  # by chance where all at once goes round in circles
-        assert k < 1000, f"no reference for {sides}, {shape}, film {film}"
+        assert k < 1000, f"no reference for {name}"
     p, r = np.where(full, np.maximum(z, 0.0), 0.0), np.where(full, 0.0, np.maximum(-z, 0.0))
     terms = np.abs(A) @ p + np.abs(B) @ r + np.abs(c)
     assert np.all(np.abs(A @ p + B @ r - c) <= 1e-9 * terms.max())
-    problem.destroy()
+    problem.free_matrices()
     return p, r
 
 

@@ -189,6 +189,7 @@ def judged(scene: BearingScene, seed: int, own_faces: bool, **how_to: Any) -> Ve
         return Verdict(seed, outcome, **how)
     p, r = whole(problem.grid, solution.fields["p"] * problem.p_unit, solution.fields["r"])
     p_sides, p_unit = problem.p_sides, problem.p_unit
+    own_faces = own_faces or problem.moving.remade  # as where the film ruptures at the side it comes in by
     if own_faces and problem.moving is not problem:  # the mirror image is what is solved
         p, r = p[:, ::-1], r[:, ::-1]
     p, r = p.ravel(), r.ravel()

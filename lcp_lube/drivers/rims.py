@@ -11,16 +11,15 @@ search or a march moves on would jump where its first cavity comes and goes.
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
 from petsc4py import PETSc
 
 from ..problems.facts import Facts
-from ..problems.film.inlets import ruptured
+from ..problems.film.cavity import cavitated
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.rims import state_of
 from ..problems.film.stored import Dry
-from ..problems.solution import Solution
+from ..problems.solution import Fields, Solution
 from ..scenes.moving import film_of, motion_of
 from ..scenes.scene import Derived, Scene, Solvable
 from .ask import Ask
@@ -59,9 +58,18 @@ def applies(scene: Solvable, ask: Ask) -> bool:
 
 
 def _by_itself(scene: Any, model: Model) -> bool:
-    """Whether the film may rupture where it comes in, and nothing moves or changes it."""
+    """Whether the film may rupture at the side it comes in by, one without pressure, and nothing moves or changes it."""
+    west, known = model.sides[0], model.scheme == "face" and not model.mean_cubes and len(model.lengths) == 2
     plain = isinstance(scene.whole if isinstance(scene, Mirrored) else scene, Scene) and motion_of(scene) is None
-    return plain and model.inlet and not (model.effects or model.law or model.supplies)
+    opens = plain and known and model.U > 0.0 and west.kind == "open" and not west.p
+    return opens and not (model.grooves or model.effects or model.law or model.supplies)
+
+
+def _behind(problem: Any, fields: Fields) -> int:
+    """Lines with a cavity at their first point behind an open west side. Collective."""
+    grid = problem.grid
+    p, r = (fields[name].reshape(grid.box)[:, :1] * (grid.x_start == 0) for name in "pr")
+    return int(problem.reduce.sum(cavitated(problem.reduce, p.ravel(), r.ravel()).astype(float)))
 
 
 def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
@@ -72,11 +80,10 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     problem: Any = first.problem
     if not first.converged:
         return first
-    state = state_of(problem, first.fields["p"], first.fields["r"])
-    found = state > 0.0 if cut else ruptured(problem.grid, state)
-    count = int(problem.reduce.sum(np.zeros(1) if found is None else found.astype(float)))
-    if not (cut or count):
+    if not cut and not _behind(problem, first.fields):
         return first
+    state = state_of(problem, first.fields["p"], first.fields["r"])
+    count = int(problem.reduce.sum((state > 0.0).astype(float)))
     again = replace(ask, start=first, nested=False, monitor=None, checkpoint=None, resume=None)
     second = (
         inner(Revised(scene, Dry(state, problem.grid)) if count else scene, again)

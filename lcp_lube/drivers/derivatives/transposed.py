@@ -156,7 +156,7 @@ class CoupledFilm:
         loop = self.gradient.loop
         model, s = loop.frozen.constant, loop.base.scheme
         gap = LiftedFilm.of(model.gap, self.grid, d)
-        if loop.base.made:  # what part of a cut face resists does not hang on the change
+        if loop.base.remade:  # what part of a cut face resists does not hang on the change
             film, slopes = self._taped(loop.base.with_lift(d)), model.film_slopes(loop.base, gap)
             film.scheme = s.changed(**{name: getattr(s, name) + getattr(slopes, name) for name in s.arrays})
             return self._evaluated(film=film)

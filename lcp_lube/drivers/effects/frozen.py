@@ -90,7 +90,7 @@ def lent(near: Any, shape: tuple[int, ...]) -> LubricationProblem | None:
         return None
     found: Any = near.problem
     rigid = found if found.plain else found.rigid
-    if type(rigid) is not LubricationProblem or rigid.made:
+    if type(rigid) is not LubricationProblem or rigid.remade:
         return None
     base = copy(rigid)
     base.exact, base.rigid, found.shares_grid = None, None, True

@@ -19,12 +19,13 @@ import numpy as np
 from ...base.parallel import Array
 from ..grid import Grid
 from ..strips import STRIP, ghosted, in_strips
+from .cavity import ruptured
 from .edges import Around, level, pairs
 from .effects import framed_by
 from .face_lines import FaceLines, Rows, line_factors
 from .flows import SIDES, line_shares
 from .fluid import Law
-from .inlets import made_at_inlet, ruptured
+from .inlets import made_at_inlet
 from .lubrication import LubricationProblem
 from .reynolds import sides
 from .rims import across_flow, frame_of, made_along
@@ -113,9 +114,9 @@ class ByFaces:
             q, r = q.reshape(grid.box), r.reshape(grid.box)
             self._through = columns, -columns * np.array([np.full(ny, enters), r[:, -1]]), columns * q[:, [0, -1]].T
             self._off = rims, rims * q[[0, -1]]
-        self._state = frame_of(grid, problem.dry) if problem.made else None  # where round edges cut faces
-        self._first = ruptured(grid, problem.dry) if problem.made and problem.U else None
-        self._driven = 0.0 if self._first is None else problem.p_sides[0] / (6.0 * float(problem.mu) * problem.U)
+        self._state = frame_of(grid, problem.dry) if problem.remade else None  # where round edges cut faces
+        driven = problem.p_sides[0] / (6.0 * float(problem.mu) * problem.U) if problem.U else 0.0
+        self._first = ruptured(grid, problem.dry, driven) if problem.remade and problem.U else None
         self._known: dict[tuple[int, bytes], tuple[Array, Array]] = {}
         self._own: dict[tuple[bool, tuple[float, ...]], Laid] = {}
 
@@ -135,7 +136,7 @@ class ByFaces:
                 widths = 0.5 * at.across[:, rows].sum(axis=0)
                 made_along(film, at.x_places[0], at.y[rows], widths, self._state[1:-1][rows], (C, H), film.period(0))
             if self._first is not None:
-                C, H = made_at_inlet(film, at.x_places[0], at.y[rows], self._first[rows], self._driven, C, H)
+                C, H = made_at_inlet(film, at.x_places[0], at.y[rows], self._first.of(rows), C, H)
             positive = positive and all(bool((a > 0.0).all()) for a in (C, H, before))
             if self.drags and positive:
                 films = self._sheared(film, at, rows, before / H)

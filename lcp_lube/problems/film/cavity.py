@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from ...base.compiled import has_numba
 from ...base.crew import crew
 from ...base.parallel import Array, Reduce
 from ...registry import SMALL
+from ..grid import Grid
 
 VOID = 1e-9  # void fraction up to which a film counts as full: below what any solve resolves, and nothing that one could see
 EMPTY = 1e-2  # void fraction that no full film has within the loosest certificate, however small its pressures are
@@ -78,3 +80,20 @@ def _looked(look: Callable[[Array, Array], NDArray[np.bool_]], p: Array, r: Arra
 
     crew().run(put, len(blocks))
     return out
+
+
+class Inlet(NamedTuple):
+    """rows : which owned lines have a cavity at their first point, shape (ny, 1). driven : p_west/(6 mu U), 1/m."""
+
+    rows: NDArray[np.bool_]
+    driven: float
+
+    def of(self, lines: Any) -> Inlet:
+        return Inlet(self.rows[lines], self.driven)
+
+
+def ruptured(grid: Grid, state: Array | None, driven: complex = 0.0) -> Inlet | None:
+    """What is known of the first faces by `rims.state_of` the points; None where no side is open there."""
+    if state is None or grid.dim == 1 or grid.ends[0][0] != "open" or grid.x_start > 0:
+        return None
+    return Inlet(np.reshape(state, grid.box)[:, :1] > 0.0, float(np.real(driven)))

@@ -1,43 +1,34 @@
 """The first faces of a film that ruptures at the side it comes in by, or in its first cell.
 
-There a full film has one flow up to a place x where p = 0, Q(x) = (p_west/(6 mu U) + Int h^-2)/Int h^-3, and the front is where
-that is least: at a side without pressure that the film opens from, what enters is what the film at the side carries. A face that
-takes the film half-way to the first points instead lets in an error of first order. As in domes (`rims`) the answer tells where,
-and the film is solved once more with faces made for it: positive conductances and Couette flows of one form, so that its
-solution is unique, certificate and bands hold as ever (docs/accuracy.md).
+There a full film has one flow up to a place x where p = 0, Q(x) = (p_west/(6 mu U) + Int h^-2)/Int h^-3, and the front is
+where that is least: at a side without pressure that the film opens from, what enters is what the film at the side carries. A
+face with the film half-way to the first points lets in more, an error of first order. As in domes (`rims`) the answer tells
+where, and the film is solved once more with faces made for it: positive conductances and Couette flows of one form, so that
+its solution is unique, certificate and bands hold as ever (docs/accuracy.md).
 """
 
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...base.parallel import Array
-from ..grid import Grid
+from .cavity import Inlet
 
-Rows = NDArray[np.bool_]
 LOOKS = 32  # between the side and the first points
 SAME = 1e-9  # of a flow: least flows that differ by less are one
 
 
-def ruptured(grid: Grid, state: Array | None) -> Rows | None:
-    """Which owned lines have a cavity at their first point behind an open west side, shape (ny, 1), by `rims.state_of` the
-    points; None where there is none to know of."""
-    if state is None or grid.dim == 1 or grid.ends[0][0] != "open" or grid.x_start > 0:
-        return None
-    return np.reshape(state, grid.box)[:, :1] > 0.0
-
-
 def made_at_inlet(
-    film: Callable[[Array, Array], Array], nodes: Array, lines: Array, rows: Rows, driven: float, cubes: Array, films: Array
+    film: Callable[[Array, Array], Array], nodes: Array, lines: Array, inlet: Inlet, cubes: Array, films: Array
 ) -> tuple[Array, Array]:
     """C and H of all x faces, the first ones of these lines up to their fronts.
 
     Parameters
     ----------
-    nodes : x of the side and of the first points, m. lines : y of the lines, m. rows : which of them, shape (lines, 1).
-    driven : p_west/(6 mu U), 1/m. cubes, films : C and H, shape (lines, faces) or what broadcasts to it.
+    nodes : x of the side and of the first points, m. lines : y of the lines, m. inlet : of these lines.
+    cubes, films : C and H, shape (lines, faces) or what broadcasts to it.
     """
+    rows, driven = inlet
     if not rows.any():
         return cubes, films
     shape, some = (lines.size, cubes.shape[1]), np.flatnonzero(rows)

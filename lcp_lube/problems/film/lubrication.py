@@ -38,8 +38,7 @@ class LubricationProblem:
     grid : the interior points. scheme : coefficients of the box scheme there, in units of p_unit.
     mu, U, p_unit : viscosity in Pa s, wall speed in m/s, pressure unit in Pa.
     p_sides : pressures above p_c at west, east, south, north in Pa.
-    p_c : cavitation pressure in Pa, added to the pressures that are reported.
-    film : h(x, y) in metres.
+    p_c : cavitation pressure in Pa, added to the pressures that are reported. film : h(x, y) in metres.
     exact : gives the exact 1D solution, where one is known. shaft : what the film is wrapped round; None for a flat one.
     r_in : void fraction that enters at the west.
     held : the supplies whose cells the scheme holds. integrals : of the film of a line whose fluxes are made of them.
@@ -80,11 +79,11 @@ class LubricationProblem:
         self.exact, self.shaft, self.r_in, self.held, self.integrals = exact, shaft, r_in, held, integrals
         self.coefficients_for: Callable[[Array], tuple[BoxScheme, Any]] | None = None  # of a film with rims, by its cavities
         self.dry: Array | None = None  # for what they have been made (`rims.state_of`); None: those of a full film
-        self.made = False  # whether it has such faces
+        self.remade = False  # whether it has such faces
         self.extras: Callable[[dict[str, Any]], dict[str, Any]] | None = None
         self.more, self.more_fields = dict[str, Any](), dict[str, tuple[Array, str]]()  # of what is solved beside p and r
-        self.more_measures: dict[str, float] = {}  # of its equations, for the certificate
-        self.cells: dict[str, Array] = {}  # what effects made of its coefficients (`film.effects`)
+        # Of its equations, for the certificate; and what effects made of its coefficients (`film.effects`).
+        self.more_measures, self.cells = dict[str, float](), dict[str, Array]()
         self._own = Owned(self, grid.petsc_comm)
 
     @made
@@ -135,10 +134,9 @@ class LubricationProblem:
         return self.multiply(self.A, p) + self.multiply(self.B, r) - self.c
 
     def balance(self, p: Array, r: Array) -> Array:
-        """F1 as the difference of the flows through each point's faces. Collective.
+        """F1 as the difference of the flows through each point's faces, to the last bit. Collective.
 
-        What leaves a cell enters the next one to the last bit, which A p + B r - c cannot say: where conductances differ by
-        1e9 and more the rounding of A's diagonal is a leak, and where little flows through a ring the rounding of c is one.
+        A p + B r - c leaks: where conductances differ by 1e9 by A's diagonal, where little flows through a ring by c.
         """
         s, flows = self.scheme, self.face_flows(p, r)
         return flows if s.held is None else np.where(s.held.ravel(), s.diagonal.ravel() * p - self.c, flows)
@@ -265,8 +263,8 @@ class LubricationProblem:
         """The film with faces at round edges (`rims`), if any, made for these points, if any (`rims.state_of`). Collective."""
         if dry is None or self.coefficients_for is None:
             return self
-        (other := copy(self)).dry, other.made = dry, True
-        other.scheme = pressed(self.coefficients_for(dry)[0], self.held, self.p_unit)
+        scheme = pressed(self.coefficients_for(dry)[0], self.held, self.p_unit)
+        (other := copy(self)).__dict__ |= {"dry": dry, "remade": True, "scheme": scheme}
         return other
 
     def with_scheme(

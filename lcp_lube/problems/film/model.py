@@ -126,12 +126,6 @@ class Model:
         return known and bool(getattr(self.gap, "rims", ()))
 
     @property
-    def inlet(self) -> bool:
-        """Whether the film may rupture at the side it comes in by: then the first faces are made for that (`inlets`)."""
-        west, known = self.sides[0], self.scheme == "face" and not self.mean_cubes and len(self.lengths) == 2
-        return known and self.U > 0.0 and west.kind == "open" and not west.p and not self.grooves and self.stored is None
-
-    @property
     def film(self) -> Film:
         """The gap, asked beyond a side that is not open only for what lies inside."""
         dims = len(self.lengths)
@@ -243,13 +237,12 @@ class Model:
             integrals=integrals,
         )
         problem.shares_grid, problem.extras, problem.levers, problem.stored = shared, self.extras, self.levers, self.stored
-        problem.edged = not self.mean_cubes
-        problem.tops = self.scheme == "face" and problem.edged
+        problem.edged, problem.tops = not self.mean_cubes, self.scheme == "face" and not self.mean_cubes
         if isinstance(problem, GroovedProblem):
             problem.grooves = self.grooves
-        if self.cut or self.inlet:
+        if self.scheme == "face" and grid.dim == 2:
             problem.coefficients_for, problem.dry = partial(self._scheme, grid, integrals), dry
-            problem.made = self.cut or dry is not None
+            problem.remade = self.cut or dry is not None
         return problem
 
     @property

@@ -12,8 +12,8 @@ from ...base.parallel import Array
 from ...errors import InputError
 from ..grid import Grid
 from ..strips import each_strip, in_strips, places_of
+from .cavity import ruptured
 from .edges import Around
-from .inlets import ruptured
 from .integrals import LineIntegrals, check_film
 from .stored import Stored
 from .strip import coefficients_of, dragged, entering, entering_at, leaving, leaving_at, line_weights, lines_of, stream_weights
@@ -209,13 +209,10 @@ def coefficients(
         U = 0: void travels nowhere, and its columns are those of some speed: the answer has r = 0 for any.
     scheme : form of the Couette flux. 'nodal' (paper, eq. 7): U (h_face - (h r)_upwind); 'face': U h_face (1 - r_upwind);
         'upwind': U (h (1 - r))_upwind.
-    p_sides : Dirichlet pressures above the cavitation pressure at west, east, south, north in Pa (south, north: 2D only);
-        read where the grid's end is open.
-    p_unit : pressure unit in Pa; p in the equations is measured in it.
+    p_sides : at west, east (2D: south, north), Pa above the cavitation pressure; read where the grid's end is open.
     mean_cubes : take h^3 at a face as the mean of the nodal values (scene 5) instead of the film at the face.
-    r_in : void fraction that enters at an open west side.
-    cavity : `rims.state_of` the owned points, where round edges cut a face, or the film ruptures behind the west side
-        (`inlets`); default 0, of a full film.
+    p_unit : Pa, in which p in the equations is measured. r_in : void fraction that enters at an open west side.
+    cavity : `rims.state_of` the owned points, where faces are made for cavities (`rims`, `inlets`); default 0, of a full film.
     stored : what the cells store, in a time step.
     integrals : of a line's film (1D): fluxes between its points are exact for a full film; default: from the film at the faces.
     """
@@ -223,18 +220,16 @@ def coefficients(
     rims = [] if mean_cubes or scheme != "face" or grid.dim == 1 else getattr(film, "rims", [])
     # The void is dragged as the film at the points, or as what the wall drags through the faces, which are stored anyway.
     nodal, weight = scheme != "face" and U != 0.0, None
-    known = scheme == "face" and not mean_cubes and stored is None and np.real(U) > 0.0
-    first = ruptured(grid, cavity) if known else None
-    # With a frame of neighbours, as sweeps want them (`solvers.fas.levels`).
-    frames = ((ny + 2, nx + 3), (ny + 3, nx + 2), (ny + 2, nx + 2))
+    first = ruptured(grid, cavity, p_sides[0] / (6.0 * mu * U)) if stored is None and np.real(U) > 0.0 else None
     kind = np.asarray(film(grid.x[:, :1], grid.y[:1])).dtype
-    kx, ky, c_frame = (np.zeros(shape, dtype=kind) for shape in frames)
+    # With a frame of neighbours, as sweeps want them (`solvers.fas.levels`).
+    kx, ky, c_frame = (np.zeros(shape, dtype=kind) for shape in ((ny + 2, nx + 3), (ny + 3, nx + 2), (ny + 2, nx + 2)))
     films, wall = lines_of(grid, film, bool(rims) or first is not None, kind)
     void = films if nodal else wall if U else np.zeros_like(wall)
 
     def make(rows: slice) -> None:
         strip = grid if rims else places_of(grid, rows)
-        inlet = None if first is None else (first[rows], float(np.real(p_sides[0] / (6.0 * mu * U))))
+        inlet = first and first.of(rows)
         parts = coefficients_of(strip, film, p_unit / (6.0 * mu), U or 1.0, scheme, mean_cubes, rims, cavity, inlet, integrals)
         kx[1:-1, 1:-1][rows], films[rows] = parts[0], parts[2]
         if grid.dim == 2:

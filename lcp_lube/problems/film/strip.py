@@ -9,7 +9,6 @@ import numpy as np
 from ...base.parallel import Array
 from ..grid import Grid
 from .edges import Around, face_film, pairs
-from .inlets import made_at_inlet
 from .integrals import LineIntegrals
 
 
@@ -22,13 +21,13 @@ def coefficients_of(
     mean_cubes: bool,
     rims: Sequence[Any],
     cavity: Array | None,
-    inlet: tuple[Any, float] | None,
+    inlet: Any,
     integrals: LineIntegrals | None,
 ) -> tuple[Array, Array, Array, Array, Array]:
     """Of some lines: conductances of x and y faces, h at the points and the one before, and what goes through x faces: what the
     wall drags, and what if all is void.
 
-    inlet : which of the lines rupture behind the west side, and p_west/(6 mu U) (`inlets`); None: none."""
+    inlet : of the lines (`inlets.Inlet`), where they may rupture behind the west side."""
     dx, (ny, nx) = grid.steps(0), grid.box
     x_share, y_share = grid.widths(0), line_weights(grid)
     x_nodes, x_faces = grid.nodes_and_faces(0)
@@ -57,7 +56,9 @@ def coefficients_of(
 
         cubes_x, h_face = rims_across_x(grid, film, rims, cavity, cubes_x, h_face, period[0])
     if inlet is not None:
-        cubes_x, h_face = made_at_inlet(film, x_nodes, y[:, 0], *inlet, cubes_x, h_face)
+        from .inlets import made_at_inlet  # here: few films rupture there
+
+        cubes_x, h_face = made_at_inlet(film, x_nodes, y[:, 0], inlet, cubes_x, h_face)
     m = grid.stretch(y)
     k_x, k_y = k * cubes_x / dx * (y_share / m), np.zeros((ny + 1, nx))
     if grid.dim == 2:
