@@ -98,7 +98,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         first.destroy()
         return solve(scene, replace(ask, cavities=None), inner)
     if not second.converged:
-        first.because(f"faces at round edges are those of a full film: {second.message}")
+        first.because(f"faces are those of a full film: {second.message}")
         second.destroy()
         return first
     details, more = settings["details"], second.settings["details"]
