@@ -85,12 +85,12 @@ class Ask:
     reduction : solve no more than symmetry leaves (`symmetry`).
     memory_check : refuse a run that needs more memory than there is, by an estimate (`memory`).
     implied : method and options are a driver's choice, and nobody has named them.
+    alone : whether this film is asked for, not one of those that a search goes through (loads, pads): see `rims`.
     direct_below : points up to which a film in 2D is solved directly, where multigrid would do; default `plan.FEW`,
         of the grids of a run to an accuracy none; with 0 a film in 1D is solved by multigrid's loops too.
     monitor : called after every step with its number and record.
     progress : called by the loops over grids, levels and time steps with how far they have come.
     watch : called after every time step of a march with its `time.Moment`; collective.
-    alone : whether this film is asked for, not one of those that a search goes through (loads, pads): see `rims`.
     judge : certifies the fields of the problem that is solved in that problem's place: a part's on the whole scene's data.
     times : when a march is to end a step, s, where an error estimate says how long these are.
     comm : communicator of petsc4py or mpi4py; default all ranks.

@@ -13,9 +13,7 @@ import numpy as np
 
 from ...base.parallel import Array
 from .cavity import Inlet
-
-LOOKS = 32  # between the side and the first points
-SAME = 1e-9  # of a flow: least flows that differ by less are one
+from .rims import LOOKS, before_front
 
 
 def made_at_inlet(
@@ -34,13 +32,11 @@ def made_at_inlet(
     shape, some = (lines.size, cubes.shape[1]), np.flatnonzero(rows)
     start, d = nodes[0], nodes[1] - nodes[0]
     places = start + d * np.append(0.0, (np.arange(LOOKS) + 0.5) / LOOKS)
-    h = np.broadcast_to(film(places[None, :], lines[some][:, None]), (some.size, places.size))
-    inverse = 1.0 / h[:, 1:]
-    drag, resistance = np.cumsum(inverse**2, axis=1), np.cumsum(inverse**3, axis=1)
-    flow = np.real((driven * LOOKS / d + drag) / resistance)
-    last = LOOKS - 1 - np.argmax((flow <= (1.0 + SAME) * flow.min(axis=1, keepdims=True))[:, ::-1], axis=1)  # of equals
-    at = np.arange(some.size), last
+    h = np.broadcast_to(film(places[None, :], lines[some][:, None]), (some.size, places.size)).T
+    resists = before_front(np.real(h[1:]), driven * LOOKS / d)
+    inverse = np.where(resists, 1.0 / h[1:], 0.0)
+    resistance = np.sum(inverse**3, axis=0)
     cubes, films = (np.array(np.broadcast_to(a, shape)) for a in (cubes, films))
-    cubes[some, 0] = LOOKS / resistance[at]
-    films[some, 0] = np.where(last > 0, drag[at] / resistance[at], h[:, 0])
+    cubes[some, 0] = LOOKS / resistance
+    films[some, 0] = np.where(np.sum(resists, axis=0) > 1, np.sum(inverse**2, axis=0) / resistance, h[0])  # or at the side
     return cubes, films

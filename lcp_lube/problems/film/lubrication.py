@@ -136,7 +136,7 @@ class LubricationProblem:
     def balance(self, p: Array, r: Array) -> Array:
         """F1 as the difference of the flows through each point's faces, to the last bit. Collective.
 
-        A p + B r - c leaks: where conductances differ by 1e9 by A's diagonal, where little flows through a ring by c.
+        A p + B r - c leaks by rounding: of A's diagonal where conductances differ by 1e9, of c where little flows in a ring.
         """
         s, flows = self.scheme, self.face_flows(p, r)
         return flows if s.held is None else np.where(s.held.ravel(), s.diagonal.ravel() * p - self.c, flows)

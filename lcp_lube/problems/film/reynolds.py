@@ -209,7 +209,7 @@ def coefficients(
         U = 0: void travels nowhere, and its columns are those of some speed: the answer has r = 0 for any.
     scheme : form of the Couette flux. 'nodal' (paper, eq. 7): U (h_face - (h r)_upwind); 'face': U h_face (1 - r_upwind);
         'upwind': U (h (1 - r))_upwind.
-    p_sides : at west, east (2D: south, north), Pa above the cavitation pressure; read where the grid's end is open.
+    p_sides : pressures at west, east (2D: south, north), Pa above the cavitation pressure; read where the grid's end is open.
     mean_cubes : take h^3 at a face as the mean of the nodal values (scene 5) instead of the film at the face.
     p_unit : Pa, in which p in the equations is measured. r_in : void fraction that enters at an open west side.
     cavity : `rims.state_of` the owned points, where faces are made for cavities (`rims`, `inlets`); default 0, of a full film.

@@ -115,7 +115,7 @@ def _looked(
     h = np.broadcast_to(film(a + d * places, lines), (places.size, a.size))
     resists = domed | _resists(np.real(h), jump, first > 0.0, last > 0.0, along_flow)
     if along_flow and (k := np.flatnonzero(domed & (last > 0.0))).size:
-        resists[1:-1, k] = _before_front(np.real(h[1:-1, k]), np.maximum(-first[k], 0.0) * looks / d[k])
+        resists[1:-1, k] = before_front(np.real(h[1:-1, k]), np.maximum(-first[k], 0.0) * looks / d[k])
     inverse = 1.0 / h[1:-1]
     drag = np.where(resists[1:-1], inverse * inverse, 0.0)
     resistance = np.mean(drag * inverse, axis=0)
@@ -125,7 +125,7 @@ def _looked(
     return cubes, films
 
 
-def _before_front(h: Array, driven: Array) -> Flags:
+def before_front(h: Array, driven: Array | float) -> Flags:
     """Which looks, shape (looks, faces), a film that ruptures has before its front: as many as let the least flow through.
 
     driven : by the pressure at the first point, in looks' parts of what the wall drags, 1/m2. A full film up to a place where

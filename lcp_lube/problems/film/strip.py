@@ -8,6 +8,7 @@ import numpy as np
 
 from ...base.parallel import Array
 from ..grid import Grid
+from .cavity import Inlet
 from .edges import Around, face_film, pairs
 from .integrals import LineIntegrals
 
@@ -21,13 +22,13 @@ def coefficients_of(
     mean_cubes: bool,
     rims: Sequence[Any],
     cavity: Array | None,
-    inlet: Any,
+    inlet: Inlet | None,
     integrals: LineIntegrals | None,
 ) -> tuple[Array, Array, Array, Array, Array]:
     """Of some lines: conductances of x and y faces, h at the points and the one before, and what goes through x faces: what the
     wall drags, and what if all is void.
 
-    inlet : of the lines (`inlets.Inlet`), where they may rupture behind the west side."""
+    inlet : of the lines (`inlets`), where they may rupture behind the west side."""
     dx, (ny, nx) = grid.steps(0), grid.box
     x_share, y_share = grid.widths(0), line_weights(grid)
     x_nodes, x_faces = grid.nodes_and_faces(0)

@@ -38,22 +38,10 @@ def linearise(v: Array, kx: Array, ky: Array, c: Array, m: Array, g: Array, slop
 
 
 @piece
-def relax(v: Array, kx: Array, ky: Array, bounds: Array, prepared: Array, j: int, start: int, end: int) -> None:
-    """Projected Gauss-Seidel on points start to end - 1 of row j; bounds: lower, upper; prepared: source, over."""
-    west = v[j, start - 1]
+def known_of_run(v: Array, kx: Array, ky: Array, prepared: Array, j: int, start: int, end: int, known: Array) -> None:
+    """Of the relaxed points start to end - 1 of row j, what no point to the west has a say in, and what each takes of its
+    western neighbour: made first, by vector instructions."""
     for i in range(start, end):
-        t = prepared[0, j, i] + kx[j, i + 1] * v[j, i + 1] + ky[j, i] * v[j - 1, i] + ky[j + 1, i] * v[j + 1, i]
-        t = (t + kx[j, i] * west) * prepared[1, j, i]
-        t = t if t > bounds[0, j, i] else bounds[0, j, i]
-        west = t if t < bounds[1, j, i] else bounds[1, j, i]
-        v[j, i] = west
-
-
-@piece
-def known_of_line(v: Array, kx: Array, ky: Array, prepared: Array, j: int, known: Array) -> None:
-    """What no point to the west has a say in of the relaxed points of row j, and what each takes of its western neighbour: made
-    first, by vector instructions."""
-    for i in range(1, v.shape[1] - 1):
         t = prepared[0, j, i] + kx[j, i + 1] * v[j, i + 1] + ky[j, i] * v[j - 1, i] + ky[j + 1, i] * v[j + 1, i]
         known[0, i] = prepared[1, j, i] * t
         known[1, i] = prepared[1, j, i] * kx[j, i]
@@ -65,6 +53,16 @@ def relaxed(known: Array, bounds: Array, j: int, i: int, west: float) -> float:
     t = known[0, i] + known[1, i] * west
     t = t if t > bounds[0, j, i] else bounds[0, j, i]
     return t if t < bounds[1, j, i] else bounds[1, j, i]
+
+
+@piece
+def relax(v: Array, kx: Array, ky: Array, bounds: Array, prepared: Array, j: int, start: int, end: int, known: Array) -> None:
+    """Projected Gauss-Seidel on points start to end - 1 of row j; bounds: lower, upper; prepared: source, over; known: room."""
+    known_of_run(v, kx, ky, prepared, j, start, end, known)
+    west = v[j, start - 1]
+    for i in range(start, end):
+        west = relaxed(known, bounds, j, i, west)
+        v[j, i] = west
 
 
 @kernel
@@ -82,23 +80,15 @@ def sweep(v: Array, kx: Array, ky: Array, bounds: Array, prepared: Array, count:
         for s in range(ny + 2 if both else ny):
             m, n = first + step * s, first + step * (s - 2)
             leads, follows = s < ny, both and s >= 2
-            if leads:
-                known_of_line(v, kx, ky, prepared, m, known[0])
-            if follows:
-                known_of_line(v, kx, ky, prepared, n, known[1])
-            if not (leads or follows):  # one line alone
-                continue
             if leads and follows:
+                known_of_run(v, kx, ky, prepared, m, 1, nx + 1, known[0])
+                known_of_run(v, kx, ky, prepared, n, 1, nx + 1, known[1])
                 here, behind = v[m, 0], v[n, 0]
                 for i in range(1, nx + 1):
                     here, behind = relaxed(known[0], bounds, m, i, here), relaxed(known[1], bounds, n, i, behind)
                     v[m, i], v[n, i] = here, behind
-                continue
-            line, k = (m, 0) if leads else (n, 1)
-            west = v[line, 0]
-            for i in range(1, nx + 1):
-                west = relaxed(known[k], bounds, line, i, west)
-                v[line, i] = west
+            elif leads or follows:  # neither behind the end of a film of one line
+                relax(v, kx, ky, bounds, prepared, m if leads else n, 1, nx + 1, known[0])
 
 
 @kernel
@@ -106,24 +96,22 @@ def sweep_spans(
     v: Array, kx: Array, ky: Array, bounds: Array, prepared: Array, spans: NDArray[np.int32], found: int, count: int
 ) -> int:
     """`count` sweeps, to and fro, over runs of points (`fronts.front_spans`); returns how many points these are."""
-    points = 0
+    points, known = 0, np.empty((2, v.shape[1]))
     for s in range(count):
         for k in range(found):
             at = found - 1 - k if s % 2 == 1 else k
-            relax(v, kx, ky, bounds, prepared, spans[at, 0], spans[at, 1], spans[at, 2])
+            relax(v, kx, ky, bounds, prepared, spans[at, 0], spans[at, 1], spans[at, 2], known)
     for k in range(found):
         points += spans[k, 2] - spans[k, 1]
     return points
 
 
 @piece
-def terms_of_f(v: Array, kx: Array, ky: Array, c: Array, m: Array, g: Array, j: int, i: int) -> tuple[float, float, float]:
-    """A v - b, m g(v) and the diagonal of A at a point."""
+def leaving(v: Array, kx: Array, ky: Array, j: int, i: int) -> float:
+    """A v at a point."""
     here = v[j, i]
-    k_W, k_E, k_S, k_N = kx[j, i], kx[j, i + 1], ky[j, i], ky[j + 1, i]
-    flow = k_W * (here - v[j, i - 1]) + k_E * (here - v[j, i + 1])
-    flow += k_S * (here - v[j - 1, i]) + k_N * (here - v[j + 1, i]) - c[j, i]
-    return flow, m[j, i] * g[j - 1, i - 1], k_W + k_E + k_S + k_N
+    flow = kx[j, i] * (here - v[j, i - 1]) + kx[j, i + 1] * (here - v[j, i + 1])
+    return flow + (ky[j, i] * (here - v[j - 1, i]) + ky[j + 1, i] * (here - v[j + 1, i]))
 
 
 @kernel
@@ -131,8 +119,7 @@ def forces(v: Array, kx: Array, ky: Array, c: Array, m: Array, g: Array, bounds:
     """-f(v), where no bound holds v against it into `free`, where one does into `held`, 0 elsewhere."""
     for j in range(1, v.shape[0] - 1):
         for i in range(1, v.shape[1] - 1):
-            flow, supply, _ = terms_of_f(v, kx, ky, c, m, g, j, i)
-            f = flow - supply
+            f = leaving(v, kx, ky, j, i) - c[j, i] - m[j, i] * g[j - 1, i - 1]
             holds = (v[j, i] <= bounds[0, j, i] and f > 0.0) or (v[j, i] >= bounds[1, j, i] and f < 0.0)
             free[j, i], held[j, i] = (0.0, -f) if holds else (-f, 0.0)
 
@@ -144,7 +131,8 @@ def norms(v: Array, kx: Array, ky: Array, c: Array, m: Array, g: Array, bounds: 
     largest, terms = 0.0, 0.0
     for j in range(1, v.shape[0] - 1):
         for i in range(1, v.shape[1] - 1):
-            flow, supply, diagonal = terms_of_f(v, kx, ky, c, m, g, j, i)
+            flow, supply = leaving(v, kx, ky, j, i) - c[j, i], m[j, i] * g[j - 1, i - 1]
+            diagonal = kx[j, i] + kx[j, i + 1] + ky[j, i] + ky[j + 1, i]
             natural = min(flow - supply, diagonal * (v[j, i] - bounds[0, j, i]))
             largest = max(largest, abs(max(natural, diagonal * (v[j, i] - bounds[1, j, i]))))
             terms += abs(flow) + abs(supply)
@@ -159,8 +147,6 @@ def coarse_right_side(
     for j in range(1, v.shape[0] - 1):
         for i in range(1, v.shape[1] - 1):
             here = v[j, i]
-            flow = kx[j, i] * (here - v[j, i - 1]) + kx[j, i + 1] * (here - v[j, i + 1])
-            flow += ky[j, i] * (here - v[j - 1, i]) + ky[j + 1, i] * (here - v[j + 1, i])
-            c[j, i] = flow - m[j, i] * g[j - 1, i - 1] + free[j, i]
+            c[j, i] = leaving(v, kx, ky, j, i) - m[j, i] * g[j - 1, i - 1] + free[j, i]
             if here <= bounds[0, j, i] or here >= bounds[1, j, i]:
                 c[j, i] += held[j, i]
