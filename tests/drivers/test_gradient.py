@@ -7,17 +7,19 @@ import math
 import numpy as np
 import pytest
 
-from lcp_lube import InputError, load_scene, solve
+from lcp_lube import InputError, load_scene, registry, solve
 from lcp_lube.cli.arguments import parse
 from lcp_lube.cli.main import run
 from lcp_lube.drivers import supplies
 from lcp_lube.drivers.derivatives import adjoint as adjoint_module
+from lcp_lube.drivers.derivatives import near_films
 from lcp_lube.drivers.derivatives.adjoint import Adjoint
 from lcp_lube.drivers.derivatives.film_gradient import FilmGradient, areas
 from lcp_lube.drivers.derivatives.goal_error import finer_shape, goal_error
 from lcp_lube.drivers.derivatives.gradient import gradients
 from lcp_lube.drivers.loads import attitude
 from lcp_lube.drivers.motions import linearised
+from lcp_lube.problems.film import slopes
 from lcp_lube.problems.film.known import known_fields
 from lcp_lube.scenes.values import key_of, values_of, with_values
 
@@ -246,6 +248,26 @@ def test_the_scaling_law(name):
     assert sum(one.elasticity[key] for key in keys) == pytest.approx(-2.0, rel=1e-9)
     assert one.elasticity["mu"] == pytest.approx(1.0, rel=1e-9)
     adjoint.destroy()
+    solution.destroy()
+
+
+@pytest.mark.parametrize("least", [registry.SMALL, 0])
+def test_a_layer_as_thick_as_the_land_it_comes_from(least, monkeypatch):
+    """It fills the strip beside the pocket whatever the scene's numbers are: no kink of the friction, though one of its law."""
+    for module in (near_films, slopes):
+        monkeypatch.setattr(module, "SMALL", least)  # 0: films near by are sums over their faces
+    data = {"family": "bearing", "dimension": 2, "n": 10, "L": 0.01, "width": 0.01, "U": 1.0, "fluid": {"mu": 0.02}}
+    pocket = {"shape": "pocket", "depth": 8e-6, "x": [3e-4, 6.3e-3], "y": [4e-4, 9.7e-3]}
+    data |= {"film": [{"shape": "constant", "h": 1e-5}, pocket]}
+    scene = load_scene({**data, "sides": {"west": 0.0, "east": 1e5, "south": 0.0, "north": 0.0}})
+    solution = answer(scene)
+    keys = ["width", "film.pocket.depth", "film.pocket.y.2", "film.constant.h"]
+    (friction,) = gradients(scene, solution, ["friction"], keys)
+    for key in keys:
+        value = values_of(scene)[key]
+        difference = by_solves(scene, solution, key, value, STEP * value)["friction"]
+        assert abs(friction.elasticity[key] - difference * value / friction.value) < TOL, key
+    assert not friction.one_sided and not friction.uncertain
     solution.destroy()
 
 

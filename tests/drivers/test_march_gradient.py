@@ -96,6 +96,21 @@ CASES = {
         | {"film.dimples.size_mm": 3.0, "fluid.p_supply": 1e3, "motion": {"t_end": 0.003, "steps": 2}},
         ["fluid.mu"],
     ),
+    "a layer as thick as the land it comes from": (
+        "moving_texture",
+        {
+            "dimension": 2,
+            "n": 9,
+            "width_mm": 10,
+            "sides": {"west": 0.0, "east": 1e5, "south": 0.0, "north": 0.0},
+            "film": [
+                {"shape": "constant", "h_um": 10},
+                {"shape": "pocket", "depth_um": 8, "x_mm": [0.6, 12.6], "y_mm": [0.4, 9.7]},
+            ],
+            "motion": {**TEXTURE, "steps": 3, "set": {"U": "1 + 5*t"}},
+        },
+        ["width", "film.pocket.depth"],
+    ),
     "to smaller x": (
         "moving_texture",
         {

@@ -15,6 +15,7 @@ from ...base.differences import QUICK, differences
 from ...base.parallel import Array
 from ...errors import InputError
 from ...problems.film.edges import jumps_of, oblique
+from ...problems.film.flows import layers
 from ...problems.film.lubrication import LubricationProblem
 from ...problems.grid import Grid
 from ...problems.solution import Solution
@@ -85,6 +86,8 @@ class Adjoint:
         self.cavity, switching = cavity_of(eq, p, r)
         self.switching = int(eq.grid.reduce.sum(np.array([np.count_nonzero(switching)])))
         made_of = dict.fromkeys(part for weights in parts.values() for part in weights)
+        if not made_of.keys().isdisjoint(DRAGS):
+            eq.layers = layers(eq.problem(p), r)
         slopes = {part: drags.get(part) or eq.slope(p, r, part) for part in made_of}
         self.ties = {name: sum(slopes[part].ties for part in weights) for name, weights in parts.items()}
         rows = {name: right_side(slopes, weights, self.cavity) for name, weights in parts.items()}

@@ -86,6 +86,9 @@ class Equations:
             self.constant = replace(self.model, places=places).build(near.grid.shape, comm)
         self._at: tuple[Any, ...] = (None,)  # p, the constant film, and what the fluid makes of it there
         self.constant = self.constant if self.lent else self.constant.revised(dry)
+        self.layers: Array | None = None  # `flows.layers` of the solution, where derivatives of drags are wanted
+        if near is not None:
+            self.constant.layers = near.layers
         self.grid: Grid = self.constant.grid
         if pressures and (held := self.constant.held) is not None:
             q = [float(self.law.reduced(np.array(P))) if self.law else P for P in pressures]

@@ -22,7 +22,7 @@ from ...base.differences import QUICK, differences
 from ...base.parallel import Array
 from ...errors import InputError
 from ...problems.film.edges import oblique
-from ...problems.film.flows import point_weights, volume_unit
+from ...problems.film.flows import layers, point_weights, volume_unit
 from ...problems.film.slopes import giving_points
 from ...problems.film.stored import mean_film
 from ...problems.solution import Solution
@@ -71,9 +71,7 @@ class MarchGradient:
         self.fed: dict[str, list[Any]] = {name: [np.zeros(0)] * (len(trace.steps) + 1) for name in self.names}  # of supplies
         self.units: dict[int, float] = {}  # of flow, of each step
         self.sizes = dict.fromkeys(self.names, 0.0)
-        self.report: dict[str, float] = {}
-        self.conditions: dict[str, float] = {}
-        self.ties: dict[str, int] = {}
+        self.report, self.conditions, self.ties = dict[str, float](), dict[str, float](), dict[str, int]()
         self.switching = 0
         for n in range(len(trace.steps), 0 if self.course.kept(0) is None else -1, -1):
             self._back(n)
@@ -102,6 +100,8 @@ class MarchGradient:
         """The adjoints of step n, from those of later ones."""
         eq, kept = self.course.at(n), self.course.solved(n)
         p, r, asked = kept.p, kept.r, self._asked(n)
+        if asked:
+            self.course.layers[n] = layers(eq.problem(p), r)
         numbers, grid = eq.numbers(p, r, None if asked else self.course.forces), eq.grid
         told = eq.report(numbers)
         for name, (base, share) in asked.items():

@@ -96,7 +96,8 @@ class NearFilms:
         shares = self._shares if shares is None else shares
         names = [FLIPPED.get(name, name) if self.equations.turned else name for name in self.flows]
         flows = [name.removeprefix("flow_") for name in names]
-        return ByFaces(problem, self.model.scheme, law, self.p, self.r, p_sides, self.rows, self.drags, flows, shares)
+        fields = self.p, self.r, p_sides, self.rows
+        return ByFaces(problem, self.model.scheme, law, *fields, self.drags, flows, shares, self.equations.layers)
 
     @cached_property
     def _here(self) -> Array | None:

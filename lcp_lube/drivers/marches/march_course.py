@@ -116,6 +116,7 @@ class Course:
         self.grid: Grid = problem.grid
         problem.destroy()
         self.known: dict[int, Array] = {}
+        self.layers: dict[int, Array | None] = {} if near is None else near.layers  # of steps (`flows.layers`)
 
     def models(self, t: float, place: Any) -> Any:
         """The film at a time."""
@@ -200,7 +201,7 @@ class Course:
             model = replace(model, stored=Stored(formula.weight, old, self.grid))
         pressures = kept.pressures if pressures is None else pressures
         found = Equations(TimeStep(self.scene, model, self.grid), self.comm, pressures, dry=kept.dry)  # type: ignore[arg-type]
-        found.turned = bool(self.turned)
+        found.turned, found.constant.layers = bool(self.turned), self.layers.get(n)
         return found
 
     def by_followed(self, n: int, at: Any, unit: float) -> list[tuple[Array, Array, dict[str, float]]]:

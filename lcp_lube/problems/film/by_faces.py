@@ -54,12 +54,13 @@ class ByFaces:
     problem : of a fluid of constant viscosity and density. law : of its own fluid.
     p : owned points, Pa above p_c, r : owned points. p_sides : Pa above p_c. rows : the weights w.
     drags : of them `friction` and `friction_torque`, which follow the rows' sums. flows : sides, whose flows follow those.
-    shares : what `supplies.shares_of` says of a film with supplies.
+    shares : what `supplies.shares_of` says of a film with supplies. layers : `flows.layers` of this one, which all films have.
     """
 
     def __init__(
         self, problem: LubricationProblem, scheme: str, law: Law, p: Array, r: Array, p_sides: Sequence[float],
         rows: Sequence[Array], drags: Sequence[str] = (), flows: Sequence[str] = (), shares: Array | None = None,
+        layers: Array | None = None,
     ):  # fmt: skip
         from .cell_loops import loop_by_faces
 
@@ -109,6 +110,7 @@ class ByFaces:
             self._pull = own * np.diff(grid.ghosted(p, 0.0)[1:-1])[None]
             self._void = -np.insert(r.reshape(grid.box), 0, 0.0, axis=1)[None]
             self._whole, self._less = np.broadcast_to(own * thick, self._pull.shape), self._void * thick
+            self._layers = None if layers is None else np.insert(layers, 0, 0, axis=1)
             self._outer = [np.full((1, ny, 1), side) for side in (-west, east)]
         if flows:  # of what the wall drags, and of what the pressure drives, through the faces at the sides
             q, r = q.reshape(grid.box), r.reshape(grid.box)
@@ -216,7 +218,8 @@ class ByFaces:
     def _sheared(self, film: Around, at: Laid, rows: Rows, void: Array) -> list[Array]:
         """By what `_drag_parts` count on the x faces of some lines. void : the film of the void, in parts of the wall's."""
         void = void if self._nodal else np.ones(1)
-        h, resting, moving = at.sheared(film, rows, 1.0 + void * self._void[0][rows])
+        layers = None if self._layers is None else self._layers[rows]
+        h, resting, moving = at.sheared(film, rows, 1.0 + void * self._void[0][rows], layers)
         pull, full = 0.5 * h, at.steps / moving
         return [pull, at.steps * resting + full, full * void, pull[:, :1], pull[:, -1:]]
 

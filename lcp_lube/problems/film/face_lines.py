@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ...base.parallel import Array
 from ..grid import Grid
 from .edges import Around, face_film, pairs
-from .flows import linear, sheared_lines
+from .flows import held, linear, sheared_lines
 from .strip import line_weights, stream_weights
 
 NEAR = 1e-6  # of a cell: an edge so near it counts as inside
@@ -63,15 +63,15 @@ class FaceLines:
         h = np.broadcast_to(film(x[None, :], faces[:, None]), (faces.size, x.size))
         return np.asarray(h * h * h)
 
-    def sheared(self, film: Around, rows: Rows, liquid: Array) -> tuple[Array, Array, Array]:
+    def sheared(self, film: Around, rows: Rows, liquid: Array, layers: Array | None = None) -> tuple[Array, Array, Array]:
         """The film of the x faces of some lines, and what shears them per mu U, a + liquid/b: a and b (`flows.linear`).
 
-        liquid : of each face; lines that are alike have one pair, whatever it is."""
+        liquid : of each face; lines that are alike have one pair, whatever it is. layers : `flows.layers` to hold."""
         places, steps = self.grid.x[0], self.steps
         x = np.append(places[0] - steps[0] / 2, places + steps[1:] / 2)[None]
         x = x % self.grid.lengths[0] if self.grid.periodic[0] else x  # of a seam the side that `model.film` has
         h, *lengths = sheared_lines(film, x, self.y[rows][:, None], self.across[:, rows])
-        return h, *linear(np.where, liquid, *lengths)
+        return h, *linear(np.where, liquid, *held(layers, *lengths))
 
 
 def _alike(jumps: Sequence[float], low: Array, high: Array) -> Rows:

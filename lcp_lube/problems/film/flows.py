@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from .lubrication import LubricationProblem
 
 SIDES = ("west", "east", "south", "north")
+SAME = 1.0 + 1e-12  # of what is equal but for rounding
+NEVER = 1e-9  # of a length, by which it is the one that is not chosen
 
 
 def point_weights(grid: Grid) -> Array:
@@ -85,7 +87,7 @@ def friction(problem: LubricationProblem, p_pa: Array, r: Array, lever: Array | 
     def add_up(rows: slice) -> float:
         part = copy(problem)
         if alone:
-            part.grid, part.scheme = places_of(grid, rows), s.rows(rows)
+            part.grid, part.scheme, part.layers = places_of(grid, rows), s.rows(rows), _rows(problem.layers, rows)
         along = lever[rows] if isinstance(lever, np.ndarray) else lever
         return float(np.sum(sum(drag(part, part.scheme, p_pa[rows].ravel(), r[rows].ravel())) * along))
 
@@ -121,8 +123,8 @@ def drag_sum(
 
     def add_up(rows: slice) -> float:
         part, s = copy(problem), problem.scheme.rows(rows)
-        part.grid = places_of(grid, rows)
-        found = (*sheared_faces(part, grid.x + grid.steps(0)[1:] / 2), s.couette_E)
+        part.grid, part.layers = places_of(grid, rows), _rows(problem.layers, rows)
+        found = (*_east_faces(part), s.couette_E)
         # Numbers side by side: else no vector instructions are made. Most films are the same where a, b and c ask for them.
         lying = {id(one): np.ascontiguousarray(one[:1] if one.strides[0] == 0 else one) for one in found}
         h, a, b, c, couette = (lying[id(one)] for one in found)
@@ -180,8 +182,7 @@ def drag(problem: LubricationProblem, scheme: BoxScheme, p_pa: Array, r: Array, 
     walls = sides(grid, ("closed",))[:2]
     if walls[1].any():
         p_east[:, -1] = p[:, -1]
-    faces = sheared_faces(problem, grid.x + behind / 2, lifted)
-    east, push, _ = face_drag(np.where, linear, *faces, s.couette_E, s.b_E, r, p, p_east)
+    east, push, _ = face_drag(np.where, linear, *_east_faces(problem, lifted), s.couette_E, s.b_E, r, p, p_east)
     if walls[1].any():  # its faces have neither
         east[:, -1] = 0.0
     own, push_own = np.zeros_like(east), np.zeros_like(east[:, :1])
@@ -201,9 +202,41 @@ def drag(problem: LubricationProblem, scheme: BoxScheme, p_pa: Array, r: Array, 
 
 
 def linear(where: Any, liquid: Any, resting: Any, moving: Any, first: Any) -> tuple[Any, Any]:
-    """a and b of `sheared_faces` with c where that is less; what shears the face is then a + liquid/b."""
-    layer = (liquid / first).real < (resting + liquid / moving).real
+    """a and b of `sheared_faces` with c where that is less, or as much; what shears the face is then a + liquid/b."""
+    layer = (liquid / first).real < SAME * (resting + liquid / moving).real
     return where(layer, 0.0, resting), where(layer, first, moving)
+
+
+def layers(problem: LubricationProblem, r: Array) -> Array | None:
+    """Which of its two `linear` takes at each east face: 1 the layer's, -1 the other, 0 where they are one; None: at all.
+
+    Behind a land without pressure the layer is as thick as the thinnest strip, and stays so whatever the scene's numbers are:
+    with r held it would not. Either one's derivative is the film's, if that by r is of the same one.
+    """
+    grid, s = problem.grid, problem.scheme
+    if grid.dim == 1 or not (problem.edged and Around(problem.film, grid).jumps("y")):
+        return None
+    liquid = 1.0 + s.b_E * r.reshape(grid.box) / np.where(s.couette_E == 0.0, np.inf, s.couette_E)
+    _, resting, moving, first = _east_faces(problem)
+    chosen = linear(np.where, liquid, resting, moving, first)[1]
+    return np.where(moving == first, 0, np.where(chosen == first, 1, -1)).astype(np.int8)
+
+
+def held(layers: Array | None, resting: Array, moving: Array, first: Array) -> tuple[Array, Array, Array]:
+    """These, but that `linear` takes what `layers` says."""
+    if layers is None:
+        return resting, moving, first
+    return resting, np.where(layers > 0, NEVER * moving, moving), np.where(layers < 0, NEVER * first, first)
+
+
+def _rows(layers: Array | None, rows: slice) -> Array | None:
+    return None if layers is None else layers[rows]
+
+
+def _east_faces(problem: LubricationProblem, lifted: complex = 0.0) -> tuple[Array, Array, Array, Array]:
+    """`sheared_faces` of the east faces, with the layers that the problem has."""
+    h, *lengths = sheared_faces(problem, problem.grid.x + problem.grid.steps(0)[1:] / 2, lifted)
+    return h, *held(problem.layers, *lengths)
 
 
 def face_drag(

@@ -55,6 +55,7 @@ class LubricationProblem:
     rigid: Any = None
     contact: Any = None  # of asperities
     levers: Any = ()  # `Model.levers`
+    layers: Any = None  # `flows.layers` of a film near by, which has the same
     stored: Any = None  # by its cells, in a time step (`stored.Stored`)
 
     def __init__(
@@ -82,8 +83,7 @@ class LubricationProblem:
         self.remade = False  # whether it has such faces
         self.extras: Callable[[dict[str, Any]], dict[str, Any]] | None = None
         self.more, self.more_fields = dict[str, Any](), dict[str, tuple[Array, str]]()  # of what is solved beside p and r
-        # Of its equations, for the certificate; and what effects made of its coefficients (`film.effects`).
-        self.more_measures, self.cells = dict[str, float](), dict[str, Array]()
+        self.more_measures, self.cells = dict[str, float](), dict[str, Array]()  # for the certificate; what effects made of it
         self._own = Owned(self, grid.petsc_comm)
 
     @made
