@@ -48,31 +48,28 @@ def replacing(path: Path, comm: MPI.Comm) -> Iterator[str]:
     """
     temporary = Path(comm.bcast(str(path.with_name(f".{path.stem}.{os.getpid()}{path.suffix.lower()}"))))
     reason, failed = "", None
-    with on_all_ranks(comm, f"{path}: could not be written"):  # PETSc's viewers would fail on rank 0 alone
-        if comm.rank == 0:
-            temporary.touch()
     try:
-        yield str(temporary)
-    except OSError as error:
-        reason = error.strerror or str(error)
-    except PETSc.Error as error:
-        reason = f"PETSc's error code {error.ierr}; is the disk full?"
-        failed = error
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
-    if not all_come(comm, PATIENCE if failed else FOREVER):
-        temporary.unlink(missing_ok=True)
-        raise InputError(f"{path}: could not be written: {reason}") from failed
-    try:
+        with on_all_ranks(comm, f"{path}: could not be written"):  # PETSc's viewers would fail on rank 0 alone
+            if comm.rank == 0:
+                temporary.touch()
+        try:
+            yield str(temporary)
+        except OSError as error:
+            reason = error.strerror or str(error)
+        except PETSc.Error as error:
+            reason = f"PETSc's error code {error.ierr}; is the disk full?"
+            failed = error
+        if not all_come(comm, PATIENCE if failed else FOREVER):
+            raise InputError(f"{path}: could not be written: {reason}") from failed
         with on_all_ranks(comm, f"{path}: could not be written"):
             if reason:
                 raise InputError(reason)
         with on_all_ranks(comm, f"{path}: could not be written"):
             if comm.rank == 0:
                 os.replace(temporary, path)
-    except InputError:
-        temporary.unlink(missing_ok=True)
+    except BaseException:  # an interrupt may fall anywhere
+        with suppress(OSError):  # why it could not be made is told
+            temporary.unlink()
         raise
 
 

@@ -1,6 +1,7 @@
 """Fields in files and pictures: what is written is what was solved, on any number of ranks; a failure leaves nothing."""
 
 import json
+import os
 import re
 import sys
 import zipfile
@@ -194,6 +195,22 @@ def test_an_interrupt_removes_the_temporary_file(tmp_path: Path) -> None:
         Path(temporary).write_text("half")
         raise KeyboardInterrupt
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("of", [(Path, "touch"), (os, "replace")])
+def test_an_interrupt_outside_the_block_removes_it_too(of: tuple[Any, str], tmp_path: Path, monkeypatch: Any) -> None:
+    """Just after the file is made, or just before it gets its name."""
+    make, seen = Path.touch, list[Path]()
+
+    def interrupted(path: Path, *_: object) -> None:
+        make(path)
+        seen.extend(tmp_path.iterdir())
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(*of, interrupted)
+    with pytest.raises(KeyboardInterrupt), files.replacing(tmp_path / "a.png", MPI.COMM_SELF) as temporary:
+        Path(temporary).write_text("whole")
+    assert len(seen) == 1 and not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(
