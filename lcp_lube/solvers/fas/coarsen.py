@@ -1,16 +1,21 @@
-"""Conductances of the next coarser grid; arrays as in `kernels`."""
+"""Conductances of the next coarser grid; arrays as in `kernels`.
+
+Each fine row's are put in series, and its weights made, once, in loops of which vector instructions are made.
+"""
+
+import numpy as np
 
 from ...base.compiled import kernel, piece
 from ...base.parallel import Array
-from .transfer import share
+from .transfer import restrict_row, share, west_shares
 
 
 @piece
 def series(a: float, b: float) -> float:
     """Conductance of two faces one behind the other; one that lies in a supply, -1, resists nothing (`held.marked`)."""
-    if a < 0.0 or b < 0.0:
-        return max(a, b, 0.0)
-    return a * b / (a + b) if a + b > 0.0 else 0.0
+    total = a + b
+    both = a * b / total if total > 0.0 else 0.0
+    return max(a, b, 0.0) if min(a, b) < 0.0 else both
 
 
 @kernel
@@ -21,24 +26,47 @@ def coarsen_x_faces(
 
     beyond: the last coarse point is the last fine one, and only one fine face lies between it and the side.
     """
-    n_faces = out.shape[1] - 2
+    n = out.shape[1] - 2
     shift = (1 - y0 % 2 if by_y else 0) + 1
+    here, south, north = np.zeros(n + 2), np.zeros((2, n + 2)), np.zeros((2, n + 2))  # the lines beside: with their weights
     for J in range(start, end):
         m = shift + (2 * J if by_y else J)
-        for f in range(1, n_faces + 1):
-            i = 2 * f - 1 if by_x else f  # the face's column, or that of the first of two, between which point i lies
-            total = 0.0
-            for d in range(-1 if by_y else 0, 2 if by_y else 1):
-                k = kx[m + d, i]
-                if by_x and not (beyond and f == n_faces):
-                    k = series(k, kx[m + d, i + 1])
-                at = min(i, ky.shape[1] - 2)
-                if d == -1:
-                    k *= 1.0 - share(ky[m - 1, at], ky[m, at], harmonic)
-                elif d == 1:
-                    k *= share(ky[m + 1, at], ky[m + 2, at], harmonic)
-                total += max(k, 0.0)
-            out[J + 1, f] = 0.5 * total if by_y else total
+        in_line(kx, m, by_x, beyond, here)
+        if not by_y:
+            out[J + 1, 1:-1] = here[1:-1]
+            continue
+        if start == J:
+            between(kx, ky, m - 1, by_x, harmonic, beyond, south)
+        between(kx, ky, m + 1, by_x, harmonic, beyond, north)
+        for f in range(np.uint32(1), np.uint32(n + 1)):
+            out[J + 1, f] = 0.5 * (((1.0 - south[1, f]) * south[0, f] + here[f]) + north[1, f] * north[0, f])
+        south, north = north, south
+
+
+@piece
+def in_line(kx: Array, m: int, by_x: bool, beyond: bool, out: Array) -> None:
+    """The x faces of row m, each two of them in series where points are left out."""
+    n = out.size - 2
+    if not by_x:
+        for f in range(np.uint32(1), np.uint32(n + 1)):
+            out[f] = max(kx[m, f], 0.0)
+        return
+    for f in range(np.uint32(1), np.uint32(n + 1 - beyond)):
+        out[f] = series(kx[m, 2 * f - 1], kx[m, 2 * f])
+    if beyond:
+        out[n] = max(kx[m, 2 * n - 1], 0.0)
+
+
+@piece
+def between(kx: Array, ky: Array, m: int, by_x: bool, harmonic: bool, beyond: bool, out: Array) -> None:
+    """The same of a row between two coarse lines, and at each face the weight of the southern one."""
+    in_line(kx, m, by_x, beyond, out[0])
+    n, step = out.shape[1] - 2, 2 if by_x else 1
+    for f in range(np.uint32(1), np.uint32(n)):
+        i = step * f - (step - 1)
+        out[1, f] = share(ky[m, i], ky[m + 1, i], harmonic)
+    i = min(step * n - (step - 1), ky.shape[1] - 2)
+    out[1, n] = share(ky[m, i], ky[m + 1, i], harmonic)
 
 
 @kernel
@@ -49,19 +77,17 @@ def coarsen_y_faces(
     n_faces, n_columns = out.shape[0] - 2, out.shape[1] - 2
     # Row of the even line under the first coarse face; the face south of row m is ky[m].
     shift = (0 if y0 % 2 == 1 else 1) if by_y else 1
+    fine, w, coarse = np.zeros(ky.shape[1]), np.zeros(n_columns + 1), np.zeros(n_columns + 2)
     for f in range(start + 1, end + 1):
         m = shift + (2 * f - 2 if by_y else f - 1)
-        for k in range(1, n_columns + 1):
-            i = 2 * k if by_x else k
-            total = 0.0
-            for d in range(-1 if by_x else 0, 2 if by_x else 1):
-                value = ky[m, i + d]
-                if by_y and not (beyond and f == n_faces):
-                    value = series(value, ky[m + 1, i + d])
-                at = min(m, kx.shape[0] - 2)
-                if d == -1:
-                    value *= 1.0 - share(kx[at, i - 1], kx[at, i], harmonic)
-                elif d == 1:
-                    value *= share(kx[at, i + 1], kx[at, i + 2], harmonic)
-                total += max(value, 0.0)
-            out[f, k] = 0.5 * total if by_y else total
+        if by_y and not (beyond and f == n_faces):
+            for i in range(np.uint32(fine.size)):
+                fine[i] = series(ky[m, i], ky[m + 1, i])
+        else:
+            for i in range(np.uint32(fine.size)):
+                fine[i] = max(ky[m, i], 0.0)
+        if by_x:
+            west_shares(kx, min(m, kx.shape[0] - 2), harmonic, w)
+        restrict_row(fine, w, by_x, False, coarse)
+        for k in range(np.uint32(1), np.uint32(n_columns + 1)):
+            out[f, k] = 0.5 * coarse[k] if by_y else coarse[k]
