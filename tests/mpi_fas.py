@@ -63,7 +63,7 @@ CASES: dict[str, tuple[Any, dict[str, Any]]] = {
         },
         {},
     ),
-    "hard": ("textured_slider", {"K": 3, "nx": 60, "ny": 64, "depth": 135e-6}),
+    "hard": ("textured_slider", {"K": 3, "nx": 60, "ny": 63, "depth": 135e-6}),
 }
 
 

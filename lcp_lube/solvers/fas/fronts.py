@@ -11,8 +11,9 @@ from .waiting import await_part, fetch, write
 REACH = 8  # cells within which a cavity ends, if it does so at the front that is looked at
 RARE, WIDER = 0.1, 5  # part of the points that a strip this many times as wide may take
 VERY = 0.2  # and the part of that, of a strip which is then made twice as wide once more
-OVER, LAST = 1.7, 2  # overrelaxation of the sweeps near fronts, but for so many that leave smooth what remains
-AHEAD = 2  # runs of points for which memory is asked before their turn
+OVER, LAST = 1.8, 2  # overrelaxation of the sweeps near fronts, but for so many that leave smooth what remains
+AHEAD = 2  # rows for whose points memory is asked before their turn
+FUSED = 5  # sweeps that go over rows in one pass
 
 
 @piece
@@ -126,20 +127,40 @@ def relax_front(
         looks, points = 2, together(own, thread, threads, done, near, 2)
     if held is not None:
         spans, at = without(spans, at, held)
-    work = np.empty((4, nx + 2))
-    for s in range(count):
-        over = most if more or s < count - LAST else 1.0
+    of_row, work = first_spans(spans, at, ny), np.empty((4, nx + 2))
+    most_fused = FUSED if plain else 1
+    for turn in range((count + most_fused - 1) // most_fused):
+        before, step = turn * most_fused, -1 if turn % 2 == 1 else 1
+        fused = min(count - before, most_fused)
         for half in range(min(blocks, 2)):
             for b in range(2 * thread + half, blocks, 2 * threads):
-                await_part(done, b - 1, looks + s + half)
-                await_part(done, b + 1, looks + s + half)
-                for k in range(at[b], at[b + 1]):
-                    here, step = (at[b] + at[b + 1] - 1 - k, -1) if s % 2 == 1 else (k, 1)
-                    if at[b] <= here + AHEAD * step < at[b + 1]:
-                        bring_near(z, kx, ky, c, spans[here + AHEAD * step], step)
-                    relax_pairs(z, kx, ky, c, spans[here, 0], spans[here, 1], spans[here, 2], carry, ring, over, work)
-                write(done, b, looks + s + 1)
+                await_part(done, b - 1, looks + turn + half)
+                await_part(done, b + 1, looks + turn + half)
+                top, bottom = ny * b // blocks + 1, ny * (b + 1) // blocks
+                lines, first = bottom + 1 - top, bottom if step < 0 else top
+                for s in range(lines + fused - 1):
+                    m = first + step * (s + AHEAD)
+                    if top <= m <= bottom:
+                        for n in range(of_row[m], of_row[m + 1]):
+                            bring_near(z, kx, ky, c, spans[n], step)
+                    for k in range(max(s + 1 - lines, 0), min(s + 1, fused)):
+                        m, over = first + step * (s - k), most if more or before + k < count - LAST else 1.0
+                        for q in range(of_row[m + 1] - of_row[m]):
+                            n = of_row[m] + q if step > 0 else of_row[m + 1] - 1 - q
+                            relax_pairs(z, kx, ky, c, m, spans[n, 1], spans[n, 2], carry, ring, over, work)
+                write(done, b, looks + turn + 1)
     return count * points
+
+
+@piece
+def first_spans(spans: NDArray[np.int32], at: NDArray[np.int64], ny: int) -> NDArray[np.int64]:
+    """Where the spans of each row begin; at : those of the blocks, of which only a thread's own have any."""
+    out = np.zeros(ny + 3, dtype=np.int64)
+    for n in range(at[-1]):
+        out[spans[n, 0] + 1] = n + 1
+    for m in range(1, ny + 3):
+        out[m] = max(out[m], out[m - 1])
+    return out
 
 
 @piece
