@@ -76,7 +76,7 @@ class Fas(FilmCycles):
             self._levels = levels.settled(levels.hierarchy(finest.finest(problem), self._harmonic, ELIMINATED))
         # A corrected pressure counts beside a corrected flow of void as the flow that it drives: units of pressure are any.
         first = self._levels[0]
-        driven = 2.0 * problem.reduce.max(np.array([loops.mean(k) for k in (first.kx, first.ky)]))
+        driven = 2.0 * max(levels.looked(first)[:2])
         self._unit = 1.0 / driven if driven > 0.0 else 1.0
         self._begin(start is not None)
         self._fields: Fields | None = None  # p and r of z as it is, where they have been asked for

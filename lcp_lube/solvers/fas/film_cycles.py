@@ -29,7 +29,7 @@ class FilmCycles(Cycles):
         level = self._levels[k]
         if k + 1 < self._depth:
             coarse = self._levels[k + 1]
-            where = (level.first, level.by_x, level.by_y, self._harmonic, self._tools.smooth(coarse), level.sides)
+            where = (level.first, level.by_x, level.by_y, self._harmonic, not self._tools.looked(coarse)[2], level.sides)
             coarse.put_sides(*(a * p / self.problem.p_unit for a, p in zip(level.sides, self.problem.p_sides, strict=True)))
             self._loops.interpolate(level.z, coarse.part(coarse.seen(coarse.z)), level.kx, level.ky, *where)
             coarse.put_sides()

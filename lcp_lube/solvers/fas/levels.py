@@ -37,7 +37,7 @@ class Level:
         store more by p = 1; scale : z of a cavitated cell over that of the finer grid's, which is smaller.
     held, owner, given, spans, slips : of a film with supplies (`held`): which points are held, by which supply (from 1 on),
         their pressures, the runs of free points, and the held points that the next coarser grid sees beside their place.
-    even : whether this grid sees no steps in the film, once that is known; ways : weights of interpolation else (`steps`).
+    look : what has been seen of the conductances (`looked`); ways : weights of interpolation in films with steps (`steps`).
     factors : of the coarsest grid's Jacobian, and the signs of z that they are of (`coarsest`).
     """
 
@@ -65,7 +65,7 @@ class Level:
     spans: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int32))
     slips: NDArray[np.bool_] | None = None
     ways: NDArray[np.float32] | None = None
-    even: bool | None = None
+    look: tuple[float, float, float] | None = None
     factors: tuple[Array, NDArray[np.int8]] | None = None
     visits: int = 0
     seconds: float = 0.0
@@ -219,9 +219,7 @@ def _coarser(fine: Level, harmonic: bool) -> Level | None:
     # Without a point in between, the two ends of a period would be neighbours on the coarse grid and not on the fine one.
     can_x = fine.nx // 2 >= FEWEST and not (fine.periodic[0] and fine.nx % 2)
     can_y = fine.ny // 2 >= FEWEST and not (fine.periodic[1] and fine.ny % 2)
-    mean_x, mean_y = (loops.mean(fine.part(k)) for k in (fine.kx, fine.ky))
-    if fine.comm is not None:
-        mean_x, mean_y = (fine.comm.allreduce(mean) for mean in (mean_x, mean_y))
+    mean_x, mean_y, steps = looked(fine)
     by_x = can_x and (mean_y <= STRONG * mean_x or not can_y)
     by_y = can_y and (mean_x <= STRONG * mean_y or not can_x)
     if not (by_x or by_y):
@@ -238,7 +236,7 @@ def _coarser(fine: Level, harmonic: bool) -> Level | None:
     beyond_x = by_x and fine.nx % 2 == 0 and not fine.periodic[0]
     beyond_y = by_y and fine.ny % 2 == 0 and not fine.periodic[1] and last
     into_x, into_y = coarse.part(coarse.kx), coarse.part(coarse.ky)
-    if harmonic and fine.held is None and by_x and by_y and not smooth(fine):
+    if harmonic and fine.held is None and by_x and by_y and steps:
         fine.ways = np.full((fine.kx.shape[0], fine.ky.shape[1]), 0.5, dtype=np.float32)
         loops.make_ways(fine.kx, fine.ky, fine.ways, fine.first)
         fine.share(fine.ways)
@@ -279,12 +277,14 @@ def right_sides(levels: Sequence[Level], harmonic: bool) -> None:
         levels[-1].c[levels[-1].held] = 0.0
 
 
-def smooth(level: Level) -> bool:
-    """Whether the film has no steps that this grid sees (`starts.smooth`). Collective."""
-    if level.even is None:
-        found = loops.smooth(level.kx, level.ky)
-        level.even = found if level.comm is None else level.comm.allreduce(found, MPI.LAND)
-    return level.even
+def looked(level: Level) -> tuple[float, float, float]:
+    """Mean conductances of the x and y faces, and how many steps of the film this grid sees (`starts.look`). Collective."""
+    if level.look is None:
+        x, y, steps = loops.look(level.kx, level.ky)
+        if level.comm is not None:
+            x, y, steps = (level.comm.allreduce(a) / n for a, n in ((x, level.comm.size), (y, level.comm.size), (steps, 1)))
+        level.look = x, y, steps
+    return level.look
 
 
 def restrict(fine: Level, coarse: Level, out: Array, harmonic: bool, given: Array | None = None) -> None:

@@ -48,12 +48,6 @@ def norms(z: Array, *others: Any) -> Array:
     return np.sum(_by_rows(lambda start, end: kernels.norms(*(z, *others, start, end)), z), axis=0)
 
 
-def mean(a: Array) -> float:
-    """Of all within the frame."""
-    inside = a[1:-1, 1:-1]
-    return float(sum(crew().rows(lambda start, end: inside[start:end].sum(), len(inside), a.size)) / inside.size)
-
-
 def inject(z: Array, out: Array, *others: Any) -> None:
     _into(out, z, transfer.inject, z, out, *others)
 
@@ -74,9 +68,11 @@ def coarsen_steps(kx: Array, ky: Array, ways: Any, out_x: Array, out_y: Array, *
     crew().rows(lambda start, end: steps.coarsen(*(*given, start, end)), out_x.shape[0], kx.size)
 
 
-def smooth(kx: Array, ky: Array) -> bool:
-    """`starts.smooth` of all rows."""
-    return all(_by_rows(lambda start, end: starts.smooth(*(kx, ky, start, end)), kx))
+def look(kx: Array, ky: Array) -> tuple[float, float, int]:
+    """`starts.look` of all rows: the means of the x and of the y faces' conductances, and the number of steps."""
+    found = np.sum(_by_rows(lambda start, end: starts.look(*(kx, ky, start, end)), kx), axis=0)
+    ny, nx = kx.shape[0] - 2, ky.shape[1] - 2
+    return float(found[0] / (ny * (nx + 1))), float(found[1] / ((ny + 1) * nx)), int(found[2])
 
 
 def add_balance(z: Array, *others: Any) -> None:

@@ -27,7 +27,7 @@ def interpolate(
     """Rows start to end - 1 of a start from the coarse grid's answer: p and q interpolated one by one, the larger flow decides
     which one a point has.
 
-    Where the film is full, and smooth everywhere (`smooth`), p is a cubic polynomial's. sides : whether what the frame has to
+    Where the film is full, and smooth everywhere (`look`), p is a cubic polynomial's. sides : whether what the frame has to
     the west, east, south and north are sides' pressures, a coarse mesh beyond the last coarse points.
     """
     nx, size, rows, top = z.shape[1] - 2, coarse.shape[1], coarse.shape[0], ky.shape[0] - 2
@@ -106,17 +106,26 @@ def smooth_row(coarse: Array, kx: Array, m: int, west: bool, east: bool, out: Ar
 
 
 @kernel
-def smooth(kx: Array, ky: Array, start: int, end: int) -> bool:
-    """Whether in rows start to end - 1 no two neighbouring faces, but at sides, conduct so differently that the film has a step
-    there. Beside steps pressures have kinks, and in a deep pocket the weights by conductances keep what differs by next to
-    nothing."""
-    steps = 0
+def look(kx: Array, ky: Array, start: int, end: int) -> tuple[float, float, int]:
+    """Of rows start to end - 1 the sums of the x and of the y faces' conductances; and between how many neighbouring faces, but
+    at sides, these differ so much that the film has a step there.
+
+    Beside steps pressures have kinks, and in a deep pocket the weights by conductances keep what differs by next to nothing.
+    """
+    nx, ny, steps = ky.shape[1] - 2, kx.shape[0] - 2, 0
+    x, y = np.zeros(nx + 3), np.zeros(nx + 2)  # column by column: vector instructions
     for m in range(start, end):
-        for i in range(2, kx.shape[1] - 3):
+        for i in range(np.uint32(1), np.uint32(nx + 2)):
+            x[i] += kx[m, i]
+        for i in range(np.uint32(2), np.uint32(max(nx, 2))):
             a, b = kx[m, i], kx[m, i + 1]
             steps += (a > SMOOTH * b) | (b > SMOOTH * a)
-    for m in range(max(start, 2), min(end, ky.shape[0] - 3)):
-        for i in range(1, ky.shape[1] - 1):
-            a, b = ky[m, i], ky[m + 1, i]
-            steps += (a > SMOOTH * b) | (b > SMOOTH * a)
-    return steps == 0
+        for i in range(np.uint32(1), np.uint32(nx + 1)):
+            y[i] += ky[m, i]
+        if 2 <= m < ny:
+            for i in range(np.uint32(1), np.uint32(nx + 1)):
+                a, b = ky[m, i], ky[m + 1, i]
+                steps += (a > SMOOTH * b) | (b > SMOOTH * a)
+    if end == ny + 1:
+        y += ky[end]
+    return x.sum(), y[1:-1].sum(), steps
