@@ -181,7 +181,7 @@ def correct(
     unit: the pressure that counts as a flow of void of 1, where a neighbour's correction is of the one and the point's of the
     other.
     """
-    nx, size = z.shape[1] - 2, new.shape[1]
+    nx, size, per_unit = z.shape[1] - 2, new.shape[1], 1.0 / unit
     w, d = np.zeros(size - 1), np.zeros(size)
     south, north, e, added = np.zeros(nx + 2), np.zeros(nx + 2), np.zeros(nx + 2), np.zeros(nx + 2)
     for m in range(start, end if end else z.shape[0] - 1):
@@ -206,7 +206,7 @@ def correct(
             drop(z, m, new, old, row, last, by_x, e)
         for i in range(1, nx + 1):
             here = z[m, i]
-            z[m, i] = moved(here, e[i] if here > 0.0 else e[i] / unit, truncation)
+            z[m, i] = moved(here, e[i] if here > 0.0 else e[i] * per_unit, truncation)
             added[i] += (z[m, i] - here) ** 2
     return added.sum()
 
