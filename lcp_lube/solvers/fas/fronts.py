@@ -14,6 +14,7 @@ VERY = 0.2  # and the part of that, of a strip which is then made twice as wide 
 OVER, LAST = 1.8, 2  # overrelaxation of the sweeps near fronts, but for so many that leave smooth what remains
 AHEAD = 2  # rows for whose points memory is asked before their turn
 FUSED = 5  # sweeps that go over rows in one pass
+NEAR = 16  # points between two runs of a row that cost less than a loop of its own for each
 
 
 @piece
@@ -39,8 +40,17 @@ def relax_pairs(
     What no point to the west has a say in is made first, by vector instructions: then from point to point in full film one
     multiplication and addition waits for the one before.
     """
-    nx = z.shape[1] - 2
-    t, inverse, a, b = np.empty((4, nx + 2)) if work is None else work
+    room = np.empty((4, z.shape[1])) if work is None else work
+    prepare(z, kx, ky, c, m, start, end, carry, over, room)
+    pass_along(z, kx, ky, m, start, end, carry, ring, over, room)
+
+
+@piece
+def prepare(
+    z: Array, kx: Array, ky: Array, c: Array, m: int, start: int, end: int, carry: Array | None, over: float, work: Array
+) -> None:
+    """Of `relax_pairs` what no point to the west has a say in."""
+    t, inverse, a, b = work
     for i in range(np.uint32(start), np.uint32(end)):
         gives = 0.0 if carry is None else carry[1, m, i]
         t[i] = (c[m, i] + kx[m, i + 1] * max(z[m, i + 1], 0.0)) + (
@@ -49,6 +59,15 @@ def relax_pairs(
         inverse[i] = 1.0 / ((kx[m, i] + kx[m, i + 1]) + (ky[m, i] + ky[m + 1, i]) + gives)
         a[i] = over * (t[i] * inverse[i]) + (1.0 - over) * z[m, i]
         b[i] = over * (kx[m, i] * inverse[i])
+
+
+@piece
+def pass_along(
+    z: Array, kx: Array, ky: Array, m: int, start: int, end: int, carry: Array | None, ring: bool, over: float, work: Array
+) -> None:
+    """And what goes from point to point."""
+    nx = z.shape[1] - 2
+    t, inverse, a, b = work
     west = z[m, start - 1]
     for i in range(start, end):
         here = z[m, i]
@@ -145,11 +164,30 @@ def relax_front(
                             bring_near(z, kx, ky, c, spans[n], step)
                     for k in range(max(s + 1 - lines, 0), min(s + 1, fused)):
                         m, over = first + step * (s - k), most if more or before + k < count - LAST else 1.0
-                        for q in range(of_row[m + 1] - of_row[m]):
-                            n = of_row[m] + q if step > 0 else of_row[m + 1] - 1 - q
-                            relax_pairs(z, kx, ky, c, m, spans[n, 1], spans[n, 2], carry, ring, over, work)
+                        relax_row(z, kx, ky, c, m, spans[of_row[m] : of_row[m + 1]], carry, ring, over, step, work)
                 write(done, b, looks + turn + 1)
     return count * points
+
+
+@piece
+def relax_row(
+    z: Array, kx: Array, ky: Array, c: Array, m: int, spans: NDArray[np.int32], carry: Array | None, ring: bool, over: float,
+    step: int, work: Array,
+) -> None:  # fmt: skip
+    """`relax_pairs` of the runs of row m, prepared together where they are near each other; step -1: from the last one on."""
+    n = 0 if step > 0 else len(spans) - 1
+    while 0 <= n < len(spans):
+        beyond = n + step
+        while 0 <= beyond < len(spans):
+            west, east = min(beyond - step, beyond), max(beyond - step, beyond)
+            if spans[east, 1] - spans[west, 2] > NEAR:
+                break
+            beyond += step
+        first, last = min(n, beyond - step), max(n, beyond - step)
+        prepare(z, kx, ky, c, m, spans[first, 1], spans[last, 2], carry, over, work)
+        while n != beyond:
+            pass_along(z, kx, ky, m, spans[n, 1], spans[n, 2], carry, ring, over, work)
+            n += step
 
 
 @piece
