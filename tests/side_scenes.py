@@ -33,10 +33,7 @@ mu = 0.01
 p_supply = 3e5
 """
 WEDGE = '[film]\nshape = "linear"\nh_start_um = 3\nh_end_um = 1\n'
-PAD = (
-    '[[film]]\nshape = "linear"\nh_start_um = 1.1\nh_end_um = 1\n'
-    '[[film]]\nshape = "pocket"\ndepth_um = 1\nx_mm = [2, 5]\ny_mm = [1, 5]\n'
-)
+PAD = '[[film]]\nshape = "linear"\nh_start_um = 1.1\nh_end_um = 1\n[[film]]\nshape = "pocket"\ndepth_um = 1\nx_mm = [2, 5]\n'
 RING = '[film]\nshape = "journal"\nc_um = 5\neccentricity = 0.6\n[sides]\nwest = "periodic"\neast = "periodic"\n'
 TILTED = '[film]\nshape = "formula"\nh = "3 - 150*x + 100*y"\nunit = "um"\n[sides]\n'
 SCENES = {

@@ -13,9 +13,11 @@ from petsc4py import PETSc
 from ..base.parallel import Array
 from ..base.together import EXPECTED, on_all_ranks
 from ..linear.krylov import LinearSolverError
-from ..problems.film.grooves import GroovedProblem, Pad
+from ..problems.film.grooves import GroovedProblem, Pad, pads_between
+from ..problems.film.lines import SAME
 from ..problems.film.lubrication import LubricationProblem
-from ..problems.film.model import Model
+from ..problems.film.model import Model, Side
+from ..problems.film.views import FromHere
 from ..problems.grid import Grid
 from ..problems.solution import Enclosure, Fields, Outcome, Solution
 from ..problems.transfer import fetch, numbers
@@ -91,7 +93,26 @@ def applies(scene: Solvable, ask: Ask) -> bool:
 def pad_films(scene: Solvable) -> PadFilms:
     """The films between the grooves, and where they lie."""
     model: Model = scene.model  # type: ignore[union-attr]
-    return [(pad, PadFilm(scene, film, (pad.n, *scene.shape[1:]), pad.first)) for pad, film in model.pads(scene.shape)]
+    return [
+        (pad, PadFilm(scene, film, (pad.n, *scene.shape[1:]), pad.first)) for pad, film in films_between(model, scene.shape)
+    ]
+
+
+def films_between(model: Model, shape: Sequence[int]) -> list[tuple[Pad, Model]]:
+    """The films between the grooves on a ring of nx columns, whose points they keep."""
+    films, y = [], model.lines(shape)[1]
+    for pad in pads_between(model.columns(shape), model.lengths[0], model.grooves):
+        # Its x = 0 is the last column of the groove before it.
+        x = pad.around - pad.around[0]
+        lengths = (float(x[-1]), *model.lengths[1:])
+        sides = (Side(p=pad.west), Side(p=pad.east), *model.sides[2:])
+        gap = FromHere(model.gap, float(pad.around[0]), model.lengths[0])
+        stored = model.stored.starting(pad.first) if model.stored else None
+        dry = model.dry.starting(pad.first) if model.dry else None
+        even = np.allclose(np.diff(x), x[-1] / (pad.n + 1), rtol=SAME, atol=0.0)
+        changed: dict[str, Any] = {"grooves": (), "levers": (), "places": (None if even else x[1:-1], y), "stored": stored}
+        films.append((pad, replace(model, lengths=lengths, sides=sides, gap=gap, exact=None, dry=dry, **changed)))
+    return films
 
 
 def _dealt(scene: Solvable, films: PadFilms, comm: MPI.Comm) -> tuple[int, MPI.Comm, list[int]]:

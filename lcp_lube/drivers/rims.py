@@ -1,4 +1,4 @@
-"""Films with round edges, or that rupture where they come in: solved, and solved once more with faces made for the cavities.
+"""Films with round edges or corners, or that rupture where they come in: solved, and once more with faces made for cavities.
 
 Whatever acts on the film, its supplies and effects settle both times, on faces that are held: those of a full film first, and
 then those of its cavities (`problems/film/rims`). So each of the two is one discrete problem, with its certificate and its
@@ -13,6 +13,7 @@ from typing import Any
 
 from petsc4py import PETSc
 
+from ..base.parallel import Array
 from ..problems.facts import Facts
 from ..problems.film.cavity import cavitated
 from ..problems.film.lubrication import LubricationProblem
@@ -27,13 +28,15 @@ from .chain import added
 from .compose import Inner
 from .turned import Mirrored
 
+KNOWN = 1e-4  # ||F|| at which cavities are known: loads move by 1e-9 at most beside those of a first solve to the end
+SUMS = "fluid_solves", "coupling_work", "cycles", "work_units"  # of both solves
 # Settings of the second solve:
 LAST = ("eps1", "method", "took_over", "system", "recipe", "ksp_type", "pc_type", "supply_pressures")
 
 
 @dataclass(frozen=True)
 class Revised(Derived):
-    """A scene with the faces that round edges cut made for these cavities, on its own grid."""
+    """A scene with the faces that know cavities made for these, on its own grid."""
 
     dry: Dry
 
@@ -52,16 +55,17 @@ class Revised(Derived):
 
 
 def applies(scene: Solvable, ask: Ask) -> bool:
-    """Whether the scene is a film whose round edges cut faces, or which may rupture where it comes in."""
+    """Whether the scene is a film whose round edges cut faces, one with corners, or which may rupture where it comes in."""
     model = film_of(scene)
-    return model is not None and model.dry is None and (model.cut or (ask.alone and _by_itself(scene, model)))
+    cut = model is not None and (model.cut or model.cornered)
+    return model is not None and model.dry is None and (cut or (ask.alone and _by_itself(scene, model)))
 
 
 def _by_itself(scene: Any, model: Model) -> bool:
     """Whether the film may rupture at the side it comes in by, one without pressure, and nothing moves or changes it."""
-    west, known = model.sides[0], model.scheme == "face" and not model.mean_cubes and len(model.lengths) == 2
+    west = model.sides[0]
     plain = isinstance(scene.whole if isinstance(scene, Mirrored) else scene, Scene) and motion_of(scene) is None
-    opens = plain and known and model.U > 0.0 and west.kind == "open" and not west.p
+    opens = plain and model.knows and model.U > 0.0 and west.kind == "open" and not west.p
     return opens and not (model.grooves or model.effects or model.law or model.supplies)
 
 
@@ -72,22 +76,40 @@ def _behind(problem: Any, fields: Fields) -> int:
     return int(problem.reduce.sum(cavitated(problem.reduce, p.ravel(), r.ravel()).astype(float)))
 
 
+def _has_corners(problem: Any, state: Array) -> bool:
+    """Whether there are corners about which faces are made. Collective."""
+    from ..problems.film.recesses import corners_on  # here: few films have any
+
+    return corners_on(problem.grid, problem.film, state) is not None
+
+
 def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
-    """The second solution; the first where nothing is cavitated, or where there is no second one. Collective."""
-    cut = film_of(scene).cut  # type: ignore[union-attr]
+    """The second solution; the first where nothing asks for other faces, or where there is no second one. Collective."""
+    model: Any = film_of(scene)
+    corners = model.cornered and not model.cut and ask.stopping is None
+    found = _solve(scene, replace(ask, cavities=KNOWN) if corners and ask.cavities is None else ask, inner)
+    return _solve(scene, replace(ask, cavities=None), inner) if found is None else found  # type: ignore[return-value]
+
+
+def _solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution | None:
+    """None where the second solve fails after a first one that was to know cavities alone. Collective."""
+    model: Any = film_of(scene)
+    cut = model.cut or model.cornered
     loose = ask.stopping if ask.cavities is None else {**(ask.stopping or {}), "eps1": ask.cavities}  # type: ignore[dict-item]
     first = inner(scene, replace(ask, certify=False, stopping=loose) if cut else ask)
     problem: Any = first.problem
     if not first.converged:
         return first
-    if not cut and not _behind(problem, first.fields):
+    behind = not model.cut and ask.alone and _by_itself(scene, model) and _behind(problem, first.fields)
+    if not cut and not behind:
         return first
     state = state_of(problem, first.fields["p"], first.fields["r"])
     count = int(problem.reduce.sum((state > 0.0).astype(float)))
+    made = (bool(model.cut or behind) and count > 0) or (model.cornered and _has_corners(problem, state))
     again = replace(ask, start=first, nested=False, monitor=None, checkpoint=None, resume=None)
     second = (
-        inner(Revised(scene, Dry(state, problem.grid)) if count else scene, again)
-        if count or ask.certify or ask.cavities
+        inner(Revised(scene, Dry(state, problem.grid)) if made else scene, again)
+        if made or ask.certify or ask.cavities
         else first
     )
     if second is first:
@@ -96,14 +118,15 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     if not second.converged and ask.cavities:
         second.destroy()
         first.destroy()
-        return solve(scene, replace(ask, cavities=None), inner)
+        return None
     if not second.converged:
         first.because(f"faces are those of a full film: {second.message}")
         second.destroy()
         return first
     details, more = settings["details"], second.settings["details"]
-    sums = {name: details[name] + more[name] for name in ("fluid_solves", "coupling_work") if name in more}
-    settings["details"] = {**details, **sums, **({"revised": count} if count else {})}
+    told = {name: details.get(name, 0.0) + more[name] for name in SUMS if name in more}
+    told |= {name: more[name] for name in ("convergence_factor",) if name in more}
+    settings["details"] = {**details, **told, **({"revised": count} if made else {})}
     times, steps = added(first.times, second.times), [*first.steps, *second.steps]
     first.destroy()
     return replace(second, settings=settings, times=times, steps=steps, levels=first.levels)

@@ -14,6 +14,7 @@ from ..linear.krylov import LinearSolverError
 from ..linear.system import make_system
 from ..problems.film.flows import point_weights
 from ..problems.film.forces import ambient
+from ..problems.film.fronts import counted
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Enclosure, Fields
 from .zform import ZForm
@@ -220,10 +221,12 @@ def bounds_of(problem: LubricationProblem, fields: Fields, lower: Fields, upper:
     largest = max(abs(p_max), high, *(side / unit for side in problem.p_sides)) + abs(problem.p_c) / unit
     above = ambient(problem) / unit
     weight = point_weights(problem.grid)
+    carried, least, most = (counted(problem, one["p"] * unit, one["r"]) / unit for one in (fields, lower, upper))
+    off_load = np.maximum(most - carried, carried - least)
     load_rounding = (problem.size + 32) * UNIT * reduce.sum(weight * (np.abs(p) + off_p + above))  # n numbers, in any order
     return {
         "band_p": (reduce.max(off_p) + 8 * UNIT * largest) * unit,
         "band_p_max": (max(high - p_max, p_max - low) + 8 * UNIT * largest) * unit,
-        "band_load": (reduce.sum(weight * off_p) + load_rounding) * problem.grid.cell * unit,
+        "band_load": (reduce.sum(weight * off_load) + load_rounding) * problem.grid.cell * unit,
         "band_r": reduce.max(off_r) * (1 + 8 * UNIT),
     }

@@ -301,7 +301,7 @@ def test_errors_of_areas_are_a_sample():
     assert estimated([1.0, 1.0, 1.0], [0.0] * 3, "cavitated_area").relative == 0.0
 
 
-@pytest.mark.parametrize("form, truth, most", [("square", 6.1975, 160), ("round", 7.0775, 224)])
+@pytest.mark.parametrize("form, truth, most", [("square", 6.1981, 160), ("round", 7.0775, 224)])
 def test_pads_whose_errors_cancel_in_each_dimple(form, truth, most):
     """Pressures change by far more than the load: 1 % of it takes few points (round: 159 are told as 1.02 %, and are 0.26)."""
     with solve(load_scene("dimpled_pad", {"film.dimples.form": form}), accuracy=1e-2, quantity="pressure_integral") as solution:

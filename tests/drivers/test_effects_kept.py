@@ -71,7 +71,7 @@ def test_taken_up_as_if_not_stopped(name, after, tmp_path, monkeypatch):
 def test_other_ranks_go_on(cli, tmp_path, monkeypatch):
     asked = ("solve", "pocketed_pad_2d", "--nx", 79, "--ny", 39, "--model", "full", "--json")
     scene = load_scene("pocketed_pad_2d", {"nx": 79, "ny": 39})
-    assert stopped(scene, tmp_path / "c", 4, monkeypatch, model="full")
+    assert stopped(scene, tmp_path / "c", 3, monkeypatch, model="full")
     one, two = cli(*asked), cli(*asked, "--resume", "c", ranks=2)
     assert (one.status, two.status) == (0, 0), two.err
     for key in ("load", "p_max", "friction"):

@@ -19,9 +19,9 @@ pytest.importorskip("numba")
 SCENES = {
     "problem4": {"nx": 33, "ny": 20},  # nodal
     "upwind": {"scheme": "upwind"},
-    "fed": {"fluid.barus": 0.0, "fluid.density": "constant"},
-    "law": {},
-    "dimpled_pad": {"nx": 31, "ny": 33},
+    "fed": {"nx": 33, "ny": 20},
+    "law": {"nx": 33, "ny": 20, "fluid.barus": 1.2e-8, "fluid.density": "dowson-higginson"},
+    "steps": {"nx": 31, "ny": 33},
     "cut": {"nx": 32, "ny": 30},
     "turned": {"U": -1.0},
     "journal": {"nx": 40, "ny": 9},
@@ -37,12 +37,19 @@ HOLE = {"shape": "hole", "at": [0.019, 0.021], "diameter": 0.009, "p": 8e5}
 HOLES["supply"] = [HOLE, {"shape": "rectangle", "x": [0.036, 0.047], "y": [0.012, 0.026], "flow": 4e-6}]
 RING = {key: HOLES[key] for key in ("family", "dimension", "L", "width", "U", "nx", "ny", "film", "fluid")}
 RING["sides"] = {"west": {"kind": "periodic"}, "east": {"kind": "periodic"}}
+STEPS = {"family": "bearing", "dimension": 2, "L": 0.01, "width": 0.01, "U": 1.0, "nx": 31, "ny": 29, "fluid": {"mu": 0.01}}
+EDGES = [{"shape": "step", "height": 2e-6, "at": 0.004}, {"shape": "step", "height": -1e-6, "at": 0.0031, "along": "y"}]
+EDGES += [{"shape": "pocket", "depth": 2e-6, "x": [0.0061, 0.0083]}]  # edges both ways, and no corner of a recess
+STEPS |= {"film": [{"shape": "constant", "h": 4e-6}, *EDGES], "sides": dict.fromkeys(SIDES, 1e5)}
+FED_FILM = [{"shape": "linear", "h_start": 5e-6, "h_end": 4e-6}, *EDGES]
+FED = {"fluid": {"mu": 0.01, "p_supply": 1e5}, "sides": {}, "film": FED_FILM}
 BASES = {
+    "steps": (STEPS, {}),
     "upwind": ("problem4", {"nx": 33, "ny": 20}),
-    "fed": ("pocketed_pad_2d", {"nx": 33, "ny": 20}),
-    "cut": ("dimpled_pad", {}),
-    "turned": ("dimpled_pad", {"nx": 31, "ny": 29}),
-    "law": ("pocketed_pad_2d", {"nx": 33, "ny": 20}),
+    "fed": ({**STEPS, **FED}, {}),
+    "cut": (STEPS, {}),
+    "turned": (STEPS, {}),
+    "law": ({**STEPS, **FED}, {}),
     "thrust": ("tapered_land", {"nx": 30, "ny": 17}),
     "hybrid": ("hybrid_journal", {}),
     "holes": (HOLES, {}),
@@ -97,7 +104,7 @@ def test_the_film_s_own_derivative_is_that_of_its_arrays(monkeypatch, name):
         assert field == pytest.approx(other, abs=1e-12 * np.abs(other).max())
 
 
-@pytest.mark.parametrize("name", ["problem4", "upwind", "fed", "dimpled_pad", "turned", "journal", "thrust"])
+@pytest.mark.parametrize("name", ["problem4", "upwind", "fed", "steps", "turned", "journal", "thrust"])
 def test_drag_and_its_derivatives_in_one_pass_are_those_of_arrays(monkeypatch, name):
     scene, names = made(name), ["friction", "friction_torque"] if name == "thrust" else ["friction"]
     with solve(scene, reduction=False) as solution:
@@ -115,7 +122,7 @@ def test_drag_and_its_derivatives_in_one_pass_are_those_of_arrays(monkeypatch, n
 
 def test_drag_and_flows_build_no_problem(monkeypatch):
     monkeypatch.setattr(near_films, "SMALL", 1)
-    scene, built = load_scene("dimpled_pad", nx=31, ny=33, **{"fluid.barus": 1e-8, "fluid.density": "dowson-higginson"}), []
+    scene, built = load_scene(STEPS, {"fluid.barus": 1e-8, "fluid.density": "dowson-higginson"}), []
     with solve(scene) as solution:
         adjoint = Adjoint(scene, solution, ["friction", "side_leakage"])
         monkeypatch.setattr(adjoint, "lagrangians", built.append)

@@ -8,6 +8,7 @@ import pytest
 
 from lcp_lube import InputError, load_scene, solve
 from lcp_lube.drivers.ask import Ask
+from lcp_lube.drivers.grooves import films_between
 from lcp_lube.drivers.loads.pad_coordinates import JournalPads, ThrustPads
 from lcp_lube.drivers.motions.coefficients import coefficients
 
@@ -174,7 +175,7 @@ def test_edges_of_pads_between_even_lines(nx):
         pads = {"pad_deg": 67.3, "pivots_deg": [3, 92.1, 181.7, 270], "balance": None}
         scene = load_scene("tilting_pad_journal", {"nx": points, "ny": 9, **pads})
         with solve(scene) as solution:
-            x, films = scene.model.columns(scene.shape), scene.model.pads(scene.shape)
+            x, films = scene.model.columns(scene.shape), films_between(scene.model, scene.shape)
             assert all(film.lines((pad.n, 9)) == (None, None) for pad, film in films)  # even: as any other film
             ends = [np.degrees((end - x[0]) / 0.05) for pad, _ in films for end in pad.around[[0, -1]]]
             assert np.allclose(np.ptp(np.reshape(ends, (-1, 2)), axis=1), 67.3)

@@ -55,9 +55,10 @@ def found(changes):
 
 @pytest.mark.parametrize("nx, ny, p_max, load", [(99, 39, 8.8695e6, 330.06), (199, 79, 8.9072e6, 329.19)])
 def test_bertocchis_pad(nx, ny, p_max, load):
-    """Another code on grids of 100 x 40 and 200 x 80 cells, of first order at the edges of the pocket."""
+    """Another code on grids of 100 x 40 and 200 x 80 cells, of first order at the pocket; p_max tends to 8.94 MPa."""
     quantities, solution = found({"nx": nx, "ny": ny})
-    assert quantities["p_max"] == pytest.approx(p_max, rel=8e-3 if nx < 100 else 4e-3)
+    assert quantities["p_max"] == pytest.approx(p_max, rel=9e-3 if nx < 100 else 5e-3)
+    assert quantities["p_max"] == pytest.approx(8.94e6, rel=2e-3)
     assert quantities["load"] == pytest.approx(load, rel=8e-3 if nx < 100 else 3e-3)
     assert 2 < solution.settings["details"]["fluid_solves"] < 8
     assert solution.certificate.measures["residual"] < 1e-8 and solution.certificate.measures["mass_defect"] < 1e-8

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ...base.parallel import Array
 from ...problems.film.forces import of_line, totals
+from ...problems.film.fronts import counted
 from ...problems.film.lubrication import LubricationProblem
 from ...problems.film.strip import stream_weights
 from ...problems.film.turned import TurnedProblem
@@ -138,20 +138,20 @@ def carried(problem: Problem, fields: Fields | None, quantity: str) -> float | N
         return None
     if isinstance(problem, TurnedProblem) or (problem.extras is not None and problem.shaft is None):
         return None
-    return _integral(problem, None if fields is None else fields["p"] * problem.p_unit, quantity)
+    return _integral(problem, fields, quantity)
 
 
-def _integral(problem: LubricationProblem, p_pa: Array | None, quantity: str) -> float:
-    """One of INTEGRALS, as `forces` has it; p_pa : None as in `carried`. Collective."""
+def _integral(problem: LubricationProblem, fields: Fields | None, quantity: str) -> float:
+    """One of INTEGRALS, as `forces` has it; fields : as in `carried`. Collective."""
     names = ("force_x", "force_y") if quantity == "load" and problem.shaft is not None else (quantity,)
     from ...problems.film.known import known_of  # here: of runs to an accuracy alone
 
     known = known_of(problem)
-    if p_pa is None:
+    if fields is None:
         assert known is not None  # as `known_line` found
         found = of_line(problem, known, names)
     else:
-        found = totals(problem, p_pa, known, names)
+        found = totals(problem, fields["p"] * problem.p_unit, fields["r"], known, names)
     return hypot(found["force_x"], found["force_y"]) if len(names) == 2 else found[quantity]
 
 
@@ -180,7 +180,8 @@ def _change(solution: Solution, before: Solution, quantity: str, value: float) -
     grid = coarse.grid
     there = interpolated(problem.grid, grid, solution.fields["p"] * problem.p_unit)
     p = before.fields["p"] * coarse.p_unit
-    changed = (there - p).reshape(grid.box) * (grid.cell * stream_weights(grid)) * grid.widths(0)
+    share = np.divide(counted(coarse, p, before.fields["r"]), p, out=np.ones_like(p), where=p > 0.0)
+    changed = ((there - p) * share).reshape(grid.box) * (grid.cell * stream_weights(grid)) * grid.widths(0)
     column, row = (
         np.arange(*ends) * BLOCKS // n
         for ends, n in zip(((grid.x_start, grid.x_end), (grid.y_start, grid.y_end)), grid.shape, strict=True)
@@ -189,6 +190,6 @@ def _change(solution: Solution, before: Solution, quantity: str, value: float) -
     by_blocks, own = float(np.sum(np.abs(grid.comm.allreduce(blocks)))), abs(value)
     by_points, whole = (
         coarse.reduce.sum(np.abs(changed)),
-        value if quantity == INTEGRALS[1] else _integral(coarse, p, INTEGRALS[1]),
+        value if quantity == INTEGRALS[1] else _integral(coarse, before.fields, INTEGRALS[1]),
     )
     return by_blocks / own if own else inf, by_points / whole if whole else inf

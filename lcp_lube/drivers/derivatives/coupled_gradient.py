@@ -113,7 +113,7 @@ class CoupledGradient(CoupledResponse):
         fields = {"p": at.p / at.problem.p_unit, "r": at.r}
         told = at.problem.quantities(fields)
         told = self.reported.told(told) if self.turned else told
-        out = {name: value for name, value in totals(at.problem, at.p).items() if name.startswith(PIVOT)}
+        out = {name: value for name, value in totals(at.problem, at.p, at.r).items() if name.startswith(PIVOT)}
         for name, value in told.items():
             parts = {"": value}
             if isinstance(value, (list, tuple)) and name != "at":

@@ -145,7 +145,7 @@ class Equations:
         fields = known_fields(problem) if wanted is None or wanted or problem.held else None
         if fields is not None:  # a line's numbers are free of the grid's error (`film.known`)
             if wanted is not None and set(wanted) <= set(weights(problem)):  # integrals of the pressure: no flows, no fronts
-                told = totals(problem, fields["p"] * problem.p_unit, known_of(problem), wanted)
+                told = totals(problem, fields["p"] * problem.p_unit, fields["r"], known_of(problem), wanted)
             else:
                 every = problem.quantities(fields)  # by the names of `slopes.numbers`
                 told = every | {f"flow_{side}": value for side, value in every["flow"].items()}

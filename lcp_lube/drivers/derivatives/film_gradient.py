@@ -13,11 +13,13 @@ from typing import Any
 import numpy as np
 
 from ...base.parallel import Array
+from ...problems.film.borne import by_faces
 from ...problems.film.contact import areas
 from ...problems.film.flows import drag, volume_unit
+from ...problems.film.forces import Weight, weights
 from ...problems.film.lubrication import LubricationProblem
 from ...problems.film.reynolds import BoxScheme, sides
-from ...problems.film.slopes import giving_points
+from ...problems.film.slopes import by_points, giving_points
 from ...problems.film.strip import line_weights
 from ...problems.film.tangent import effective
 from ...problems.film.weighed import Weighed, can
@@ -49,10 +51,14 @@ class FilmGradient:
         return Implicit.of(self.adjoint)
 
     @cached_property
+    def bare(self) -> BoxScheme:
+        """Of the coefficients by the film, of a constant fluid."""
+        return self.model.film_slopes(self.adjoint.equations.constant)
+
+    @cached_property
     def slopes(self) -> BoxScheme:
         """Of the coefficients by the film."""
-        eq = self.adjoint.equations
-        slopes = self.model.film_slopes(eq.constant)
+        eq, slopes = self.adjoint.equations, self.bare
         if eq.law is None:
             return slopes
         known = {name: getattr(eq.constant, name) for name in ("p_unit", "p_sides", "film")}
@@ -107,6 +113,8 @@ class FilmGradient:
                 total.append(weight * (-1.0 if adjoint.equations.turned else 1.0) * self._friction(lever))
             elif part.startswith("flow_"):
                 total.append(weight * self._flow(part.removeprefix("flow_")))
+            elif self.problem.cornered and (carried := weights(self.problem).get(part)) is not None:
+                total.append(weight * self._fronts(carried))
         return sum(total, self._balance(rows))
 
     def _balance(self, rows: Array) -> Array:
@@ -163,6 +171,14 @@ class FilmGradient:
         east, own = (np.broadcast_to(lever * np.imag(part) / step, problem.grid.box) for part in parts)
         none = np.zeros_like(east)
         return self._dealt(own + 0.5 * east, [none, 0.5 * east, none, none])
+
+    def _fronts(self, weight: Weight) -> Array:
+        """Of an integral of the pressure by the film, fields held: as fronts lie elsewhere in it."""
+        adjoint, problem, s = self.adjoint, self.problem, self.bare
+        by_k, by_b = by_faces(problem, adjoint.p, adjoint.r, by_points(problem, weight))
+        half = 0.5 * (by_k * s.k_W + by_b * s.b_W)
+        none = np.zeros_like(half)
+        return self._dealt(half, [half, none, none, none])
 
     def _flow(self, side: str) -> Array:
         """Of the flow through one side by the film of the cells there, fields held."""

@@ -111,7 +111,7 @@ class NearFilms:
 
     def _totals(self, problem: LubricationProblem) -> dict[str, float]:
         """The numbers, with the integrals of a film's pressure, which is held, and its largest one."""
-        found = forces.totals(problem, self.p, wanted=self.wanted, columns=self._columns)
+        found = forces.totals(problem, self.p, self.r, wanted=self.wanted, columns=self._columns)
         if "p_max" in self.wanted:
             found["p_max"] = largest_pressure(problem, self.p)[0] + problem.p_c
         return self.numbers | {name: found[name] for name in self.wanted.difference(DRAGS, FLOWS, self.fed)}

@@ -195,7 +195,7 @@ Bearing = JournalPads | ThrustPads
 def _integrals(solution: Solution) -> dict[str, float]:
     """Of the pressure: forces and moments. Collective."""
     problem: Any = solution.problem
-    return totals(problem, solution.fields["p"] * problem.p_unit)
+    return totals(problem, solution.fields["p"] * problem.p_unit, solution.fields["r"])
 
 
 def _moments(scene: Any) -> float:

@@ -94,7 +94,8 @@ def coefficients(
     assert isinstance(ring, LubricationProblem)  # as a scene with a `model` has
     along = 0.0
     if turning is not None:
-        force = totals(ring, solution.fields["p"] * ring.p_unit, known_of(ring), wanted=("force_x", "force_y"))
+        p_pa = solution.fields["p"] * ring.p_unit
+        force = totals(ring, p_pa, solution.fields["r"], known_of(ring), wanted=("force_x", "force_y"))
         along = math.atan2(-force["force_y"], -force["force_x"])
     motions = motions_of(turning, tilt, 0.5 * model.lengths[-1], along)
     names = FLAT if turning is None else TILTED if tilt else JOURNAL

@@ -24,6 +24,7 @@ from ...problems.film.cavity import about_to_change, cavity_sign
 from ...problems.film.contact import areas
 from ...problems.film.effects import Answer, answer, factors
 from ...problems.film.flows import point_weights
+from ...problems.film.fronts import counted
 from ...problems.film.grooves import GroovedProblem
 from ...problems.film.known import known_of
 from ...problems.film.supplies import Supply, supply_flows
@@ -31,7 +32,7 @@ from ...problems.solution import Solution
 from ..ask import Ask
 from ..effects.loop import Loop
 from ..supplies import Fed
-from .line_forces import OfLine, line_forces, stiffness_of
+from .line_forces import OfLine, carried_by, line_forces, stiffness_of
 from .linearised import Linear, following
 from .response import near
 
@@ -69,18 +70,21 @@ class CoupledResponse(OfLine):
         self._size = 2.0 * grid.spacing[0] / self.unit * point_weights(grid)
         self._areas = areas(grid).ravel()
         self.place(solution.fields["p"], solution.fields["r"], loop.vector(problem.cells) if loop.names else np.zeros(0), flip)
-        weight = grid.cell * base.p_unit * point_weights(grid) * np.where(self.cavity, 0.0, 1.0)
+        weight = grid.cell * base.p_unit * point_weights(grid)
         model, least = loop.frozen.constant, STEP * base.reduce.min(base.scheme.h.ravel())
         steps = [least / (base.reduce.max(np.abs(self._change(gap, least))) or 1.0) for gap in gaps]
         changes = [self._change(gap, e) for gap, e in zip(gaps, steps, strict=True)]
-        self._sides = [weight * change for change in changes]
+        carried = [weight * change for change in changes]
+        self._sides = [carried_by(problem, self.p, self.r, self.cavity, one) for one in carried]
         touched = base.p_unit + problem.cells.get("contact", 0.0)  # dp_a by the loop's field, log(1 + p_a/p_unit)
         self._contacts = [touched * self._areas * change for change in changes]
-        self._forward, forces = [], []
+        self._forward, forces, fronts = [], [], list[Any]()
         told = bool(gaps) and known_of(problem) is not None
         for k, (gap, e) in enumerate(zip(gaps, steps, strict=True)):
             pair = [near(model, gap(side * e), base) for side in (1.0, -1.0)]
             self._forward.append(_slopes([self._system(np.zeros(self.n), self.x, other) for other in pair], 2.0 * e))
+            borne_by = [counted(other, self.p * base.p_unit, self.r) / base.p_unit for other in pair]
+            fronts.append([base.reduce.dot(one, borne_by[0] - borne_by[1]) / (2.0 * e) for one in carried])
             for other in pair:
                 other.destroy()
             e *= OF_LINE
@@ -90,7 +94,7 @@ class CoupledResponse(OfLine):
                 forces.append(line_forces(other, changes))
                 other.destroy()
             steps[k] = e
-        self._line = stiffness_of(forces, steps)
+        self._line, self._fronts = stiffness_of(forces, steps), -np.transpose(fronts) if fronts else 0.0
 
     def place(self, p: Array, r: Array, x: Array, flip: bool = False) -> None:
         """Linearise at a state: p in p_unit. Collective."""

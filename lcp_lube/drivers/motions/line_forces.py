@@ -7,12 +7,22 @@ from typing import Any
 import numpy as np
 
 from ...base.parallel import Array
+from ...problems.film.borne import by_fields
 from ...problems.film.forces import antiderivative, weights
 from ...problems.film.known import known_of
 from ...problems.film.lubrication import LubricationProblem
 
 TOLD = ("load", "force_x", "force_y")
 NEAR = 1e-9  # relative: how far a motion may be from a sum of those that these numbers belong to
+
+
+def carried_by(problem: LubricationProblem, p: Array, r: Array, cavity: Any, by_borne: Array) -> Array:
+    """By what answers z, p in the full film and -r in the cavity, are multiplied for the change of a force. Collective.
+
+    p : owned points, in p_unit. by_borne : of the force with the pressure that counts there.
+    """
+    by_p, by_r = by_fields(problem, p * problem.p_unit, r, by_borne)
+    return np.where(cavity, -by_r, by_p)
 
 
 def line_forces(problem: LubricationProblem, changes: Sequence[Array]) -> Array | None:
@@ -46,6 +56,7 @@ class OfLine:
     """What all linearised films share: their stiffness; for a line that of its own, exact numbers."""
 
     _line: Array | None  # -dF/de of a line, as `stiffness_of` tells; None: of no line
+    _fronts: Any = 0.0  # -dF/de, fields held: as fronts lie elsewhere in their cells (`film.borne`)
     _slow: Any  # the answers to motions without an end
 
     def _forces(self, found: Any) -> Any:
@@ -55,7 +66,7 @@ class OfLine:
     @cached_property
     def _of_grid(self) -> Array:
         """-dF/de of the discrete equations."""
-        return self._forces(self._slow).real
+        return self._forces(self._slow).real + self._fronts
 
     def stiffness(self) -> Array:
         """-dF/de with nothing but e changed, shape (motions, motions)."""
@@ -63,5 +74,6 @@ class OfLine:
 
     @property
     def _misplaced(self) -> Any:
-        """What the grid gets wrong of a line's stiffness, at any frequency."""
-        return 0.0 if self._line is None else self._line - self._of_grid
+        """What the answers' forces lack of the stiffness, at any frequency: what the grid gets wrong of a line's, and what
+        comes of fronts in their cells."""
+        return self._fronts if self._line is None else self._line - self._of_grid + self._fronts

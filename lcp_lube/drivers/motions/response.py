@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 from ...base.parallel import Array
 from ...problems.film.cavity import cavity_sign
 from ...problems.film.flows import point_weights
+from ...problems.film.fronts import counted
 from ...problems.film.known import known_of
 from ...problems.film.lubrication import LubricationProblem
 from ...problems.film.model import Model
@@ -32,7 +33,7 @@ from ...problems.solution import Fields
 from ...registry import SMALL
 from ...scenes.scene import Solvable
 from .halved import Halved
-from .line_forces import OfLine, line_forces, stiffness_of
+from .line_forces import OfLine, carried_by, line_forces, stiffness_of
 from .linearised import Feed, Linear
 
 STEP = 1e-5  # of the thinnest film
@@ -92,8 +93,9 @@ class Response(OfLine):
         self._moved = [Moved(model.gap, motion, 0.0, first) for motion in motions]
         self.changes = [np.broadcast_to(moved.change(grid.x, grid.y), grid.box).ravel() for moved in self._moved]
         size = point_weights(grid)
-        weight = grid.cell * problem.p_unit * size * np.where(self.cavity, 0.0, 1.0)  # cavitated cells have no p'
-        self._sides = [weight * change for change in self.changes]
+        weight = grid.cell * problem.p_unit * size
+        self._carried = [weight * change for change in self.changes]
+        self._sides = [carried_by(problem, self.p, self.r, self.cavity, one) for one in self._carried]
         unit = 2.0 * grid.spacing[0] / problem.scheme.flow_unit * size
         self._M = np.where(self.cavity, unit * problem.scheme.h.ravel(), 0.0)
         self._S = [unit * (1.0 - self.r) * change for change in self.changes]
@@ -112,7 +114,8 @@ class Response(OfLine):
         self._swept = [swept(S) for S in self._S]
         self._told = known_of(problem) is not None  # numbers are the film's own, not those of the fields
         self._forces_of_line: list[Array | None] = []
-        self._dG, self._raw, steps = zip(*(self._derivative(moved) for moved in self._moved), strict=True)
+        self._dG, self._raw, borne, steps = zip(*(self._derivative(moved) for moved in self._moved), strict=True)
+        self._fronts = -np.stack(borne, axis=1)
         self._line = stiffness_of(self._forces_of_line, steps)
 
     def _solved(self, rows: Sequence[Any], raws: Sequence[Any], nu: float = 0.0, stored: bool = True) -> list[Any]:
@@ -148,12 +151,13 @@ class Response(OfLine):
         dot = self.problem.reduce.dot
         return np.array([[-complex(dot(row, z.real), dot(row, z.imag)) for z in found] for row in self._sides])
 
-    def _derivative(self, moved: Moved) -> tuple[Array, Array, float]:
+    def _derivative(self, moved: Moved) -> tuple[Array, Array, Array, float]:
         """dG/de at fixed fields, and that of the cells' own balances, were none held: G is a cubic in e (conductances in h^3,
-        Couette and stored terms in h), whose third derivative the step makes small; and the step."""
+        Couette and stored terms in h), whose third derivative the step makes small; that of what is carried, as fronts move in
+        their cells; and the step."""
         size = self.problem.reduce.max(np.abs(moved.change(self.problem.grid.x, self.problem.grid.y)))
         step = STEP * self.problem.reduce.min(self.problem.scheme.h) / (size or 1.0)
-        values = []
+        values, carried = [], []
         for part in (1.0, -1.0):
             other = near(self.model, replace(moved, e=part * step), self.problem)
             if self.problem.factors is not None:
@@ -161,11 +165,13 @@ class Response(OfLine):
             balance = other.balance(self.p, self.r)
             raw = balance if other.held is None else other.face_flows(self.p, self.r)
             values.append(np.stack([balance, raw]) * (other.scheme.flow_unit / self.problem.scheme.flow_unit))
+            p = counted(other, self.p * self.problem.p_unit, self.r) / self.problem.p_unit
+            carried.append(np.array([self.problem.reduce.dot(one, p) for one in self._carried]))
             if self._told:
                 self._forces_of_line.append(line_forces(other, self.changes))
             other.destroy()
         dG, raw = (values[0] - values[1]) / (2.0 * step)
-        return dG, raw, step
+        return dG, raw, (carried[0] - carried[1]) / (2.0 * step), step
 
     def destroy(self) -> None:
         """Free the PETSc objects. Collective."""

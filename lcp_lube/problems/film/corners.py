@@ -39,7 +39,7 @@ def around_corners(grid: Grid, regions: Sequence[Region]) -> Array:
     (ny, nx), first = grid.box, (grid.x_start, grid.y_start)
     out = np.ones((ny, nx + 1)), np.ones((nx, ny + 1))  # lines across, faces along
     around = grid.periodic
-    nodes = [_places(grid, side) for side in (0, 1)]
+    nodes = [places(grid, side) for side in (0, 1)]
     for at, outward in corners:
         away = [np.array([abs(at[side] - other[side]) for other, _ in corners]) for side in (0, 1)]
         away = [np.minimum(d, L - d) if ring else d for d, L, ring in zip(away, grid.lengths, around, strict=True)]
@@ -79,7 +79,7 @@ def around_corners(grid: Grid, regions: Sequence[Region]) -> Array:
     return np.stack([x[:, :-1], x[:, 1:], y[:-1], y[1:]])
 
 
-def _places(grid: Grid, side: int) -> Array:
+def places(grid: Grid, side: int) -> Array:
     """Coordinates of all points of a side, m, between their neighbours; round a ring of three turns."""
     places = grid.with_neighbours(side)
     if not grid.periodic[side]:

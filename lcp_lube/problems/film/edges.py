@@ -46,6 +46,19 @@ def kinks_of(film: Any, axis: str) -> tuple[float, ...]:
     return _told(film, "kinks", axis)
 
 
+def corners_of(film: Any) -> Array:
+    """Corners of rectangles in which a film, or a part of one, is thicker or thinner, as far as it tells, shape (n, 4): x and y
+    (m), and the signs of the way out of them."""
+    return np.asarray(getattr(film, "corners", ()), dtype=float).reshape(-1, 4)
+
+
+def rectangles(x: Any, y: Any) -> Array:
+    """`corners_of` rectangles from x[0] to x[1] and y[0] to y[1], m: pairs of numbers, or of arrays that broadcast."""
+    ways = [(i, j) for i in (0, 1) for j in (0, 1)]
+    found = [np.broadcast_arrays(x[i], y[j], 2.0 * i - 1.0, 2.0 * j - 1.0) for i, j in ways]
+    return np.concatenate([np.stack([a.ravel() for a in one], axis=1) for one in found])
+
+
 def _told(film: Any, name: str, axis: str) -> tuple[float, ...]:
     tell = getattr(film, name, None)
     return tuple(tell(axis)) if tell else tuple(t for part in getattr(film, "parts", ()) for t in _told(part, name, axis))
@@ -121,6 +134,10 @@ class Around:
     @property
     def level(self) -> bool:
         return level(self.film)
+
+    @property
+    def corners(self) -> Array:
+        return corners_of(self.film)
 
     @property
     def rims(self) -> Sequence[Any]:

@@ -11,6 +11,7 @@ import numpy as np
 from ...base.parallel import Array
 from ..strips import each_strip, places_of
 from .flows import volume_unit
+from .fronts import counted
 from .reynolds import sides
 from .strip import line_weights, stream_weights
 
@@ -37,7 +38,7 @@ def ambient(problem: LubricationProblem) -> float:
     return min(at_sides or [supply.p for supply in held] or [0.0])  # p_c of a film that nothing opens
 
 
-def forces(problem: LubricationProblem, p_pa: Array, known: Known | None = None) -> dict[str, Any]:
+def forces(problem: LubricationProblem, p_pa: Array, r: Array, known: Known | None = None) -> dict[str, Any]:
     """Load, force and moment, N and N m (1D: N/m and N): the keys of `docs/numbers.md`. Collective.
 
     A flat film: `load`, the integral of p - p_ambient, and `moment` about the middle of the film, [about x, about y], of that
@@ -49,9 +50,9 @@ def forces(problem: LubricationProblem, p_pa: Array, known: Known | None = None)
 
     Parameters
     ----------
-    p_pa : owned points, Pa above p_c. known : of a line, from which follows what the grid gets wrong.
+    p_pa : owned points, Pa above p_c. r : owned points. known : of a line, from which follows what the grid gets wrong.
     """
-    shaft, found = problem.shaft, totals(problem, p_pa, known)
+    shaft, found = problem.shaft, totals(problem, p_pa, r, known)
     out: dict[str, Any] = {"pressure_integral": found["pressure_integral"]}
     if shaft is None:
         out["load"] = found["load"]
@@ -73,18 +74,21 @@ def forces(problem: LubricationProblem, p_pa: Array, known: Known | None = None)
 def totals(
     problem: LubricationProblem,
     p_pa: Array,
+    r: Array,
     known: Known | None = None,
     wanted: Collection[str] | None = None,
     columns: dict[bytes, Array] | None = None,
 ) -> dict[str, float]:
-    """Integrals of the pressure by its `weights`, but for `pressure_integral` above ambient and with contact. Collective.
+    """Integrals of the pressure (`borne`) by its `weights`, above ambient, with contact. Collective.
 
-    wanted : those alone, the others are NaN; None: all. columns : as `integrals` takes them.
+    `pressure_integral` counts from the cavitation pressure. wanted : those alone, the others are NaN; None: all.
+    columns : as `integrals` takes them.
     """
     every, contact = weights(problem), problem.contact
     by = {name: weight for name, weight in every.items() if wanted is None or name in wanted}
     asked = [(_above(problem, name, weight), weight) for name, weight in by.items()]
-    out = dict.fromkeys(every, np.nan) | dict(zip(by, integrals(problem, p_pa, asked, columns), strict=True))
+    carries = counted(problem, p_pa, r) if by else p_pa
+    out = dict.fromkeys(every, np.nan) | dict(zip(by, integrals(problem, carries, asked, columns), strict=True))
     for name, weight in by.items() if contact is not None else ():
         if name != "pressure_integral":
             out[name] += contact.total(problem, weight)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,15 @@ if TYPE_CHECKING:
     from .lubrication import LubricationProblem
 
 MANY = 200  # places that are looked for together
+
+
+def counted(problem: LubricationProblem, p_pa: Any, r: Array) -> Any:
+    """The pressure as integrals count it, `borne` where they know fronts. Collective."""
+    if not problem.cornered:
+        return p_pa
+    from .borne import borne  # here: few films have corners
+
+    return borne(problem, p_pa, r)
 
 
 @dataclass(frozen=True)

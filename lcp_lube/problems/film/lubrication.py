@@ -37,10 +37,9 @@ class LubricationProblem:
     ----------
     grid : the interior points. scheme : coefficients of the box scheme there, in units of p_unit.
     mu, U, p_unit : viscosity in Pa s, wall speed in m/s, pressure unit in Pa.
-    p_sides : pressures above p_c at west, east, south, north in Pa.
+    p_sides : pressures above p_c at west, east, south, north in Pa. r_in : void fraction that enters at the west.
     p_c : cavitation pressure in Pa, added to the pressures that are reported. film : h(x, y) in metres.
     exact : gives the exact 1D solution, where one is known. shaft : what the film is wrapped round; None for a flat one.
-    r_in : void fraction that enters at the west.
     held : the supplies whose cells the scheme holds. integrals : of the film of a line whose fluxes are made of them.
     """
 
@@ -48,11 +47,13 @@ class LubricationProblem:
     shares_grid = False  # a time step's with those of the others
     plain = True  # whether the coefficients are those of the film alone
     edged = True  # whether the coefficients know edges inside cells; not where mean_cubes
+    cornered = False  # whether about corners of recesses faces are made for cavities, and integrals know fronts (`borne`)
     tops = False  # whether the largest pressure is looked for between the points (`peak`)
     factors: Any = None  # of its faces, that follow from `cells`
     tangent: Any = None  # dG/dp, where that is not A
     oil: Any = None  # `oil_along.Oil`, where nothing else acts but what it knows; rigid: its film in q, of a small one
     rigid: Any = None
+    bare: Any = None  # coefficients of the film alone, where `scheme` has them by its answer
     contact: Any = None  # of asperities
     levers: Any = ()  # `Model.levers`
     layers: Any = None  # `flows.layers` of a film near by, which has the same
@@ -193,8 +194,7 @@ class LubricationProblem:
         In the equation's terms, U h (1 - r) - h^3/(6 mu) dp/dx, that is twice the volume flow; m2/s in 1D, in 2D the sum
         over the side's points (times dy: m3/s).
         """
-        s, box = self.scheme, self.grid.box
-        p, r = p.reshape(box), r.reshape(box)
+        s, box, (p, r) = self.scheme, self.grid.box, (a.reshape(self.grid.box) for a in (p, r))
         p_W, p_E, p_S, p_N = (side / self.p_unit for side in self.p_sides)
         west, east, south, north = side_points(self.grid)
         total = lambda at, flows: s.flow_unit * self.reduce.of_some(flows, at, box)  # noqa: E731
@@ -272,7 +272,7 @@ class LubricationProblem:
     ) -> Self:
         """The problem on the same grid with other coefficients; mu : viscosity at the east faces, Pa s."""
         (other := copy(self)).scheme, other.mu, other.exact = scheme, mu, None  # type: ignore[assignment]
-        other.p_sides, other.held = p_sides or self.p_sides, held or self.held
+        other.p_sides, other.held, other.bare = p_sides or self.p_sides, held or self.held, self.bare or self.scheme
         other.__dict__ |= dict.fromkeys(("coefficients_for", "factors", "contact", "tangent", "rigid"), None)
         other.__dict__ |= {name: {} for name in ("more", "more_fields", "more_measures", "cells")} | {"plain": False}
         return other

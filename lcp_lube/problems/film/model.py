@@ -12,20 +12,20 @@ from ...base.parallel import Array
 from ...errors import InputError
 from ..facts import Facts
 from ..grid import EVEN, Grid, Places, Polar, some_places
-from .edges import jumps_of, kinks_of, one_line
+from .edges import corners_of, jumps_of, kinks_of, one_line
 from .effects import Effect
 from .exact import ExactSolution
 from .fluid import Law
-from .grooves import Groove, GroovedProblem, Pad, pads_between
+from .grooves import Groove, GroovedProblem
 from .integrals import LineIntegrals, line_integrals
-from .lines import SAME, on_edges, stretches
+from .lines import on_edges, stretches
 from .lubrication import LubricationProblem
 from .reynolds import BoxScheme, Film, box_scheme, coefficients
 from .stored import Dry, Stored
 from .supplies import Held, Supply, hold, owners
 from .turned import TurnedProblem
 from .turning import Shaft
-from .views import FromHere, Inside, LiftedFilm, MirroredFilm, Raised
+from .views import Inside, LiftedFilm, MirroredFilm, Raised
 
 NAMES = ("west", "east", "south", "north")
 STEP = 1e-30  # relative, of a complex step: nothing is subtracted, so no digits are lost however small it is
@@ -120,10 +120,19 @@ class Model:
         return self.law is not None and self.law.dowson_higginson
 
     @property
+    def knows(self) -> bool:
+        """Whether its faces know edges, and fronts, of a film in the plane."""
+        return self.scheme == "face" and not self.mean_cubes and len(self.lengths) == 2
+
+    @property
     def cut(self) -> bool:
         """Whether round edges cut faces that are made for cavities (`rims`)."""
-        known = self.scheme == "face" and not self.mean_cubes and len(self.lengths) == 2
-        return known and bool(getattr(self.gap, "rims", ()))
+        return self.knows and bool(getattr(self.gap, "rims", ()))
+
+    @property
+    def cornered(self) -> bool:
+        """Whether it has corners about which faces are made for cavities (`recesses`)."""
+        return self.knows and bool(corners_of(self.gap).size)
 
     @property
     def film(self) -> Film:
@@ -181,7 +190,7 @@ class Model:
     @property
     def edges(self) -> list[tuple[float, list[str], list[float]]]:
         """Length, kinds of the ends and edges of each side of a film whose lines of points lie on edges."""
-        if self.scheme != "face" or self.mean_cubes or len(self.lengths) == 1:
+        if not self.knows:
             return []
         kinds = [[side.kind for side in self.sides[2 * k : 2 * k + 2]] for k in (0, 1)]
         return list(zip(self.lengths, kinds, map(self.edges_along, "xy"), strict=True))
@@ -242,7 +251,8 @@ class Model:
             problem.grooves = self.grooves
         if self.scheme == "face" and grid.dim == 2:
             problem.coefficients_for, problem.dry = partial(self._scheme, grid, integrals), dry
-            problem.remade = self.cut or dry is not None
+            problem.cornered = self.cornered
+            problem.remade = self.cut or self.cornered or dry is not None
         return problem
 
     @property
@@ -281,20 +291,3 @@ class Model:
         """x of all columns of points of a ring, m."""
         x = self.lines(shape)[0]
         return some_places(shape[0], self.lengths[0], RING, shape[0]) if x is None else x
-
-    def pads(self, shape: Sequence[int]) -> list[tuple[Pad, "Model"]]:
-        """The films between the grooves on a ring of nx columns, whose points they keep."""
-        films, y = [], self.lines(shape)[1]
-        for pad in pads_between(self.columns(shape), self.lengths[0], self.grooves):
-            # Its x = 0 is the last column of the groove before it.
-            x = pad.around - pad.around[0]
-            lengths = (float(x[-1]), *self.lengths[1:])
-            sides = (Side(p=pad.west), Side(p=pad.east), *self.sides[2:])
-            gap = FromHere(self.gap, float(pad.around[0]), self.lengths[0])
-            stored = self.stored.starting(pad.first) if self.stored else None
-            dry = self.dry.starting(pad.first) if self.dry else None
-            even = np.allclose(np.diff(x), x[-1] / (pad.n + 1), rtol=SAME, atol=0.0)
-            changed: dict[str, Any] = {"grooves": (), "levers": (), "places": (None if even else x[1:-1], y), "stored": stored}
-            film = replace(self, lengths=lengths, sides=sides, gap=gap, exact=None, dry=dry, **changed)
-            films.append((pad, film))
-        return films

@@ -86,7 +86,7 @@ def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any
     out: dict[str, Any] = {
         "p_max": read.p_max + problem.p_c,
         "p_max_at": read.p_max_at,
-        **forces(problem, p_pa, known),
+        **forces(problem, p_pa, r, known),
         "p_ambient": (ambient(problem) if known is None else known.ambient(problem)) + problem.p_c,
         "friction": read.friction,
         "p_unit": problem.p_unit,

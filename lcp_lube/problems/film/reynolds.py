@@ -217,9 +217,9 @@ def coefficients(
     integrals : of a line's film (1D): fluxes between its points are exact for a full film; default: from the film at the faces.
     """
     (ny, nx), film = grid.box, Around(film, grid)
-    rims = [] if mean_cubes or scheme != "face" or grid.dim == 1 else getattr(film, "rims", [])
+    rims = [] if mean_cubes or scheme != "face" or grid.dim == 1 else film.rims
     # The void is dragged as the film at the points, or as what the wall drags through the faces, which are stored anyway.
-    nodal, weight = scheme != "face" and U != 0.0, None
+    nodal = scheme != "face" and U != 0.0
     first = ruptured(grid, cavity, p_sides[0] / (6.0 * mu * U)) if stored is None and np.real(U) > 0.0 else None
     kind = np.asarray(film(grid.x[:, :1], grid.y[:1])).dtype
     # With a frame of neighbours, as sweeps want them (`solvers.fas.levels`).
@@ -240,16 +240,17 @@ def coefficients(
         make(slice(0, ny))
     else:
         each_strip(grid, make)
-    h = films[:, 1:]
-    if nodal:
-        weight = stream_weights(grid) * np.ones((ny, 1))
+    if cavity is not None and not mean_cubes and film.corners.size:
+        from .recesses import around_recesses  # here: few films have corners
+
+        around_recesses(grid, film, cavity, kx[1:-1, 1:-1], ky[1:-1, 1:-1], wall, 6.0 * mu * U / p_unit)
+    h, weight = films[:, 1:], stream_weights(grid) * np.ones((ny, 1)) if nodal else None
     k_W, k_E, k_S, k_N = kx[1:-1, 1 : nx + 1], kx[1:-1, 2 : nx + 2], ky[1 : ny + 1, 1:-1], ky[2 : ny + 2, 1:-1]
     if U == 0.0:
         # No void is carried, and there is none: any speed keeps B regular, as what cells store does.
         void *= 0.0 if stored else grid.reduce.max(np.real(kx)) / grid.reduce.max(np.real(h))
         r_in = 0.0
-    open_west, *_ = sides(grid)
-    if r_in and open_west.any():
+    if r_in and sides(grid)[0].any():
         wall[:, :1] = wall[:, :1] - dragged(void[:, :1], weight, U) * r_in
     last = None
     west, east, south, north = (mask.any() for mask in sides(grid, ("closed", "mirror")))
@@ -273,8 +274,7 @@ def coefficients(
     box = BoxScheme(k_W, k_E, k_S, k_N, c, couette_W, couette_E, h, b_C, b_W)
     if stored is None:
         return box
-    # Twice a cell's area over the mean dy.
-    area = 2.0 * grid.spacing[0] * grid.widths(0) * line_weights(grid) * grid.stretch(grid.y)
+    area = 2.0 * grid.spacing[0] * grid.widths(0) * line_weights(grid) * grid.stretch(grid.y)  # twice a cell's, over dy
     return box.changed(**stored.terms(grid, film, area, box.b_C, c))
 
 

@@ -281,8 +281,9 @@ def _widths(grid: Grid, side: int) -> Array:
 
 
 def state_of(problem: Any, p: Array, r: Array) -> Array:
-    """What faces are made for: 1 at cavitated points, at others -p/(6 mu U), 1/m: less what the pressure drives. Collective."""
-    driven = np.maximum(p, 0.0) * problem.p_unit / np.ravel(6.0 * problem.mu * abs(problem.U)) if problem.U else 0.0
+    """What faces are made for: 1 at cavitated points, at others -p/(6 mu U), 1/m, or -p/(6 mu) of a wall that stands: less what
+    the pressure drives. Collective."""
+    driven = np.maximum(p, 0.0) * problem.p_unit / np.ravel(6.0 * problem.mu * (abs(problem.U) or 1.0))
     return np.where(cavitated(problem.reduce, p, r), 1.0, -driven)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...base.parallel import Array
-from .edges import level, marks_of
+from .edges import corners_of, level, marks_of, rectangles
 
 Shape = Callable[[Array, Array], Array]
 EDGE = 1e-12  # relative: a point so near an edge is on it, whatever its coordinate's rounding; edges belong to the recess
@@ -83,6 +83,11 @@ class Block:
     def jumps(self, axis: str) -> tuple[float, ...]:
         return tuple(t for t in (self.x if axis == "x" else self.y) if np.isfinite(t))
 
+    @property
+    def corners(self) -> Array:
+        """As `edges.corners_of` has them."""
+        return rectangles(self.x, self.y) if np.isfinite([*self.x, *self.y]).all() and self.height else np.zeros((0, 4))
+
 
 @dataclass(frozen=True)
 class DimpleArray:
@@ -130,6 +135,12 @@ class DimpleArray:
             return ()  # the edge of a round one is nowhere a line
         centres = start + (end - start) * (np.arange(count) + 0.5) / count
         return tuple(np.concatenate([centres - 0.5 * self.size, centres + 0.5 * self.size]))
+
+    @property
+    def corners(self) -> Array:
+        """As `edges.corners_of` has them."""
+        x, y = (np.reshape(self.jumps(axis), (2, -1)) for axis in "xy")
+        return rectangles(x[:, :, None], y[:, None, :]) if x.size and y.size and self.depth else np.zeros((0, 4))
 
     @property
     def level(self) -> bool:
@@ -201,6 +212,11 @@ class Sum:
     @property
     def level(self) -> bool:
         return all(map(level, self.parts))
+
+    @property
+    def corners(self) -> Array:
+        """As `edges.corners_of` has them; what is cut off is not looked for."""
+        return np.concatenate([corners_of(part) for part in self.parts])
 
     @property
     def rims(self) -> tuple[Shape, ...]:

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from ...base.parallel import Array
 from ...registry import SMALL
+from .borne import by_fields
 from .cavity import cavity_sign
 from .effects import around
 from .flows import SIDES, drag_sum, friction, linear, runs, sheared_faces, side_flows, volume_unit
-from .forces import open_pressures, totals, weights
+from .forces import Weight, open_pressures, totals, weights
 from .grooves import GroovedProblem
 from .lubrication import LubricationProblem
 from .peak import Window
@@ -52,7 +53,7 @@ def numbers(problem: LubricationProblem, p_pa: Array, r: Array, wanted: Collecti
     def asked(start: str) -> bool:
         return wanted is None or any(name.startswith(start) for name in wanted)
 
-    out = totals(problem, p_pa, wanted=wanted)
+    out = totals(problem, p_pa, r, wanted=wanted)
     out["friction"] = friction(problem, p_pa, r) if asked("friction") else np.nan
     if problem.grid.polar is not None:
         lever = problem.grid.polar[0] + problem.grid.y
@@ -68,6 +69,13 @@ def numbers(problem: LubricationProblem, p_pa: Array, r: Array, wanted: Collecti
         out |= {f"groove_flow_{k}": flow for k, flow in enumerate(problem.groove_flows(p, r), start=1)}
     out |= {f"supply_flow_{k}": flow for k, flow in enumerate(supply_flows(problem, p, r), start=1)}
     return out
+
+
+def by_points(problem: LubricationProblem, weight: Weight) -> Array:
+    """What an integral of the pressure with this weight changes by with p at each point, in p_unit, shape `grid.box`."""
+    grid = problem.grid
+    lines = grid.cell * problem.p_unit * stream_weights(grid)
+    return np.broadcast_to(weight(grid.x, grid.y) * grid.widths(0) * lines, grid.box)
 
 
 def giving_points(problem: LubricationProblem, name: str) -> NDArray[np.bool_]:
@@ -89,9 +97,7 @@ def slope(problem: LubricationProblem, tangent: Tangent | None, p_pa: Array, r: 
     last : of points that tie for the largest pressure the last one has it, not the first.
     """
     if (weight := weights(problem).get(name)) is not None:
-        grid = problem.grid
-        lines = grid.cell * problem.p_unit * stream_weights(grid)
-        return Slope(np.broadcast_to(weight(grid.x, grid.y) * grid.widths(0) * lines, grid.box), 0.0)
+        return Slope(*by_fields(problem, p_pa, r, by_points(problem, weight)))
     if name == "p_max":
         return _largest(problem, p_pa / problem.p_unit, last)
     if name == "min_h":

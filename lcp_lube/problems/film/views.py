@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from ...base.parallel import Array
 from ..grid import Grid
-from .edges import jumps_of, kinks_of, level, marks_of
+from .edges import corners_of, jumps_of, kinks_of, level, marks_of
 
 
 @dataclass(frozen=True)
@@ -22,8 +22,8 @@ class View:
         """The film's own x."""
         return x
 
-    def back(self, x: float) -> float:
-        """Where its x is seen."""
+    def back(self, x: Any) -> Any:
+        """Where its x, a number or an array of them, is seen."""
         return x
 
     def __call__(self, x: ArrayLike, y: ArrayLike | None = None, /) -> Array:
@@ -39,6 +39,13 @@ class View:
         """x or y (m) of the straight lines across which its slope jumps."""
         found = kinks_of(self.film, axis)
         return tuple(sorted(map(self.back, found))) if axis == "x" else found
+
+    @property
+    def corners(self) -> Array:
+        """Of its rectangles, as `edges.corners_of` has them."""
+        found = np.array(corners_of(self.film))
+        found[:, 0] = self.back(found[:, 0])
+        return found
 
     @property
     def rims(self) -> tuple[Any, ...]:
@@ -69,7 +76,11 @@ class MirroredFilm(View):
         # The wall lies at 0, not beyond it by the last bit of L: sqrt(x) is a film.
         return np.where((turned < 0) & (turned > -1e-12 * self.L), 0.0, turned)
 
-    def back(self, x: float) -> float:
+    @property
+    def corners(self) -> Array:
+        return super().corners * np.array([1.0, 1.0, -1.0, 1.0])
+
+    def back(self, x: Any) -> Any:
         return self.L - x
 
 
@@ -80,10 +91,15 @@ class Travelling(View):
     travel: float
     L: float
 
+    @property
+    def corners(self) -> Array:
+        """None that grids could follow: faces would change in steps whenever a corner passes a point."""
+        return np.zeros((0, 4))
+
     def own(self, x: Array) -> Array:
         return (x - self.travel) % self.L
 
-    def back(self, x: float) -> float:
+    def back(self, x: Any) -> Any:
         return (x + self.travel) % self.L
 
 
@@ -97,7 +113,7 @@ class FromHere(View):
     def own(self, x: Array) -> Array:
         return x + self.start
 
-    def back(self, x: float) -> float:
+    def back(self, x: Any) -> Any:
         return (x - self.start) % self.period
 
 
