@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from lcp_lube import load_scene, solve
 from lcp_lube.drivers.motions.coefficients import coefficients
-from lcp_lube.problems.film import borne, recesses
+from lcp_lube.problems.film import borne, corners
 from lcp_lube.problems.film.edges import corners_of
 from lcp_lube.problems.film.recesses import Corners, _Field, corners_on
 from lcp_lube.problems.film.shapes import Block, DimpleArray, Sum
@@ -162,7 +162,7 @@ def test_ratios_are_positive_and_near_one():
         changed = problem.revised(state).scheme
         for name in ("k_E", "k_W", "k_S", "k_N"):
             ratio = getattr(changed, name) / getattr(problem.scheme, name)
-            assert (ratio >= recesses.LEAST**2).all() and (ratio < 4.0).all()
+            assert (ratio >= corners.LEAST**2).all() and (ratio < 4.0).all()
         problem.destroy()
 
 
@@ -197,7 +197,7 @@ def test_derivatives_of_borne_pressures(cavitated):
     ):
         assert found == pytest.approx((step(1e-5) - step(-1e-5)) / 2e-5, rel=1e-6)
     assert not by_r[~at].any()
-    by_k, by_b = borne.by_faces(problem, p, r, w)
+    by_k, by_b = borne.by_coefficients(problem, p, r, w)
     s, e = problem.scheme, 1e-6
     for name, by in (("k_W", by_k), ("b_W", by_b)):
         values = []

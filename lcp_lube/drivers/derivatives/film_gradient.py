@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...base.parallel import Array
-from ...problems.film.borne import by_faces
+from ...problems.film.borne import by_coefficients
 from ...problems.film.contact import areas
 from ...problems.film.flows import drag, volume_unit
 from ...problems.film.forces import Weight, weights
@@ -175,7 +175,7 @@ class FilmGradient:
     def _fronts(self, weight: Weight) -> Array:
         """Of an integral of the pressure by the film, fields held: as fronts lie elsewhere in it."""
         adjoint, problem, s = self.adjoint, self.problem, self.bare
-        by_k, by_b = by_faces(problem, adjoint.p, adjoint.r, by_points(problem, weight))
+        by_k, by_b = by_coefficients(problem, adjoint.p, adjoint.r, by_points(problem, weight))
         half = 0.5 * (by_k * s.k_W + by_b * s.b_W)
         none = np.zeros_like(half)
         return self._dealt(half, [half, none, none, none])

@@ -63,7 +63,7 @@ def by_fields(problem: LubricationProblem, p_pa: Array, r: Array, by_borne: Arra
     return by_p, grid.ghosted(more, outside=0.0)[1:-1, 2:].ravel()
 
 
-def by_faces(problem: LubricationProblem, p_pa: Array, r: Array, by_borne: Array) -> tuple[Array, Array]:
+def by_coefficients(problem: LubricationProblem, p_pa: Array, r: Array, by_borne: Array) -> tuple[Array, Array]:
     """Its derivatives by k_W and by b_W, shape `grid.box`, fields held. Collective."""
     by_k, by_b = np.zeros((2, problem.grid.local_size))
     if (found := _fronts(problem, p_pa, r)) is not None:

@@ -61,9 +61,8 @@ def around_corners(grid: Grid, regions: Sequence[Region]) -> Array:
             slope = np.diff(_power(T, S).imag) / np.diff(T)
             flow = -np.diff(_power(t, s).real, axis=0) / np.diff(s, axis=0)
             least = (SMALL * 2.0 / 3.0) ** 2 * np.hypot(t, S) ** (-2.0 / 3.0)
-            ratio = np.maximum((flow * slope + least) / (slope * slope + least), LEAST)
             far = np.maximum(np.abs(t / scale[side]) / reach[side], np.abs(S / scale[across]) / reach[across])
-            ratio = 1.0 + (ratio - 1.0) * np.maximum(1.0 - far**BLEND, 0.0)
+            ratio = ratios(flow, slope, least, far)
             n, last = grid.shape[side], near[side][-1] + 1
             lines, numbers = near[across] % grid.shape[across], np.append(near[side], last)
             if around[side]:
@@ -77,6 +76,13 @@ def around_corners(grid: Grid, regions: Sequence[Region]) -> Array:
             out[side][np.ix_(j[rows], i[columns])] *= ratio[np.ix_(rows, columns)]
     x, y = out[0], out[1].T
     return np.stack([x[:, :-1], x[:, 1:], y[:-1], y[1:]])
+
+
+def ratios(flow: Array, driven: Array, least: Array, far: Array) -> Array:
+    """What flows through faces over what the scheme drives, which `least` keeps from vanishing; 1 from `far` = 1 on."""
+    ratio = (flow * driven + least) / (driven * driven + least)
+    ratio = np.where(np.real(ratio) < LEAST, LEAST, ratio)
+    return 1.0 + (ratio - 1.0) * np.maximum(1.0 - far**BLEND, 0.0)
 
 
 def places(grid: Grid, side: int) -> Array:

@@ -252,7 +252,7 @@ class Model:
         if self.scheme == "face" and grid.dim == 2:
             problem.coefficients_for, problem.dry = partial(self._scheme, grid, integrals), dry
             problem.cornered = self.cornered
-            problem.remade = self.cut or self.cornered or dry is not None
+            problem.remade = self.cut or problem.cornered or dry is not None
         return problem
 
     @property

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from ...base.parallel import Array
 from ..grid import Grid
-from .corners import BLEND, LEAST, ON, SMALL, places
+from .corners import BLEND, ON, SMALL, places, ratios
 from .edges import corners_of
 
 CELLS = 2  # about a corner
@@ -84,11 +84,11 @@ def corners_on(grid: Grid, film: Callable[[Array, Array], Array], state: Array, 
     jumps = (np.min(room, axis=0) > 0.0) & (found != 0.0) & (np.abs(inside - outside) > SLIGHT * np.abs(outside))
     if not jumps.any():
         return None
-    every = Corners(at, outward, places_, np.array(room), inside, outside, found > 0.0)
-    some = Corners._make(a[..., jumps] for a in every)
-    near = np.sum(some.reach**-BLEND, axis=0)  # no step where another one becomes the nearest
-    spans = np.array([np.ptp(_window(grid, side, some), axis=1) / 2.0 for side in (0, 1)])
-    return some._replace(reach=(spans**-BLEND + near) ** (-1.0 / BLEND))
+    near = np.sum(np.array(room)[:, jumps] ** -BLEND, axis=0)  # no step where another one becomes the nearest
+    some = at[:, jumps], outward[:, jumps], places_[:, jumps]
+    spans = np.array([np.ptp(_window(grid, side, *some), axis=1) / 2.0 for side in (0, 1)])
+    reach = (spans**-BLEND + near) ** (-1.0 / BLEND)
+    return Corners(*some, reach, inside[jumps], outside[jumps], found[jumps] > 0.0)
 
 
 def around_recesses(
@@ -103,7 +103,7 @@ def around_recesses(
     """
     if (found := corners_on(grid, film, state, kx.dtype)) is None:
         return
-    nodes = [_window(grid, side, found) for side in (0, 1)]
+    nodes = [_window(grid, side, *found[:3]) for side in (0, 1)]
     h, H = found.inside, found.outside
     slope = np.where(found.dry, 0.0, 1.0 / (h * h + h * H + H * H))
     steps, stretch = grid.steps(0), grid.stretch(grid.y)[:, 0]
@@ -164,13 +164,13 @@ def _quarters(
     return h[0], h[1], np.real(h[2])
 
 
-def _window(grid: Grid, side: int, found: Corners) -> Array:
+def _window(grid: Grid, side: int, at: NDArray[np.int64], outward: NDArray[np.int64], places_: Array) -> Array:
     """Coordinates of the points about corners, from them and outwards, m, shape (n, 2 CELLS + 1)."""
     lines, ring = places(grid, side), grid.periodic[side]
-    k = found.at[side] + 1 + grid.shape[side] * ring
+    k = at[side] + 1 + grid.shape[side] * ring
     around = lines[np.clip(k[:, None] + np.arange(-CELLS, CELLS + 1), 0, lines.size - 1)] - lines[k][:, None]
-    scale = grid.stretch(found.places[1]) if side == 0 else 1.0
-    return around * np.broadcast_to(found.outward[side] * scale, k.shape)[:, None]
+    scale = grid.stretch(places_[1]) if side == 0 else 1.0
+    return around * np.broadcast_to(outward[side] * scale, k.shape)[:, None]
 
 
 def _ratios(found: Corners, side: int, nodes: list[Array]) -> Array:
@@ -186,12 +186,9 @@ def _ratios(found: Corners, side: int, nodes: list[Array]) -> Array:
     low, high = np.minimum(ends[:, :-1], ends[:, 1:]), np.maximum(ends[:, :-1], ends[:, 1:])
     share = np.where(t < 0.0, np.clip(-low, 0.0, None) - np.clip(-high, 0.0, None), 0.0) / np.where(high > low, high - low, 1.0)
     K = 1.0 + (field.kappa - 1.0) * share
-    driven, least = slope * K, (SMALL * field.steep(*turn(t, points[1])) * K) ** 2
-    with np.errstate(invalid="ignore"):
-        ratio = (flow * driven + least) / (driven * driven + least)
-    ratio = np.where(np.real(ratio) < LEAST, LEAST, ratio)
     far = np.maximum(*(np.abs(a) / found.reach[k][:, None, None] for a, k in ((t, side), (points[1], 1 - side))))
-    ratio = 1.0 + (ratio - 1.0) * np.maximum(1.0 - far**BLEND, 0.0)
+    with np.errstate(invalid="ignore"):
+        ratio = ratios(flow, slope * K, (SMALL * field.steep(*turn(t, points[1])) * K) ** 2, far)
     return np.where(np.isfinite(np.real(ratio)), ratio, 1.0)
 
 
