@@ -82,15 +82,29 @@ class Reduce:
 
     def largest(self, a: Array) -> float:
         """Largest |entry|, as `max`, without an array of them."""
-        return self.max(np.array(_of_parts(lambda part: (np.max(part), -np.min(part)), a)) if a.size else a)
+        low, high = self.extremes(a)
+        return float(np.maximum(-low, high))  # NaN stays NaN
+
+    def extremes(self, a: Array) -> tuple[float, float]:
+        """`min` and `max`; large arrays are read once."""
+        if not a.size:
+            return self.min(a), self.max(a)
+        ends = _of_parts(lambda part: (part.min(axis=0).min(), part.max(axis=0).max()), _once(a))
+        low, high = np.transpose(ends)
+        return self.min(low), self.max(high)
 
     def _extremum(self, a: Array, empty: float, op: MPI.Op) -> float:
         reduced = (np.minimum if op == MPI.MIN else np.maximum).reduce
-        value = float(reduced(_of_parts(lambda part: reduced(part, axis=None), a))) if a.size else empty
+        value = float(reduced(_of_parts(lambda part: reduced(part, axis=None), _once(a)))) if a.size else empty
         if self.comm.size == 1:
             return value
         bad = self.comm.allreduce(bool(np.isnan(value)), MPI.LOR)
         return float("nan") if bad else self.comm.allreduce(value, op)
+
+
+def _once(a: NDArray) -> NDArray:
+    """The one line of an array whose lines are all in one place."""
+    return a[:1] if a.ndim == 2 and a.strides[0] == 0 else a
 
 
 def _of_parts(task: Callable[[NDArray], Any], a: NDArray) -> list[Any]:

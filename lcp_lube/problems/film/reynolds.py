@@ -12,11 +12,11 @@ from ...base.parallel import Array
 from ...errors import InputError
 from ..grid import Grid
 from ..strips import each_strip, in_strips, places_of
+from . import strip
 from .cavity import ruptured
 from .edges import Around
 from .integrals import LineIntegrals, check_film
 from .stored import Stored
-from .strip import coefficients_of, dragged, entering, entering_at, leaving, leaving_at, line_weights, lines_of, stream_weights
 
 Film = Callable[[Array, Array], Array]
 USUAL = 1e6  # the largest coefficient lies between this and its inverse: absolute tolerances then mean something
@@ -108,13 +108,13 @@ class BoxScheme:
     def b_E_at(self, row: Any, i: Any) -> Array:
         """`b_E` of some cells, without an array of them all."""
         b_C = vars(self)["b_C"]
-        some = leaving_at(row, i, *b_C.args) if isinstance(b_C, partial) else b_C[row, i]
+        some = strip.leaving_at(row, i, *b_C.args) if isinstance(b_C, partial) else b_C[row, i]
         return some if self.storage is None else some + self.storage[row, i]
 
     def b_W_at(self, row: Any, i: Any) -> Array:
         """`b_W` of some cells."""
         b_W = vars(self)["b_W"]
-        return entering_at(row, i, *b_W.args) if isinstance(b_W, partial) else b_W[row, i]
+        return strip.entering_at(row, i, *b_W.args) if isinstance(b_W, partial) else b_W[row, i]
 
     @property
     def diagonal(self) -> Array:
@@ -158,14 +158,13 @@ def box_scheme(grid: Grid, film: Film, **data: Any) -> BoxScheme:
         x, y = (grid.nodes_and_faces(side)[0] if side < grid.dim else np.zeros(1) for side in (0, 1))
         ends = [np.ravel(film(*at)) for at in ((x[None, [0, -1]], y[:, None]), (x[None, :], y[[0, -1], None]))]
     reduce = grid.reduce
-    # Every face once: k_E and k_N are k_W and k_S but for the last ones.
-    faces = [box.k_W, box.k_E[:, -1:]] + ([box.k_S, box.k_N[-1:]] if grid.dim == 2 else [])
-    west, east, south, north = (int(mask.any()) for mask in sides(grid, ("closed", "mirror")))  # which conduct nothing
-    conducting = [faces[0][:, west:], faces[1][:, east:]] + ([faces[2][south:], faces[3][north:]] if grid.dim == 2 else [])
+    # Every face once, k_E and k_N are k_W and k_S but for the last ones; those at closed sides conduct nothing.
+    west, east, south, north = (int(mask.any()) for mask in sides(grid, ("closed", "mirror")))
+    faces = [box.k_W[:, west:], box.k_E[:, -1:][:, east:]] + ([box.k_S[south:], box.k_N[-1:][north:]] if grid.dim == 2 else [])
     stores = [] if box.storage is None else [box.storage]
-    smallest = float(np.min([reduce.min(a) for a in (box.h, *ends, *conducting, *stores)]))  # NaN stays NaN
-    voids = np.array(each_strip(grid, lambda rows: np.max(np.abs(box.rows(rows).b_C))))
-    largest = max(*map(reduce.max, faces), reduce.max(voids), reduce.largest(box.c))
+    lows, highs = zip(*map(reduce.extremes, [*faces, box.c]), strict=True)
+    smallest = float(np.min([*map(reduce.min, (box.h, *ends, *stores)), *lows[:-1]]))  # NaN stays NaN
+    largest = max(*highs, -lows[-1], reduce.max(strip.most_leaving(box)))
     if not (smallest > 1 / LARGE and largest < LARGE):
         with np.errstate(all="ignore"):
             check_film(grid, film)
@@ -219,22 +218,21 @@ def coefficients(
     (ny, nx), film = grid.box, Around(film, grid)
     rims = [] if mean_cubes or scheme != "face" or grid.dim == 1 else film.rims
     # The void is dragged as the film at the points, or as what the wall drags through the faces, which are stored anyway.
-    nodal = scheme != "face" and U != 0.0
+    nodal, form = scheme != "face" and U != 0.0, scheme if U or scheme == "face" else "upwind"
     first = ruptured(grid, cavity, p_sides[0] / (6.0 * mu * U)) if stored is None and np.real(U) > 0.0 else None
     kind = np.asarray(film(grid.x[:, :1], grid.y[:1])).dtype
-    # With a frame of neighbours, as sweeps want them (`solvers.fas.levels`).
-    kx, ky, c_frame = (np.zeros(shape, dtype=kind) for shape in ((ny + 2, nx + 3), (ny + 3, nx + 2), (ny + 2, nx + 2)))
-    films, wall = lines_of(grid, film, bool(rims) or first is not None, kind)
+    (kx, ky, c_frame), (films, wall) = strip.room(grid, film, bool(rims) or first is not None, kind)
     void = films if nodal else wall if U else np.zeros_like(wall)
 
+    k = p_unit / (6.0 * mu)
+
     def make(rows: slice) -> None:
-        strip = grid if rims else places_of(grid, rows)
+        here = grid if rims else places_of(grid, rows)
         inlet = first and first.of(rows)
-        parts = coefficients_of(strip, film, p_unit / (6.0 * mu), U or 1.0, scheme, mean_cubes, rims, cavity, inlet, integrals)
-        kx[1:-1, 1:-1][rows], films[rows] = parts[0], parts[2]
-        if grid.dim == 2:
-            ky[1:-1, 1:-1][rows.start : rows.stop + 1] = parts[1]
-        (wall if U else void)[rows] = parts[3 if U else 4]
+        parts = strip.coefficients_of(here, film, k, U or 1.0, form, mean_cubes, rims, cavity, inlet, integrals)
+        inside = kx[1:-1, 1:-1][rows], ky[1:-1, 1:-1][rows.start : rows.stop + 1], films[rows], (wall if U else void)[rows]
+        for out, part in zip(inside, parts, strict=True):
+            strip.put(out, part)
 
     if rims:
         make(slice(0, ny))
@@ -244,14 +242,14 @@ def coefficients(
         from .recesses import around_recesses  # here: few films have corners
 
         around_recesses(grid, film, cavity, kx[1:-1, 1:-1], ky[1:-1, 1:-1], wall, 6.0 * mu * U / p_unit)
-    h, weight = films[:, 1:], stream_weights(grid) * np.ones((ny, 1)) if nodal else None
+    h, weight = films[:, 1:], strip.stream_weights(grid) * np.ones((ny, 1)) if nodal else None
     k_W, k_E, k_S, k_N = kx[1:-1, 1 : nx + 1], kx[1:-1, 2 : nx + 2], ky[1 : ny + 1, 1:-1], ky[2 : ny + 2, 1:-1]
     if U == 0.0:
         # No void is carried, and there is none: any speed keeps B regular, as what cells store does.
         void *= 0.0 if stored else grid.reduce.max(np.real(kx)) / grid.reduce.max(np.real(h))
         r_in = 0.0
     if r_in and sides(grid)[0].any():
-        wall[:, :1] = wall[:, :1] - dragged(void[:, :1], weight, U) * r_in
+        wall[:, :1] = wall[:, :1] - strip.dragged(void[:, :1], weight, U) * r_in
     last = None
     west, east, south, north = (mask.any() for mask in sides(grid, ("closed", "mirror")))
     # Column sums stay >= 0, those of A and B are 0 in the cells away from open sides. b_C stays at a closed east side: in
@@ -270,11 +268,11 @@ def coefficients(
     for conductance, points, p_side in zip((k_W, k_E, k_S, k_N), side_points(grid), p_sides, strict=True):
         c[points] += conductance[points] * (p_side / p_unit)
     enters = grid.x_start > 0 or (grid.periodic[0] and U != 0.0)  # or else what does is in c
-    b_C, b_W = partial(leaving, void, last, weight, U), partial(entering, void, enters, weight, U)
+    b_C, b_W = partial(strip.leaving, void, last, weight, U), partial(strip.entering, void, enters, weight, U)
     box = BoxScheme(k_W, k_E, k_S, k_N, c, couette_W, couette_E, h, b_C, b_W)
     if stored is None:
         return box
-    area = 2.0 * grid.spacing[0] * grid.widths(0) * line_weights(grid) * grid.stretch(grid.y)  # twice a cell's, over dy
+    area = 2.0 * grid.spacing[0] * grid.widths(0) * strip.line_weights(grid) * grid.stretch(grid.y)  # twice a cell's, over dy
     return box.changed(**stored.terms(grid, film, area, box.b_C, c))
 
 

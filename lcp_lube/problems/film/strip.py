@@ -12,6 +12,8 @@ from .cavity import Inlet
 from .edges import Around, face_film, pairs
 from .integrals import LineIntegrals
 
+Line = tuple[Array, Array]
+
 
 def coefficients_of(
     grid: Grid,
@@ -24,10 +26,11 @@ def coefficients_of(
     cavity: Array | None,
     inlet: Inlet | None,
     integrals: LineIntegrals | None,
-) -> tuple[Array, Array, Array, Array, Array]:
-    """Of some lines: conductances of x and y faces, h at the points and the one before, and what goes through x faces: what the
-    wall drags, and what if all is void.
+) -> tuple[Line, Line, Line, Line]:
+    """Of some lines: conductances of x and y faces, h at the points and the one before, and what the wall drags through x
+    faces, each as what it is made of, one line where all are the same, and what of each line multiplies that (`put`).
 
+    scheme : 'nodal', where the film at the faces is dragged, or as `reynolds.coefficients` has it; U : of the wall.
     inlet : of the lines (`inlets`), where they may rupture behind the west side."""
     dx, (ny, nx) = grid.steps(0), grid.box
     x_share, y_share = grid.widths(0), line_weights(grid)
@@ -61,7 +64,7 @@ def coefficients_of(
 
         cubes_x, h_face = made_at_inlet(film, x_nodes, y[:, 0], inlet, cubes_x, h_face)
     m = grid.stretch(y)
-    k_x, k_y = k * cubes_x / dx * (y_share / m), np.zeros((ny + 1, nx))
+    k_y: Line = np.zeros((1, 1)), np.ones((1, 1))
     if grid.dim == 2:
         y_nodes, y_faces = grid.nodes_and_faces(1)
         if x_jumps or y_jumps:
@@ -74,11 +77,15 @@ def coefficients_of(
         if rims:
             cubes_y = rims_across_y(grid, film, rims, cavity, cubes_y, period[1])
         arcs = k * cubes_y * (grid.spacing[0] * x_share)
-        k_y = arcs * (grid.stretch(y_faces) / (grid.steps(1) * grid.spacing[1]))[:, None]
-    weight = y_share * m
-    void = dragged(h_face if scheme == "face" else h_x[:, :-1], weight, U)
-    wall = void if scheme != "nodal" else dragged(h_face, weight, U)
-    return k_x, k_y, h_x[:, :-1], wall, void
+        k_y = arcs, (grid.stretch(y_faces) / (grid.steps(1) * grid.spacing[1]))[:, None]
+    films = h_x[:, :-1], np.ones((1, 1))
+    return (k * cubes_x / dx, y_share / m), k_y, films, (films[0] if scheme == "upwind" else h_face, y_share * m * U)
+
+
+def put(out: Array, parts: Line) -> None:
+    """The product of the parts; what all lines share the memory of one for, once."""
+    one = out.strides[0] == 0
+    np.multiply(*(part[:1] if one else part for part in parts), out=out[:1] if one else out)
 
 
 def line_weights(grid: Grid) -> Array:
@@ -91,16 +98,20 @@ def stream_weights(grid: Grid) -> Array:
     return line_weights(grid) * grid.stretch(grid.y)
 
 
-def lines_of(grid: Grid, film: Around, cut: bool, kind: Any) -> list[Array]:
-    """Room for h at the points and the one before, and for what the wall drags through x faces.
+def room(grid: Grid, film: Around, cut: bool, kind: Any) -> tuple[list[Array], list[Array]]:
+    """Room for the conductances of x and y faces and for c, with a frame of zeros, as sweeps want them (`solvers.fas.levels`);
+    and for h at the points and the one before, and for what the wall drags through x faces.
 
     What all lines have in common takes the memory of one, of which each is a view. cut : by round edges, which lines differ in.
     """
-    (ny, nx), out = grid.box, []
+    (ny, nx), framed, out = grid.box, [], []
+    for more, beside in ((2, 3), (3, 2), (2, 2)):
+        framed.append(np.empty((ny + more, nx + beside), dtype=kind))  # its inside is to be filled
+        framed[-1][[0, -1]] = framed[-1][:, [0, -1]] = 0.0
     for even in (True, np.ptp(stream_weights(grid)) == 0.0):
         own = np.zeros((1 if even and film.one_line and not cut else ny, nx + 1), dtype=kind)
         out.append(own if len(own) == ny else np.ndarray((ny, nx + 1), kind, own, 0, (0, own.itemsize)))
-    return out
+    return framed, out
 
 
 def dragged(void: Array, weight: Array | None, U: float) -> Array:
@@ -176,3 +187,11 @@ def by_lines(scheme: Any, name: str) -> tuple[Array, int, Array, Array]:
     if last:
         return void, 1, -lines, -lines * void[:, -1] if other is None else -other
     return void, 0, lines, lines * void[:, 0] * float(other)
+
+
+def most_leaving(scheme: Any) -> Array:
+    """The largest |b_C| of each line, without an array of all."""
+    void, shift, lines, last = by_lines(scheme, "b_C")
+    inside = void[:, shift : shift + scheme.h.shape[1] - 1]
+    most = np.maximum(inside.max(axis=1, initial=0.0), -inside.min(axis=1, initial=0.0))
+    return np.maximum(np.abs(lines) * most, np.abs(last))
