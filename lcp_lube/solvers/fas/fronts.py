@@ -50,15 +50,14 @@ def prepare(
     z: Array, kx: Array, ky: Array, c: Array, m: int, start: int, end: int, carry: Array | None, over: float, work: Array
 ) -> None:
     """Of `relax_pairs` what no point to the west has a say in."""
-    t, inverse, a, b = work
     for i in range(np.uint32(start), np.uint32(end)):
         gives = 0.0 if carry is None else carry[1, m, i]
-        t[i] = (c[m, i] + kx[m, i + 1] * max(z[m, i + 1], 0.0)) + (
+        work[0, i] = (c[m, i] + kx[m, i + 1] * max(z[m, i + 1], 0.0)) + (
             ky[m, i] * max(z[m - 1, i], 0.0) + ky[m + 1, i] * max(z[m + 1, i], 0.0)
         )
-        inverse[i] = 1.0 / ((kx[m, i] + kx[m, i + 1]) + (ky[m, i] + ky[m + 1, i]) + gives)
-        a[i] = over * (t[i] * inverse[i]) + (1.0 - over) * z[m, i]
-        b[i] = over * (kx[m, i] * inverse[i])
+        work[1, i] = 1.0 / ((kx[m, i] + kx[m, i + 1]) + (ky[m, i] + ky[m + 1, i]) + gives)
+        work[2, i] = over * (work[0, i] * work[1, i]) + (1.0 - over) * z[m, i]
+        work[3, i] = over * (kx[m, i] * work[1, i])
 
 
 @piece
@@ -67,20 +66,19 @@ def pass_along(
 ) -> None:
     """And what goes from point to point."""
     nx = z.shape[1] - 2
-    t, inverse, a, b = work
     west = z[m, start - 1]
     for i in range(start, end):
         here = z[m, i]
         if west > 0.0:
-            arrives = t[i] + kx[m, i] * west
-            further = a[i] + b[i] * west
+            arrives = work[0, i] + kx[m, i] * west
+            further = work[2, i] + work[3, i] * west
             west = arrives
             if arrives > 0.0:
-                west = further if here > 0.0 and further > 0.0 else arrives * inverse[i]
+                west = further if here > 0.0 and further > 0.0 else arrives * work[1, i]
             z[m, i] = west
             continue
         passed, gives = (1.0, 0.0) if carry is None else (carry[0, m, i - 1], carry[1, m, i])
-        arrives = t[i] + passed * west
+        arrives = work[0, i] + passed * west
         if here > 0.0 and (i > start or (ring and i == 1)):
             k_W, k_E, k_S, k_N = kx[m, i], kx[m, i + 1], ky[m, i], ky[m + 1, i]
             sent = k_E + k_S + k_N if carry is None else k_E + k_S + k_N + (1.0 - passed) * k_W + gives
@@ -89,7 +87,7 @@ def pass_along(
             if p > 0.0 and before <= 0.0:
                 z[m, i - 1 if i > 1 else nx], z[m, i], west = before, p, p
                 continue
-        west = arrives * inverse[i] if arrives > 0.0 else arrives
+        west = arrives * work[1, i] if arrives > 0.0 else arrives
         if west > 0.0 and here > 0.0:
             further = here + over * (west - here)
             west = further if further > 0.0 else west
@@ -161,24 +159,25 @@ def relax_front(
                     m = first + step * (s + AHEAD)
                     if top <= m <= bottom:
                         for n in range(of_row[m], of_row[m + 1]):
-                            bring_near(z, kx, ky, c, spans[n], step)
+                            bring_near(z, kx, ky, c, m, spans[n, 1], spans[n, 2], step)
                     for k in range(max(s + 1 - lines, 0), min(s + 1, fused)):
                         m, over = first + step * (s - k), most if more or before + k < count - LAST else 1.0
-                        relax_row(z, kx, ky, c, m, spans[of_row[m] : of_row[m + 1]], carry, ring, over, step, work)
+                        relax_row(z, kx, ky, c, m, spans, of_row[m], of_row[m + 1], carry, ring, over, step, work)
                 write(done, b, looks + turn + 1)
     return count * points
 
 
 @piece
 def relax_row(
-    z: Array, kx: Array, ky: Array, c: Array, m: int, spans: NDArray[np.int32], carry: Array | None, ring: bool, over: float,
-    step: int, work: Array,
+    z: Array, kx: Array, ky: Array, c: Array, m: int, spans: NDArray[np.int32], begin: int, end: int, carry: Array | None,
+    ring: bool, over: float, step: int, work: Array,
 ) -> None:  # fmt: skip
-    """`relax_pairs` of the runs of row m, prepared together where they are near each other; step -1: from the last one on."""
-    n = 0 if step > 0 else len(spans) - 1
-    while 0 <= n < len(spans):
+    """`relax_pairs` of the runs begin to end - 1, those of row m, prepared together where they are near each other; step -1:
+    from the last one on."""
+    n = begin if step > 0 else end - 1
+    while begin <= n < end:
         beyond = n + step
-        while 0 <= beyond < len(spans):
+        while begin <= beyond < end:
             west, east = min(beyond - step, beyond), max(beyond - step, beyond)
             if spans[east, 1] - spans[west, 2] > NEAR:
                 break
@@ -202,10 +201,9 @@ def first_spans(spans: NDArray[np.int32], at: NDArray[np.int64], ny: int) -> NDA
 
 
 @piece
-def bring_near(z: Array, kx: Array, ky: Array, c: Array, span: NDArray[np.int32], step: int) -> None:
+def bring_near(z: Array, kx: Array, ky: Array, c: Array, m: int, start: int, end: int, step: int) -> None:
     """Ask memory for what the points of a run need, whose line no loop would foresee. step : of the lines, 1 or -1."""
-    m = span[0]
-    for i in range(span[1], span[2], 8):
+    for i in range(start, end, 8):
         fetch(z, m + step, i)
         fetch(kx, m, i)
         fetch(ky, m + (step > 0), i)
