@@ -64,3 +64,24 @@ def ghosted(grid: Grid, owned: NDArray, outside: float) -> Callable[[slice], NDA
         return out
 
     return framed
+
+
+class Scaled:
+    """An array times a positive number, of which parts are made when they are asked for."""
+
+    def __init__(self, a: NDArray, by: float):
+        self.a, self.by, self.shape = a, by, a.shape
+
+    def __getitem__(self, part: Any) -> Any:
+        return self.a[part] * self.by
+
+    def reshape(self, shape: tuple[int, ...]) -> "Scaled":
+        return Scaled(self.a.reshape(shape), self.by)
+
+    def ravel(self) -> NDArray:
+        return np.asarray(self[:].ravel())
+
+
+def apart(a: Any) -> tuple[NDArray, float]:
+    """An array and by what it is multiplied."""
+    return (a.a, a.by) if isinstance(a, Scaled) else (a, 1.0)

@@ -37,6 +37,8 @@ def cavity_sign(reduce: Reduce, p: Array, r: Array) -> Array:
 
 def cavitated(reduce: Reduce, p: Array, r: Array) -> NDArray[np.bool_]:
     """Where `cavity_sign` is negative. Collective."""
+    if p.size >= SMALL and has_numba():
+        return states(reduce, p, r)[0]
     p_max = reduce.largest(p)
     return _looked(lambda p, r: (r > VOID) & (((p / p_max if p_max > 0 else p) < r) | (r > EMPTY)), p, r)
 
@@ -67,7 +69,9 @@ def states(reduce: Reduce, p: Array, r: Array) -> tuple[NDArray[np.bool_], NDArr
     from .cell_loops import loop_states
 
     cavity, switching = (np.empty(p.shape, dtype=bool) for _ in range(2))
-    loop_states(p, r, reduce.largest(p), VOID, EMPTY, cavity, switching)
+    p_max = reduce.largest(p)
+    look = lambda a, b: loop_states(p[a:b], r[a:b], p_max, VOID, EMPTY, cavity[a:b], switching[a:b])  # noqa: E731
+    crew().rows(look, p.size, p.size)
     return cavity, switching
 
 

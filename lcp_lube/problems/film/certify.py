@@ -64,7 +64,8 @@ def certify(problem: "LubricationProblem", p: Array, r: Array, eps1: float, clos
     problem = filled(problem, p)
     red, s = problem.reduce, problem.scheme
     # The ends' pressure is the scale where a cavity leaves no point full.
-    p_max, driven = max(red.largest(p), max(problem.p_sides) / problem.p_unit), red.norm(s.c)
+    (low, high), driven = red.extremes(p), red.norm(s.c)
+    p_max = max(float(np.maximum(-low, high)), max(problem.p_sides) / problem.p_unit)
     if not driven and not any(problem.p_sides):  # p = 0: what is left of it is measured by its unit
         p_max = max(p_max, 1.0)
     found, supplied = misfits(problem, p, r, p_max, 0.0 if driven else 1.0), supply_flows(problem, p, r)
@@ -84,7 +85,7 @@ def certify(problem: "LubricationProblem", p: Array, r: Array, eps1: float, clos
     return Certificate(
         measures,
         tol=certificate_tol(eps1),
-        extremes={"min_p": red.min(p) * problem.p_unit, "min_r": red.min(r)},
+        extremes={"min_p": low * problem.p_unit, "min_r": red.min(r)},
     )
 
 

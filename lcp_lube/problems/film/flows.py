@@ -10,7 +10,7 @@ import numpy as np
 from ...base.compiled import has_numba
 from ...base.parallel import Array
 from ..grid import Grid
-from ..strips import MANY, each_strip, places_of
+from ..strips import MANY, apart, each_strip, places_of
 from .cavity import cavitated
 from .edges import Around, pairs, strips
 from .reynolds import BoxScheme, sides
@@ -92,7 +92,7 @@ def friction(problem: LubricationProblem, p_pa: Array, r: Array, lever: Array | 
         return float(np.sum(sum(drag(part, part.scheme, p_pa[rows].ravel(), r[rows].ravel())) * along))
 
     if runs(problem, MANY):
-        of_film = drag_sum(problem, p_pa, r, lever)
+        of_film = drag_sum(problem, *apart(p_pa), r, lever)
     else:
         of_film = sum(each_strip(grid, add_up)) if alone else add_up(slice(0, grid.box[0]))
     of_film = problem.reduce.summed(float(of_film), lambda: np.add(*drag(problem, s, p_pa.ravel(), r.ravel())) * lever)
@@ -110,7 +110,7 @@ def runs(problem: LubricationProblem, least: int) -> bool:
 
 
 def drag_sum(
-    problem: LubricationProblem, p: Array, r: Array, lever: Array | float, unit: float = 1.0, by: Array | None = None
+    problem: LubricationProblem, p: Array, unit: float, r: Array, lever: Array | float, by: Array | None = None
 ) -> float:
     """The sum of `drag` times the lever, of a film that it `runs` over. p in units of `unit` Pa; by : its derivatives by p
     and r are written there."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...base.parallel import Array
-from ..strips import each_strip, places_of
+from ..strips import apart, each_strip, places_of
 from .flows import volume_unit
 from .fronts import counted
 from .reynolds import sides
@@ -167,8 +167,7 @@ def integrals(
 
     known : keeps the sums of p's columns by the weights of their lines, for integrals of the same p on other grids.
     """
-    grid = problem.grid
-    p = p_pa.reshape(grid.box)
+    grid, p = problem.grid, p_pa.reshape(problem.grid.box)
     if known is not None and all(np.atleast_2d(weight(grid.x, grid.y[[0, -1]])).shape[0] == 1 for _, weight in asked):
         of_lines, along = stream_weights(grid)[:, 0], grid.widths(0)
         if (key := of_lines.tobytes()) not in known:
@@ -176,6 +175,8 @@ def integrals(
         sums = [(known[key] - above * of_lines.sum()) @ (np.atleast_2d(w(grid.x, grid.y))[0] * along) for above, w in asked]
         parts = zip(sums, asked, strict=True)
         return [float(grid.cell * (problem.reduce.sum(np.array([a])) + _in_rims(problem, *one))) for a, one in parts]
+
+    values, unit = apart(p)
 
     def add_up(rows: slice) -> Array:
         part, inside = places_of(grid, rows), np.zeros(len(asked))
@@ -186,15 +187,15 @@ def integrals(
             if w.shape[0] == 1 and above in columns:
                 inside[k] += columns[above] @ (w[0] * along)
                 continue
-            own = p[rows] - above if above else p[rows]
+            own, by = (p[rows] - above, 1.0) if above else (values[rows], unit)
             # Columns first, and no BLAS: row by row it takes ten times as long, and it may have threads of its own.
             if w.shape[0] == 1:
-                columns[above] = np.einsum("i,ij->j", lines, own)
+                columns[above] = np.einsum("i,ij->j", by * lines, own)
                 inside[k] += columns[above] @ (w[0] * along)
             elif w.shape[1] == 1:  # of y alone
-                inside[k] += np.einsum("i,ij->j", lines * w[:, 0], own) @ along
+                inside[k] += np.einsum("i,ij->j", by * lines * w[:, 0], own) @ along
             else:
-                inside[k] += np.einsum("i,ij->j", lines, own * w) @ along
+                inside[k] += np.einsum("i,ij->j", by * lines, own * w) @ along
         return inside
 
     cells = lambda: stream_weights(grid) * grid.widths(0)  # noqa: E731

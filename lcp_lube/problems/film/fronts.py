@@ -154,9 +154,9 @@ def cavitated_area(problem: LubricationProblem, found: Fronts | None, p: Array, 
             for (j, i, back), step in zip(fronts_across, (steps[:-1, 0], steps[1:, 0]), strict=True):
                 more += float(np.sum((0.5 * step[j] - back) * width[i] * stretch[j, 0]))
             for side, (end, rim) in enumerate(zip(sides(part)[2:], grid.rims(1), strict=True)):
-                if end.any():
+                if (line := np.flatnonzero(end)).size:
                     up_to = 0.5 - before_side(problem, side)
-                    more += float(np.sum(up_to * rim * dy * width * stretch * (end & cavity[rows])))
+                    more += float(np.sum(up_to * rim * dy * width * stretch[line] * cavity[rows][line]))
         return area, more
 
     area, more = (sum(parts) for parts in zip(*each_strip(grid, add_up), strict=True))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...base.crew import crew
 from ...base.parallel import Array
+from ..strips import Scaled, apart
 from .cavity import cavitated
 from .flows import friction, side_flows
 from .forces import ambient, flow_growth, forces, open_pressures
@@ -144,22 +145,6 @@ class _Read:
         )
 
 
-class Scaled:
-    """An array times a positive number, of which parts are made when they are asked for."""
-
-    def __init__(self, a: Array, by: float):
-        self._a, self._by, self.shape = a, by, a.shape
-
-    def __getitem__(self, part: Any) -> Any:
-        return self._a[part] * self._by
-
-    def reshape(self, shape: tuple[int, ...]) -> Scaled:
-        return Scaled(self._a.reshape(shape), self._by)
-
-    def ravel(self) -> Array:
-        return np.asarray(self[:].ravel())
-
-
 def _read(problem: LubricationProblem, p_pa: Array, r: Array, p: Array, cavity: NDArray[np.bool_]) -> _Read:
     """p_pa in Pa, p in units of p_unit; cavity : where they are `cavitated`. Collective."""
     ends = line_fronts(problem, p, r, cavity) if problem.U else None
@@ -175,7 +160,9 @@ def _read(problem: LubricationProblem, p_pa: Array, r: Array, p: Array, cavity: 
 def largest_pressure(problem: LubricationProblem, p_pa: Array) -> tuple[float, list[float] | None]:
     """p - p_c in Pa at the points and sides, where `tops` is so between the points too (`peak`), and where. Collective."""
     grid = problem.grid
-    largest, place = largest_of(problem, p_pa.reshape(grid.box), grid.x[0], grid.y[:, 0])
+    p, unit = apart(p_pa)
+    largest, place = largest_of(problem, p.reshape(grid.box), grid.x[0], grid.y[:, 0])
+    largest *= unit
     if problem.tops and place is not None:
         largest, place = Window(grid, p_pa, place, problem.p_sides, problem.scheme.held).top()
     low = [*grid.origin[: grid.dim]]

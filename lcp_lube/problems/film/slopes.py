@@ -116,7 +116,7 @@ def _friction(problem: LubricationProblem, tangent: Tangent | None, p: Array, r:
     grid, s = problem.grid, problem.scheme
     if runs(problem, SMALL) and (tangent is None or tangent.viscosity is None):
         by = np.empty((2, *grid.box))
-        value = drag_sum(problem, p.reshape(grid.box), r.reshape(grid.box), lever, problem.p_unit, by)
+        value = drag_sum(problem, p.reshape(grid.box), problem.p_unit, r.reshape(grid.box), lever, by)
         return Slope(by[0].ravel(), by[1].ravel(), value=value)
     before, behind = grid.steps(0)[:-1], grid.steps(0)[1:]
     dy, unit = grid.spacing[1] if grid.dim == 2 else 1.0, problem.p_unit

@@ -84,8 +84,10 @@ def coefficients_of(
 
 def put(out: Array, parts: Line) -> None:
     """The product of the parts; what all lines share the memory of one for, once."""
-    one = out.strides[0] == 0
-    np.multiply(*(part[:1] if one else part for part in parts), out=out[:1] if one else out)
+    made, lines = parts
+    if out.strides[0] == 0:
+        made, lines, out = made[:1], lines[:1], out[:1]
+    np.multiply(made, lines, out=out)
 
 
 def line_weights(grid: Grid) -> Array:
