@@ -234,8 +234,9 @@ def _is_symmetric(problem: LubricationProblem, faces: bool) -> bool:
     if not _all_close(problem, [(problem.scheme.h[some], problem.film(grid.x, mirror - grid.y[some]))]):
         return False
     if grid.comm.size == 1:  # what is solved is all here
-        s, half = problem.scheme, grid.box[0] // 2
-        pairs = [(s.k_S, s.k_N), *((a, a) for a in (s.k_W, s.k_E, s.couette_W, s.couette_E, s.h))]
+        s, half = problem.scheme, grid.box[0] // 2  # k_E and couette_E are k_W and couette_W but for the last ones
+        differ = [a for a in (s.k_W, s.k_E[:, -1:], s.couette_W, s.couette_E[:, -1:], s.h) if a.strides[0]]  # from line to line
+        pairs = [(s.k_S, s.k_N), *zip(differ, differ, strict=True)]
         return _all_close(problem, [(a[:half], b[::-1][:half]) for a, b in pairs], CUBED * SAME)
     pairs = list(zip(_films(problem), _films(problem, mirror), strict=True))
     if (by := problem.factors) is not None:  # of effects
