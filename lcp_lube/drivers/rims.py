@@ -9,6 +9,7 @@ search or a march moves on would jump where its first cavity comes and goes.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 from petsc4py import PETSc
@@ -40,9 +41,9 @@ class Revised(Derived):
 
     dry: Dry
 
-    @property
+    @cached_property
     def model(self) -> Model:
-        return replace(self.whole.model, dry=self.dry)
+        return replace(self.whole.model, dry=self.dry, places=self.dry.grid.places)
 
     def with_shape(self, shape: tuple[int, ...]) -> Any:
         return self.whole.with_shape(shape)
@@ -105,7 +106,7 @@ def _solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution | None:
         return first
     state = state_of(problem, first.fields["p"], first.fields["r"])
     count = int(problem.reduce.sum((state > 0.0).astype(float)))
-    made = (bool(model.cut or behind) and count > 0) or (model.cornered and _has_corners(problem, state))
+    made = (bool(model.cut or behind) and count > 0) or (model.cornered and bool(ask.cavities or _has_corners(problem, state)))
     again = replace(ask, start=first, nested=False, monitor=None, checkpoint=None, resume=None)
     second = (
         inner(Revised(scene, Dry(state, problem.grid)) if made else scene, again)

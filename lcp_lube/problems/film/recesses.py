@@ -109,18 +109,20 @@ def around_recesses(
     steps, stretch = grid.steps(0), grid.stretch(grid.y)[:, 0]
     for side, k in ((0, kx), (1, ky.T)):
         ratio, n = _ratios(found, side, nodes), grid.shape[side]
-        starts = (grid.y_start, grid.x_start) if side == 0 else (grid.x_start, grid.y_start)
-        for j, i in np.ndindex(ratio.shape[1:]):
-            line = found.at[1 - side] + j - CELLS + 1
-            line = (line % grid.shape[1 - side] if grid.periodic[1 - side] else line) - starts[0]
-            number = found.at[side] + i - CELLS + 1
-            turns = (-n, 0, n) if grid.periodic[side] else (0,)  # the last face of a ring is the first one
-            for face in (number + turn - starts[1] for turn in turns):
-                own = (line >= 0) & (line < k.shape[0]) & (face >= 0) & (face < k.shape[1]) & (ratio[:, j, i] != 1.0)
-                at, more = (line[own], face[own]), ratio[own, j, i]
+        corner, j, i = np.nonzero(ratio != 1.0)
+        more, by = ratio[corner, j, i], slope[corner]
+        line, face = found.at[1 - side][corner] + j - CELLS + 1, found.at[side][corner] + i - CELLS + 1
+        line = (line % grid.shape[1 - side] if grid.periodic[1 - side] else line) - (grid.x_start if side else grid.y_start)
+        for turn in (-n, 0, n) if grid.periodic[side] else (0,):  # the last face of a ring is the first one
+            turned = face + turn - (grid.y_start if side else grid.x_start)
+            left = np.flatnonzero((line >= 0) & (line < k.shape[0]) & (turned >= 0) & (turned < k.shape[1]))
+            while left.size:  # once, but for faces that several corners are near
+                once = left[np.unique(line[left] * k.shape[1] + turned[left], return_index=True)[1]]
+                at = line[once], turned[once]
                 if side == 0:
-                    wall[at] += (more - 1.0) * k[at] * steps[at[1]] * stretch[at[0]] ** 2 * drag * slope[own]
-                k[at] *= more
+                    wall[at] += (more[once] - 1.0) * k[at] * steps[at[1]] * stretch[at[0]] ** 2 * drag * by[once]
+                k[at] *= more[once]
+                left = np.setdiff1d(left, once, assume_unique=True)
 
 
 def _apart(places_: Array, line: Array, period: float) -> Array:

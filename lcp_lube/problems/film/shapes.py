@@ -83,7 +83,7 @@ class Block:
     def jumps(self, axis: str) -> tuple[float, ...]:
         return tuple(t for t in (self.x if axis == "x" else self.y) if np.isfinite(t))
 
-    @property
+    @cached_property
     def corners(self) -> Array:
         """As `edges.corners_of` has them."""
         return rectangles(self.x, self.y) if np.isfinite([*self.x, *self.y]).all() and self.height else np.zeros((0, 4))
@@ -136,7 +136,7 @@ class DimpleArray:
         centres = start + (end - start) * (np.arange(count) + 0.5) / count
         return tuple(np.concatenate([centres - 0.5 * self.size, centres + 0.5 * self.size]))
 
-    @property
+    @cached_property
     def corners(self) -> Array:
         """As `edges.corners_of` has them."""
         x, y = (np.reshape(self.jumps(axis), (2, -1)) for axis in "xy")
@@ -213,7 +213,7 @@ class Sum:
     def level(self) -> bool:
         return all(map(level, self.parts))
 
-    @property
+    @cached_property
     def corners(self) -> Array:
         """As `edges.corners_of` has them; what is cut off is not looked for."""
         return np.concatenate([corners_of(part) for part in self.parts])
