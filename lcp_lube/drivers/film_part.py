@@ -12,11 +12,11 @@ mirror : the film is symmetric about the middle of the width, and the sides sout
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import prod
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
@@ -25,13 +25,15 @@ from ..problems.facts import Facts
 from ..problems.film.cavity import missing_flow
 from ..problems.film.edges import jumps_of
 from ..problems.film.lubrication import LubricationProblem
-from ..problems.film.model import Model, Side
+from ..problems.film.model import Made, Model, Side
+from ..problems.film.supplies import Supply
 from ..problems.grid import EVEN, Grid, some_places
 from ..problems.solution import Fields, Problem
 from ..problems.strips import STRIP
 from ..problems.transfer import numbers
 from ..scenes.moving import film_of
 from ..scenes.scene import Derived, Solvable
+from .plan import FEW
 
 SAME = 1e-12  # relative difference that coordinates' rounding leaves between two values of one film
 CUBED = 4.0  # the same of conductances, in multiples of SAME
@@ -64,9 +66,11 @@ class Part(Derived):
     """What is left of a scene.
 
     kind : a key of SENTENCES. shape : that of the whole scene's grid, in 1D for 'line'.
+    problem : the whole scene's, where coefficients of half of it may be taken from there.
     """
 
     kind: str
+    problem: LubricationProblem | None = None
 
     @property
     def sentence(self) -> str:
@@ -76,6 +80,7 @@ class Part(Derived):
     def shape(self) -> tuple[int, ...]:
         return self.whole.shape[:1] if self.kind == "line" else self.whole.shape
 
+    @cached_property
     def _model(self) -> tuple[Model, tuple[int, ...]]:
         """The part's own film, and its grid."""
         model = model_of(self.whole)
@@ -94,16 +99,18 @@ class Part(Derived):
 
     def grid(self, comm: PETSc.Comm | None = None) -> Grid:
         """The part's points."""
-        model, shape = self._model()
+        model, shape = self._model
         return model.grid(shape, comm)
 
     def facts(self, comm: PETSc.Comm | None = None) -> Facts:
-        model, shape = self._model()
+        model, shape = self._model
         return replace(model.facts(shape, comm), spread=prod(self.whole.shape))
 
     def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
         """The discrete problem of the part. Collective."""
-        model, shape = self._model()
+        model, shape = self._model
+        if self.kind == "mirror" and (whole := self.problem) is not None and whole.grid.shape == self.shape:
+            return model.build(shape, comm, made=_half(whole, shape[1], model.supplies))
         problem = model.build(shape, comm)
         return self.factored(problem, *numbers(problem.grid))
 
@@ -125,6 +132,20 @@ class Part(Derived):
         """Line and column in the part that the owned points of the whole grid are like."""
         j, i = numbers(grid)
         return (0 * j if self.kind == "line" else np.minimum(j, grid.shape[1] - 1 - j)), i
+
+
+def _half(whole: LubricationProblem, lines: int, supplies: tuple[Supply, ...]) -> Made:
+    """Coefficients of a problem's first lines, up to the middle: its last line has half cells, or shut faces."""
+    scheme = whole.scheme.rows(slice(0, lines))
+    part = {name: np.array(getattr(scheme, name)) for name in scheme.arrays}
+    if whole.grid.shape[1] % 2:
+        for name in part.keys() - {"h", "k_S", "k_N"}:
+            part[name][-1] *= 0.5
+    part["k_N"][-1] = 0.0
+    if whole.grid.periodic[1]:
+        part["k_S"][0] = 0.0
+    held = whole.held and replace(whole.held, supplies=supplies, owner=whole.held.owner[:lines])
+    return scheme.changed(**part), held
 
 
 def promising(scene: Solvable) -> bool:
@@ -190,7 +211,7 @@ def part_of(scene: Solvable, problem: Problem) -> Part | None:
         return Part(scene, "line")
     faces = not (model.mean_cubes and model.scheme == "upwind")  # whether the discretisation asks for the film there
     if ends[0] == ends[1] and grid.shape[1] // 2 >= grid.comm.size and _is_symmetric(problem, faces):
-        return Part(scene, "mirror")
+        return Part(scene, "mirror", problem if problem.plain and grid.comm.size == 1 and grid.size <= FEW else None)
     return None
 
 
@@ -205,7 +226,8 @@ def _is_constant(problem: LubricationProblem) -> bool:
 def _needs_no_pressure(problem: LubricationProblem) -> bool:
     """Whether the wall drags all oil on that comes in, on lines that this rank has whole. Collective."""
     grid = problem.grid
-    return grid.comm.allreduce(grid.box[1] == grid.shape[0] and missing_flow(problem.scheme.c) is not None, MPI.LAND)
+    own = grid.box[1] == grid.shape[0] and missing_flow(problem.scheme.c) is not None
+    return bool(grid.reduce.min(np.array([float(own)])))
 
 
 def _all_lines_are_one(problem: LubricationProblem) -> bool:

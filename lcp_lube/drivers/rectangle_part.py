@@ -49,10 +49,14 @@ class Quarter(Derived):
     def facts(self, comm: PETSc.Comm | None = None) -> Facts:
         return replace(self.whole.facts(comm), shape=part_shape(self.shape, self.axes))
 
+    def grid(self, comm: PETSc.Comm | None = None) -> Grid:
+        """The part's points. Collective."""
+        (x0, x1), (y0, y1) = self.whole.rectangle
+        return part_grid(self.shape, (x1 - x0, y1 - y0), self.axes, comm, (x0, y0))
+
     def build(self, comm: PETSc.Comm | None = None) -> Problem:
         """The discrete problem of the part. Collective."""
-        (x0, x1), (y0, y1) = self.whole.rectangle
-        return self.whole.problem_on(part_grid(self.shape, (x1 - x0, y1 - y0), self.axes, comm, (x0, y0)))
+        return self.whole.problem_on(self.grid(comm))
 
     def answer(self, problem: Problem) -> Fields | None:
         """None: there always is something to solve."""

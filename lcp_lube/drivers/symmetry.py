@@ -6,7 +6,9 @@ fails the whole problem is solved. (A film that does not cavitate needs no choic
 linear solve.)
 """
 
+from copy import copy
 from dataclasses import replace
+from math import prod
 from typing import Any
 
 from ..problems.certificate import Certificate
@@ -15,9 +17,9 @@ from ..problems.solution import Fields, Outcome, Problem, Solution
 from ..problems.transfer import Pick, numbers
 from ..scenes.scene import Solvable
 from . import film_part, rectangle_part
-from .ask import Ask, Start, light
+from .ask import Ask, Start
 from .compose import Inner
-from .memory import look_ahead
+from .memory import LARGE, look_ahead
 from .plan import plan
 
 Part = film_part.Part | rectangle_part.Quarter
@@ -51,7 +53,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     assert family is not None  # as `applies` found
     if reason := why_not(ask) or ("" if family.promising(scene) else family.UNLIKELY):
         return _whole(inner(scene, ask), reason)
-    if ask.memory_check:
+    if ask.memory_check and prod(scene.shape) >= LARGE:
         facts = scene.facts(ask.comm)
         look_ahead(facts, plan(facts, ask, scene.name), ask.mpi)
     problem = scene.build(ask.comm)
@@ -95,7 +97,7 @@ def solve_part(part: Part, problem: Problem, ask: Ask, inner: Inner) -> Solution
         return Solution(problem, known, Outcome.CONVERGED, "nothing to solve", certificate, [], settings).judged()
     start = None
     if ask.start is not None:
-        small = light(part.build(problem.grid.petsc_comm))
+        (small := copy(problem)).grid = part.grid(problem.grid.petsc_comm)  # all that a start is asked for
         same = ask.start.problem.grid is problem.grid
         near = ask.start.fields if same else problem.prolong(ask.start.problem, ask.start.fields, False)
         take = Pick(problem.grid, small.grid, *numbers(small.grid))
@@ -104,7 +106,7 @@ def solve_part(part: Part, problem: Problem, ask: Ask, inner: Inner) -> Solution
     whole = _Whole(part, problem)
     solution = inner(part, replace(ask, start=start, judge=whole.certify))
     if start is not None:
-        start.problem.destroy()
+        start.problem.grid.destroy()
     certificate = whole.certify(solution.problem, solution.fields, solution.settings["eps1"])
     solution.problem.destroy()
     settings = {

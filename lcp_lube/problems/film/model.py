@@ -27,6 +27,7 @@ from .turned import TurnedProblem
 from .turning import Shaft
 from .views import Inside, LiftedFilm, MirroredFilm, Raised
 
+Made = tuple[BoxScheme, Held | None]  # coefficients, and the supplies that they hold
 NAMES = ("west", "east", "south", "north")
 STEP = 1e-30  # relative, of a complex step: nothing is subtracted, so no digits are lost however small it is
 RING = ("periodic", "periodic")
@@ -148,8 +149,9 @@ class Model:
         periodic = tuple(self.sides[2 * k].kind == "periodic" for k in range(len(self.lengths)))
         ranks, held = (comm or PETSc.COMM_WORLD).getSize(), bool(self.supplies)
         told = {"held": held, "moving": self.stored is not None, "free": self.stored is not None and self.stored.exact}
-        even = len(shape) == 2 and self.polar is None and self.lines(shape)[1] is None
-        return Facts("lubrication", tuple(shape), ranks, periodic, **told, alike=even and one_line(self.film))
+        plane = len(shape) == 2 and self.polar is None
+        alike = plane and one_line(self.film) and self.lines(shape)[1] is None
+        return Facts("lubrication", tuple(shape), ranks, periodic, **told, alike=alike)
 
     @property
     def mirrored(self) -> "Model":
@@ -206,8 +208,12 @@ class Model:
             return ()
         return tuple(max(1, stretches(*edges)[1].size) for edges in self.edges)
 
-    def build(self, shape: Sequence[int], comm: PETSc.Comm | None = None, grid: Grid | None = None) -> LubricationProblem:
+    def build(
+        self, shape: Sequence[int], comm: PETSc.Comm | None = None, grid: Grid | None = None, made: Made | None = None
+    ) -> LubricationProblem:
         """The discrete problem on (nx,) or (nx, ny) points, or on a grid that others use too. Collective.
+
+        made : where that is known.
 
         Raises
         ------
@@ -229,7 +235,7 @@ class Model:
             integrals.part(supplied(integrals, grid, self.supplies, owner))
 
         dry = None if self.dry is None else self.dry.on(grid)
-        scheme, held = self._scheme(grid, integrals, dry)
+        scheme, held = made or self._scheme(grid, integrals, dry)
         problem = (GroovedProblem if self.grooves else LubricationProblem)(
             grid,
             scheme,
@@ -277,11 +283,11 @@ class Model:
         slopes = BoxScheme(**{name: a if name == "h" else a / flow_unit for name, a in changes.items()}, flow_unit=flow_unit)
         return self._held(grid, slopes, integrals)[0]
 
-    def _scheme(self, grid: Grid, integrals: LineIntegrals | None, cavity: Array | None) -> tuple[BoxScheme, Held | None]:
+    def _scheme(self, grid: Grid, integrals: LineIntegrals | None, cavity: Array | None) -> Made:
         """Coefficients with supplies, faces at round edges made for these cavities. Collective."""
         return self._held(grid, box_scheme(grid, self.gap, **self._data, integrals=integrals, cavity=cavity), integrals)
 
-    def _held(self, grid: Grid, scheme: BoxScheme, integrals: LineIntegrals | None) -> tuple[BoxScheme, Held | None]:
+    def _held(self, grid: Grid, scheme: BoxScheme, integrals: LineIntegrals | None) -> Made:
         """With its supplies."""
         if not self.supplies:
             return scheme, None
