@@ -5,6 +5,7 @@ from copy import copy
 from dataclasses import dataclass, field, fields
 from numbers import Integral, Real
 from pathlib import Path
+from types import NoneType
 from typing import Any
 
 from mpi4py import MPI
@@ -43,18 +44,18 @@ def light(problem: Any) -> Any:
     return other
 
 
-# The types of attributes, and their names in messages: for callers from Python.
+# The types of attributes, the usual ones first, and their names in messages: for callers from Python.
 KINDS: dict[str, tuple[Any, str]] = {
     **dict.fromkeys(("method", "system", "model"), (str, "a text")),
-    **dict.fromkeys(("recipe", "quantity"), (str | None, "a text")),
-    **dict.fromkeys(("checkpoint", "resume"), (str | Path | None, "a path")),
-    **dict.fromkeys(("options", "stopping"), (Mapping | Stopping | None, "a dictionary")),
-    **dict.fromkeys(("monitor", "progress", "watch"), (Callable | None, "a function")),
-    "accuracy": (Real | None, "a number"),
-    "finest": (tuple | None, "a tuple"),
-    "every": (Integral, "an integer"),
-    "direct_below": (Integral | None, "an integer"),
-    "start": (Solution | Start | None, "a Solution"),
+    **dict.fromkeys(("recipe", "quantity"), ((NoneType, str), "a text")),
+    **dict.fromkeys(("checkpoint", "resume"), ((NoneType, str, Path), "a path")),
+    **dict.fromkeys(("options", "stopping"), ((NoneType, dict, Stopping, Mapping), "a dictionary")),
+    **dict.fromkeys(("monitor", "progress", "watch"), ((NoneType, Callable), "a function")),
+    "accuracy": ((NoneType, Real), "a number"),
+    "finest": ((NoneType, tuple), "a tuple"),
+    "every": ((int, Integral), "an integer"),
+    "direct_below": ((NoneType, Integral), "an integer"),
+    "start": ((NoneType, Solution, Start), "a Solution"),
 }
 
 

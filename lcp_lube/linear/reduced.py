@@ -40,7 +40,8 @@ class ReducedSystem(System):
             b = [void.get((dj, di), np.zeros(1)) for dj, di, _ in pressure]
             beside = [place[1 + dj : 1 + dj + ny, 1 + di : 1 + di + nx] for dj, di, _ in pressure]
             self._pointers, self._columns, self._a, self._b_entries, self._neighbour = csr(grid, pressure, b, beside)
-            self.mat = self._own(matrix(grid, self._pointers, self._columns, self._a.copy()))
+            self._values = self._a.copy()  # of one rank the matrix's own
+            self.mat = self._own(matrix(grid, self._pointers, self._columns, self._values))
             self._diagonal_A = scheme.diagonal.ravel()
             self._diagonal_B = -scheme.b_C.ravel()
             self._x, self._b = map(self._own, self.mat.createVecs())
@@ -53,8 +54,9 @@ class ReducedSystem(System):
             scaling *= self._diagonal_A
         full = self.problem.grid.ghosted(theta * scaling).ravel()
         cavity = self.problem.grid.ghosted((1.0 - theta) * scaling).ravel()
-        values = self._a * full[self._neighbour] - self._b_entries * cavity[self._neighbour]
-        self.mat.setValuesCSR(self._pointers, self._columns, values)
+        np.subtract(self._a * full[self._neighbour], self._b_entries * cavity[self._neighbour], out=self._values)
+        if self.problem.grid.comm.size > 1:
+            self.mat.setValuesCSR(self._pointers, self._columns, self._values)
         self.mat.assemble()
         return scaling
 

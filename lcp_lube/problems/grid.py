@@ -14,6 +14,8 @@ from ..base.parallel import Array, Reduce
 from ..errors import InputError
 
 BYTES_PER_POINT = 60  # of the coefficients and the fields alone: no run needs less
+LITTLE = 2**25  # bytes that any machine has
+LARGEST = np.iinfo(PETSc.IntType).max // 2  # points: half of the unknowns
 
 # Where the first point lies, in spacings from its side. open: the side is a neighbour with a given value; closed: it is the
 # outer face of the first cell, through which nothing flows; mirror: the first point lies on it, in half a cell; periodic: the
@@ -28,7 +30,7 @@ Polar = tuple[float, float]  # radius at y = 0, and the radius on which x is mea
 def some_places(n: int, length: float, ends: Sequence[str], most: int) -> Array:
     """Coordinates of at most so many of the n points of a line between two ends, its first and last among them, m."""
     meshes = n + OFFSET[ends[0]] + OFFSET[ends[1]] - 1.0
-    return (np.unique(np.linspace(0, n - 1, min(n, most)).round()) + OFFSET[ends[0]]) * (length / meshes)
+    return (np.linspace(0, n - 1, min(n, most)).round() + OFFSET[ends[0]]) * (length / meshes)
 
 
 class Grid:
@@ -93,7 +95,7 @@ class Grid:
         (self.x_start, self.x_end), (self.y_start, self.y_end) = self._owned
         self.box = (self.y_end - self.y_start, self.x_end - self.x_start)
         # Rank k owns the global (PETSc) numbers starts[k] to starts[k + 1].
-        self.starts = np.concatenate([[0], np.cumsum(self.comm.allgather(self.local_size))])
+        self.starts = np.cumsum([0, *(self.comm.allgather(self.local_size) if comm.size > 1 else [self.local_size])])
 
     @made
     def dm(self) -> PETSc.DMDA:
@@ -119,12 +121,10 @@ class Grid:
     def _check_size(self, comm: PETSc.Comm) -> None:
         """Refuse before anything is allocated what PETSc's integers or this machine's memory cannot hold."""
         what = f"grid {'x'.join(map(str, self.shape))}: {self.size} points"
-        largest = np.iinfo(PETSc.IntType).max // 2  # of the 2 n unknowns
-        if self.size > largest:
-            raise InputError(f"{what}; this PETSc numbers at most {largest}")
-        memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+        if self.size > LARGEST:
+            raise InputError(f"{what}; this PETSc numbers at most {LARGEST}")
         needed = BYTES_PER_POINT * self.size // comm.size
-        if needed > memory:
+        if needed > LITTLE and needed > (memory := os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")):
             raise InputError(f"{what} need {needed / 1e9:.0f} GB a rank, this machine has {memory / 1e9:.0f}; use fewer points")
 
     @property

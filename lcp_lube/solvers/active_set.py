@@ -118,12 +118,12 @@ class ActiveSet(Method):
             self._look()
             changed = self.problem.reduce.sum((full != (self.z >= 0)).astype(float))
         if not changed and self.system.direct:
-            self.z = self.form.refine(self.z, full, lambda f: self._solve_again(f, full))
+            self.z = self.form.refine(self.z, self.G, full, lambda f: self._solve_again(f, full))
             self._look()
             # Signs of pressures that are next to nothing beside what the wall could make.
             changed = self.problem.reduce.sum((full != (self.z >= 0)).astype(float))
         # In parts of the largest pressure, if that is far below p_unit: eps2 is no step then.
-        p_max = float(np.clip(self.problem.reduce.max(self.z), LEAST, 1.0)) if self.norm > 8 * EPS else 1.0
+        p_max = min(max(self.problem.reduce.max(self.z), LEAST), 1.0) if self.norm > 8 * EPS else 1.0
         step_norm = self.problem.reduce.norm(d) / p_max if changed else 0.0
         with self.system.stages("relaxation"):
             if self._stalled >= self.options.patience:

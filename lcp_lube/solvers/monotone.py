@@ -140,7 +140,8 @@ class Monotone(Method):
                 cavity |= self.form.z(self._relaxation(self.fields, self.options.sweeps)) < 0
         changed = self._any(cavity != self.cavity)
         if not changed and self.system.direct:
-            self.z = self.form.refine(self.z, self.z > 0, lambda f: self.system.solve_again(f, self.options.rtol)[0])
+            G = self.form.residual(self.z)
+            self.z = self.form.refine(self.z, G, self.z > 0, lambda f: self.system.solve_again(f, self.options.rtol)[0])
             self.norm = self._norm()
         self.cavity = cavity
         step_norm = self.problem.reduce.norm(self.z - before) if changed else 0.0

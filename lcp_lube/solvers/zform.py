@@ -51,12 +51,12 @@ class ZForm:
         driven = self._driven or reduce.norm(self.diagonal)  # nothing drives the film: p is measured by its unit
         return reduce.norm(G) / max(driven, rounding / eps1)
 
-    def refine(self, z: Array, full: NDArray[np.bool_], solve_again: Callable[[Array], Array]) -> Array:
+    def refine(self, z: Array, G: Array, full: NDArray[np.bool_], solve_again: Callable[[Array], Array]) -> Array:
         """Solve again with the same factors for what is left of G: their rounding is that of A's diagonal, G's is not.
 
         Parameters
         ----------
-        full : where z is a pressure for the factors.
+        G : of z. full : where z is a pressure for the factors.
         solve_again : d with J d = f for the J of the last step.
 
         Raises
@@ -67,7 +67,7 @@ class ZForm:
         """
         reduce, last, left = self.problem.reduce, np.inf, 0.0
         for _ in range(REFINEMENTS):
-            d = solve_again(-self.residual(z))
+            d = solve_again(-G)
             parts = [(np.where(some, np.abs(d), 0.0), np.where(some, np.abs(z), 0.0)) for some in (full, ~full)]
             size = max(reduce.max(moved) / (reduce.max(whole) or 1.0) for moved, whole in parts)
             left = reduce.max(parts[0][0])
@@ -76,6 +76,7 @@ class ZForm:
             z, last = z + d, size
             if size <= REFINED:
                 break
+            G = self.residual(z)
         p_max, s = max(reduce.max(z), 0.0), self.problem.scheme
         if left > ACCURATE * p_max:
             weakest = reduce.min(np.array([np.min(k, where=k > 0, initial=np.inf) for k in (s.k_W, s.k_E, s.k_S, s.k_N)]))
