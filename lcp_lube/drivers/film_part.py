@@ -66,7 +66,7 @@ class Part(Derived):
     """What is left of a scene.
 
     kind : a key of SENTENCES. shape : that of the whole scene's grid, in 1D for 'line'.
-    problem : the whole scene's, where coefficients of half of it may be taken from there.
+    problem : the whole scene's, if it has been built.
     """
 
     kind: str
@@ -75,6 +75,9 @@ class Part(Derived):
     @property
     def sentence(self) -> str:
         return SENTENCES[self.kind]
+
+    def with_shape(self, shape: tuple[int, ...]) -> "Part":
+        return Part(self.whole.with_shape(shape), self.kind)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -85,7 +88,10 @@ class Part(Derived):
         """The part's own film, and its grid."""
         model = model_of(self.whole)
         assert model is not None  # as `applies` found
-        x, y = model.lines(self.whole.shape) if len(self.whole.shape) == 2 else EVEN
+        if self.problem is not None:
+            x, y = self.problem.grid.places
+        else:
+            x, y = model.lines(self.whole.shape) if len(self.whole.shape) == 2 else EVEN
         if self.kind == "line":
             return replace(model, lengths=model.lengths[:1], exact=None, places=(x, None), integrals=False), self.shape
         nx, ny = self.shape
@@ -109,7 +115,8 @@ class Part(Derived):
     def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
         """The discrete problem of the part. Collective."""
         model, shape = self._model
-        if self.kind == "mirror" and (whole := self.problem) is not None and whole.grid.shape == self.shape:
+        whole = self.problem
+        if self.kind == "mirror" and whole is not None and whole.plain and whole.grid.comm.size == 1 and whole.size <= FEW:
             return model.build(shape, comm, made=_half(whole, shape[1], model.supplies))
         problem = model.build(shape, comm)
         return self.factored(problem, *numbers(problem.grid))
@@ -208,10 +215,10 @@ def part_of(scene: Solvable, problem: Problem) -> Part | None:
     if grid.dim == 1:
         return None
     if "open" not in (ends[0].kind, ends[1].kind) and not model.supplies and not rims and _all_lines_are_one(problem):
-        return Part(scene, "line")
+        return Part(scene, "line", problem)
     faces = not (model.mean_cubes and model.scheme == "upwind")  # whether the discretisation asks for the film there
     if ends[0] == ends[1] and grid.shape[1] // 2 >= grid.comm.size and _is_symmetric(problem, faces):
-        return Part(scene, "mirror", problem if problem.plain and grid.comm.size == 1 and grid.size <= FEW else None)
+        return Part(scene, "mirror", problem)
     return None
 
 
