@@ -9,7 +9,7 @@ from lcp_lube import load_scene, solve
 from lcp_lube.drivers.motions.coefficients import coefficients
 from lcp_lube.problems.film import borne, corners
 from lcp_lube.problems.film.edges import corners_of
-from lcp_lube.problems.film.recesses import Corners, _Field, corners_on
+from lcp_lube.problems.film.recesses import corners_on
 from lcp_lube.problems.film.shapes import Block, DimpleArray, Sum
 from lcp_lube.problems.film.slopes import by_points
 from lcp_lube.problems.film.views import FromHere, MirroredFilm, Travelling
@@ -22,7 +22,8 @@ SIDES = ("west", "east", "south", "north")
 def field_of(kappa, dry=False):
     one = np.ones(1)
     at, way = np.zeros((2, 1), dtype=np.int64), np.ones((2, 1), dtype=np.int64)
-    return _Field(Corners(at, way, np.zeros((2, 1)), np.ones((2, 1)), one * kappa ** (1 / 3), one, np.array([dry])))
+    found = corners.Corners(at, way, np.zeros((2, 1)), np.ones((2, 1)), one * kappa ** (1 / 3), one, np.array([dry]))
+    return corners.Field(found)
 
 
 def on_ray(field, of, radius, phi):
