@@ -36,13 +36,14 @@ IN_VAIN = 6  # times that sweeps may take over without ||G|| ever falling below 
 # Inner tolerances: the first steps need signs, not digits; later ones a part of ||G||; the last one brings ||G|| below eps1
 # and no further (benchmarks/constants.py sweeps the three).
 FIRST, FORCING, LAST = 1e-2, 0.1, 0.4
+NONE = 1e-9  # of the largest flow that the wall brings to a cell or drags away: less is rounding
 LEAST = 1e-15  # p_unit: a largest pressure below this is rounding
 
 
 @dataclass(frozen=True)
 class ActiveSetOptions(MethodOptions):
     """patience: steps without a fall of ||G|| by 10 % before sweeps take over; give_up: steps after which it is taken to
-    cycle; p0: full film at this p (p_unit) at the start; rtol: smallest relative tolerance of iterative inner solves; sweeps:
+    cycle; p0: p of the full film at the start (p_unit); rtol: smallest relative tolerance of iterative inner solves; sweeps:
     of relaxation before the first step from a given start, and after each step; 0: none at all, also when stalled."""
 
     method = "active-set"
@@ -56,7 +57,7 @@ class ActiveSetOptions(MethodOptions):
 class ActiveSet(Method):
     """The iterates z; `newton.iterate` runs it. `norm` is ||G(z)|| / ||c||, see `zform.ZForm.norm`.
 
-    A start's cells count as cavitated where r > 0; without one the film is full at options.p0.
+    A start's cells count as cavitated where r > 0; without one those do that the wall empties, if nothing presses the film.
     """
 
     Options = ActiveSetOptions
@@ -69,7 +70,7 @@ class ActiveSet(Method):
         problem, options, start = self.problem, self.options, job.start
         self.system = make_system(job.system, problem, self.stages)
         self.form = ZForm(problem)
-        self.z = self.form.z(start) if start else np.full(problem.grid.local_size, options.p0)
+        self.z = self.form.z(start) if start else np.where(self._left_behind(), -options.p0, options.p0)
         self._look()
         self._relaxation: Relaxation | None = relaxation(problem) if options.sweeps else None
         self._sweeps = options.sweeps if start else 0
@@ -79,6 +80,12 @@ class ActiveSet(Method):
     @property
     def fields(self) -> Fields:
         return self.form.fields(self.z)
+
+    def _left_behind(self) -> NDArray[np.bool_]:
+        """Where the wall drags away more than it brings, in a film without given pressures: a step is saved. Collective."""
+        problem, c = self.problem, self.problem.c
+        pressed = any(problem.p_sides) or problem.held is not None
+        return (c < -NONE * problem.reduce.largest(c)) & (not pressed)
 
     def _look(self) -> None:
         self.G = self.form.residual(self.z)
