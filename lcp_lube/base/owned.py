@@ -24,10 +24,12 @@ class Owned:
     def __init__(self, owner: object, comm: PETSc.Comm):
         self._made: list[Any] = []
         self._owner, self.names = weakref.ref(owner), set[str]()  # names: of `made` attributes
-        if comm.getSize() == 1:
-            weakref.finalize(owner, _free, self._made).atexit = False  # PETSc ends before the interpreter does
+        self._unwatched = comm.getSize() == 1
 
     def __call__(self, made: Made) -> Made:
+        if self._unwatched and (owner := self._owner()) is not None:  # many never make anything
+            weakref.finalize(owner, _free, self._made).atexit = False  # PETSc ends before the interpreter does
+            self._unwatched = False
         self._made.append(made)
         return made
 

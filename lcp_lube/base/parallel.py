@@ -95,7 +95,8 @@ class Reduce:
 
     def _extremum(self, a: Array, empty: float, op: MPI.Op) -> float:
         reduced = (np.minimum if op == MPI.MIN else np.maximum).reduce
-        value = float(reduced(_of_parts(lambda part: reduced(part, axis=None), _once(a)))) if a.size else empty
+        parts = _of_parts(lambda part: reduced(part, axis=None), _once(a)) if a.size else [empty]
+        value = float(parts[0] if len(parts) == 1 else reduced(parts))
         if self.comm.size == 1:
             return value
         bad = self.comm.allreduce(bool(np.isnan(value)), MPI.LOR)

@@ -249,7 +249,7 @@ class Grid:
             return np.add(self.ghosted(high, outside), self.ghosted((owned - high).astype(float), 0.0), dtype=np.longdouble)
         if self.comm.size == 1:
             out = np.empty((self.box[0] + 2, self.box[1] + 2), dtype=bool if owned.dtype == bool and not outside else float)
-            out[1:-1, 1:-1] = np.reshape(owned, self.box)
+            out[1:-1, 1:-1] = owned.reshape(self.box)
             out[:, 0], out[:, -1] = (out[:, -2], out[:, 1]) if self.periodic[0] else (outside, outside)
             out[0], out[-1] = (out[-2], out[1]) if self.periodic[-1] and self.dim == 2 else (outside, outside)
             return out

@@ -24,13 +24,11 @@ class Relaxation:
 
     def __init__(self, problem: LubricationProblem):
         self.problem = problem
-        s = problem.scheme
-        self._over_a, self._over_b = 1.0 / s.diagonal, 1.0 / s.b_C
 
     def __call__(self, fields: Fields, sweeps: int) -> Fields:
         """p and r after so many sweeps, to and fro in y. Collective."""
         grid, s, p, r = self.problem.grid, self.problem.scheme, fields["p"], fields["r"]
-        coefficients = (*s.coupling, s.entering, s.c, self._over_a, self._over_b)
+        coefficients = (*s.coupling, s.entering, s.c, 1.0 / s.diagonal, 1.0 / s.b_C)
         alone = grid.comm.size == 1 and not any(grid.periodic)
         for k in range(sweeps):
             if k == 0 or not alone:
