@@ -175,10 +175,10 @@ def promising(scene: Solvable) -> bool:
         h = np.broadcast_to(model.film(xs[None, :], y), (y.size, xs.size))
         if _dragged_alone(model) and np.all(h >= h[:, :1] * (1.0 - SAME)):
             return True
-        mirrored = model.film(xs[None, :], model.lengths[-1] - y) if ys else np.inf
-        return bool(np.all(np.abs(h / h[:1] - 1.0) <= SAME) if ys else np.ptp(h) <= SAME * h.max()) or bool(
-            np.all(np.abs(mirrored / h - 1.0) <= SAME)
-        )
+        if not ys:
+            return bool(np.ptp(h) <= SAME * h.max())
+        mirrored = model.film(xs[None, :], model.lengths[-1] - y)
+        return bool(np.all(np.abs(h / h[:1] - 1.0) <= SAME) or np.all(np.abs(mirrored / h - 1.0) <= SAME))
 
 
 def _given_pressures(model: Model) -> set[float]:
