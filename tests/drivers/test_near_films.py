@@ -159,3 +159,13 @@ def test_a_fluid_that_grows_thicker_with_pressure_is_told_by_the_adjoint_s_own_e
             monkeypatch.setattr(near_films, "SLIGHT", slight)
             slopes.append(solution.gradient("load", "fluid.barus")["fluid.barus"])
     assert slopes[0] == pytest.approx(slopes[1], rel=1e-8)
+
+
+def test_a_supply_of_a_fluid_with_a_law_is_given_a_pressure_and_no_q(monkeypatch):
+    """By exp(b p) = 1.04 the derivatives were too large."""
+    monkeypatch.setattr(near_films, "SMALL", 1)
+    scene = load_scene(HOLES, {"fluid.barus": 1e-8, "supply.1.p": 4e6})
+    with solve(scene) as solution:
+        slope = solution.gradient("load", "supply.1.p")["supply.1.p"]
+    loads = [solve(with_values(scene, {"supply.1.p": 4e6 + way}), stopping={"eps1": 1e-11}).load for way in (400.0, -400.0)]
+    assert slope == pytest.approx((loads[0] - loads[1]) / 800.0, rel=1e-5)

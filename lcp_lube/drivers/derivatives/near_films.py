@@ -77,7 +77,7 @@ class NearFilms:
             size, free = problem.scheme.diagonal.ravel() / problem.p_unit, ~held.mask.ravel()
             self._pushed = np.array([[problem.reduce.sum(np.where(mine, w * size, 0.0)) for mine in taken] for w in self.rows])
             self.rows = [*(w * free for w in self.rows), *(mine.astype(float) for mine in taken)]
-        self.known = can(problem, self.model, SMALL, held=self.model.law is None, rims=True) and self.wanted <= by_p.union(
+        self.known = can(problem, self.model, SMALL, held=equations.law is None, rims=True) and self.wanted <= by_p.union(
             DRAGS, FLOWS, self.fed
         )
         self._shares = self._within(problem.grid, held) if held and self.known else None
