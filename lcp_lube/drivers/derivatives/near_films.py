@@ -5,7 +5,7 @@ viscosity, a speed or a pressure of a side costs nothing, as the balance is line
 Barus' law has another q, as p is held.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import fields, replace
 from functools import cached_property
@@ -16,7 +16,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ...base.parallel import Array
-from ...problems.film import forces
+from ...problems.film import borne, forces
 from ...problems.film.by_faces import ByFaces
 from ...problems.film.flows import SIDES
 from ...problems.film.fluid import Law
@@ -24,6 +24,7 @@ from ...problems.film.lubrication import LubricationProblem
 from ...problems.film.model import Model
 from ...problems.film.quantities import largest_pressure
 from ...problems.film.reynolds import sides
+from ...problems.film.slopes import by_points
 from ...problems.film.supplies import Held, owners, shares_of
 from ...problems.film.weighed import can
 from ...problems.grid import Grid
@@ -46,8 +47,8 @@ class NearFilms:
 
     Parameters
     ----------
-    p : Pa above p_c, r : of the solution. lambdas : by quantity. parts : what each is made of. numbers : of the solution.
-    pressures : of its supplies, if any, Pa above p_c. asked : J' lambda.
+    p : Pa above p_c, r : of the solution. lambdas : by quantity. parts : what each is made of, and its derivatives by that.
+    numbers : of the solution. pressures : of its supplies, if any, Pa above p_c. asked : J' lambda.
     """
 
     def __init__(
@@ -56,7 +57,7 @@ class NearFilms:
         p: Array,
         r: Array,
         lambdas: Mapping[str, Array],
-        parts: Mapping[str, Collection[str]],
+        parts: Mapping[str, Mapping[str, float]],
         numbers: dict[str, float],
         pressures: Sequence[float] = (),
         asked: Mapping[str, Array] | None = None,
@@ -69,7 +70,8 @@ class NearFilms:
         self.drags = tuple(name for name in DRAGS if name in self.wanted)
         self.flows = tuple(name for name in FLOWS if name in self.wanted)
         problem, self.rows = equations.constant, list(lambdas.values())
-        by_p, held = {*forces.weights(problem), "p_max"}, problem.held
+        self._weights, self._parts, held = forces.weights(problem), parts, problem.held
+        by_p = {*self._weights, "p_max"}
         self.fed = [f"supply_flow_{k}" for k in range(1, len(held.supplies) + 1)] if held else []
         self.pressures = pressures or [one.p for one in (held.supplies if held else ())]
         if held is not None:  # rows of free cells, and what leaves the others
@@ -96,8 +98,21 @@ class NearFilms:
         shares = self._shares if shares is None else shares
         names = [FLIPPED.get(name, name) if self.equations.turned else name for name in self.flows]
         flows = [name.removeprefix("flow_") for name in names]
-        fields = self.p, self.r, p_sides, self.rows
-        return ByFaces(problem, self.model.scheme, law, *fields, self.drags, flows, shares, self.equations.layers)
+        fields, more = (self.p, self.r, p_sides, self.rows), (shares, self.equations.layers, self._by_borne)
+        return ByFaces(problem, self.model.scheme, law, *fields, self.drags, flows, *more)
+
+    @cached_property
+    def _begun(self) -> borne.Begun | None:
+        return borne.begun(self.equations.constant, self.p, self.r)
+
+    @cached_property
+    def _by_borne(self) -> list[Array]:
+        """By what the pressures that integrals count are counted in every L, if they know fronts."""
+        problem, out = self.equations.constant, list[Array]()
+        for name in self.lambdas if problem.cornered else ():
+            counts = [(by, self._weights[part]) for part, by in self._parts[name].items() if part in self._weights]
+            out.append(sum((by * by_points(problem, weight) for by, weight in counts), np.zeros(problem.grid.box)))
+        return out
 
     @cached_property
     def _here(self) -> Array | None:
@@ -110,8 +125,13 @@ class NearFilms:
         return self._totals(own)
 
     def _totals(self, problem: LubricationProblem) -> dict[str, float]:
-        """The numbers, with the integrals of a film's pressure, which is held, and its largest one."""
-        found = forces.totals(problem, self.p, self.r, wanted=self.wanted, columns=self._columns)
+        """The numbers, with the integrals of a film's pressure, which is held, and its largest one. As it has none of its
+        coefficients, fronts stay where they are between the points: L knows by its faces what moves them (`ByFaces`)."""
+        (whole := copy(problem)).cornered = False
+        found = forces.totals(whole, self.p, self.r, wanted=self.wanted, columns=self._columns)
+        if self._begun is not None and (names := [name for name in self._weights if name in self.wanted]):
+            lost = borne.less(problem.grid, self._begun, self.p, [forces.weights(problem)[name] for name in names])
+            found |= {name: found[name] - by for name, by in zip(names, lost, strict=True)}
         if "p_max" in self.wanted:
             found["p_max"] = largest_pressure(problem, self.p)[0] + problem.p_c
         return self.numbers | {name: found[name] for name in self.wanted.difference(DRAGS, FLOWS, self.fed)}
@@ -123,7 +143,7 @@ class NearFilms:
         eq = self.equations
         film: Any = Mirrored(scene) if eq.turned else scene
         model: Model = film.model
-        known = alike(model, self.model, "supplies") and model.cut == self.model.cut
+        known = alike(model, self.model, "supplies") and (model.cut, model.cornered) == (self.model.cut, eq.constant.cornered)
         known = known and [one.open for one in model.supplies] == [one.open for one in self.model.supplies]
         if model.U <= 0.0 or model.effects or not known or film.shape != eq.grid.shape:
             return None

@@ -12,6 +12,7 @@ and so are the flows through the sides (`flows.side_flows`).
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,14 +20,14 @@ import numpy as np
 from ...base.parallel import Array
 from ..grid import Grid
 from ..strips import STRIP, ghosted, in_strips
-from .cavity import ruptured
+from .borne import by_coefficients
 from .edges import Around, level, pairs
 from .effects import framed_by
 from .face_lines import FaceLines, Rows, line_factors
 from .flows import SIDES, line_shares
 from .fluid import Law
-from .inlets import made_at_inlet
 from .lubrication import LubricationProblem
+from .made import Made
 from .reynolds import sides
 from .rims import across_flow, frame_of, made_along
 from .strip import line_weights
@@ -55,12 +56,14 @@ class ByFaces:
     p : owned points, Pa above p_c, r : owned points. p_sides : Pa above p_c. rows : the weights w.
     drags : of them `friction` and `friction_torque`, which follow the rows' sums. flows : sides, whose flows follow those.
     shares : what `supplies.shares_of` says of a film with supplies. layers : `flows.layers` of this one, which all films have.
+    by_borne : of a film whose integrals know fronts (`borne`): by what they are counted in the numbers that the first of these
+        sums are taken from. As these change with what moves fronts, so do the sums the other way; here they stay as they are.
     """
 
     def __init__(
         self, problem: LubricationProblem, scheme: str, law: Law, p: Array, r: Array, p_sides: Sequence[float],
         rows: Sequence[Array], drags: Sequence[str] = (), flows: Sequence[str] = (), shares: Array | None = None,
-        layers: Array | None = None,
+        layers: Array | None = None, by_borne: Sequence[Array] = (),
     ):  # fmt: skip
         from .cell_loops import loop_by_faces
 
@@ -82,10 +85,6 @@ class ByFaces:
         for end, owned in ((0, grid.y_start == 0), (-1, grid.y_end == grid.shape[1])):
             if owned and grid.ends[1][end] in ("closed", "mirror"):
                 across[:, end] = 0.0
-        if shares is not None:
-            ways = 1.0 / np.broadcast_to(shares, (4, ny, nx))
-            along *= np.concatenate([ways[0], ways[1][:, -1:]], axis=1)
-            across *= np.concatenate([ways[2], ways[3][-1:]])
         west, east, south, north = (float(mask.any()) for mask in sides(grid))
         columns, rims = np.outer([west, east], np.ones(ny)), np.outer([south, north], np.ones(nx))  # of the faces at the sides
         if law.dowson_higginson:
@@ -95,6 +94,14 @@ class ByFaces:
                 part *= by_x
             across *= by_y.T
             columns, rims = columns * by_x[:, [0, -1]].T, rims * by_y[:, [0, -1]].T
+        for k, by in enumerate(by_borne):  # both parts of a face, which are of degree 0 in C and H, make nothing together
+            by_k, by_b = by_coefficients(problem, p, r, by)
+            along[k, :, :-1] -= by_k * problem.p_unit
+            wall[k, :, :-1] -= by_b
+        if shares is not None:
+            ways = 1.0 / np.broadcast_to(shares, (4, ny, nx))
+            along *= np.concatenate([ways[0], ways[1][:, -1:]], axis=1)
+            across *= np.concatenate([ways[2], ways[3][-1:]])
         self._along, self._across = along, across
         self._at_face, self._before = wall if at_face else None, void if before else None
         self._beside = [-np.array([a[:, [at]] * columns[at, :, None] for a in w]) for at in (0, -1)]
@@ -117,10 +124,9 @@ class ByFaces:
             self._through = columns, -columns * np.array([np.full(ny, enters), r[:, -1]]), columns * q[:, [0, -1]].T
             self._off = rims, rims * q[[0, -1]]
         self._state = frame_of(grid, problem.dry) if problem.remade else None  # where round edges cut faces
-        driven = problem.p_sides[0] / (6.0 * float(problem.mu) * problem.U) if problem.U else 0.0
-        self._first = ruptured(grid, problem.dry, driven) if problem.remade and problem.U else None
+        self._made = partial(Made.of, problem)
         self._known: dict[tuple[int, bytes], tuple[Array, Array]] = {}
-        self._own: dict[tuple[bool, tuple[float, ...]], Laid] = {}
+        self._own: dict[tuple[Any, ...], Laid] = {}
 
     def sums(self, gap: Any, grid: Grid) -> Array | None:
         """What the pressures (m2/s Pa s) and the wall (m) make of each, and by what it grows with each side's pressure: shape
@@ -130,15 +136,15 @@ class ByFaces:
         cut = [film.edges(side) for side in range(2)]
         first = self.count + len(self.drags)
         out, positive = np.zeros((first + len(self.flows), 6)), True
-        balances, at = out[: self.count], self._laid(grid, level(film) and self._first is None, tuple(cut[1]))
+        made = self._made(film)
+        balances, at = out[: self.count], self._laid(grid, level(film), tuple(cut[1]), made.apart)
         for some, rows in _strips(at.lines, grid.box[1]):
             C, H, before = at.along(film, rows, cut)
             if self._state is not None and film.rims:
                 C, H = np.array(C), np.array(H)
                 widths = 0.5 * at.across[:, rows].sum(axis=0)
                 made_along(film, at.x_places[0], at.y[rows], widths, self._state[1:-1][rows], (C, H), film.period(0))
-            if self._first is not None:
-                C, H = made_at_inlet(film, at.x_places[0], at.y[rows], self._first.of(rows), C, H)
+            C, H = made.along(at, rows, C, H)
             positive = positive and all(bool((a > 0.0).all()) for a in (C, H, before))
             if self.drags and positive:
                 films = self._sheared(film, at, rows, before / H)
@@ -160,7 +166,7 @@ class ByFaces:
                 state = across_flow(grid, self._state[ends])
                 widths = 0.5 * pairs(at.steps).sum(axis=0)
                 made_along(film, at.y_places[0][ends], at.x_places[0][1:-1], widths, state, (C.T,), film.period(1), across=True)
-            C *= at.widths
+            C = made.over(rows, C) * at.widths
             positive = positive and bool((C > 0.0).all())
             balances[:, 0] += _total(at.of_faces, some, C)
             for k, end, here in ((4, 0, some.start == 0), (5, -1, some.stop == at.faces.size)):
@@ -171,12 +177,12 @@ class ByFaces:
         total = grid.comm.allreduce(np.append(out, float(not positive)))
         return None if total[-1] else total[:-1].reshape(out.shape)
 
-    def _laid(self, grid: Grid, level: bool, cut: tuple[float, ...]) -> Laid:
+    def _laid(self, grid: Grid, level: bool, cut: tuple[float, ...], apart: Sequence[Rows]) -> Laid:
         """Its lines, those of the problem's own grid made once for films that jump along the same ones."""
-        key = level, cut
+        key = level, cut, *(one.tobytes() for one in apart)
         if grid is self.grid and key in self._own:
             return self._own[key]
-        places = FaceLines.of(grid, level, cut)
+        places = FaceLines.of(grid, level, cut, apart)
         lines, faces = places.lines, places.faces
         pressed, ends, dragged = line_factors(grid)
         of_lines = [(self._along, pressed), (self._at_face, dragged), (self._before, dragged)]

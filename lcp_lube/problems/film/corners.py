@@ -74,7 +74,7 @@ def around_corners(grid: Grid, regions: Sequence[Region]) -> Array:
     out = np.ones((ny, nx + 1)), np.ones((nx, ny + 1))  # lines across, faces along
     nodes = [window(grid, side, at, outward, places_, cells) for side in (0, 1)]
     for side, k in enumerate(out):
-        for face, more, _ in faces_about(grid, side, corners, ratios(corners, side, nodes), k.shape):
+        for face, more, _ in batches_about(grid, side, corners, ratios(corners, side, nodes), k.shape):
             k[face] *= more
         if not grid.periodic[side]:  # what a side's face lets through is in c already
             first, last = ((grid.x_start, grid.x_end), (grid.y_start, grid.y_end))[side]
@@ -101,7 +101,7 @@ def numbers_of(grid: Grid, side: int, a: Array) -> tuple[NDArray[np.int64], NDAr
     return k, np.abs(lines[k] - a) <= ON * grid.spacing[side]
 
 
-def faces_about(
+def batches_about(
     grid: Grid, side: int, found: Corners, ratio: Array, shape: tuple[int, ...]
 ) -> Iterator[tuple[tuple[NDArray[np.int64], NDArray[np.int64]], Array, NDArray[np.int64]]]:
     """Lines and faces, the ratios there and the numbers of the corners, in batches that have no face twice.

@@ -15,6 +15,7 @@ from .strip import line_weights, stream_weights
 
 NEAR = 1e-6  # of a cell: an edge so near it counts as inside
 Rows = NDArray[np.int64]
+NONE: Rows = np.zeros(0, dtype=np.int64)
 
 
 @dataclass(frozen=True)
@@ -31,14 +32,15 @@ class FaceLines:
     faces: Rows
 
     @classmethod
-    def of(cls, grid: Grid, level: bool, cut: Sequence[float]) -> "FaceLines":
-        """level : the film is the same along y between the edges y = const that `cut` tells."""
+    def of(cls, grid: Grid, level: bool, cut: Sequence[float], apart: Sequence[Rows] = (NONE, NONE)) -> "FaceLines":
+        """level : the film is the same along y between the edges y = const that `cut` tells. apart : of the lines, and of those
+        of the faces between them, such as are like no other."""
         y_nodes, y_faces = grid.nodes_and_faces(1)
         y, across = grid.y[:, 0], pairs(grid.steps(1))
         lines, faces = np.arange(y.size), np.arange(y_faces.size)
         if level:
-            lines = _alike(cut, y - 0.5 * across[0], y + 0.5 * across[1])
-            faces = _alike(cut, *pairs(y_nodes))
+            lines = _alike(cut, apart[0], y - 0.5 * across[0], y + 0.5 * across[1])
+            faces = _alike(cut, apart[1], *pairs(y_nodes))
         return cls(grid, grid.nodes_and_faces(0), (y_nodes, y_faces), grid.steps(0), y, across, lines, faces)
 
     def along(self, film: Around, rows: Rows, cut: Sequence[Any]) -> tuple[Array, Array, Array]:
@@ -74,11 +76,12 @@ class FaceLines:
         return h, *linear(np.where, liquid, *held(layers, *lengths))
 
 
-def _alike(jumps: Sequence[float], low: Array, high: Array) -> Rows:
-    """The first of each run of intervals with no jump in or between them."""
+def _alike(jumps: Sequence[float], apart: Rows, low: Array, high: Array) -> Rows:
+    """The first of each run of intervals with no jump in or between them, and none that is `apart`."""
     places, slack = np.unique(np.asarray(jumps, dtype=float)), NEAR * np.abs(high - low)
     below = np.searchsorted(places, low - slack)
     alone = (np.searchsorted(places, high + slack) > below) | (high <= low)
+    alone[apart] = True
     new = np.append(True, alone[1:] | alone[:-1] | (below[1:] != below[:-1]))
     return np.flatnonzero(new)
 

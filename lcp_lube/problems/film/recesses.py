@@ -17,13 +17,14 @@ corners, and once more with the faces about them made for what was found (`drive
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...base.parallel import Array
 from ..grid import Grid
-from .corners import BLEND, Corners, faces_about, numbers_of, ratios, window
+from .corners import BLEND, Corners, batches_about, numbers_of, ratios, window
 from .edges import corners_of
 
 CELLS = 2  # about a corner
@@ -73,6 +74,57 @@ def corners_on(grid: Grid, film: Callable[[Array, Array], Array], state: Array, 
     return Corners(*some, reach, inside[jumps], outside[jumps], found[jumps] > 0.0)
 
 
+class Faces(NamedTuple):
+    """Owned faces along x or y about corners, each of them once: rows and columns of an array of them all.
+
+    more : by what they conduct more. drags : by what H grows, in parts of the C that they would have. Both complex where the
+    film is.
+    """
+
+    rows: NDArray[np.int64]
+    columns: NDArray[np.int64]
+    more: Array
+    drags: Array
+
+    def among(self, rows: NDArray[np.int64]) -> tuple[NDArray[np.bool_], NDArray[np.int64], NDArray[np.int64]]:
+        """Which of them are in some rows, which are told in order; and of these the number of the row, and the column."""
+        at = np.minimum(np.searchsorted(rows, self.rows), rows.size - 1)
+        own = rows[at] == self.rows
+        return own, at[own], self.columns[own]
+
+
+def faces_about(
+    grid: Grid, film: Callable[[Array, Array], Array], state: Array, kind: Any = float
+) -> tuple[Faces, Faces] | None:
+    """The x and y faces about corners, and what these ask for; None without corners. Collective.
+
+    As in `corners_on`."""
+    if (found := corners_on(grid, film, state, kind)) is None:
+        return None
+    nodes = [window(grid, side, *found[:3], CELLS) for side in (0, 1)]
+    h, H = found.inside, found.outside
+    slope, out = np.where(found.dry, 0.0, 1.0 / (h * h + h * H + H * H)), []
+    for side in (0, 1):
+        lines, columns = grid.box[side], grid.box[1 - side] + 1
+        batches = batches_about(grid, side, found, ratios(found, side, nodes), (lines, columns))
+        parts = [(line * columns + face, more, slope[of]) for (line, face), more, of in batches]
+        nothing = np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0)
+        faces, more, drags = _joined(*map(np.concatenate, zip(nothing, *parts, strict=True)))
+        line, face = np.divmod(faces, columns)
+        out.append(Faces(line, face, more, drags) if side == 0 else Faces(face, line, more, 0.0 * drags))
+    return out[0], out[1]
+
+
+def _joined(faces: Array, ratio: Array, slope: Array) -> tuple[Array, Array, Array]:
+    """Faces, each of them once, by what all of its corners together make it conduct more, and what H grows by with C."""
+    once, first, of = np.unique(faces, return_index=True, return_inverse=True)
+    more, drags = ratio[first], (ratio[first] - 1.0) * slope[first]
+    for k in np.delete(np.arange(of.size), first):  # corner after corner
+        drags[of[k]] += (ratio[k] - 1.0) * more[of[k]] * slope[k]
+        more[of[k]] *= ratio[k]
+    return once, more, drags
+
+
 def around_recesses(
     grid: Grid, film: Callable[[Array, Array], Array], state: Array, kx: Array, ky: Array, wall: Array, drag: Any
 ) -> None:
@@ -83,17 +135,13 @@ def around_recesses(
     state : as in `corners_on`. kx, ky : conductances of the x and y faces, shapes (ny, nx + 1) and (ny + 1, nx).
     wall : what it drags through the x faces. drag : 6 mu U/p_unit.
     """
-    if (found := corners_on(grid, film, state, kx.dtype)) is None:
+    if (found := faces_about(grid, film, state, kx.dtype)) is None:
         return
-    nodes = [window(grid, side, *found[:3], CELLS) for side in (0, 1)]
-    h, H = found.inside, found.outside
-    slope = np.where(found.dry, 0.0, 1.0 / (h * h + h * H + H * H))
-    steps, stretch = grid.steps(0), grid.stretch(grid.y)[:, 0]
-    for side, k in ((0, kx), (1, ky.T)):
-        for at, more, of in faces_about(grid, side, found, ratios(found, side, nodes), k.shape):
-            if side == 0:
-                wall[at] += (more - 1.0) * k[at] * steps[at[1]] * stretch[at[0]] ** 2 * drag * slope[of]
-            k[at] *= more
+    x, y = found
+    at = x.rows, x.columns
+    wall[at] += x.drags * kx[at] * grid.steps(0)[x.columns] * grid.stretch(grid.y)[x.rows, 0] ** 2 * drag
+    kx[at] *= x.more
+    ky[y.rows, y.columns] *= y.more
 
 
 def _apart(places_: Array, line: Array, period: float) -> Array:

@@ -25,7 +25,7 @@ def can(problem: LubricationProblem, model: Model, least: int = MANY, held: bool
     held : supplies may hold some cells. rims : round edges may cut faces.
     """
     grid = problem.grid
-    plain = type(problem) is LubricationProblem and problem.plain and not problem.cornered and (rims or not problem.remade)
+    plain = type(problem) is LubricationProblem and problem.plain and (rims or not problem.remade)
     plain = plain and (held or problem.held is None)
     flow = not model.mean_cubes and model.U > 0.0 and model.stored is None and model.law is None
     return plain and flow and grid.dim == 2 and "closed" not in grid.ends[0] and grid.size >= least and has_numba()
