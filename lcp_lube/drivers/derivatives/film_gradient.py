@@ -174,8 +174,11 @@ class FilmGradient:
 
     def _fronts(self, weight: Weight) -> Array:
         """Of an integral of the pressure by the film, fields held: as fronts lie elsewhere in it."""
-        adjoint, problem, s = self.adjoint, self.problem, self.bare
+        adjoint, problem = self.adjoint, self.problem
         by_k, by_b = by_coefficients(problem, adjoint.p, adjoint.r, by_points(problem, weight))
+        if self._weighed is not None:
+            return self._weighed.begun_by_film(by_k, by_b, problem.scheme.flow_unit)
+        s = self.bare
         half = 0.5 * (by_k * s.k_W + by_b * s.b_W)
         none = np.zeros_like(half)
         return self._dealt(half, [half, none, none, none])

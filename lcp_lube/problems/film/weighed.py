@@ -12,6 +12,7 @@ from .edges import Around, level
 from .face_lines import FaceLines, Rows, line_factors, runs
 from .flows import line_shares
 from .lubrication import LubricationProblem
+from .made import Made
 from .model import Model
 from .reynolds import sides
 from .views import Raised
@@ -25,7 +26,7 @@ def can(problem: LubricationProblem, model: Model, least: int = MANY, held: bool
     held : supplies may hold some cells. rims : round edges may cut faces.
     """
     grid = problem.grid
-    plain = type(problem) is LubricationProblem and problem.plain and (rims or not problem.remade)
+    plain = type(problem) is LubricationProblem and problem.plain and (rims or not model.cut)
     plain = plain and (held or problem.held is None)
     flow = not model.mean_cubes and model.U > 0.0 and model.stored is None and model.law is None
     return plain and flow and grid.dim == 2 and "closed" not in grid.ends[0] and grid.size >= least and has_numba()
@@ -46,7 +47,8 @@ class Weighed:
         self._film, step = Around(model.gap, self.grid), STEP * float(np.max(np.abs(model.gap(self.grid.x, self.grid.y[:1]))))
         self._raised, self._step = Around(Raised(model.gap, 1j * step), self.grid), step
         self._cut = [self._film.edges(side) for side in range(2)]
-        self._at = FaceLines.of(self.grid, level(self._film), tuple(self._cut[1]))
+        self._made = Made.of(problem, self._raised, complex)
+        self._at = FaceLines.of(self.grid, level(self._film), tuple(self._cut[1]), self._made.apart)
 
     def by_film(self, w: Array, unit: float, even: bool = False) -> Array:
         """What w' G changes by with the film at each owned point, that between two points being their mean, in so many m/s.
@@ -68,12 +70,27 @@ class Weighed:
         def add(rows: slice, out: Array) -> None:
             lines, of_line = runs(at.lines, rows.start, rows.stop)
             faces, of_face = runs(at.faces, rows.start, rows.stop + 1)
-            C_x, wall, void, C_y = self._slopes(lines, faces)
-            by_x = _dealt(parts, (C_x / at.steps, wall, void))
-            by_y = C_y * grid.widths(0), of_face, of_faces[:, rows.start : rows.stop + 1]
+            C, wall, void = self._along(lines)
+            by_x = _dealt(parts, (C / at.steps, wall, void))
+            by_y = self._over(faces) * grid.widths(0), of_face, of_faces[:, rows.start : rows.stop + 1]
             loop_by_film(weights(rows), self._framed(rows), self._r(rows), by_x, of_line, of_lines[:, rows], *by_y, out)
 
         return self._strip_by_strip(add, even)
+
+    def begun_by_film(self, by_k: Array, by_b: Array, unit: float) -> Array:
+        """The same of what changes by so much with k_W and b_W, in these units of flow (`borne.by_coefficients`)."""
+        grid, problem, at, (pressed, _, dragged) = self.grid, self.problem, self._at, line_factors(self.grid)
+        frames = ghosted(grid, by_k.ravel(), 0.0), ghosted(grid, by_b.ravel(), 0.0)
+        k, b = 0.5 * problem.p_unit / (problem.mu * unit) * pressed[:, None], 0.5 * problem.U / unit * dragged[:, None]
+
+        def add(rows: slice, out: Array) -> None:
+            lines, of_line = runs(at.lines, rows.start, rows.stop)
+            C, _, void = self._along(lines)
+            of_k, of_b = (frame(rows)[1:-1, 1:] for frame in frames)
+            halves = k[rows] * of_k * (C / at.steps)[of_line] + b[rows] * of_b * void[of_line]
+            out += halves[:, :-1] + halves[:, 1:]
+
+        return self._strip_by_strip(add, False)
 
     def drag_by_film(self, lever: Any, even: bool = False) -> Array:
         """The same of the drag at the wall (`flows.drag`), times the lever of each line, in N/m."""
@@ -119,19 +136,28 @@ class Weighed:
             line[mask] = p_side
         return p
 
-    def _slopes(self, lines: Rows, faces: Rows) -> list[Array]:
-        """Derivatives by a film that is everywhere thicker by as much, of some lines: of C of the x faces, of the film that the
-        wall drags there and of the void's, and of C of the y faces."""
+    def _along(self, lines: Rows) -> list[Array]:
+        """Derivatives by a film that is everywhere thicker by as much, of x faces of some lines: of C, of the film that the
+        wall drags there and of the void's."""
+        film, at = self._film, self._at
+        if self._cut[0] or self._cut[1] or self._made.inlet:
+            C, H, before = at.along(self._raised, lines, self._cut)
+            C, H = self._made.along(at, lines, C, H)
+            found = C, before if self.scheme == "upwind" else H, H if self.scheme == "face" else before
+            return [np.imag(a) / self._step for a in found]
+        x_faces = at.x_places[1]
+        h = np.broadcast_to(film(x_faces[None, :], at.y[lines][:, None]), (lines.size, x_faces.size))
+        same = np.ones_like(h)
+        return [3.0 * h * h, same, same]
+
+    def _over(self, faces: Rows) -> Array:
+        """The same of C of some lines of y faces."""
         film, at = self._film, self._at
         if self._cut[0] or self._cut[1]:
-            C, H, before = at.along(self._raised, lines, self._cut)
-            made = [C, before if self.scheme == "upwind" else H, H if self.scheme == "face" else before]
-            return [np.imag(a) / self._step for a in (*made, at.over(self._raised, faces, self._cut))]
-        (_, x_faces), y_faces = at.x_places, at.y_places[1]
-        h_x = np.broadcast_to(film(x_faces[None, :], at.y[lines][:, None]), (lines.size, x_faces.size))
-        h_y = np.broadcast_to(film(at.x_places[0][None, 1:-1], y_faces[faces][:, None]), (faces.size, self.grid.box[1]))
-        same = np.ones_like(h_x)
-        return [3.0 * h_x * h_x, same, same, 3.0 * h_y * h_y]
+            return np.imag(self._made.over(faces, at.over(self._raised, faces, self._cut))) / self._step
+        x, y = at.x_places[0][None, 1:-1], at.y_places[1][faces][:, None]
+        h = np.broadcast_to(film(x, y), (faces.size, self.grid.box[1]))
+        return 3.0 * h * h
 
 
 def _dealt(parts: Sequence[Array], films: Sequence[Array]) -> Array:
