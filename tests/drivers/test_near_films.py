@@ -30,6 +30,7 @@ SCENES = {
     "holes": {},
     "seam": {},  # a ring whose ends are of different heights
     "rims": {"nx": 30, "ny": 28, "film.dimples.form": "round"},
+    "inlet": {},  # lines that rupture where they come in beside one that does not
 }
 HOLES = {"family": "bearing", "dimension": 2, "L": 0.06, "width": 0.04, "U": 1.5, "nx": 48, "ny": 34}
 HOLES |= {"film": [{"shape": "linear", "h_start": 3e-5, "h_end": 2e-5}], "fluid": {"mu": 0.03, "p_supply": 1e4}}
@@ -43,6 +44,7 @@ EDGES += [{"shape": "pocket", "depth": 2e-6, "x": [0.0061, 0.0083]}]  # edges bo
 STEPS |= {"film": [{"shape": "constant", "h": 4e-6}, *EDGES], "sides": dict.fromkeys(SIDES, 1e5)}
 FED_FILM = [{"shape": "linear", "h_start": 5e-6, "h_end": 4e-6}, *EDGES]
 FED = {"fluid": {"mu": 0.01, "p_supply": 1e5}, "sides": {}, "film": FED_FILM}
+OPENS = [{"shape": "parabola", "h_max": 4e-6, "h_min": 9e-6}]
 BASES = {
     "steps": (STEPS, {}),
     "upwind": ("problem4", {"nx": 33, "ny": 20}),
@@ -55,6 +57,7 @@ BASES = {
     "holes": (HOLES, {}),
     "seam": (RING, {}),
     "rims": ("dimpled_pad", {}),
+    "inlet": ({**STEPS, "film": OPENS, "sides": {"north": {"p": 2e5}}}, {}),
 }
 
 

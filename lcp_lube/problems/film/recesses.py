@@ -77,8 +77,8 @@ def corners_on(grid: Grid, film: Callable[[Array, Array], Array], state: Array, 
 class Faces(NamedTuple):
     """Owned faces along x or y about corners, each of them once: rows and columns of an array of them all.
 
-    more : by what they conduct more. drags : by what H grows, in parts of the C that they would have. Both complex where the
-    film is.
+    more : by what they conduct more. drags : by what H grows, in parts of the C that they would have; 0 of y faces. Both
+    complex where the film is.
     """
 
     rows: NDArray[np.int64]
