@@ -99,8 +99,8 @@ def test_rows_equal_single_solves_and_warm_starts_save_steps():
     single = solve(load_scene("journal", {**JOURNAL, "eccentricity": 0.6}))
     assert warm[6]["load"] == pytest.approx(single.problem.quantities(single.fields)["load"], rel=1e-7)
     single.destroy()
-    # Counted, not timed: 2 to 3 steps from a neighbour, 6 or 7 without one.
-    assert sum(row["iterations"] for row in warm[1:4]) < 0.6 * sum(row["iterations"] for row in cold[1:4])
+    # Counted, not timed, on the wide ones: 1 or 2 steps from a neighbour, 2 or 3 without one.
+    assert sum(row["iterations"] for row in warm[5:]) < 0.6 * sum(row["iterations"] for row in cold[5:])
 
 
 def test_a_new_line_starts_by_itself():
