@@ -9,7 +9,7 @@ from films import FilmScene, L, Pieces, random_films
 
 from lcp_lube.api import solve
 from lcp_lube.drivers.accuracy.estimate import estimate, is_known, known_line, misplaced_film, of_pair
-from lcp_lube.drivers.accuracy.rungs import finer, first_shape, round_ring, rungs_up
+from lcp_lube.drivers.accuracy.rungs import finer, first_rung, first_shape, round_ring, rungs_up
 from lcp_lube.errors import InputError
 from lcp_lube.problems.solution import Outcome
 from lcp_lube.registry import scene_names
@@ -243,8 +243,13 @@ def test_grids_that_an_estimate_leaves_out():
     assert rungs_up([math.inf, 1.4e-2], 1e-2, False, 2, True) == 1  # twice the points
     assert rungs_up([math.inf, 4e-3], 1e-4, False, 2, True) == rungs_up([math.inf, 5e-2], 1e-4, False, 2, True) == 5
     assert rungs_up([math.inf, 1.5e-2, 1.1e-2], 1e-2, False, 2, True) == 1
-    assert rungs_up([math.inf, 4e-2], 1e-2, False, 2, True) == 2  # by order 4/3 beside rims, or where a grid has missed:
-    assert rungs_up([math.inf, 4e-2], 1e-2, False, 2, True, True) == rungs_up([math.inf, 9e-2, 4e-2], 1e-2, False, 2, True) == 3
+    assert rungs_up([math.inf, 4e-2], 1e-2, False, 2, True) == rungs_up([math.inf, 9e-2, 4e-2], 1e-2, False, 2, True) == 2
+
+
+def test_first_grid_by_tolerance():
+    """Twice the points for each tenth of the tolerance, four times at most, or where stretches are narrow."""
+    assert [first_rung(tol, False) for tol in (0.1, 1e-2, 3e-3, 1e-3, 3e-4, 1e-6)] == [0, 0, 1, 1, 2, 2]
+    assert first_rung(1e-2, True) == 2
 
 
 def known_numbers(problem):
@@ -282,13 +287,24 @@ def test_estimate_of_two_grids():
     found = of_pair([1.0, 1.3], [0.0, 0.0], [16.0, 32.0], 0.1, "load")
     assert found.value == pytest.approx(1.375) and found.error == pytest.approx(1.4 * 0.3 / 3) and found.extrapolated
     assert of_pair([1.0, 1.0], [0.0, 0.0], [16.0, 32.0], 0.1, "load").error == pytest.approx(1.4 * 0.1 / 3)
-    assert of_pair([1.0, 1.3], [0.0, 0.0], [16.0, 32.0], 0.1, "load", rims=True).error == pytest.approx(0.8 * 0.3)
-    assert of_pair([1.0, 1.3], [0.0, 0.0], [16.0, 96.0], 0.1, "load", rims=True).error == pytest.approx(0.8 * 0.3 / 5)
-    far = of_pair([1.0, 1.2, 1.3], [0.0] * 3, [16.0, 23.0, 32.0], 0.1, "load", -3)  # with the grid of twice the spacing
-    assert far.value == found.value and far.error == found.error
+    assert of_pair([1.0, 1.3], [0.0, 0.0], [16.0, 32.0], 0.1, "load", full=True).error == pytest.approx(0.7 * 0.3 / 3)
+    assert of_pair([1.0, 1.3], [0.0, 0.0], [16.0, 32.0], 0.1, "load", rims=True).error == pytest.approx(1.7 * 1.4 * 0.3 / 3)
+    assert of_pair([1.0, 1.3], [0.0, 0.0], [16.0, 32.0], 0.1, "load", corners=True).error == pytest.approx(1.2 * 1.4 * 0.3 / 3)
+    assert of_pair([1.0, 1.3], [0.0, 0.0], [16.0, 32.0], 0.1, "p_max", corners=True).error == pytest.approx(3 * 0.3 / 3)
     assert of_pair([1.0, 1.0], [0.0, 0.0], [16.0, 32.0], 0.1, "friction").error == pytest.approx(3 * 0.03 / 3)
     assert of_pair([1.0], [0.0], [16.0], 0.1, "load").error == math.inf
     assert of_pair([1.0, 1.1], [0.0, 0.0], [16.0, 32.0], 0.1, "cavitated_area").error == math.inf
+
+
+def test_third_grid_tells_of_the_order():
+    """Corrections that fall by second order leave an estimate of half its size; others one that is larger, by a fourth root."""
+    sizes = [16.0, 32.0, 64.0]
+    two = of_pair([1.16, 1.04], [0.0] * 2, sizes[1:], 0.1, "load").error
+    assert of_pair([1.64, 1.16, 1.04], [0.0] * 3, sizes, 0.1, "load").error == pytest.approx(1.5 * 0.02**0.25 * two)
+    assert of_pair([1.16, 1.16, 1.04], [0.0] * 3, sizes, 0.1, "load").error == pytest.approx(1.5 * two)
+    far = of_pair([1.64, 1.3, 1.16], [0.0] * 3, [16.0, 23.0, 32.0], 0.1, "load", -3)  # with the grid of twice the spacing
+    assert far.value == pytest.approx(1.16 - 0.75 * 0.16) and 0.5 * 1.4 * 0.16 < far.error < 1.4 * 0.16
+    assert of_pair([math.nan, 1.16, 1.04], [0.0] * 3, sizes, 0.1, "load").error == two
 
 
 def test_errors_of_areas_are_a_sample():

@@ -26,7 +26,7 @@ from ..compose import Inner
 from ..memory import DENSE, available
 from ..plan import FEW, SMALL
 from .estimate import INTEGRALS, given_film, is_known, scalars
-from .rungs import ASYMPTOTIC, finer, first_shape, round_ring, rungs_up
+from .rungs import ASYMPTOTIC, finer, first_rung, first_shape, round_ring, rungs_up
 from .values import Values, carried, sought
 
 FEW_KNOWN = 128  # points of the first grid of a line whose number is known: no coarser grid is cheaper
@@ -35,8 +35,7 @@ ALGEBRAIC = 1e-3  # ||F|| relative to the tolerance: with many small cavities it
 CAVITIES = 1e-2  # ||F|| at which cavities are known well enough for round edges: of 46 loads 9 in 10 move by 1e-6 at most
 ALLOWED = (1e-10, 0.5)  # tolerances
 FIRST = 1e-2  # the same of a first grid that tells nothing by itself
-SOON = 3e-3  # a tolerance below which most films in 2D end on grids for multigrid, and few on the first two
-AGAIN = 5e-4  # below it few end on the next two either: the first ones tell as much for less
+SOON = 3e-3  # a tolerance below which most films in 2D end on grids for multigrid
 WHOLE = {True: 100_000, False: 1500}  # points up to which looking for symmetries costs what it saves, by multigrid or directly
 HOPELESS = 1_000_000  # points on which an estimate that has not come down is taken to stay up
 PATIENCE = 6  # grids without a better estimate: rounding dominates
@@ -98,17 +97,16 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     rung = next(k for k in count() if ranks == 1 or finer(first, meshes, k, unit)[-1] >= 2 * ranks)
     if line and first[0] < FEW_KNOWN and (finest is None or finer(first, meshes, rung + 1, unit)[0] <= finest[0]):
         rung += 1
-    # Where a stretch between two edges may be one cell wide a grid tells little of the next one.
     narrow = any(n + 1 < 2 * least for n, least in zip(first, fewest, strict=False))
-    cut = model is not None and model.cut
-    later = 2 if pairs and (narrow or (SOON > tol > AGAIN and not cut)) else 0
+    later = first_rung(tol, narrow) if pairs else 0
     most = finest or (inf,) * len(first)
     if all(n <= end for n, end in zip(finer(first, meshes, rung + later + 2, unit), most, strict=True)):
         rung += later
     shape = finer(first, meshes, rung, unit)
     solution: Solution | None = None
     before: Solution | None = None
-    told = Values(line, pairs, ALGEBRAIC * tol, cut, order)
+    rims, corners = (model.cut, model.cornered) if model is not None else (False, False)
+    told = Values(line, pairs, ALGEBRAIC * tol, rims, corners, order)
     levels: list[dict[str, Any]] = []
     times: dict[str, float] = {}
     # A program that goes on loads multigrid's loops once; for one run they pay where its last grid will be one for multigrid
@@ -155,7 +153,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         if not end and len(values) > 1 and max(map(abs, values)) <= rounding:
             noise = f"below {rounding:.0e} N, which is rounding beside what wall and sides could carry"
             end = f"it is {noise if rounding else 0}"
-        ups = 0 if end else rungs_up(estimates, tol, told.line is not None, len(first), pairs, cut)
+        ups = 0 if end else rungs_up(estimates, tol, told.line is not None, len(first), pairs)
         for up in range(ups, 0, -1):
             shape = finer(first, meshes, rung + up, unit)
             if not (end := _no_room(solution, shape, finest, best.relative, tol)):

@@ -53,9 +53,11 @@ EXPECTED = 1.0 / 3.0  # of what corrections before lead one to expect of the las
 SPAN = 12.0  # over the square of finest over coarsest grid: factor of n
 ENOUGH = 3.9  # finest over coarsest of grids that are enough without those before
 INTEGRALS = ("load", "pressure_integral")  # whose change from grid to grid is at most that of the pressure
-FULL = 1.0  # in the place of PAIR for the first two grids of a film without cavities: a linear problem, of clean second order
-RIMS = 0.8  # of a film whose rims cut faces, each of which errs by first order with either sign
-PAIR, BESIDE, SHARE = 1.4, 3.0, 0.3  # factors of an error from two grids, of these and of others, and of the pressure's change
+PAIR = {False: 1.4, True: 0.7}  # factor of their error from two grids, with cavities and without: a linear problem
+RIMS, CORNERS = 1.7, 1.2  # times that where rims cut faces, or corners of recesses are in them
+RIMS_BESIDE = 3.0  # of other numbers: a largest pressure errs by first order there
+MORE, STEADY, PART_MOVED = 1.5, 0.02, 0.25  # from the third grid on: factor, least move of the correction over it, exponent
+BESIDE, SHARE = 3.0, 0.3  # factors of an error of other numbers from two grids, and of the pressure's change in it
 CLEAN = 0.01  # what moves of w leave over the last correction
 QUADRATURE = 1e-9  # relative: what a line's quadrature may leave
 ANSWER = (1.0, 10.0)  # least and greatest answer to what is misplaced: relative change over share of Int h^-3
@@ -137,30 +139,42 @@ def of_pair(
     other: int = -2,
     full: bool = False,
     rims: bool = False,
+    corners: bool = False,
 ) -> Estimate:
     """The best value and its error from two grids, and from how far the pressure changed between them.
 
     Values can agree by chance, pressures in all parts of a film do not: what its integrals over parts change by is never less,
     added up, than the change of the whole one. By second order the last grid's error is the change over (d_j/d_k)^2 - 1.
+    A third grid tells whether it is of second order: how far the last correction is from what that makes of the one before.
+    Of an integral that has a part in the error, which no chance makes nought of.
 
     Parameters
     ----------
     values, misplaced, finer : as in `estimate`. change : that sum over the quantity, or for a quantity that is no integral of p
         the integral of |p_k - p_j| over that of p. other : number of the grid j that the last one is compared with.
-    full : whether nothing is cavitated. rims : whether rims cut faces, each of which errs by first order with either sign.
+    full : whether nothing is cavitated. rims, corners : whether rims cut faces, and corners of recesses are in them.
     """
     if name in NOISY or len(values) < 2:
         return Estimate(values[-1], inf)
-    of_integral = RIMS if rims else FULL if full and len(values) == 2 else PAIR
-    factor, least = (of_integral, 1.0) if name in INTEGRALS else (BESIDE, SHARE)
-    step, ratio = values[-1] - values[other], finer[-1] / finer[other]
-    to_come = 1.0 / (ratio**2 - 1.0)
-    fall = ratio ** (1.0 if rims else 2.0) - 1.0
-    error = factor / fall * max(abs(step), least * change * abs(values[-1]))
+    told = name in INTEGRALS
+    step, to_come = values[-1] - values[other], 1.0 / ((finer[-1] / finer[other]) ** 2 - 1.0)
+    error = to_come * max(abs(step), (1.0 if told else SHARE) * change * abs(values[-1]))
+    if told and isfinite(moved := _moved(values, finer)) and error:
+        error *= MORE * max(moved / error, STEADY) ** PART_MOVED
+    at_corners, at_rims = (CORNERS, RIMS) if told else (1.0, RIMS_BESIDE)
+    error *= (PAIR[full] if told else BESIDE) * (at_rims if rims else at_corners if corners else 1.0)
     film = _of_film(np.abs(np.diff(values)), misplaced, values[-1])
     return (
         Estimate(values[-1] + PART * to_come * step, max(error, film), True) if isfinite(error) else Estimate(values[-1], inf)
     )
+
+
+def _moved(values: Sequence[float], finer: Sequence[float]) -> float:
+    """How far the last correction is from what second order makes of the one before; NaN where there are not two."""
+    if len(values) < 3:
+        return np.nan
+    before, last = np.diff(values[-3:]) / np.diff(np.square(finer[-3:])) * np.square(finer[-3:-1])
+    return float(abs(last - before * (finer[-2] / finer[-1]) ** 2))
 
 
 def _of_film(steps: np.ndarray, misplaced: Sequence[float], value: float) -> float:

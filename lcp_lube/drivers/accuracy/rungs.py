@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from fractions import Fraction
-from math import ceil, inf, lcm, log2, prod
+from math import ceil, lcm, log2, log10, prod
 
 from ...scenes.scene import Solvable
 
@@ -10,7 +10,7 @@ COARSEST = {1: 12, 2: 4}  # points a side at least on the first grid
 FEW = {1: 12, 2: 100}  # points of the first grid at least: coarser ones cost as much, and tell less
 JUMP, NEARLY = 1, 0.5  # doublings of the points a side at once, and part of a rung that is not worth one more
 FAR = 5  # rungs at once where two grids give an estimate
-SLOW = 4.0 / 3.0  # order by which estimates fall where second order fails, and where rims cut faces beside cavities
+LOOSE, MOST_FIRST = 1e-2, 2  # a tolerance for which two grids tell most from the first one on; rungs above it at most
 ASYMPTOTIC = 0.1  # an estimate below it falls by second order at best
 MOST_ROUND, SAME = 720, 1e-9  # meshes that a turn is thought in to find edges, and by how much of a turn they may be off
 
@@ -48,21 +48,28 @@ def finer(shape: tuple[int, ...], meshes: Sequence[float], rung: int, unit: int 
     return tuple(n + k + round((2**doublings - 1) * (m + k)) for n, m, k in zip(shape, meshes, more, strict=True))
 
 
-def rungs_up(estimates: Sequence[float], tol: float, known: bool, dim: int, pairs: bool = False, slow: bool = False) -> int:
+def rungs_up(estimates: Sequence[float], tol: float, known: bool, dim: int, pairs: bool = False) -> int:
     """How many rungs the next grid lies above this one: the first that reaches the tolerance, if an estimate below ASYMPTOTIC
     (of three grids, or of one whose error is known) falls by second order; of several at most JUMP doublings of the points a
     side.
 
-    pairs : two grids give an estimate, for the first one best with half the spacing on the second; at most FAR rungs, and by
-        order SLOW once a grid has missed what second order had promised, or from the beginning (slow).
+    pairs : two grids give an estimate, for the first one best with half the spacing on the second; at most FAR rungs.
     """
     if pairs and not (len(estimates) >= 2 and estimates[-1] < ASYMPTOTIC):
         return dim
     if not (known or pairs or len(estimates) >= 3) or not estimates[-1] < ASYMPTOTIC:
         return 1
-    slow = slow or (pairs and min(estimates[1:-1], default=inf) < ASYMPTOTIC)
-    up = max(1, ceil(dim * log2(estimates[-1] / tol) / (SLOW if slow else 2.0) - NEARLY))
+    up = max(1, ceil(dim * log2(estimates[-1] / tol) / 2.0 - NEARLY))
     return up if known else min(up, FAR if pairs else dim * JUMP)
+
+
+def first_rung(tol: float, narrow: bool) -> int:
+    """The rung that a run by pairs of grids begins with: one for each tenth of LOOSE, as a solve costs most of what a small
+    grid does, and the less there are to the last grid the better.
+
+    narrow : whether a stretch between two edges may be one cell wide, so that a grid tells little of the next one.
+    """
+    return min(MOST_FIRST, max(MOST_FIRST if narrow else 0, round(log10(LOOSE / tol))))
 
 
 def round_ring(scene: Solvable, first: tuple[int, ...], finest: tuple[int, ...] | None = None) -> tuple[tuple[int, ...], int]:

@@ -17,9 +17,6 @@ from ...problems.solution import Fields, Problem, Solution
 from ...problems.transfer import interpolated
 from .estimate import INTEGRALS, QUADRATURE, Estimate, estimate, follow, known_line, misplaced_film, of_pair, scalars
 
-LEAST_PAIR = 0.25  # weight of the estimate of two grids beside that of all: in the exponent, at least
-# What each grid more leaves of it, of films without cavities and with: values agree by chance there.
-FEWER = {True: 0.5, False: 0.75}
 APART = 1.8  # spacings of two grids over one another, at least, where two such are there: nearer ones tell little
 BLOCKS = 6  # parts of a side over which the change of the pressure is integrated
 CLOSE = 32  # points a side of a grid whose cells are looked at in some 500 places along each line
@@ -33,14 +30,14 @@ class Values:
     ----------
     line : whether the film is known by quadrature (`estimate.is_known`). pairs : whether an integral of the pressure is
         estimated from each two grids (`estimate.of_pair`). least : relative error that the solves may leave on any grid.
-    rims : whether rims cut faces. order : of the scheme.
+    rims, corners : whether rims cut faces, and corners of recesses are in them. order : of the scheme.
 
     Attributes
     ----------
     line : a problem and its fields that have the numbers of a line that is known; None of other films.
     """
 
-    def __init__(self, line: bool, pairs: bool, least: float, rims: bool, order: float):
+    def __init__(self, line: bool, pairs: bool, least: float, rims: bool, corners: bool, order: float):
         self.line: tuple[LubricationProblem, Fields] | None = None
         self._known: Mapping[str, float] | None = None  # all numbers of it
         self.quantity, self.best = "", Estimate(np.nan, inf)
@@ -52,7 +49,8 @@ class Values:
         self._misplaced: list[float] = []
         self._converged = False  # on the last grid
         self._other, self._change = -2, (inf, inf)  # of the pressure from that grid on: `_change`
-        self._order, self._full, self._rims = order, False, rims  # _full: nothing is cavitated, and second order clean
+        self._order, self._rims, self._corners = order, rims, corners
+        self._full = False  # nothing is cavitated
 
     def add(
         self, solution: Solution, before: Solution | None, earlier: Solution | None, size: float, quantity: str, value: float
@@ -75,7 +73,7 @@ class Values:
         self._other = -3 if earlier is not None and size < APART * self._sizes[-2] else -2
         other = earlier if self._other == -3 else before
         self._change = _change(solution, other, quantity, self._own[self._other]) if other and self._pairs else (inf, inf)
-        self._full = self._pairs and not self._rims and not problem.reduce.max(solution.fields["r"]) > 0.0
+        self._full = self._pairs and not problem.reduce.max(solution.fields["r"]) > 0.0
         self.best = self._best(quantity, self._own)
         return self.best
 
@@ -85,14 +83,12 @@ class Values:
         if np.isfinite(truth):
             above = max(1.0, abs(value / truth)) if truth else 1.0  # relative to the truth, not to a value that is too large
             return Estimate(value, above * abs(value - truth) + QUADRATURE * abs(value))
-        of_all, (by_load, by_all) = estimate(values, self._misplaced, self._sizes, name, self._order), self._change
+        by_load, by_all = self._change
         if not isfinite(by_load) or (name not in INTEGRALS and len(values) > 2):
-            return of_all
-        change = by_load if name in INTEGRALS else by_all
-        pair = of_pair(values, self._misplaced, self._sizes, change, name, self._other, self._full, self._rims)
-        weight = max(FEWER[self._full] ** (len(values) - 2), LEAST_PAIR)
-        error = pair.error**weight * min(of_all.error, pair.error) ** (1.0 - weight)
-        return replace(pair, error=max(error, self._least * abs(value)))
+            return estimate(values, self._misplaced, self._sizes, name, self._order)
+        grids, change = (self._misplaced, self._sizes), by_load if name in INTEGRALS else by_all
+        pair = of_pair(values, *grids, change, name, self._other, self._full, self._rims, self._corners)
+        return replace(pair, error=max(pair.error, self._least * abs(value)))
 
     def _truth(self, name: str) -> float:
         """A number of a line that is known; NaN where there is none. Collective."""
