@@ -10,13 +10,25 @@ import numpy as np
 from mpi4py import MPI
 
 from lcp_lube import load_scene, solve
-from lcp_lube.drivers.derivatives import near_films
+from lcp_lube.drivers.derivatives import film_gradient, near_films
 from lcp_lube.drivers.derivatives.adjoint import Adjoint
+from lcp_lube.drivers.derivatives.film_gradient import FilmGradient
 from lcp_lube.scenes.values import values_of, with_values
 
 STEP = 1e-5
 KINDS = ("pad", "pad", "pad", "ring", "journal", "sector")
 OPEN = ("west", "east", "south", "north")
+
+
+def own_derivatives(monkeypatch: Any, scene: Any, solution: Any, names: list[str]) -> list[list[Any]]:
+    """By the film at all points, of the numbers: in one pass, and of arrays."""
+    fields = []
+    for least in (1, 10**9):
+        monkeypatch.setattr(film_gradient, "SMALL", least)
+        adjoint = Adjoint(scene, solution, names)
+        fields.append([FilmGradient(adjoint).field(name) for name in names])
+        adjoint.destroy()
+    return fields
 
 
 def recess_of(rng: np.random.Generator, depth: float, L: float, W: float) -> dict[str, Any]:

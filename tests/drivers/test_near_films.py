@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from cornered_films import own_derivatives
 
 from lcp_lube import solve
 from lcp_lube.drivers.derivatives import adjoint as adjoint_module
-from lcp_lube.drivers.derivatives import film_gradient, near_films
+from lcp_lube.drivers.derivatives import near_films
 from lcp_lube.drivers.derivatives.adjoint import Adjoint
 from lcp_lube.drivers.derivatives.equations import Equations, fields_of
-from lcp_lube.drivers.derivatives.film_gradient import FilmGradient
 from lcp_lube.problems.film import slopes
 from lcp_lube.problems.film.flows import SIDES
 from lcp_lube.scenes.scene import load_scene
@@ -97,12 +97,7 @@ def test_films_near_by_have_the_lagrangians_of_their_problems(monkeypatch, name)
 def test_the_film_s_own_derivative_is_that_of_its_arrays(monkeypatch, name):
     scene, names = made(name), ["load", "friction", "friction_torque" if name == "thrust" else "p_max"]
     with solve(scene) as solution:  # some of them on half of the width
-        fields = []
-        for least in (1, 10**9):
-            monkeypatch.setattr(film_gradient, "SMALL", least)
-            adjoint = Adjoint(scene, solution, names)
-            fields.append([FilmGradient(adjoint).field(name) for name in names])
-            adjoint.destroy()
+        fields = own_derivatives(monkeypatch, scene, solution, names)
     for field, other in zip(*fields, strict=True):
         assert field == pytest.approx(other, abs=1e-12 * np.abs(other).max())
 
