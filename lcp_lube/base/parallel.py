@@ -89,13 +89,13 @@ class Reduce:
         """`min` and `max`; large arrays are read once."""
         if not a.size:
             return self.min(a), self.max(a)
-        ends = _of_parts(lambda part: (part.min(axis=0).min(), part.max(axis=0).max()), _once(a))
+        ends = _of_parts(lambda part: (part.min(axis=0).min(), part.max(axis=0).max()), once(a))
         low, high = np.transpose(ends)
         return self.min(low), self.max(high)
 
     def _extremum(self, a: Array, empty: float, op: MPI.Op) -> float:
         reduced = (np.minimum if op == MPI.MIN else np.maximum).reduce
-        parts = _of_parts(lambda part: reduced(part, axis=None), _once(a)) if a.size else [empty]
+        parts = _of_parts(lambda part: reduced(part, axis=None), once(a)) if a.size else [empty]
         value = float(parts[0] if len(parts) == 1 else reduced(parts))
         if self.comm.size == 1:
             return value
@@ -103,7 +103,7 @@ class Reduce:
         return float("nan") if bad else self.comm.allreduce(value, op)
 
 
-def _once(a: NDArray) -> NDArray:
+def once(a: NDArray) -> NDArray:
     """The one line of an array whose lines are all in one place."""
     return a[:1] if a.ndim == 2 and a.strides[0] == 0 else a
 

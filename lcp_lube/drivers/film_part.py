@@ -25,7 +25,7 @@ from ..problems.facts import Facts
 from ..problems.film.cavity import missing_flow
 from ..problems.film.edges import jumps_of
 from ..problems.film.lubrication import LubricationProblem
-from ..problems.film.model import Made, Model, Side
+from ..problems.film.model import Coefficients, Model, Side
 from ..problems.film.supplies import Supply
 from ..problems.grid import EVEN, Grid, some_places
 from ..problems.solution import Fields, Problem
@@ -141,7 +141,7 @@ class Part(Derived):
         return (0 * j if self.kind == "line" else np.minimum(j, grid.shape[1] - 1 - j)), i
 
 
-def _half(whole: LubricationProblem, lines: int, supplies: tuple[Supply, ...]) -> Made:
+def _half(whole: LubricationProblem, lines: int, supplies: tuple[Supply, ...]) -> Coefficients:
     """Coefficients of a problem's first lines, up to the middle: its last line has half cells, or shut faces."""
     scheme = whole.scheme.rows(slice(0, lines))
     part = {name: np.array(getattr(scheme, name)) for name in scheme.arrays}

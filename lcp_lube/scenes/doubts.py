@@ -12,7 +12,7 @@ DENSITY = 900.0  # kg/m3, of an oil
 TURBULENT = 1000.0  # Reynolds number of the gap
 STEEL = 3e9  # Pa: more than any bearing surface stands
 LONG = 100.0  # times the pad: a profile in another unit
-SAMPLES = 33  # points a side, an odd number, at which the film is looked at
+SAMPLES = 33  # points a side at which the film is looked at
 
 
 def doubts(scene: Scene) -> list[str]:
@@ -40,7 +40,7 @@ def _of_the_film(model: Any) -> list[str]:
     places = [(np.arange(SAMPLES) + 0.5) / SAMPLES * length for length in model.lengths]
     with np.errstate(all="ignore"):
         h = model.gap(places[0][None, :], places[1][:, None] if len(places) == 2 else np.zeros((1, 1)))
-    h = float(np.partition(h, h.size // 2, axis=None)[h.size // 2])  # their number is odd
+    h = float(np.median(h))
     if not 0 < h < np.inf:
         return []  # the discretisation says where the film is not positive
     found = []

@@ -27,7 +27,7 @@ from .face_lines import FaceLines, Rows, line_factors
 from .flows import SIDES, line_shares
 from .fluid import Law
 from .lubrication import LubricationProblem
-from .made import Made
+from .made_faces import MadeFaces
 from .reynolds import sides
 from .rims import across_flow, frame_of, made_along
 from .strip import line_weights
@@ -124,7 +124,7 @@ class ByFaces:
             self._through = columns, -columns * np.array([np.full(ny, enters), r[:, -1]]), columns * q[:, [0, -1]].T
             self._off = rims, rims * q[[0, -1]]
         self._state = frame_of(grid, problem.dry) if problem.remade else None  # where round edges cut faces
-        self._made = partial(Made.of, problem)
+        self._made = partial(MadeFaces.of, problem)
         self._known: dict[tuple[int, bytes], tuple[Array, Array]] = {}
         self._own: dict[tuple[Any, ...], Laid] = {}
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...base.compiled import has_numba
-from ...base.parallel import Array
+from ...base.parallel import Array, once
 from ..grid import Grid
 from ..strips import MANY, apart, each_strip, places_of
 from .cavity import cavitated
@@ -126,7 +126,7 @@ def drag_sum(
         part.grid, part.layers = places_of(grid, rows), _rows(problem.layers, rows)
         found = (*_east_faces(part), s.couette_E)
         # Numbers side by side: else no vector instructions are made. Most films are the same where a, b and c ask for them.
-        lying = {id(one): np.ascontiguousarray(one[:1] if one.strides[0] == 0 else one) for one in found}
+        lying = {id(one): np.ascontiguousarray(once(one)) for one in found}
         h, a, b, c, couette = (lying[id(one)] for one in found)
         fields, of_lines = (r[rows], p[rows], beyond[rows]), (columns, shears[rows], pulls[rows])
         into: Any = (None, None) if by is None else by[:, rows]

@@ -27,7 +27,7 @@ from .turned import TurnedProblem
 from .turning import Shaft
 from .views import Inside, LiftedFilm, MirroredFilm, Raised
 
-Made = tuple[BoxScheme, Held | None]  # coefficients, and the supplies that they hold
+Coefficients = tuple[BoxScheme, Held | None]  # and the supplies that they hold
 NAMES = ("west", "east", "south", "north")
 STEP = 1e-30  # relative, of a complex step: nothing is subtracted, so no digits are lost however small it is
 RING = ("periodic", "periodic")
@@ -209,7 +209,7 @@ class Model:
         return tuple(max(1, stretches(*edges)[1].size) for edges in self.edges)
 
     def build(
-        self, shape: Sequence[int], comm: PETSc.Comm | None = None, grid: Grid | None = None, made: Made | None = None
+        self, shape: Sequence[int], comm: PETSc.Comm | None = None, grid: Grid | None = None, made: Coefficients | None = None
     ) -> LubricationProblem:
         """The discrete problem on (nx,) or (nx, ny) points, or on a grid that others use too. Collective.
 
@@ -283,11 +283,11 @@ class Model:
         slopes = BoxScheme(**{name: a if name == "h" else a / flow_unit for name, a in changes.items()}, flow_unit=flow_unit)
         return self._held(grid, slopes, integrals)[0]
 
-    def _scheme(self, grid: Grid, integrals: LineIntegrals | None, cavity: Array | None) -> Made:
+    def _scheme(self, grid: Grid, integrals: LineIntegrals | None, cavity: Array | None) -> Coefficients:
         """Coefficients with supplies, faces at round edges made for these cavities. Collective."""
         return self._held(grid, box_scheme(grid, self.gap, **self._data, integrals=integrals, cavity=cavity), integrals)
 
-    def _held(self, grid: Grid, scheme: BoxScheme, integrals: LineIntegrals | None) -> Made:
+    def _held(self, grid: Grid, scheme: BoxScheme, integrals: LineIntegrals | None) -> Coefficients:
         """With its supplies."""
         if not self.supplies:
             return scheme, None

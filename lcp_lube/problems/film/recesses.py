@@ -106,23 +106,17 @@ def faces_about(
     slope, out = np.where(found.dry, 0.0, 1.0 / (h * h + h * H + H * H)), []
     for side in (0, 1):
         lines, columns = grid.box[side], grid.box[1 - side] + 1
-        batches = batches_about(grid, side, found, ratios(found, side, nodes), (lines, columns))
-        parts = [(line * columns + face, more, slope[of]) for (line, face), more, of in batches]
-        nothing = np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0)
-        faces, more, drags = _joined(*map(np.concatenate, zip(nothing, *parts, strict=True)))
+        batches = [*batches_about(grid, side, found, ratios(found, side, nodes), (lines, columns))]
+        numbers = [line * columns + face for (line, face), *_ in batches]
+        faces = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *numbers]))
+        more, drags = np.ones(faces.size, dtype=kind), np.zeros(faces.size, dtype=kind)
+        for number, (_, ratio, of) in zip(numbers, batches, strict=True):  # corner after corner, where they share a face
+            k = np.searchsorted(faces, number)
+            drags[k] += (ratio - 1.0) * more[k] * slope[of]
+            more[k] *= ratio
         line, face = np.divmod(faces, columns)
         out.append(Faces(line, face, more, drags) if side == 0 else Faces(face, line, more, 0.0 * drags))
     return out[0], out[1]
-
-
-def _joined(faces: Array, ratio: Array, slope: Array) -> tuple[Array, Array, Array]:
-    """Faces, each of them once, by what all of its corners together make it conduct more, and what H grows by with C."""
-    once, first, of = np.unique(faces, return_index=True, return_inverse=True)
-    more, drags = ratio[first], (ratio[first] - 1.0) * slope[first]
-    for k in np.delete(np.arange(of.size), first):  # corner after corner
-        drags[of[k]] += (ratio[k] - 1.0) * more[of[k]] * slope[k]
-        more[of[k]] *= ratio[k]
-    return once, more, drags
 
 
 def around_recesses(

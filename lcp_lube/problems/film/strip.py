@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...base.parallel import Array
+from ...base.parallel import Array, once
 from ..grid import Grid
 from .cavity import Inlet
 from .edges import Around, face_film, pairs
@@ -185,7 +185,7 @@ def by_lines(scheme: Any, name: str) -> tuple[Array, int, Array, Array]:
         return made, 0, np.ones(len(made)), np.ascontiguousarray(made[:, -1 if last else 0])
     void, other, weight, U = made.args
     lines = np.ones(len(void)) if weight is None else (weight * U)[:, 0]
-    void = void if void.strides[0] else void[:1]
+    void = once(void)
     if last:
         return void, 1, -lines, -lines * void[:, -1] if other is None else -other
     return void, 0, lines, lines * void[:, 0] * float(other)

@@ -12,7 +12,7 @@ from .edges import Around, level
 from .face_lines import FaceLines, Rows, line_factors, runs
 from .flows import line_shares
 from .lubrication import LubricationProblem
-from .made import Made
+from .made_faces import MadeFaces
 from .model import Model
 from .reynolds import sides
 from .views import Raised
@@ -47,7 +47,7 @@ class Weighed:
         self._film, step = Around(model.gap, self.grid), STEP * float(np.max(np.abs(model.gap(self.grid.x, self.grid.y[:1]))))
         self._raised, self._step = Around(Raised(model.gap, 1j * step), self.grid), step
         self._cut = [self._film.edges(side) for side in range(2)]
-        self._made = Made.of(problem, self._raised, complex)
+        self._made = MadeFaces.of(problem, self._raised, complex)
         self._at = FaceLines.of(self.grid, level(self._film), tuple(self._cut[1]), self._made.apart)
 
     def by_film(self, w: Array, unit: float, even: bool = False) -> Array:

@@ -16,7 +16,7 @@ from .recesses import Faces, faces_about
 
 
 @dataclass(frozen=True)
-class Made:
+class MadeFaces:
     """Of one film; None: it has no such faces."""
 
     film: Around
@@ -24,7 +24,7 @@ class Made:
     about: tuple[Faces, Faces] | None = None
 
     @classmethod
-    def of(cls, problem: LubricationProblem, film: Around, kind: Any = float) -> "Made":
+    def of(cls, problem: LubricationProblem, film: Around, kind: Any = float) -> "MadeFaces":
         """What the cavities of a problem ask of a film on its points, or on the same ones elsewhere. Collective.
 
         kind : dtype of the film, complex where it is differentiated."""
