@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...base.parallel import Array
 from ..grid import Grid
 from ..strips import each_strip, ghosted, places_of
+from .edges import jumps_of
 from .reynolds import Film, sides
 from .strip import line_weights, stream_weights
 
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
     from .lubrication import LubricationProblem
 
 MANY = 200  # places that are looked for together
+NEAR, ON_EDGE = 1e-13, 4e-12  # parts of the distances from x = 0, so near a place is to be known, and one at a jump
+SECANTS = 4  # looks at the film by which its place is foreseen
 
 
 def counted(problem: LubricationProblem, p_pa: Any, r: Array) -> Any:
@@ -215,15 +218,40 @@ def first_cavity(grid: Grid, ruptures: list[float], reformations: list[float]) -
 
 
 def _rises_through(film: Film, level: Array, a: Array, b: Array, y: Array) -> Array:
-    """Where the film first grows to a level between a and b, to 50 bits: at a jump too; a or b where it does not."""
-    n = 32 if a.size < MANY else 4  # fewer calls, or fewer places
-    parts, power = np.arange(1, n) / n, n.bit_length() - 1
-    for _ in range(50 // power if a.size else 0):
-        width = (b - a)[:, None]
-        thick = film(a[:, None] + width * parts, y[:, None]) >= level[:, None]
-        first = np.where(thick.any(axis=1), thick.argmax(axis=1), n - 1)  # the part at whose end the film has grown so far
-        a, b = a + width[:, 0] * (first / n), np.where(first < n - 1, a + width[:, 0] * ((first + 1) / n), b)
-    return b
+    """Where the film first grows to a level between a and b: at a jump too; a or b where it does not.
+
+    Once the place is known to a sixteenth it is at the jump that the film tells there, or where secants lead to; looks on either
+    side of it say whether it is. Where it is not, bisection goes on, to 50 bits.
+    """
+    far, places = np.abs(b).max(initial=0.0), (level, y)
+    for _ in range(2):
+        a, b = _narrowed(film, *places, a, b, 4)
+    jumps = np.unique([*jumps_of(film, "x"), np.inf])
+    jump = jumps[np.searchsorted(jumps, a)]
+    last, x, high = b, a, film(b, y)
+    before, never = film(a, y) >= level, high < level
+    with np.errstate(invalid="ignore", divide="ignore"):  # a film that is level there leads nowhere
+        for _ in range(SECANTS):
+            here = film(x, y)
+            last, x, high = x, x - (here - level) * (last - x) / (high - here), here
+    jumps_there = jump <= b + ON_EDGE * far
+    near = far * np.where(jumps_there, ON_EDGE, NEAR)
+    x = np.where(before, a, np.where(never, b, np.where(jumps_there, jump, x)))
+    rest = ~(before | never | ((a < x) & (x <= b + near) & (film(x - near, y) < level) & (film(x + near, y) >= level)))
+    if rest.any():
+        a, b, places = a[rest], b[rest], (level[rest], y[rest])
+        for _ in range(12 if a.size < MANY else 24):
+            a, b = _narrowed(film, *places, a, b, 16 if a.size < MANY else 4)  # fewer calls, or fewer places
+        x[rest] = b
+    return x
+
+
+def _narrowed(film: Film, level: Array, y: Array, a: Array, b: Array, n: int) -> tuple[Array, Array]:
+    """The first of n parts of a to b at whose end the film has grown to the level; the last one if there is none."""
+    width = b - a
+    thick = film(a[:, None] + width[:, None] * (np.arange(1, n) / n), y[:, None]) >= level[:, None]
+    first = np.where(thick.any(axis=1), thick.argmax(axis=1), n - 1)
+    return a + width * (first / n), np.where(first < n - 1, a + width * ((first + 1) / n), b)
 
 
 def middle_row(problem: LubricationProblem) -> int:
