@@ -57,10 +57,13 @@ class Crew:
             self._busy.release()
         return out
 
-    def rows(self, task: Callable[[int, int], Any], lines: int, points: int) -> list[Any]:
-        """What task(first, last + 1) returns for parts of so many lines, of so many points in all."""
-        parts = min(PARTS, lines) if points >= FEWEST else 1
-        return self.run(lambda k: task(lines * k // parts, lines * (k + 1) // parts), parts)
+
+def by_rows(task: Callable[[int, int], Any], lines: int, points: int) -> list[Any]:
+    """What task(first, last + 1) returns for parts of so many lines, of so many points in all, by the crew if these are many."""
+    if points < FEWEST:
+        return [task(0, lines)]
+    parts = min(PARTS, lines)
+    return crew().run(lambda k: task(lines * k // parts, lines * (k + 1) // parts), parts)
 
 
 def crew() -> Crew:

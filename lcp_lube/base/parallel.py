@@ -8,7 +8,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from .crew import FEWEST, crew
+from .crew import FEWEST, by_rows
 
 Array = NDArray[np.float64]
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -110,7 +110,7 @@ def once(a: NDArray) -> NDArray:
 
 def _of_parts(task: Callable[[NDArray], Any], a: NDArray) -> list[Any]:
     """The task's result for an array, or by several threads those for the parts of a large one."""
-    return [task(a)] if a.size < FEWEST else crew().rows(lambda start, end: task(a[start:end]), len(a), a.size)
+    return [task(a)] if a.size < FEWEST else by_rows(lambda start, end: task(a[start:end]), len(a), a.size)
 
 
 def _over(one: bool) -> Reduce:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.compiled import has_numba
-from ...base.crew import crew
+from ...base.crew import by_rows, crew
 from ...base.parallel import Array, Reduce
 from ...registry import SMALL
 from ..grid import Grid
@@ -71,7 +71,7 @@ def states(reduce: Reduce, p: Array, r: Array) -> tuple[NDArray[np.bool_], NDArr
     cavity, switching = (np.empty(p.shape, dtype=bool) for _ in range(2))
     p_max = reduce.largest(p)
     look = lambda a, b: loop_states(p[a:b], r[a:b], p_max, VOID, EMPTY, cavity[a:b], switching[a:b])  # noqa: E731
-    crew().rows(look, p.size, p.size)
+    by_rows(look, p.size, p.size)
     return cavity, switching
 
 

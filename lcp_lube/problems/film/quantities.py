@@ -9,7 +9,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from ...base.crew import crew
+from ...base.crew import by_rows
 from ...base.parallel import Array
 from ..strips import Scaled, apart
 from .cavity import cavitated
@@ -192,7 +192,7 @@ def largest_of(
 
     Of equals, to within the tolerance of a solve, the first in x and then y, whatever the ranks.
     """
-    parts = crew().rows(lambda a, b: -values[a:b].min(axis=0) if opposite else values[a:b].max(axis=0), len(y), len(y) * len(x))
+    parts = by_rows(lambda a, b: -values[a:b].min(axis=0) if opposite else values[a:b].max(axis=0), len(y), len(y) * len(x))
     columns = np.max(parts, axis=0)
     largest = problem.reduce.max(columns)
     if not np.isfinite(largest):

@@ -19,6 +19,8 @@ from ...base.parallel import Array
 from ...problems.film.cell_loops import carried
 from .waiting import await_part, fetch, write
 
+SHIFT = 8  # columns: as many as memory deals with at once, which two threads are not to write to in turn
+
 
 @kernel
 def sweep(
@@ -39,12 +41,15 @@ def sweep(
     Three at a time: the second one follows the first two lines behind, the third one the second. The values are those of
     sweeps one after the other, but memory is passed over once, and three chains of dependent operations overlap. ring: the
     ends of a line are neighbours, and each line that is done brings its frame up to date. part, done, west : of several threads
-    (`crew`) which columns are this one's, the lines that each has done, and what arrives from the last columns of each.
+    (`crew`) which columns are this one's, the lines that each has done, and what arrives from the last columns of each. The
+    second sweep's parts begin SHIFT columns west of the first one's, and so on: what they need to the east is their own then,
+    and no part waits for the next one, but lest it be more lines ahead than `west` has room for.
     """
     ny, nx = z.shape[0] - 2, z.shape[1] - 2
     step, first = (-1, ny) if down else (1, 1)
     parts = 1 if done is None else done.shape[0]
     start, end, taken = nx * part // parts + 1, nx * (part + 1) // parts + 1, 0
+    left, right = SHIFT if part else 0, SHIFT if part + 1 < parts else 0
     at = start - 1 if part else start  # the first column of what follows: the last one of the part before
     t, over, g = np.zeros((3, nx + 2)), np.zeros((5, nx + 2)), np.zeros((5, nx + 2))
     for before in range(0, count, 3):
@@ -52,24 +57,25 @@ def sweep(
         for s in range(ny + 2 * (fused - 1)):
             m = first + step * s
             if s < ny:
-                diagonals(kx, ky, m, at, end, over, g, s % 5, carry)
-            if done is not None:
-                await_part(done, part + 1, taken - 1)
+                diagonals(kx, ky, m, at - (fused - 1) * left, end, over, g, s % 5, carry)
+            if done is not None and west is not None:
+                await_part(done, part + 1, taken + 1 - west.shape[1])
                 await_part(done, part - 1, taken + 1)
             for k in range(fused):
                 if 0 <= s - 2 * k < ny:
-                    arriving(z, kx, ky, c, m - 2 * k * step, at, end, t, k, carry)
+                    arriving(z, kx, ky, c, m - 2 * k * step, at - k * left, end - k * right, t, k, carry)
                     if west is not None and part:
-                        t[k, at] = west[part - 1, taken % west.shape[1], k]
+                        t[k, at - k * left] = west[part - 1, taken % west.shape[1], k]
                     if carry is not None:
                         pass_on_part(t, k, g, (s - 2 * k) % 5, carry, m - 2 * k * step, end)
             if carry is None:
-                pass_on(t, g, s % 5, (s - 2) % 5, (s - 4) % 5, z, kx, ky, c, m + step, m + 2 * step, at, end)
+                pass_on(t, g, s % 5, (s - 2) % 5, (s - 4) % 5, z, kx, ky, c, m + step, m + 2 * step, at, end, left, right)
             for k in range(fused):
                 if 0 <= s - 2 * k < ny:
-                    settle(t, k, over, (s - 2 * k) % 5, z, m - 2 * k * step, start, end, ring)
+                    settle(t, k, over, (s - 2 * k) % 5, z, m - 2 * k * step, start - k * left, end - k * right, ring)
             if done is not None and west is not None:
-                west[part, taken % west.shape[1], :3] = t[:, end - 1]
+                for k in range(3):
+                    west[part, taken % west.shape[1], k] = t[k, end - k * right - 1]
                 taken += 1
                 write(done, part, taken)
 
@@ -105,14 +111,16 @@ def arriving(
 @piece
 def pass_on(
     t: Array, g: Array, g1: int, g2: int, g3: int,
-    z: Array, kx: Array, ky: Array, c: Array, after: int, beyond: int, at: int, end: int,
+    z: Array, kx: Array, ky: Array, c: Array, after: int, beyond: int, at: int, end: int, left: int, right: int,
 ) -> None:  # fmt: skip
     """Add to each point's t what arrives from the west: void as it is, of a pressure t over the diagonal what the face lets.
 
-    Each step waits for the one before. Meanwhile memory is asked for what the next row, `after`, needs.
+    Each step waits for the one before. Meanwhile memory is asked for what the next row, `after`, needs. left, right : how far
+    west of a sweep's ends those of the next one are.
     """
-    w1, w2, w3 = t[0, at], t[1, at], t[2, at]
-    for i in range(np.uint32(at + 1), np.uint32(end)):
+    stop = end - 2 * right
+    w1, w2, w3 = t[0, at], along(t, 1, g, g2, at - left, at + 1), along(t, 2, g, g3, at - 2 * left, at + 1)
+    for i in range(np.uint32(at + 1), np.uint32(stop)):
         if i % 8 == 1:
             fetch(z, beyond, i)
             fetch(kx, after, i)
@@ -127,6 +135,18 @@ def pass_on(
             w2 = t[1, i] + w2 * (g[g2, i] if w2 > 0.0 else 1.0)
             w3 = t[2, i] + w3 * (g[g3, i] if w3 > 0.0 else 1.0)
         t[0, i], t[1, i], t[2, i] = w1, w2, w3
+    along(t, 0, g, g1, stop - 1, end)
+    along(t, 1, g, g2, stop - 1, end - right)
+
+
+@piece
+def along(t: Array, k: int, g: Array, slot: int, first: int, end: int) -> float:
+    """The same of one sweep alone, in the columns behind the first; what arrives at the last."""
+    w = t[k, first]
+    for i in range(np.uint32(first + 1), np.uint32(end)):
+        w = t[k, i] + w * (g[slot, i] if w > 0.0 else 1.0)
+        t[k, i] = w
+    return w
 
 
 @piece

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.compiled import kernel, piece
-from ...base.crew import crew
+from ...base.crew import by_rows
 from ...base.parallel import Array
 from . import held
 from .kernels import balance_at
@@ -30,6 +30,11 @@ class Mixing:
         self._level = level
         self._room = np.zeros((0, 2, 0, 0))  # z and residual of each; rows of the frame are not kept
         self._order: list[int] = []  # where iterates lie, the newest last
+
+    @property
+    def begun(self) -> bool:
+        """Whether iterates are kept, as some cycle has been slow."""
+        return bool(self._order)
 
     def forget(self) -> None:
         self._order = []
@@ -88,7 +93,7 @@ class Mixing:
 
 
 def _by_rows(task: Callable[[int, int], Any], z: Array) -> list[Any]:
-    return crew().rows(lambda start, end: task(start + 1, end + 1), z.shape[0] - 2, z.size)
+    return by_rows(lambda start, end: task(start + 1, end + 1), z.shape[0] - 2, z.size)
 
 
 @kernel

@@ -10,7 +10,7 @@ from numba.extending import intrinsic
 from ...base.compiled import piece
 from ...base.parallel import Array
 
-SLOTS, LINE = 4, 8  # lines that a part may be ahead of the next one, and numbers in a cache line
+SLOTS, LINE = 16, 8  # lines that a part may be ahead of the next one, and numbers in a cache line
 PATIENCE = 500  # looks at what another thread has done, before its place on a core is offered to others
 
 give_way = types.ExternalFunction("sched_yield", types.int32())
