@@ -1,13 +1,16 @@
 """What a cycle of nonlinear multigrid does on a film's grids: sweeps, the way down and the way up (`driver`)."""
 
+from math import ceil
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 
 from ...problems.film.lubrication import LubricationProblem
 from .cycles import Cycles
 
 BORDER = 4  # lines on either side of the border between two ranks
+RARE = 0.75  # times that sweeps at fronts relax a point in the mean, where these are rare
 
 
 class FilmCycles(Cycles):
@@ -36,6 +39,16 @@ class FilmCycles(Cycles):
             level.share(level.z)
         if level.held is not None:
             level.z[level.held] = level.given
+        if k + 1 < self._depth and self._rare(level, self._levels[k + 1]):
+            self._relax_fronts(level, 0.5)
+
+    def _rare(self, level: Any, coarse: Any) -> bool:
+        """Whether fronts, seen on the coarse grid, are so few that a start is to have sweeps there. Collective.
+
+        What they carry away from the front is smooth, and the coarse grid's business.
+        """
+        rare = level.carry is None and level.held is None and coarse.near <= RARE
+        return bool(level.comm.allreduce(rare, MPI.LAND)) if level.split else rare
 
     def _solve_coarsest(self, k: int) -> None:
         level, self._correction = self._levels[k], 0.0
@@ -84,16 +97,22 @@ class FilmCycles(Cycles):
             self._relax_fronts(level)
         self._relax(level, o.post, True)
 
-    def _relax_fronts(self, level: Any) -> None:
-        """Sweeps near the fronts; in a time step, in which these have moved by some cells, twice as many twice as far."""
-        front, width = ((1 if level.carry is None else 2) * n for n in (self.options.front, self.options.width))
+    def _relax_fronts(self, level: Any, part: float = 1.0) -> None:
+        """Sweeps near the fronts; in a time step, in which these have moved by some cells, twice as many twice as far.
+
+        part : of the sweeps, where all are not needed.
+        """
+        front, width = ((1 if level.carry is None else 2) * n for n in (ceil(part * self.options.front), self.options.width))
         # What lies beyond a periodic side, or is another rank's, must be new every sweep or two: else fronts across it wander.
         ring, often = level.periodic[0], level is self._levels[0] or level.carry is not None or level.held is not None
         parts = front if level.periodic[1] else (front + 1) // 2 if level.split else 1
+        work = 0
         for n, count in enumerate(front // parts + (n < front % parts) for n in range(parts)):
             how = (count, width, level.carry, level.held, level.slips, ring, n + 1 < parts, often)
-            level.work += self._loops.relax_front(level.z, level.kx, level.ky, level.c, *how)
+            work += self._loops.relax_front(level.z, level.kx, level.ky, level.c, *how)
             level.share(level.z)
+        level.work += work
+        level.near = work / (level.nx * (level.z.shape[0] - 2))
 
     def _relax(self, level: Any, sweeps: int, down: bool) -> None:
         """Sweeps without a word between them; then, where other ranks go on, once more over the lines that border on theirs.

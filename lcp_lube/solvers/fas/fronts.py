@@ -12,6 +12,7 @@ REACH = 8  # cells within which a cavity ends, if it does so at the front that i
 RARE, WIDER = 0.1, 5  # part of the points that a strip this many times as wide may take
 VERY = 0.2  # and the part of that, of a strip which is then made twice as wide once more
 OVER, LAST = 1.8, 2  # overrelaxation of the sweeps near fronts, but for so many that leave smooth what remains
+DENSE = 0.5  # part of the points beyond which half as many sweeps do
 AHEAD = 2  # rows for whose points memory is asked before their turn
 FUSED = 5  # sweeps that go over rows in one pass
 NEAR = 16  # points between two runs of a row that cost less than a loop of its own for each
@@ -122,7 +123,7 @@ def relax_front(
 
     Where fronts are rare, and strips of twice or WIDER times the width take in less than a tenth of the points, it is these;
     often : swept twice as often then. Only in steady films without supplies the sweeps overrelax, and strips are more than
-    twice as wide.
+    twice as wide. Where most points are near a front they are swept half as often: coarse grids, not fronts, are in want there.
 
     done, near : of the blocks of lines into which large grids are divided, every second one first, then those between, so that
     no two neighbours are at work at once: how often each has been swept, and its points in both strips; thread : the one of so
@@ -142,6 +143,8 @@ def relax_front(
         count, width = (2 * count, 2 * wider * width) if very else (count, 2 * width if points <= 0.5 * wider * rare else width)
         spans, at, own = spans_of_blocks(seen, width, ring, thread, threads, blocks)
         looks, points = 2, together(own, thread, threads, done, near, 2)
+    if points > DENSE * ny * nx:
+        count = (count + 1) // 2
     if held is not None:
         spans, at = without(spans, at, held)
     of_row, work = first_spans(spans, at, ny), np.empty((4, nx + 2))

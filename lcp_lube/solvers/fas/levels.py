@@ -39,6 +39,7 @@ class Level:
         their pressures, the runs of free points, and the held points that the next coarser grid sees beside their place.
     look : what has been seen of the conductances (`looked`); ways : weights of interpolation in films with steps (`steps`).
     factors : of the coarsest grid's Jacobian, and the signs of z that they are of (`coarsest`).
+    near : how often this rank's points were relaxed by the last sweeps at fronts, in the mean.
     """
 
     nx: int
@@ -67,6 +68,7 @@ class Level:
     ways: NDArray[np.float32] | None = None
     look: tuple[float, float, float] | None = None
     factors: tuple[Array, NDArray[np.int8]] | None = None
+    near: float = np.inf
     visits: int = 0
     seconds: float = 0.0
     work: float = 0.0  # relaxed points

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...base.crew import FEWEST, PARTS, crew
+from ...base.crew import FEWEST, PARTS, by_rows, crew
 from ...base.parallel import Array
 from ...problems.film.reynolds import BoxScheme
 from ...problems.film.strip import by_lines
@@ -37,10 +37,10 @@ def sweep(z: Array, *others: Any) -> None:
 def relax_front(z: Array, *others: Any) -> int:
     """`fronts.relax_front`, of a large grid in blocks, whose number does not depend on the threads."""
     blocks = 1 if z.size < FEWEST else min(PARTS, z.shape[0] - 2)
-    threads = min(crew().threads, (blocks + 1) // 2)
+    threads = 1 if blocks == 1 else min(crew().threads, (blocks + 1) // 2)
     done, near = np.zeros((blocks, LINE), dtype=np.int64), np.zeros((2, blocks), dtype=np.int64)
     sweep_blocks = lambda k: fronts.relax_front(*(z, *others, k, threads, done, near))  # noqa: E731
-    return int(crew().run(sweep_blocks, threads, together=True)[0])
+    return int(sweep_blocks(0) if threads == 1 else crew().run(sweep_blocks, threads, together=True)[0])
 
 
 def norms(z: Array, *others: Any) -> Array:
@@ -65,7 +65,7 @@ def make_ways(kx: Array, ky: Array, out: Any, y0: int) -> None:
 def coarsen_steps(kx: Array, ky: Array, ways: Any, out_x: Array, out_y: Array, *flags: Any) -> None:
     """`steps.coarsen`, dealt out by the rows that are written to."""
     given = (kx, ky, ways, out_x, out_y, *flags)
-    crew().rows(lambda start, end: steps.coarsen(*(*given, start, end)), out_x.shape[0], kx.size)
+    by_rows(lambda start, end: steps.coarsen(*(*given, start, end)), out_x.shape[0], kx.size)
 
 
 def look(kx: Array, ky: Array) -> tuple[float, float, int]:
@@ -99,7 +99,7 @@ def restrict(z: Array, kx: Array, ky: Array, c: Array, out: Array, *others: Any)
         out[start:end] = 0.0
         transfer.restrict(*(z, kx, ky, c, out, *others, start, end))
 
-    crew().rows(give, out.shape[0], z.size)
+    by_rows(give, out.shape[0], z.size)
 
 
 def pressure_and_void(z: Array, scheme: BoxScheme, grid: Grid) -> Fields:
@@ -116,9 +116,9 @@ def void(z: Array, scheme: BoxScheme, grid: Grid, r: Array) -> None:
 
 
 def _by_rows(task: Any, z: Array) -> list[Any]:
-    return crew().rows(lambda start, end: task(start + 1, end + 1), z.shape[0] - 2, z.size)
+    return by_rows(lambda start, end: task(start + 1, end + 1), z.shape[0] - 2, z.size)
 
 
 def _into(out: Array, z: Array, loop: Any, *given: Any) -> None:
     """Dealt out by the rows that are written to, within the frame; z : has as many points as are read."""
-    crew().rows(lambda start, end: loop(*given, start, end), out.shape[0] - 2, z.size)
+    by_rows(lambda start, end: loop(*given, start, end), out.shape[0] - 2, z.size)
