@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from lcp_lube import InputError, load_scene, solve
+from lcp_lube.problems.film.fronts import _rises_through
 from lcp_lube.problems.film.peak import Window
+from lcp_lube.problems.film.shapes import Along, Block, Sum
 from lcp_lube.problems.grid import Grid
 
 WEDGE = {
@@ -108,6 +110,34 @@ def test_a_front_from_side_to_side():
     np.testing.assert_allclose(places[20, -1.0], WEDGE["L"] - places[20, 1.0], atol=1e-12)
     coarse, fine = (np.median(np.abs(places[n, 1.0] - places[95, 1.0]) / WEDGE["L"]) for n in (20, 40))
     assert coarse < 1.5e-3 and fine < 1e-3  # a few hundredths of a spacing
+
+
+def bisected(film, level, a, b, y):
+    """Where the film first grows to a level, by the first of four parts at whose end it has, again and again."""
+    for _ in range(25):
+        ends = a[:, None] + (b - a)[:, None] * np.array([0.25, 0.5, 0.75, 1.0])
+        thick = film(ends, y[:, None]) >= level[:, None]
+        thick[:, -1] = True
+        first, row = thick.argmax(axis=1), np.arange(a.size)
+        a, b = np.where(first > 0, ends[row, first - 1], a), ends[row, first]
+    return b
+
+
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("count", [3, 500])
+def test_where_a_film_grows_to_a_level(seed, count):
+    """Waves, level parts and steps, that are told and that are not; levels below and above all of the film too."""
+    rng = np.random.default_rng(seed)
+    at, far = np.sort(rng.uniform(0.0, 1.0, 6)), 10.0 ** rng.uniform(-4, 2)
+    wave = Along("sinusoid", 1e-6, 1e-6 * (1 + rng.choice([0.0, 3.0])), 0.0, far, waves=rng.uniform(0.5, 3))
+    steps = [Block(1e-6 * rng.uniform(-0.4, 5), (far * a, far * b), (-np.inf, np.inf)) for a, b in at.reshape(3, 2)]
+    film = Sum((wave, *steps))
+    untold = film if seed % 2 else lambda x, y: film(x, y)
+    a = rng.uniform(0.0, far, count)
+    b, y = a + far * 10.0 ** rng.uniform(-4, -1.5, count), np.zeros(count)
+    level = rng.choice([1.0, 0.5, 20.0], count, p=[0.8, 0.1, 0.1]) * film(rng.uniform(a, b), y)
+    place = _rises_through(untold, level, a, b, y)
+    assert np.abs(place - bisected(film, level, a, b, y)).max() <= 1e-11 * (b - a).max() + 5e-12 * far
 
 
 def test_films_without_fronts():

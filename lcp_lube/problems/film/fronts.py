@@ -229,15 +229,15 @@ def _rises_through(film: Film, level: Array, a: Array, b: Array, y: Array) -> Ar
     jumps = np.unique([*jumps_of(film, "x"), np.inf])
     jump = jumps[np.searchsorted(jumps, a)]
     last, x, high = b, a, film(b, y)
-    before, never = film(a, y) >= level, high < level
+    before = film(a, y) >= level
     with np.errstate(invalid="ignore", divide="ignore"):  # a film that is level there leads nowhere
         for _ in range(SECANTS):
             here = film(x, y)
             last, x, high = x, x - (here - level) * (last - x) / (high - here), here
     jumps_there = jump <= b + ON_EDGE * far
     near = far * np.where(jumps_there, ON_EDGE, NEAR)
-    x = np.where(before, a, np.where(never, b, np.where(jumps_there, jump, x)))
-    rest = ~(before | never | ((a < x) & (x <= b + near) & (film(x - near, y) < level) & (film(x + near, y) >= level)))
+    x = np.where(before, a, np.where(jumps_there, jump, x))
+    rest = ~(before | ((a < x) & (x <= b + near) & (film(x - near, y) < level) & (film(x + near, y) >= level)))
     if rest.any():
         a, b, places = a[rest], b[rest], (level[rest], y[rest])
         for _ in range(12 if a.size < MANY else 24):

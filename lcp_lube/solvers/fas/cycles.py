@@ -78,7 +78,7 @@ class Cycles(Method):
             self._cycle(k, "V")
 
     def _cycle(self, k: int, kind: str) -> None:
-        """One cycle from level k down and back; L: an F cycle that goes down but once from its finest grid. Collective."""
+        """One cycle from level k down and back. Collective."""
         level = self._levels[k]
         level.visits += 1
         begin = perf_counter()
@@ -87,8 +87,8 @@ class Cycles(Method):
         else:
             self._descend(k)
             level.seconds += perf_counter() - begin
-            self._cycle(k + 1, "F" if kind == "L" else kind)
-            if kind not in ("V", "L") and k + 2 < self._depth:
+            self._cycle(k + 1, kind)
+            if kind != "V" and k + 2 < self._depth:
                 self._cycle(k + 1, "V" if kind == "F" else kind)
             begin = perf_counter()
             self._ascend(k)

@@ -38,7 +38,6 @@ FEW = 0.05  # part of a ring's line that is full, below which it is hardly fed
 FED = 3e-5  # of the certificate's tolerance: the flow that a film with supplies may lose, 3e-12 in parts of what flows
 SLOW, EARLY = 0.15, 0.16  # a cycle whose iterates are mixed leaves more than that; two cycles, where coarse grids mislead
 VAIN = 0.5  # and two cycles, where it is corrections that are cut off at fronts
-LIGHT = 0.09  # part that a cycle leaves above which the next one goes down once, while none has been slow
 SLOWER, LEAST_FALL = 2.5, (0.07, 0.2)  # times what an F cycle leaves is what a V cycle does in its place; at least, in time too
 
 
@@ -203,16 +202,11 @@ class Fas(FilmCycles):
         return self._mixing is not None and level.nx * level.ny > OWN and self.norm > EARLY * self._recent[1]
 
     def _kind(self) -> str:
-        """Of the next cycle: a V cycle in place of an F cycle where that will do, as the last one; one that goes down once where
-        cycles leave much, but none too much: there fronts in many cells are in want of more, not what coarse grids answer for.
-        """
+        """Of the next cycle: a V cycle in place of an F cycle where that will do, as the last one."""
         level, least = self._levels[0], LEAST_FALL[self._levels[0].carry is not None]
-        fall = self.norm / (self._recent[-1] or inf)
-        last = SLOWER * max(fall, least) * self.norm <= self._rest and (level.carry is not None or level.held is None)
-        if self.options.cycle != "F":
-            return self.options.cycle
-        at_ease = self._mixing is not None and not self._mixing.begun
-        return "V" if last else "L" if at_ease and LIGHT < fall < SLOW else "F"
+        expected = SLOWER * max(self.norm / (self._recent[-1] or inf), least) * self.norm
+        last = expected <= self._rest and (level.carry is not None or level.held is None)
+        return "V" if last and self.options.cycle == "F" else self.options.cycle
 
     @property
     def _hardly_fed(self) -> bool:

@@ -31,11 +31,6 @@ class Mixing:
         self._room = np.zeros((0, 2, 0, 0))  # z and residual of each; rows of the frame are not kept
         self._order: list[int] = []  # where iterates lie, the newest last
 
-    @property
-    def begun(self) -> bool:
-        """Whether iterates are kept, as some cycle has been slow."""
-        return bool(self._order)
-
     def forget(self) -> None:
         self._order = []
 
