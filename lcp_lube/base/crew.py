@@ -59,7 +59,7 @@ class Crew:
 
 
 def by_rows(task: Callable[[int, int], Any], lines: int, points: int) -> list[Any]:
-    """What task(first, last + 1) returns for parts of so many lines, of so many points in all, by the crew if these are many."""
+    """What task(first, last + 1) returns for parts of so many lines, of so many points in all: the crew's work if many."""
     if points < FEWEST:
         return [task(0, lines)]
     parts = min(PARTS, lines)

@@ -89,7 +89,9 @@ class Reduce:
         """`min` and `max`; large arrays are read once."""
         if not a.size:
             return self.min(a), self.max(a)
-        ends = _of_parts(lambda part: (part.min(axis=0).min(), part.max(axis=0).max()), once(a))
+        ends = _of_parts(lambda part: (float(part.min(axis=0).min()), float(part.max(axis=0).max())), once(a))
+        if self.comm.size == 1 and len(ends) == 1:
+            return ends[0]
         low, high = np.transpose(ends)
         return self.min(low), self.max(high)
 

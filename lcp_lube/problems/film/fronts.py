@@ -220,8 +220,8 @@ def first_cavity(grid: Grid, ruptures: list[float], reformations: list[float]) -
 def _rises_through(film: Film, level: Array, a: Array, b: Array, y: Array) -> Array:
     """Where the film first grows to a level between a and b: at a jump too; a or b where it does not.
 
-    Once the place is known to a sixteenth it is at the jump that the film tells there, or where secants lead to; looks on either
-    side of it say whether it is. Where it is not, bisection goes on, to 50 bits.
+    Once known to a sixteenth the place is at the jump that the film tells there, or where secants lead to; looks on either side
+    of it say whether it is. Where it is not, bisection goes on, to 50 bits.
     """
     far, places = np.abs(b).max(initial=0.0), (level, y)
     for _ in range(2):
