@@ -143,7 +143,7 @@ def relax_front(
         count, width = (2 * count, 2 * wider * width) if very else (count, 2 * width if points <= 0.5 * wider * rare else width)
         spans, at, own = spans_of_blocks(seen, width, ring, thread, threads, blocks)
         looks, points = 2, together(own, thread, threads, done, near, 2)
-    if points > DENSE * ny * nx:
+    if plain and points > DENSE * ny * nx:
         count = (count + 1) // 2
     if held is not None:
         spans, at = without(spans, at, held)
