@@ -211,9 +211,10 @@ def factor(J: Array, b: int) -> bool:
             if part != 0.0:
                 part /= pivot
                 J[k + r, b - r] = part
-                above, below = J[k], J[k + r]
-                for q in range(1, end + 1):
-                    below[b - r + q] -= part * above[b + q]
+                # Rows by their numbers, columns unsigned: no views, and vector instructions (`kernels.diagonals`).
+                above, below, to, at = np.uint32(k), np.uint32(k + r), np.uint32(b - r), np.uint32(b)
+                for q in range(np.uint32(1), np.uint32(end + 1)):
+                    J[below, to + q] -= part * J[above, at + q]
     return True
 
 
