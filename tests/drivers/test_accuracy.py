@@ -239,8 +239,9 @@ def test_grids_that_an_estimate_leaves_out():
     assert rungs_up([math.inf, math.inf, 9e-2], 1e-2, False, 2) == 2
     assert rungs_up([math.inf, math.inf, 1.1e-2], 1e-2, False, 2) == 1
     assert rungs_up([5e-2], 1e-2, True, 1) == 1 and rungs_up([1e-4], 1e-8, True, 1) == 7
-    assert rungs_up([math.inf], 1e-2, False, 2, True) == rungs_up([math.inf, 5e-2], 1e-2, False, 2, True) == 2
-    assert rungs_up([math.inf, 1.4e-2], 1e-2, False, 2, True) == 1  # twice the points
+    assert rungs_up([math.inf], 1e-2, False, 2, True) == 2  # half the spacing
+    assert rungs_up([math.inf, 1.9e-2], 1e-2, False, 2, True) == 1  # twice the points
+    assert rungs_up([math.inf, 2.1e-2], 1e-2, False, 2, True) == 2
     assert rungs_up([math.inf, 4e-3], 1e-4, False, 2, True) == rungs_up([math.inf, 5e-2], 1e-4, False, 2, True) == 5
     assert rungs_up([math.inf, 1.5e-2, 1.1e-2], 1e-2, False, 2, True) == 1
     assert rungs_up([math.inf, 4e-2], 1e-2, False, 2, True) == rungs_up([math.inf, 9e-2, 4e-2], 1e-2, False, 2, True) == 2

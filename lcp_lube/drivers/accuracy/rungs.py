@@ -8,7 +8,7 @@ from ...scenes.scene import Solvable
 
 COARSEST = {1: 12, 2: 4}  # points a side at least on the first grid
 FEW = {1: 12, 2: 100}  # points of the first grid at least: coarser ones cost as much, and tell less
-JUMP, NEARLY = 1, 0.5  # doublings of the points a side at once, and part of a rung that is not worth one more
+JUMP, NEARLY = 1, 0.5  # doublings of the points a side at once, and part of a rung that is not worth one more (of three grids)
 FAR = 5  # rungs at once where two grids give an estimate
 LOOSE, MOST_FIRST = 1e-2, 2  # a tolerance for which two grids tell most from the first one on; rungs above it at most
 ASYMPTOTIC = 0.1  # an estimate below it falls by second order at best
@@ -53,13 +53,14 @@ def rungs_up(estimates: Sequence[float], tol: float, known: bool, dim: int, pair
     (of three grids, or of one whose error is known) falls by second order; of several at most JUMP doublings of the points a
     side.
 
-    pairs : two grids give an estimate, for the first one best with half the spacing on the second; at most FAR rungs.
+    pairs : two grids give an estimate, for the first one best with half the spacing on the second; at most FAR rungs. There
+        another grid after a near miss costs more than a rung too many.
     """
     if pairs and not (len(estimates) >= 2 and estimates[-1] < ASYMPTOTIC):
         return dim
     if not (known or pairs or len(estimates) >= 3) or not estimates[-1] < ASYMPTOTIC:
         return 1
-    up = max(1, ceil(dim * log2(estimates[-1] / tol) / 2.0 - NEARLY))
+    up = max(1, ceil(dim * log2(estimates[-1] / tol) / 2.0 - (0.0 if pairs else NEARLY)))
     return up if known else min(up, FAR if pairs else dim * JUMP)
 
 
