@@ -4,7 +4,6 @@ from math import ceil
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
 from ...problems.film.lubrication import LubricationProblem
 from .cycles import Cycles
@@ -47,8 +46,9 @@ class FilmCycles(Cycles):
 
         What they carry away from the front is smooth, and the coarse grid's business.
         """
-        rare = level.carry is None and level.held is None and coarse.near <= RARE
-        return bool(level.comm.allreduce(rare, MPI.LAND)) if level.split else rare
+        if level.carry is not None or level.held is not None:
+            return False
+        return (coarse.comm.allreduce(coarse.near) if coarse.split else coarse.near) <= RARE
 
     def _solve_coarsest(self, k: int) -> None:
         level, self._correction = self._levels[k], 0.0
@@ -112,7 +112,7 @@ class FilmCycles(Cycles):
             work += self._loops.relax_front(level.z, level.kx, level.ky, level.c, *how)
             level.share(level.z)
         level.work += work
-        level.near = work / (level.nx * (level.z.shape[0] - 2))
+        level.near = work / (level.nx * level.ny)
 
     def _relax(self, level: Any, sweeps: int, down: bool) -> None:
         """Sweeps without a word between them; then, where other ranks go on, once more over the lines that border on theirs.

@@ -39,7 +39,7 @@ class Level:
         their pressures, the runs of free points, and the held points that the next coarser grid sees beside their place.
     look : what has been seen of the conductances (`looked`); ways : weights of interpolation in films with steps (`steps`).
     factors : of the coarsest grid's Jacobian, and the signs of z that they are of (`coarsest`).
-    near : how often this rank's points were relaxed by the last sweeps at fronts, in the mean.
+    near : how many points this rank relaxed in the last sweeps at fronts, over all of the grid's.
     """
 
     nx: int
