@@ -223,21 +223,24 @@ def _rises_through(film: Film, level: Array, a: Array, b: Array, y: Array) -> Ar
     Once known to a sixteenth the place is at the jump that the film tells there, or where secants lead to; looks on either side
     of it say whether it is. Where it is not, bisection goes on, to 50 bits.
     """
-    far, places = np.abs(b).max(initial=0.0), (level, y)
+    far, places, first, end = np.abs(b).max(initial=0.0), (level, y), a, b
     for _ in range(2):
         a, b = _narrowed(film, *places, a, b, 4)
     jumps = np.unique([*jumps_of(film, "x"), np.inf])
     jump = jumps[np.searchsorted(jumps, a)]
     last, x, high = b, a, film(b, y)
     before = film(a, y) >= level
-    with np.errstate(invalid="ignore", divide="ignore"):  # a film that is level there leads nowhere
+    with np.errstate(all="ignore"):
         for _ in range(SECANTS):
             here = film(x, y)
-            last, x, high = x, x - (here - level) * (last - x) / (high - here), here
+            ahead = x - (here - level) * (last - x) / (high - here)
+            # A film that is level there leads nowhere, and none need be known beyond the two ends.
+            last, x, high = x, np.where(np.isfinite(ahead), np.clip(ahead, a, b), a), here
     jumps_there = jump <= b + ON_EDGE * far
     near = far * np.where(jumps_there, ON_EDGE, NEAR)
     x = np.where(before, a, np.where(jumps_there, jump, x))
-    rest = ~(before | ((a < x) & (x <= b + near) & (film(x - near, y) < level) & (film(x + near, y) >= level)))
+    west, east = (film(np.clip(x + shift, first, end), y) >= level for shift in (-near, near))
+    rest = ~(before | ((a < x) & (x <= b + near) & ~west & east))
     if rest.any():
         a, b, places = a[rest], b[rest], (level[rest], y[rest])
         for _ in range(12 if a.size < MANY else 24):
