@@ -243,8 +243,9 @@ def _rises_through(film: Film, level: Array, a: Array, b: Array, y: Array) -> Ar
     rest = ~(before | ((a < x) & (x <= b + near) & ~west & east))
     if rest.any():
         a, b, places = a[rest], b[rest], (level[rest], y[rest])
-        for _ in range(12 if a.size < MANY else 24):
-            a, b = _narrowed(film, *places, a, b, 16 if a.size < MANY else 4)  # fewer calls, or fewer places
+        n = 16 if a.size < MANY else 4  # fewer calls, or fewer places
+        for _ in range(48 // (n.bit_length() - 1)):
+            a, b = _narrowed(film, *places, a, b, n)
         x[rest] = b
     return x
 

@@ -9,7 +9,7 @@ from ...problems.film.lubrication import LubricationProblem
 from .cycles import Cycles
 
 BORDER = 4  # lines on either side of the border between two ranks
-RARE = 0.75  # times that sweeps at fronts relax a point in the mean, where these are rare
+SELDOM = 0.75  # times that sweeps at fronts relax a point in the mean, up to which a start has them too
 
 
 class FilmCycles(Cycles):
@@ -48,7 +48,7 @@ class FilmCycles(Cycles):
         """
         if level.carry is not None or level.held is not None:
             return False
-        return (coarse.comm.allreduce(coarse.near) if coarse.split else coarse.near) <= RARE
+        return (coarse.comm.allreduce(coarse.near) if coarse.split else coarse.near) <= SELDOM
 
     def _solve_coarsest(self, k: int) -> None:
         level, self._correction = self._levels[k], 0.0

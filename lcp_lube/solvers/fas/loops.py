@@ -45,7 +45,7 @@ def relax_front(z: Array, *others: Any) -> int:
 
 def norms(z: Array, *others: Any) -> Array:
     """`kernels.norms` of all rows."""
-    return np.sum(_by_rows(lambda start, end: kernels.norms(*(z, *others, start, end)), z), axis=0)
+    return np.sum(by_inner_rows(lambda start, end: kernels.norms(*(z, *others, start, end)), z), axis=0)
 
 
 def inject(z: Array, out: Array, *others: Any) -> None:
@@ -70,26 +70,26 @@ def coarsen_steps(kx: Array, ky: Array, ways: Any, out_x: Array, out_y: Array, *
 
 def look(kx: Array, ky: Array) -> tuple[float, float, int]:
     """`starts.look` of all rows: the means of the x and of the y faces' conductances, and the number of steps."""
-    found = np.sum(_by_rows(lambda start, end: starts.look(*(kx, ky, start, end)), kx), axis=0)
+    found = np.sum(by_inner_rows(lambda start, end: starts.look(*(kx, ky, start, end)), kx), axis=0)
     ny, nx = kx.shape[0] - 2, ky.shape[1] - 2
     return float(found[0] / (ny * (nx + 1))), float(found[1] / ((ny + 1) * nx)), int(found[2])
 
 
 def add_balance(z: Array, *others: Any) -> None:
-    _by_rows(lambda start, end: kernels.add_balance(*(z, *others, start, end)), z)
+    by_inner_rows(lambda start, end: kernels.add_balance(*(z, *others, start, end)), z)
 
 
 def correct(z: Array, *others: Any) -> float:
-    return sum(_by_rows(lambda start, end: transfer.correct(*(z, *others, start, end)), z))
+    return sum(by_inner_rows(lambda start, end: transfer.correct(*(z, *others, start, end)), z))
 
 
 def correct_steps(z: Array, *others: Any) -> float:
     """`steps.correct` of all rows."""
-    return sum(_by_rows(lambda start, end: steps.correct(*(z, *others, start, end)), z))
+    return sum(by_inner_rows(lambda start, end: steps.correct(*(z, *others, start, end)), z))
 
 
 def interpolate(z: Array, *others: Any) -> None:
-    _by_rows(lambda start, end: starts.interpolate(*(z, *others, start, end)), z)
+    by_inner_rows(lambda start, end: starts.interpolate(*(z, *others, start, end)), z)
 
 
 def restrict(z: Array, kx: Array, ky: Array, c: Array, out: Array, *others: Any) -> None:
@@ -115,7 +115,8 @@ def void(z: Array, scheme: BoxScheme, grid: Grid, r: Array) -> None:
     each_strip(grid, lambda rows: kernels.void(z[rows], by_lines(scheme.rows(rows), "b_C"), r[rows]))
 
 
-def _by_rows(task: Any, z: Array) -> list[Any]:
+def by_inner_rows(task: Any, z: Array) -> list[Any]:
+    """`by_rows` of an array's rows within its frame."""
     return by_rows(lambda start, end: task(start + 1, end + 1), z.shape[0] - 2, z.size)
 
 

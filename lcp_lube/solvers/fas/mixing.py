@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.compiled import kernel, piece
-from ...base.crew import by_rows
 from ...base.parallel import Array
 from . import held
 from .kernels import balance_at
+from .loops import by_inner_rows
 
 KEPT = 4  # iterates, the newest among them
 GAIN = 0.5  # part of ||G|| that a mixture has to promise: what it costs, and what fronts take of it
@@ -49,7 +49,7 @@ class Mixing:
         if not promised <= GAIN**2 * own:
             return False
         order = np.array(self._order)
-        _by_rows(lambda start, end: mix(z, self._room, order, weights, start, end), z)
+        by_inner_rows(lambda start, end: mix(z, self._room, order, weights, start, end), z)
         level.share(z)
         sweep_fronts(level)
         if self._look() < own:
@@ -68,14 +68,14 @@ class Mixing:
         self._order.append(next(k for k in range(KEPT) if k not in self._order))
         given = level.z, level.kx, level.ky, level.c, level.carry, self._room[self._order[-1]]
         level.work += level.nx * (level.z.shape[0] - 2)
-        return float(self._sum(_by_rows(lambda start, end: np.array(look(*given, start, end)), level.z)))
+        return float(self._sum(by_inner_rows(lambda start, end: np.array(look(*given, start, end)), level.z)))
 
     def _weights(self) -> tuple[Array, float, float]:
         """Of all iterates but the newest, which has the rest of 1; what they leave where all signs agree; and at how many
         points these do not."""
         level, order = self._level, np.array(self._order)
         n = len(order) - 1
-        found = self._sum(_by_rows(lambda start, end: products(self._room, order, start, end), level.z))
+        found = self._sum(by_inner_rows(lambda start, end: products(self._room, order, start, end), level.z))
         level.work += level.nx * (level.z.shape[0] - 2)
         A, b = found[:n, :n], found[:n, n]
         scale = np.where(np.diag(A) > 0.0, np.sqrt(np.diag(A)), 1.0)
@@ -85,10 +85,6 @@ class Mixing:
     def _sum(self, parts: list[Array]) -> Array:
         total, level = np.sum(parts, axis=0), self._level
         return total if level.comm is None else level.comm.allreduce(total)
-
-
-def _by_rows(task: Callable[[int, int], Any], z: Array) -> list[Any]:
-    return by_rows(lambda start, end: task(start + 1, end + 1), z.shape[0] - 2, z.size)
 
 
 @kernel
