@@ -24,16 +24,15 @@ from ..base.parallel import Array
 from ..problems.facts import Facts
 from ..problems.film.cavity import missing_flow
 from ..problems.film.edges import jumps_of
+from ..problems.film.halves import half
 from ..problems.film.lubrication import LubricationProblem
-from ..problems.film.model import Coefficients, Model, Side
-from ..problems.film.supplies import Supply
+from ..problems.film.model import Model, Side
 from ..problems.grid import EVEN, Grid, some_places
 from ..problems.solution import Fields, Problem
 from ..problems.strips import STRIP
 from ..problems.transfer import numbers
 from ..scenes.moving import film_of
 from ..scenes.scene import Derived, Solvable
-from .plan import FEW
 
 SAME = 1e-12  # relative difference that coordinates' rounding leaves between two values of one film
 CUBED = 16.0  # the same of conductances, in multiples of SAME; where rims cut faces they were found to differ by 8
@@ -84,7 +83,7 @@ class Part(Derived):
         return self.whole.shape[:1] if self.kind == "line" else self.whole.shape
 
     @cached_property
-    def _model(self) -> tuple[Model, tuple[int, ...]]:
+    def own(self) -> tuple[Model, tuple[int, ...]]:
         """The part's own film, and its grid."""
         model = model_of(self.whole)
         assert model is not None  # as `applies` found
@@ -105,19 +104,21 @@ class Part(Derived):
 
     def grid(self, comm: PETSc.Comm | None = None) -> Grid:
         """The part's points."""
-        model, shape = self._model
+        model, shape = self.own
         return model.grid(shape, comm)
 
     def facts(self, comm: PETSc.Comm | None = None) -> Facts:
-        model, shape = self._model
+        model, shape = self.own
         return replace(model.facts(shape, comm), spread=prod(self.whole.shape))
 
     def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
         """The discrete problem of the part. Collective."""
-        model, shape = self._model
+        model, shape = self.own
         whole = self.problem
-        if self.kind == "mirror" and whole is not None and whole.plain and whole.grid.comm.size == 1 and whole.size <= FEW:
-            return model.build(shape, comm, made=_half(whole, shape[1], model.supplies))
+        if self.kind == "mirror" and whole is not None and whole.plain and whole.grid.comm.size == 1:
+            scheme = half(whole.scheme, shape[1], self.shape[1] % 2 == 1, whole.grid.periodic[1])
+            held = whole.held and replace(whole.held, supplies=model.supplies, owner=whole.held.owner[: shape[1]])
+            return model.build(shape, comm, made=(scheme, held))
         problem = model.build(shape, comm)
         return self.factored(problem, *numbers(problem.grid))
 
@@ -139,20 +140,6 @@ class Part(Derived):
         """Line and column in the part that the owned points of the whole grid are like."""
         j, i = numbers(grid)
         return (0 * j if self.kind == "line" else np.minimum(j, grid.shape[1] - 1 - j)), i
-
-
-def _half(whole: LubricationProblem, lines: int, supplies: tuple[Supply, ...]) -> Coefficients:
-    """Coefficients of a problem's first lines, up to the middle: its last line has half cells, or shut faces."""
-    scheme = whole.scheme.rows(slice(0, lines))
-    part = {name: np.array(getattr(scheme, name)) for name in scheme.arrays}
-    if whole.grid.shape[1] % 2:
-        for name in part.keys() - {"h", "k_S", "k_N"}:
-            part[name][-1] *= 0.5
-    part["k_N"][-1] = 0.0
-    if whole.grid.periodic[1]:
-        part["k_S"][0] = 0.0
-    held = whole.held and replace(whole.held, supplies=supplies, owner=whole.held.owner[:lines])
-    return scheme.changed(**part), held
 
 
 def promising(scene: Solvable) -> bool:

@@ -17,6 +17,7 @@ from petsc4py import PETSc
 from ..base.parallel import Array
 from ..problems.facts import Facts
 from ..problems.film.cavity import cavitated
+from ..problems.film.halves import doubled
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.rims import state_of
@@ -27,6 +28,7 @@ from ..scenes.scene import Derived, Scene, Solvable
 from .ask import Ask
 from .chain import added
 from .compose import Inner
+from .film_part import Part
 from .turned import Mirrored
 
 KNOWN = 1e-4  # ||F|| at which cavities are known: loads move by 1e-9 at most beside those of a first solve to the end
@@ -37,9 +39,14 @@ LAST = ("eps1", "method", "took_over", "system", "recipe", "ksp_type", "pc_type"
 
 @dataclass(frozen=True)
 class Revised(Derived):
-    """A scene with the faces that know cavities made for these, on its own grid."""
+    """A scene with the faces that know cavities made for these, on its own grid.
+
+    mirror : half of it, where that is what is solved: its faces are the other half's too. Made by themselves, two that mirror
+    each other may see a rim on either side of a look.
+    """
 
     dry: Dry
+    mirror: Part | None = None
 
     @cached_property
     def model(self) -> Model:
@@ -52,7 +59,14 @@ class Revised(Derived):
         return self.whole.facts(comm)
 
     def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
-        return self.model.build(self.shape, comm, getattr(self.whole, "grid", None))
+        grid = getattr(self.whole, "grid", None)
+        if self.mirror is None:
+            return self.model.build(self.shape, comm, grid)
+        model, shape = self.mirror.own
+        half = replace(model, dry=self.dry).build(shape, comm)
+        made = doubled(half.scheme, self.shape[1]), None
+        half.destroy()
+        return self.model.build(self.shape, comm, grid, made)
 
 
 def applies(scene: Solvable, ask: Ask) -> bool:
@@ -75,6 +89,14 @@ def _behind(problem: Any, fields: Fields) -> int:
     grid = problem.grid
     p, r = (fields[name].reshape(grid.box)[:, :1] * (grid.x_start == 0) for name in "pr")
     return int(problem.reduce.sum(cavitated(problem.reduce, p.ravel(), r.ravel()).astype(float)))
+
+
+def _mirror(scene: Any, model: Model, first: Solution) -> Part | None:
+    """Half of the film, where it was solved by that, up to a line in the middle."""
+    problem: Any = first.problem
+    found = first.settings["details"].get("reduction") == "mirror" and problem.grid.comm.size == 1
+    plain = model.scheme == "face" and model.U > 0.0 and model.stored is None and not model.supplies
+    return Part(scene, "mirror", problem) if found and plain and scene.shape[1] % 2 else None
 
 
 def _has_corners(problem: Any, state: Array) -> bool:
@@ -109,7 +131,7 @@ def _solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution | None:
     made = (bool(model.cut or behind) and count > 0) or (model.cornered and bool(ask.cavities or _has_corners(problem, state)))
     again = replace(ask, start=first, nested=False, monitor=None, checkpoint=None, resume=None)
     second = (
-        inner(Revised(scene, Dry(state, problem.grid)) if made else scene, again)
+        inner(Revised(scene, Dry(state, problem.grid), _mirror(scene, model, first)) if made else scene, again)
         if made or ask.certify or ask.cavities
         else first
     )

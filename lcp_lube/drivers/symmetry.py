@@ -137,5 +137,7 @@ class _Whole:
             if (by := getattr(small, "factors", None)) is not None and by.at is not None:
                 renew(self.problem, spread(by.at))
             spread.destroy()
+            if hasattr(small, "many"):
+                self.problem.many = small.many
             self._found = self.problem.certify(self.fields, eps1)
         return self._found

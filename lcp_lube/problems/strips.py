@@ -11,7 +11,8 @@ from .grid import Grid, Places, Polar
 
 STRIP, LARGEST = 16_384, 262_144  # points: of the strips of a small grid; and of a large one, which has PARTS at least
 PARTS = 8  # as many for each of two threads or four; each costs Python some 1 ms in a whole run
-MANY = 250_000  # points of a grid from which compiled loops over its strips are worth being loaded
+# Points of a grid from which compiled loops over its strips are worth being loaded; and where others are loaded for it anyway.
+MANY, LOADED = 250_000, 2_000
 
 
 def in_strips(grid: Grid) -> Iterator[slice]:

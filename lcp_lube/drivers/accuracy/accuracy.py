@@ -37,6 +37,7 @@ ALLOWED = (1e-10, 0.5)  # tolerances
 FIRST = 1e-2  # the same of a first grid that tells nothing by itself
 SOON = 3e-3  # a tolerance below which most films in 2D end on grids for multigrid
 WHOLE = {True: 100_000, False: 1500}  # points up to which looking for symmetries costs what it saves, by multigrid or directly
+TWICE = 20_000  # the same by multigrid of a film that is solved twice
 HOPELESS = 1_000_000  # points on which an estimate that has not come down is taken to stay up
 PATIENCE = 6  # grids without a better estimate: rounding dominates
 BLANK = 3  # grids without a value: a finer one is not expected to have it
@@ -117,7 +118,8 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         level_begin, before, earlier = perf_counter(), solution, before
         near = ask.start if before is None else _start(before, prod(shape)) if ask.nested is not False else None
         stopping = _stopping(ask, tol, before) if before is not None or (pairs and not ring) else ask.stopping
-        halved = ask.reduction and (not plane or prod(shape) > WHOLE[loops if before is None else before.asked == "fas"])
+        least = WHOLE[loops if before is None else before.asked == "fas"]
+        halved = ask.reduction and (not plane or prod(shape) > (min(least, TWICE) if rims or corners else least))
         loose = CAVITIES if stopping is not ask.stopping else None
         this = replace(ask, accuracy=None, stopping=stopping, cavities=loose, start=near, nested=False, reduction=halved)
         by_loops = loops and (plane or (line and shape[0] <= ELIMINATED))

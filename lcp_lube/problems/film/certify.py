@@ -9,7 +9,7 @@ import numpy as np
 from ...base.compiled import has_numba
 from ...base.parallel import Array
 from ..certificate import Certificate, certificate_tol
-from ..strips import MANY, each_strip, ghosted
+from ..strips import each_strip, ghosted
 from .flows import volume_unit
 from .graded import Pivots, within_reach
 from .reynolds import side_points
@@ -145,7 +145,7 @@ def misfits(problem: "LubricationProblem", p: Array, r: Array, p_max: float, abo
     """Sums and extremes over all cells. Collective."""
     reduce, grid, nx, nothing = problem.reduce, problem.grid, problem.grid.box[1], np.zeros((0, 0), dtype=bool)
     framed = [ghosted(grid, field, 0.0) for field in (p, r)]
-    many = problem.held is None and grid.size >= MANY and has_numba()
+    many = problem.held is None and grid.size >= problem.many and has_numba()
     if many:
         from .cell_loops import loop_misfits
 

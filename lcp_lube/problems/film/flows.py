@@ -10,7 +10,7 @@ import numpy as np
 from ...base.compiled import has_numba
 from ...base.parallel import Array, once
 from ..grid import Grid
-from ..strips import MANY, apart, each_strip, places_of
+from ..strips import apart, each_strip, places_of
 from .cavity import cavitated
 from .edges import Around, pairs, strips
 from .reynolds import BoxScheme, sides
@@ -91,7 +91,7 @@ def friction(problem: LubricationProblem, p_pa: Array, r: Array, lever: Array | 
         along = lever[rows] if isinstance(lever, np.ndarray) else lever
         return float(np.sum(sum(drag(part, part.scheme, p_pa[rows].ravel(), r[rows].ravel())) * along))
 
-    if runs(problem, MANY):
+    if runs(problem, problem.many):
         of_film = drag_sum(problem, *apart(p_pa), r, lever)
     else:
         of_film = sum(each_strip(grid, add_up)) if alone else add_up(slice(0, grid.box[0]))

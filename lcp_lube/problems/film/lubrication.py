@@ -14,7 +14,7 @@ from ...base.parallel import Array
 from ..certificate import Certificate
 from ..grid import Grid
 from ..solution import Fields
-from ..strips import ghosted
+from ..strips import MANY, ghosted
 from ..transfer import interpolated
 from .assembly import assemble
 from .certify import certify
@@ -44,7 +44,7 @@ class LubricationProblem:
     """
 
     kind = "lubrication"
-    shares_grid = False  # a time step's with those of the others
+    shares_grid, many = False, MANY  # a time step's with those of the others; points from which compiled loops over cells pay
     plain = True  # whether the coefficients are those of the film alone
     edged = True  # whether the coefficients know edges inside cells; not where mean_cubes
     cornered = False  # whether about corners of recesses faces are made for cavities, and integrals know fronts (`borne`)

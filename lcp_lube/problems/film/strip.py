@@ -101,19 +101,24 @@ def stream_weights(grid: Grid) -> Array:
 
 
 def room(grid: Grid, film: Around, cut: bool, kind: Any) -> tuple[list[Array], list[Array]]:
-    """Room for the conductances of x and y faces and for c, with a frame of zeros, as sweeps want them (`solvers.fas.levels`);
-    and for h at the points and the one before, and for what the wall drags through x faces.
+    """`framed` room for conductances and c, as sweeps want them (`solvers.fas.levels`); and for h at the points and the one
+    before, and for what the wall drags through x faces.
 
     What all lines have in common takes the memory of one, of which each is a view. cut : by round edges, which lines differ in.
     """
-    (ny, nx), framed, out = grid.box, [], []
-    for more, beside in ((2, 3), (3, 2), (2, 2)):
-        framed.append(np.empty((ny + more, nx + beside), dtype=kind))  # its inside is to be filled
-        framed[-1][[0, -1]] = framed[-1][:, [0, -1]] = 0.0
+    (ny, nx), out = grid.box, []
     for even in (True, np.ptp(stream_weights(grid)) == 0.0):
         own = np.zeros((1 if even and film.one_line and not cut else ny, nx + 1), dtype=kind)
         out.append(own if len(own) == ny else np.ndarray((ny, nx + 1), kind, own, 0, (0, own.itemsize)))
-    return framed, out
+    return framed(grid.box, kind), out
+
+
+def framed(box: tuple[int, int], kind: Any = float) -> list[Array]:
+    """Room for the conductances of x and y faces and for c in a frame of zeros, whose inside is to be filled."""
+    arrays = [np.empty((box[0] + more, box[1] + beside), dtype=kind) for more, beside in ((2, 3), (3, 2), (2, 2))]
+    for a in arrays:
+        a[[0, -1]] = a[:, [0, -1]] = 0.0
+    return arrays
 
 
 def dragged(void: Array, weight: Array | None, U: float) -> Array:

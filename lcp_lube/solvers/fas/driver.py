@@ -19,6 +19,7 @@ from ...base.parallel import Array
 from ...problems.film.certify import filled
 from ...problems.film.lubrication import LubricationProblem
 from ...problems.solution import Fields, Step
+from ...problems.strips import LOADED
 from ...registry import ELIMINATED
 from ..job import Job
 from ..method_options import one_of, option
@@ -70,6 +71,7 @@ class Fas(FilmCycles):
         from . import coarsest, finest, following, kernels, levels, loops, mixing
 
         self._kernels, self._loops, self._tools, self._finest, self._coarsest = kernels, loops, levels, finest, coarsest
+        problem.many = LOADED
         self._harmonic, self._truncation = options.weights == "harmonic", TRUNCATIONS[options.truncation]
         follows = start is not None and following.foreseen(problem, start["p"])
         with self.stages("assembly"):
