@@ -280,6 +280,8 @@ def _all_close(problem: LubricationProblem, pairs: list[tuple[Array, Any]], tol:
         lines, b = max(1, STRIP // a.shape[1]), np.broadcast_to(b, a.shape)
         for j in range(0, a.shape[0], lines):
             own, other = a[j : j + lines], b[j : j + lines]
+            if np.array_equal(own, other):  # as those of films that are the same along y are
+                continue
             worst = max(worst, float(np.max(np.abs(own - other) > tol * np.abs(other))))
             if worst:
                 break

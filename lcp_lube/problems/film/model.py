@@ -150,7 +150,7 @@ class Model:
         ranks, held = (comm or PETSc.COMM_WORLD).getSize(), bool(self.supplies)
         told = {"held": held, "moving": self.stored is not None, "free": self.stored is not None and self.stored.exact}
         plane = len(shape) == 2 and self.polar is None
-        alike = plane and one_line(self.film) and self.lines(shape)[1] is None
+        alike = plane and one_line(self.film) and self.lines(shape, (False, True))[1] is None
         return Facts("lubrication", tuple(shape), ranks, periodic, **told, alike=alike)
 
     @property
