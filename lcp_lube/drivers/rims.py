@@ -92,9 +92,10 @@ def _behind(problem: Any, fields: Fields) -> int:
 
 
 def _mirror(scene: Any, model: Model, first: Solution) -> Part | None:
-    """Half of the film, where it was solved by that, up to a line in the middle."""
+    """Half of the film, where it was solved by that, up to a line in the middle: what its faces are made of is all there."""
     problem: Any = first.problem
     found = first.settings["details"].get("reduction") == "mirror" and problem.grid.comm.size == 1
+    found = found and not problem.grid.periodic[1]  # faces between the last and the first line are in neither half
     plain = model.scheme == "face" and model.U > 0.0 and model.stored is None and not model.supplies
     return Part(scene, "mirror", problem) if found and plain and scene.shape[1] % 2 else None
 

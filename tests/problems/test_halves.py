@@ -65,6 +65,16 @@ def test_the_whole_is_its_half_twice(name):
         one.destroy()
 
 
+@pytest.mark.parametrize("name", ["pocket", "ring of lines", "round"])
+def test_the_problem_that_half_of_was_solved_is_whole(name):
+    scene = load_scene(*FILMS[name]).with_shape((33, 35))
+    reduced, whole = solve(scene), solve(scene, reduction=False)
+    assert reduced.settings["details"]["reduction"] == "mirror" and "revised" in reduced.settings["details"]
+    alike(reduced.problem.scheme, whole.problem.scheme)
+    reduced.destroy()
+    whole.destroy()
+
+
 @pytest.mark.parametrize("form", ["round", "square"])
 def test_faces_made_for_cavities_are_as_symmetric_as_the_film(form, monkeypatch):
     """On 239 points looks lie on rims, by rounding on the one side of it here and on the other in the mirror image."""
