@@ -86,6 +86,40 @@ def test_an_exception_is_a_traceback_and_status_1(tmp_path: Path) -> None:
         assert end.err.startswith("Traceback") and end.err.endswith("ZeroDivisionError: division by zero\n")
 
 
+ENDS = """
+import atexit, ctypes, sys, threading, time
+atexit.register(print, "atexit")
+threading.Thread(target=lambda: (time.sleep(0.1), print("thread"))).start()
+print("begin")
+sys.stdout.flush()
+ctypes.CDLL(None).puts(b"of C's streams")
+"""
+
+
+@needs_forks
+@pytest.mark.parametrize(
+    "end", ["", "sys.exit()", "sys.exit(3)", "sys.exit(-1)", "sys.exit(300)", "sys.exit('why')", "raise KeyboardInterrupt"]
+)
+def test_an_end_is_that_of_a_new_process(tmp_path: Path, end: str) -> None:
+    """Threads are waited for, what is registered for the end is called, all streams are written."""
+    (tmp_path / "ends.py").write_text(ENDS + end)
+    forked, new = both([str(tmp_path / "ends.py")], tmp_path)
+    assert forked.status == new.status and forked.err.splitlines()[-1:] == new.err.splitlines()[-1:]
+    assert sorted(forked.out.splitlines()) == sorted(new.out.splitlines()) == ["atexit", "begin", "of C's streams", "thread"]
+
+
+@needs_forks
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
+def test_output_that_cannot_be_written_is_an_error_at_the_end(tmp_path: Path) -> None:
+    with open("/dev/full", "w") as full:
+        ends = [
+            subprocess.run([*how, "-c", "print(1)"], env=ENVIRONMENT, stdout=full, stderr=subprocess.PIPE, text=True)
+            for how in (python(), [sys.executable])
+        ]
+    forked, new = ends
+    assert forked.returncode == new.returncode != 0 and all("No space left" in end.stderr for end in ends)
+
+
 @needs_forks
 def test_nothing_is_shared_but_imports(tmp_path: Path) -> None:
     """MPI and PETSc start in the child, with its options; random numbers are its own."""
