@@ -4,7 +4,7 @@ import copy
 import gc
 import json
 import pickle
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +47,21 @@ def test_a_misspelt_argument_is_said_to_be_one() -> None:
 def small(name: str) -> Solution:
     lobes = {"nx": 60, "ny": 5} if name in ("three_lobe_journal", "tilting_pad_journal") else {"n": 24}  # they need whole pads
     return solve(name, **{**lobes, **marches.SMALL.get(name, {})})
+
+
+@pytest.fixture(scope="module")
+def answers() -> Iterator[Callable[[str], Solution]]:
+    """`small` solutions for those that only read them: each is solved for once."""
+    known: dict[str, Solution] = {}
+
+    def answer(name: str) -> Solution:
+        if name not in known:
+            known[name] = small(name)
+        return known[name]
+
+    yield answer
+    for solution in known.values():
+        solution.destroy()
 
 
 @pytest.fixture(scope="module")
@@ -118,8 +133,8 @@ def test_fields_are_arrays_in_si(film: Solution) -> None:
 
 
 @pytest.mark.parametrize("name", [name for name in scene_names() if name not in ("ehl_line", "obstacle_ball")])
-def test_fields_with_the_points_of_the_sides(name: str) -> None:
-    solution = small(name)
+def test_fields_with_the_points_of_the_sides(name: str, answers: Callable[[str], Solution]) -> None:
+    solution = answers(name)
     for field, (values, _) in solution.problem.physical(solution.fields).items():
         inner = values.reshape(solution.problem.grid.box)
         whole = np.atleast_2d(solution.field(field, boundary=True))
@@ -130,7 +145,6 @@ def test_fields_with_the_points_of_the_sides(name: str) -> None:
             assert np.all(whole[lines, 0] == solution.problem.p_sides[0] + solution.problem.p_c)
         if name in ("bratu", "obstacle_bratu") and field == "v":
             assert not whole[0].any() and not whole[:, -1].any()
-    solution.destroy()
 
 
 def test_periodic_and_closed_sides_go_on() -> None:
@@ -151,13 +165,13 @@ def test_without_sides_there_is_no_boundary() -> None:
 
 
 @pytest.mark.parametrize("name", scene_names())
-def test_every_number_has_a_unit(name: str) -> None:
+def test_every_number_has_a_unit(name: str, answers: Callable[[str], Solution]) -> None:
     """Numbers of a film that are not dimensionless have one; those of dimensionless problems have none."""
-    with small(name) as s:
-        assert set(s.numbers) <= set(s.units)
-        if isinstance(s.problem, LubricationProblem):
-            numbers = {"cavitated_fraction", "friction_coefficient", "sommerfeld", "side_leakage_number", "eccentricity", "S"}
-            assert {key for key in s.numbers if not s.units[key]} <= numbers
+    s = answers(name)
+    assert set(s.numbers) <= set(s.units)
+    if isinstance(s.problem, LubricationProblem):
+        numbers = {"cavitated_fraction", "friction_coefficient", "sommerfeld", "side_leakage_number", "eccentricity", "S"}
+        assert {key for key in s.numbers if not s.units[key]} <= numbers
 
 
 def test_saved_and_drawn(film: Solution, tmp_path: Path) -> None:
@@ -244,7 +258,8 @@ def test_without_destroy_petsc_objects_go_with_the_solution() -> None:
 @pytest.mark.parametrize("name", ["problem1", "problem4", "ring_journal", "ehl_line", "obstacle_ball", "bratu", "squeeze"])
 def test_freed_solutions_still_answer(name, tmp_path):
     """PETSc's handles are gone after `with`: what needs one makes it again, and nothing ends the process."""
-    with solve(name, n=15) as s:
+    few = {"n": 15, **marches.SMALL.get(name, {})}
+    with solve(name, **few) as s:
         expected = s.quantities
     assert s.quantities == expected and repr(s) and dir(s)
     with pytest.raises(AttributeError, match="no such_thing"):
@@ -257,5 +272,5 @@ def test_freed_solutions_still_answer(name, tmp_path):
         assert s.problem.certify(s.fields, 1e-8).holds
     again = pickle.loads(pickle.dumps(s))
     assert again.quantities["outcome"] == "converged"
-    with solve(name, n=15, start=s) as warm:
+    with solve(name, **few, start=s) as warm:
         assert warm.converged
