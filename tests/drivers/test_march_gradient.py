@@ -19,12 +19,12 @@ from lcp_lube.scenes.scene import load_scene
 from lcp_lube.scenes.values import values_of, with_values
 
 PUSH = ["2000*exp(-400*(mod(50*t,1)-0.1)^2)", "900.0"]
-TEXTURE = {"t_end": 0.01, "steps": 7}
-FREE = {"t_end": 0.002, "steps": 4, "free": True, "mass": 15.0, "load": PUSH}
+TEXTURE = {"t_end": 0.01, "steps": 5}
+FREE = {"t_end": 0.002, "steps": 3, "free": True, "mass": 15.0, "load": PUSH}
 AT = {"position": 2e-7, "velocity": 1e-5}
 PADS = {"balance": None, "nx": 8, "ny": 4}
 ROCKED = {"set": {"h_offset": "2e-6*sin(800*t)"}, "pad_inertia": 1e-4}
-ON_A_COURSE = {"t_end": 0.002, "steps": 5, "journal": ["0.5 + 0.2*cos(400*t)", "0.2*sin(400*t)"]}
+ON_A_COURSE = {"t_end": 0.002, "steps": 4, "journal": ["0.5 + 0.2*cos(400*t)", "0.2*sin(400*t)"]}
 SUPPLIES = [
     {"x_mm": [12.3, 14.1], "restrictor": "capillary", "K": 1e-11, "p_s": 8e6, "backflow": True},
     {"x_mm": [2.1, 2.9], "flow": 2e-6},
@@ -184,7 +184,7 @@ def test_films_of_all_steps_at_once_are_those_step_by_step(U, monkeypatch):
     with solve(scene, watch=trace) as solution:
         course = Course(scene, trace, solution.problem.grid.petsc_comm)
         found = march_films.films_of(course)
-        assert march_films._at_once(course, np.zeros((1, 2))).shape == (7, 2)
+        assert march_films._at_once(course, np.zeros((1, 2))).shape == (5, 2)
         monkeypatch.setattr(march_films, "_at_once", lambda course, places: np.zeros((0, 0)))
         others = march_films.films_of(course)
     assert all(np.array_equal(getattr(found, name), value) for name, value in vars(others).items())
