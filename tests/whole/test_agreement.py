@@ -30,7 +30,7 @@ def small(name):
     if name == "squeeze":
         steps |= {"steps": 12}  # of any length: its film ruptures late
     elif motion:
-        steps |= {"motion.steps": 12, "motion.t_end": motion.t_end * 12 / motion.steps}
+        steps |= {"motion.steps": 6, "motion.t_end": motion.t_end * 24 / motion.steps}  # longer ones: all end with cavities
     for factor in (8, 4, 2):
         few = [max(9, (n + 1) // factor - 1) for n in shape]
         try:
