@@ -36,7 +36,7 @@ test: $(READY) ## ruff, mypy, then all tests
 
 # Beside mypy, once for a clone: else two processes of tests compile the same at the same time.
 loops: $(READY)
-	for words in "solve obstacle_bratu" "sensitivity journal" "coefficients journal"; do \
+	for words in "solve obstacle_bratu" "solve problem4" "sensitivity journal" "coefficients journal"; do \
 	  $(BIN)/lcp-lube $$words --method fas > /dev/null || exit; done
 
 # Following every line takes half as long again as the tests.
