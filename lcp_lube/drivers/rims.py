@@ -17,7 +17,6 @@ from petsc4py import PETSc
 from ..base.parallel import Array
 from ..problems.facts import Facts
 from ..problems.film.cavity import cavitated
-from ..problems.film.halves import doubled
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.rims import state_of
@@ -62,6 +61,8 @@ class Revised(Derived):
         grid = getattr(self.whole, "grid", None)
         if self.mirror is None:
             return self.model.build(self.shape, comm, grid)
+        from ..problems.film.halves import doubled  # here: half of few small films is solved
+
         model, shape = self.mirror.own
         half = replace(model, dry=self.dry).build(shape, comm)
         made = doubled(half.scheme, self.shape[1]), None
