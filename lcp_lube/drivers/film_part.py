@@ -26,6 +26,7 @@ from ..problems.film.cavity import missing_flow
 from ..problems.film.edges import jumps_of
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model, Side
+from ..problems.film.strip import half
 from ..problems.grid import EVEN, Grid, some_places
 from ..problems.solution import Fields, Problem
 from ..problems.strips import STRIP
@@ -115,8 +116,6 @@ class Part(Derived):
         model, shape = self.own
         whole = self.problem
         if self.kind == "mirror" and whole is not None and whole.plain and whole.grid.comm.size == 1:
-            from ..problems.film.halves import half  # here: few small films have one
-
             scheme = half(whole.scheme, shape[1], self.shape[1] % 2 == 1, whole.grid.periodic[1])
             held = whole.held and replace(whole.held, supplies=model.supplies, owner=whole.held.owner[: shape[1]])
             return model.build(shape, comm, made=(scheme, held))

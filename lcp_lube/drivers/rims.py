@@ -21,6 +21,7 @@ from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.rims import state_of
 from ..problems.film.stored import Dry
+from ..problems.film.strip import doubled
 from ..problems.solution import Fields, Solution
 from ..scenes.moving import film_of, motion_of
 from ..scenes.scene import Derived, Scene, Solvable
@@ -61,8 +62,6 @@ class Revised(Derived):
         grid = getattr(self.whole, "grid", None)
         if self.mirror is None:
             return self.model.build(self.shape, comm, grid)
-        from ..problems.film.halves import doubled  # here: half of few small films is solved
-
         model, shape = self.mirror.own
         half = replace(model, dry=self.dry).build(shape, comm)
         made = doubled(half.scheme, self.shape[1]), None

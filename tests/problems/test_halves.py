@@ -7,9 +7,9 @@ import pytest
 
 import lcp_lube.drivers.film_part as film_part
 from lcp_lube import load_scene, solve
-from lcp_lube.problems.film.halves import doubled
 from lcp_lube.problems.film.rims import state_of
 from lcp_lube.problems.film.stored import Dry
+from lcp_lube.problems.film.strip import doubled
 
 POCKET = [
     {"shape": "linear", "h_start_um": 2.4, "h_end_um": 2.0},
