@@ -64,7 +64,7 @@ class Revised(Derived):
             return self.model.build(self.shape, comm, grid)
         model, shape = self.mirror.own
         half = replace(model, dry=self.dry).build(shape, comm)
-        made = doubled(half.scheme, self.shape[1]), None
+        made = doubled(half.scheme), None
         half.destroy()
         return self.model.build(self.shape, comm, grid, made)
 

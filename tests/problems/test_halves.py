@@ -60,7 +60,7 @@ def test_the_whole_is_its_half_twice(name):
     model, shape = film_part.Part(scene, "mirror", problem).own
     half = replace(model, dry=dry).build(shape)
     whole = replace(scene.model, dry=dry).build(scene.shape)
-    alike(doubled(half.scheme, 35), whole.scheme)
+    alike(doubled(half.scheme), whole.scheme)
     for one in (half, whole, found):
         one.destroy()
 

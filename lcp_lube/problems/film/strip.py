@@ -102,24 +102,19 @@ def stream_weights(grid: Grid) -> Array:
 
 
 def room(grid: Grid, film: Around, cut: bool, kind: Any) -> tuple[list[Array], list[Array]]:
-    """`framed` room for conductances and c, as sweeps want them (`solvers.fas.levels`); and for h at the points and the one
-    before, and for what the wall drags through x faces.
+    """Room for the conductances of x and y faces and for c, with a frame of zeros, as sweeps want them (`solvers.fas.levels`);
+    and for h at the points and the one before, and for what the wall drags through x faces.
 
     What all lines have in common takes the memory of one, of which each is a view. cut : by round edges, which lines differ in.
     """
-    (ny, nx), out = grid.box, []
+    (ny, nx), framed, out = grid.box, [], []
+    for more, beside in ((2, 3), (3, 2), (2, 2)):
+        framed.append(np.empty((ny + more, nx + beside), dtype=kind))  # its inside is to be filled
+        framed[-1][[0, -1]] = framed[-1][:, [0, -1]] = 0.0
     for even in (True, np.ptp(stream_weights(grid)) == 0.0):
         own = np.zeros((1 if even and film.one_line and not cut else ny, nx + 1), dtype=kind)
         out.append(own if len(own) == ny else np.ndarray((ny, nx + 1), kind, own, 0, (0, own.itemsize)))
-    return framed(grid.box, kind), out
-
-
-def framed(box: tuple[int, int], kind: Any = float) -> list[Array]:
-    """Room for the conductances of x and y faces and for c in a frame of zeros, whose inside is to be filled."""
-    arrays = [np.empty((box[0] + more, box[1] + beside), dtype=kind) for more, beside in ((2, 3), (3, 2), (2, 2))]
-    for a in arrays:
-        a[[0, -1]] = a[:, [0, -1]] = 0.0
-    return arrays
+    return framed, out
 
 
 def dragged(void: Array, weight: Array | None, U: float) -> Array:
@@ -211,8 +206,8 @@ def half(whole: Any, lines: int, on_line: bool, ring: bool) -> Any:
 
     ring : the lines before the first are the last ones, which are left out.
     """
-    (kx, ky, c), scheme = framed((lines, whole.h.shape[1])), whole.rows(slice(0, lines))
-    kx[1:-1, 1:-2], kx[1:-1, -2], ky[1:-2, 1:-1], c[1:-1, 1:-1] = scheme.k_W, scheme.k_E[:, -1], scheme.k_S, scheme.c
+    scheme = whole.rows(slice(0, lines))
+    kx, ky, c = frames(scheme.k_W, scheme.k_E, scheme.k_S, scheme.k_N, scheme.c)  # copies: the whole's frames hold more lines
     ky[-2] = 0.0
     if ring:
         ky[1] = 0.0
@@ -221,18 +216,16 @@ def half(whole: Any, lines: int, on_line: bool, ring: bool) -> Any:
     return _assembled(scheme, kx, ky, c, lambda a, kept=False: _last_line(np.array(a), 0.5) if on_line and not kept else a)
 
 
-def doubled(part: Any, lines: int) -> Any:
+def doubled(part: Any) -> Any:
     """The whole film's scheme from its half's, which ends on the middle one of an odd number of lines."""
-    (kx, ky, c), n = framed((lines, part.h.shape[1])), len(part.h)
 
     def mirrored(a: Array, kept: bool = False) -> Array:
         own = _last_line(np.array(a), 1.0 if kept else 2.0)
         return np.concatenate([own, own[-2::-1]])
 
-    kx[1:-1, 1:-2], kx[1:-1, -2], c[1:-1, 1:-1] = mirrored(part.k_W), mirrored(part.k_E[:, -1:])[:, 0], mirrored(part.c)
-    ky[1 : n + 1, 1:-1] = part.k_S
-    ky[n + 1 : -1, 1:-1] = part.k_S[::-1]
-    return _assembled(part, kx, ky, c, mirrored)
+    across = np.concatenate([part.k_S, part.k_S[::-1]])
+    k_W, k_E, c = (mirrored(a) for a in (part.k_W, part.k_E, part.c))
+    return _assembled(part, *frames(k_W, k_E, across[:-1], across[1:], c), mirrored)
 
 
 def _last_line(a: Array, times: float) -> Array:
