@@ -24,6 +24,7 @@ from ..base.parallel import Array
 from ..linear.system import System, make_system
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Fields, Step
+from ..registry import SMALL
 from .job import Job
 from .method import Method
 from .method_options import MethodOptions, least, part, positive
@@ -44,7 +45,8 @@ LEAST = 1e-15  # p_unit: a largest pressure below this is rounding
 class ActiveSetOptions(MethodOptions):
     """patience: steps without a fall of ||G|| by 10 % before sweeps take over; give_up: steps after which it is taken to
     cycle; p0: p of the full film at the start (p_unit); rtol: smallest relative tolerance of iterative inner solves; sweeps:
-    of relaxation before the first step from a given start, and after each step; 0: none at all, also when stalled."""
+    of relaxation before the first step from a given start that has a front, and after each step, but not where a direct solver
+    steps on a film in the plane so small that a step costs less than what it would save; 0: none at all, also when stalled."""
 
     method = "active-set"
     p0: float = positive(1.0, "--p0")
@@ -73,7 +75,9 @@ class ActiveSet(Method):
         self.z = self.form.z(start) if start else np.where(self._left_behind(), -options.p0, options.p0)
         self._look()
         self._relaxation: Relaxation | None = relaxation(problem) if options.sweeps else None
-        self._sweeps = options.sweeps if start else 0
+        cheap = self.system.direct and problem.grid.dim == 2 and problem.grid.size <= SMALL  # loading numba takes 0.5 s
+        fronts = bool(start) and problem.reduce.min(self.z) < 0.0
+        self._sweeps = options.sweeps if fronts and not cheap else 0
         self._relax(self._sweeps)
         self._best, self._stalled, self._rescue, self._vain, self._taken = self.norm, 0, RESCUE_SWEEPS, 0, 0
 

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 from lcp_lube import load_scene, solve
 from lcp_lube.problems.certificate import Certificate, certificate_tol
+from lcp_lube.problems.film import certify
 from lcp_lube.problems.film.cell_loops import loop_misfits
-from lcp_lube.problems.film.certify import cell_misfits, misfits
+from lcp_lube.problems.film.certify import cell_misfits, misfits, p_error, surely_empty
 from lcp_lube.problems.film.flows import friction
 from lcp_lube.problems.film.strip import frames
 
@@ -138,6 +139,28 @@ def test_where_next_to_nothing_flows_through(name):
         with np.errstate(all="ignore"):
             assert not found.problem.certify({"p": spoil(p), "r": r}, 1e-8).holds, damage
     assert not found.problem.certify({"p": p, "r": r + 0.01}, 1e-8).holds
+    found.destroy()
+
+
+EMPTY = {"shape": "linear", "h_start": 1e-6, "h_end": 3e-6}
+STARVED = [EMPTY, {"shape": "pocket", "depth": 1e-6, "x": [0.003, 0.006]}]  # narrower behind it, but not than where it begins
+
+
+@pytest.mark.parametrize("dimension", [1, 2])
+@pytest.mark.parametrize(
+    "film, surely", [(EMPTY, True), (STARVED, True), ({**EMPTY, "h_end": 1e-6}, False), (FED["film"], False)]
+)
+def test_films_that_are_surely_empty(film, surely, dimension, monkeypatch):
+    """Their voids say that there is no pressure: no factorisation is asked, which says the same."""
+    size = {"dimension": 2, "n": 9, "sides": {"west": 0.0, "east": 0.0, "south": 0.0, "north": 0.0}} if dimension == 2 else {}
+    found = solve(load_scene({**FED, "U": 1.0, "film": film, "sides": {"west": 0.0, "east": 0.0}, **size}), method="active-set")
+    problem, p, r = found.problem, found.fields["p"], found.fields["r"]
+    assert found.converged and surely_empty(problem, p, r) == surely
+    assert not surely_empty(problem, p + 1e-12, r) and not surely_empty(problem, 0.0 * p, np.roll(r, 1) + 0.01)
+    if surely:
+        assert p_error(problem, p, r) == 0.0
+        monkeypatch.setattr(certify, "surely_empty", lambda *_: False)
+        assert p_error(problem, p, r) == 0.0
     found.destroy()
 
 

@@ -125,6 +125,8 @@ def p_error(problem: "LubricationProblem", p: Array, r: Array) -> float:
     solution is what `Pivots` make of this answer. Films and voids are known to one rounding, and so is what the wall drags:
     where pressures are far below what it could build up, that may be all that they are.
     """
+    if surely_empty(problem, p, r):
+        return 0.0
     reduce = problem.reduce
     try:
         pivots = Pivots(problem, p, r, noisy=True)
@@ -139,6 +141,20 @@ def p_error(problem: "LubricationProblem", p: Array, r: Array) -> float:
     off = float(np.maximum(reduce.max(np.abs(p - pivots.p)) - reduce.max(pivots.noise), 0.0))  # NaN stays NaN
     largest = max(reduce.max(pivots.p), max(problem.p_sides) / problem.p_unit) or 1.0
     return off / largest
+
+
+def surely_empty(problem: "LubricationProblem", p: Array, r: Array) -> bool:
+    """Whether p = 0, and no void is so small that the balance's defects, all carried to it, would fill it: then the exact voids
+    are positive, too, and no pressure anywhere is the solution. Collective.
+
+    By columns of B, b_i |r_i - r*_i| is at most the sum of the defects upstream; on a ring there is no upstream.
+    """
+    if problem.grid.periodic[0] or problem.reduce.largest(p):
+        return False
+    s = problem.scheme
+    stored = -s.b_C.ravel() * r
+    rounding = 4 * UNIT * (stored + np.abs(s.couette_W).ravel() + np.abs(s.couette_E).ravel())
+    return problem.reduce.sum(np.abs(problem.balance(p, r)) + rounding) < problem.reduce.min(stored)
 
 
 def misfits(problem: "LubricationProblem", p: Array, r: Array, p_max: float, above: float = 0.0) -> Misfits:
