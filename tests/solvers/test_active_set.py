@@ -142,7 +142,7 @@ def test_sweeps_save_steps(name, changes):
     "name, changes", [("dimpled_pad", {"n": 60}), ("herringbone_journal", {"n": 40}), ("lined_pad", {"n": 99})]
 )
 def test_small_films_do_without_sweeps(name, changes, monkeypatch):
-    """From a start: a direct step of a small film costs less than loading the compiler, and without a cavity there is no front."""
+    """From a start: direct steps of small films cost less than loading the compiler; without a cavity there is no front."""
     monkeypatch.setattr("lcp_lube.solvers.relaxation.compiled", None)
     solution = run(name, changes)
     assert solution.converged and solution.settings["method"] == "active-set"
