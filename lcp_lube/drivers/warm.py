@@ -38,10 +38,15 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     return solution
 
 
-def _seeks(scene: Solvable, ask: Ask) -> bool:
-    """Whether a place, a value or an attitude is sought, and there is a neighbour's."""
+def seeks(scene: Solvable, ask: Ask) -> bool:
+    """Whether a place, a value or an attitude is sought."""
     drivers = (DRIVERS[name] for name in SEEKING)
-    return applies(scene, ask) and any(not one.idle(scene) and one.load().applies(scene, ask) for one in drivers)
+    return any(not one.idle(scene) and one.load().applies(scene, ask) for one in drivers)
 
 
-anew = SimpleNamespace(applies=_seeks, solve=solve)  # a driver: as above, all solves of a search together
+def _seeks_near(scene: Solvable, ask: Ask) -> bool:
+    """Whether it is, and there is a neighbour's."""
+    return applies(scene, ask) and seeks(scene, ask)
+
+
+anew = SimpleNamespace(applies=_seeks_near, solve=solve)  # a driver: as above, all solves of a search together

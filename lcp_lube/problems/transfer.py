@@ -27,6 +27,7 @@ class Transfer:
     Parameters
     ----------
     zero_boundary : the field is zero on the boundary: interpolate to that, but at ends through which nothing flows.
+    ahead : of rings along x, how far beyond the place that the coarse one counts x from the fine one does (`turning.ahead`), m.
 
     Attributes
     ----------
@@ -34,7 +35,7 @@ class Transfer:
     coarse_meshes : spacings of the coarse grid from side to side.
     """
 
-    def __init__(self, coarse: Grid, fine: Grid, zero_boundary: bool = False):
+    def __init__(self, coarse: Grid, fine: Grid, zero_boundary: bool = False, ahead: float = 0.0):
         from scipy.sparse import csr_matrix, kron  # here: a solve on one grid does without its import
 
         self.coarse_meshes = coarse.meshes
@@ -42,7 +43,7 @@ class Transfer:
         weights = csr_matrix([[1.0]])
         for side in range(fine.dim):
             points = np.arange(*ranges[side])
-            along = _weights(points, coarse, fine, side, zero_boundary)
+            along = _weights(points, coarse, fine, side, zero_boundary, ahead)
             weights = kron(along, weights, format="csr")
         weights.indices = weights.indices.astype(PETSc.IntType)
         if coarse.comm.size > 1:
@@ -71,19 +72,19 @@ class Transfer:
         self._own.free()
 
 
-def interpolated(coarse: Grid, fine: Grid, field: Array) -> Array:
-    """A field of `coarse` on `fine`. Collective."""
-    if _alike(coarse, fine):
+def interpolated(coarse: Grid, fine: Grid, field: Array, ahead: float = 0.0) -> Array:
+    """A field of `coarse` on `fine`; ahead : as in `Transfer`. Collective."""
+    if _alike(coarse, fine) and not ahead:
         return field.copy()
     if coarse.comm.size == 1:  # no matrix is needed for one field
         values = field.reshape(coarse.box)
         for side, n in enumerate(fine.shape):
-            left, right = _between(np.arange(n), coarse, fine, side)
+            left, right = _between(np.arange(n), coarse, fine, side, ahead)
             before, behind = (np.take(values, _inside(k, coarse, fine, side), axis=1 - side) for k in (left, left + 1))
             part = right if side == 0 else right[:, None]
             values = before + part * (behind - before)
         return values.ravel()
-    transfer = Transfer(coarse, fine)
+    transfer = Transfer(coarse, fine, ahead=ahead)
     values = transfer(field)
     transfer.destroy()
     return values
@@ -98,12 +99,12 @@ def _alike(one: Grid, other: Grid) -> bool:
     )
 
 
-def _weights(points: np.ndarray, coarse: Grid, fine: Grid, side: int, zero_boundary: bool) -> "csr_matrix":
+def _weights(points: np.ndarray, coarse: Grid, fine: Grid, side: int, zero_boundary: bool, ahead: float) -> "csr_matrix":
     """Linear interpolation along one side as a matrix, a row for each of the fine points, a column for each coarse one."""
     from scipy.sparse import csr_matrix
 
     n_coarse = coarse.shape[side]
-    left, right = _between(points, coarse, fine, side)
+    left, right = _between(points, coarse, fine, side, ahead)
     rows = np.concatenate([np.arange(points.size)] * 2)
     columns = np.concatenate([left, left + 1])
     values = np.concatenate([1.0 - right, right])
@@ -122,11 +123,14 @@ def _inside(columns: np.ndarray, coarse: Grid, fine: Grid, side: int) -> np.ndar
     return columns % n if fine.periodic[side] else np.clip(columns, 0, n - 1)
 
 
-def _between(points: np.ndarray, coarse: Grid, fine: Grid, side: int) -> tuple[np.ndarray, np.ndarray]:
+def _between(points: np.ndarray, coarse: Grid, fine: Grid, side: int, ahead: float) -> tuple[np.ndarray, np.ndarray]:
     """Number of the coarse point before each fine one, and the weight of the one behind."""
-    if coarse.places[side] is None and fine.places[side] is None:
+    turned = bool(ahead) and side == 0
+    if coarse.places[side] is None and fine.places[side] is None and not turned:
         return _even_weights(points, coarse, fine, side)
     around, at = coarse.with_neighbours(side), fine.lines[side][points]
+    if turned:
+        at = around[0] + (at + ahead - around[0]) % coarse.lengths[0]
     left = np.clip(np.searchsorted(around, at, side="right") - 1, 0, coarse.shape[side])
     right = (at - around[left]) / (around[left + 1] - around[left])
     # `around` begins with what lies before the first point.

@@ -13,6 +13,7 @@ from ...problems.film.fronts import counted
 from ...problems.film.lubrication import LubricationProblem
 from ...problems.film.strip import stream_weights
 from ...problems.film.turned import TurnedProblem
+from ...problems.film.turning import ahead
 from ...problems.solution import Fields, Problem, Solution
 from ...problems.transfer import interpolated
 from .estimate import INTEGRALS, QUADRATURE, Estimate, estimate, follow, known_line, misplaced_film, of_pair, scalars
@@ -174,7 +175,7 @@ def _change(solution: Solution, before: Solution, quantity: str, value: float) -
         return inf, inf
     coarse: Any = before.problem
     grid = coarse.grid
-    there = interpolated(problem.grid, grid, solution.fields["p"] * problem.p_unit)
+    there = interpolated(problem.grid, grid, solution.fields["p"] * problem.p_unit, ahead(coarse, problem))
     p = before.fields["p"] * coarse.p_unit
     share = np.divide(counted(coarse, p, before.fields["r"]), p, out=np.ones_like(p), where=p > 0.0)
     changed = ((there - p) * share).reshape(grid.box) * (grid.cell * stream_weights(grid)) * grid.widths(0)

@@ -17,6 +17,7 @@ import numpy as np
 from ...base.parallel import Array, Reduce
 from ...errors import InputError
 from ...problems.film.turned import TurnedProblem
+from ...problems.film.turning import ahead
 from ...problems.solution import Solution
 from ...problems.transfer import Transfer
 from ...scenes.scene import Scene
@@ -75,7 +76,7 @@ def goal_error(scene: Scene, solution: Solution, finer: Solution, quantity: str)
             raise InputError(f"quantity {quantity}: it was found; errors by cells are of numbers of the film")
         value, best = (one.equations.report(one.numbers)[quantity] for one in (adjoint, other))
         grid, reduce = adjoint.equations.grid, adjoint.equations.grid.reduce
-        transfer = Transfer(other.equations.grid, grid)
+        transfer = Transfer(other.equations.grid, grid, ahead=ahead(solution.problem, finer.problem))
         G = adjoint.equations.balance(transfer(other.p), transfer(other.r)) / adjoint.flow_unit
         transfer.destroy()
         if (held := adjoint.equations.held) is not None:  # points in a groove have its pressure on any grid

@@ -20,6 +20,7 @@ import numpy as np
 from ...problems.film.effects import Cells, neutral
 from ...problems.film.fluid import Law
 from ...problems.film.model import Model
+from ...problems.film.turning import ahead
 from ...problems.solution import Enclosure, Fields, Outcome, Solution
 from ...problems.transfer import Transfer
 from ...registry import SMALL
@@ -121,7 +122,7 @@ def _taken(loop: Loop, problem: object) -> Cells | None:
         return {name: cells[name] for name in loop.names}
     if grid.dim != own.dim:
         return None
-    transfer = Transfer(grid, own)
+    transfer = Transfer(grid, own, ahead=ahead(loop.base, problem))
     found = {name: transfer(cells[name]) for name in loop.names}
     transfer.destroy()
     return found

@@ -23,7 +23,7 @@ from .integrals import LineIntegrals
 from .quantities import open_pressures, quantities, units
 from .reynolds import BoxScheme, side_points, sides
 from .supplies import Held, Supply, pressed
-from .turning import Shaft
+from .turning import Shaft, ahead
 from .views import LiftedFilm
 
 
@@ -254,7 +254,7 @@ class LubricationProblem:
         H of the coarse grid, where p ~ (H/L)^2 and r ~ H/L: m = 10 (H/L)^3, at most 1e-3. Collective.
         """
         P, R = (coarse.reduce.max(fields[name]) or 1.0 for name in "pr")
-        z = interpolated(coarse.grid, self.grid, fields["p"] / P - fields["r"] / R)
+        z = interpolated(coarse.grid, self.grid, fields["p"] / P - fields["r"] / R, ahead(self, coarse))
         m = min(1e-3, 10.0 / max(coarse.grid.shape) ** 3)
         root = np.sqrt(z * z + 4.0 * m) if interior else np.abs(z)
         return {"p": 0.5 * P * (root + z), "r": 0.5 * R * (root - z)}

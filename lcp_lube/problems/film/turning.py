@@ -50,3 +50,12 @@ class Turning(Shaft):
             "sommerfeld": load * psi**2 / (self.B * D * mu * self.omega),
             "S": mu * N * self.B * D / (load * psi**2) if load > 0 else None,
         }
+
+
+def ahead(problem: Any, other: Any) -> float:
+    """How far beyond the place that another ring's x is counted from this one's is, m; 0 of films that are no such rings.
+
+    Rings of several sizes begin with a point on the same edge, half a mesh of their own behind their x = 0.
+    """
+    own, its = (getattr(one, "shaft", None) for one in (problem, other))
+    return 0.0 if own is None or its is None or not problem.grid.periodic[0] else (own.start - its.start) * own.R
