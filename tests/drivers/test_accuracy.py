@@ -10,6 +10,7 @@ from films import FilmScene, L, Pieces, random_films
 from lcp_lube.api import solve
 from lcp_lube.drivers.accuracy.estimate import estimate, is_known, known_line, misplaced_film, of_pair
 from lcp_lube.drivers.accuracy.rungs import finer, first_rung, first_shape, round_ring, rungs_up
+from lcp_lube.drivers.loads import attitude
 from lcp_lube.errors import InputError
 from lcp_lube.problems.solution import Outcome
 from lcp_lube.registry import scene_names
@@ -409,6 +410,25 @@ def test_a_load_on_a_ring_with_grooves_to_a_per_cent():
     with solve(scene, accuracy=1e-2) as found:
         assert found.converged and found.problem.grid.shape == (288, 15)
         assert abs(found.load / 1554.3 - 1) < 1e-2  # limit of 720 and 1440 points around
+
+
+@pytest.mark.parametrize("name", ["lemon_journal", "two_groove_journal"])
+def test_rings_of_several_sizes_are_compared_place_by_place(name):
+    """What the pressure changes by falls by second order: beside grids that begin half a mesh apart it was of first order, and
+    the estimate tenfold."""
+    with solve(name, accuracy=1e-3) as solution, solve(name, nx=1440, ny=95) as fine:
+        assert solution.converged and solution.problem.grid.shape[0] <= 1100
+        assert abs(solution.load / fine.load - 1.0) <= solution.settings["accuracy_estimate"]
+        sizes, seen = ([level[key] for level in solution.levels] for key in ("nx", "estimate"))
+    assert seen[2] < 1.5 * seen[1] * (sizes[1] / sizes[2]) ** 2
+
+
+def test_searches_go_on_from_the_grid_before(monkeypatch):
+    guesses = []
+    first = attitude.half_film_attitude
+    monkeypatch.setattr(attitude, "half_film_attitude", lambda e: guesses.append(e) or first(e))
+    with solve("two_groove_journal", accuracy=1e-2) as solution:
+        assert solution.converged and len(solution.levels) >= 3 and len(guesses) == 1
 
 
 def test_viscosity_by_shear_in_films_between_grooves():

@@ -438,6 +438,15 @@ def test_the_errors_of_cells_are_the_largest_pressures():
         assert reduced(found.field, solution) == pytest.approx(found.cells, rel=1e-9) and found.worst < 0.1
 
 
+def test_the_errors_of_cells_of_a_ring():
+    """Its finer one begins half a mesh elsewhere: what cells did was seven times the error then, with the other sign."""
+    with solve("three_lobe_journal", n=180) as solution:
+        scene = solution.solved_scene
+        with solve(scene.with_shape(finer_shape(solution))) as finer:
+            found = goal_error(scene, solution, finer, "p_max")
+    assert 0.6 < found.cells / found.error < 1.2
+
+
 def reduced(field, solution):
     return float(field.sum()) * solution.problem.grid.cell
 

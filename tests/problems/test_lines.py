@@ -13,7 +13,7 @@ from lcp_lube.problems.film.lines import UNEVEN, on_edges
 from lcp_lube.problems.film.lubrication import LubricationProblem
 from lcp_lube.problems.film.reynolds import coefficients
 from lcp_lube.problems.grid import OFFSET, Grid
-from lcp_lube.problems.transfer import Transfer
+from lcp_lube.problems.transfer import Transfer, interpolated
 
 OPEN, RING = ("open", "open"), ("periodic", "periodic")
 KINDS = [OPEN, ("open", "closed"), ("closed", "closed"), ("open", "mirror"), RING]
@@ -93,6 +93,24 @@ def test_interpolation_is_exact_for_linear_functions(ends):
     found = transfer(np.broadcast_to(coarse.x, coarse.box).ravel()).reshape(fine.box)
     inside = (fine.x[0] >= coarse.x[0, 0]) & (fine.x[0] <= coarse.x[0, -1])
     np.testing.assert_allclose(found[:, inside], np.broadcast_to(fine.x, fine.box)[:, inside], rtol=0, atol=1e-12)
+    for obj in (transfer, coarse, fine):
+        obj.destroy()
+
+
+@pytest.mark.parametrize("one, other", [((7, 3), (21, 3)), ((40, 2), (17, 2))])
+def test_rings_that_begin_elsewhere_are_compared_place_by_place(one, other):
+    """x of a journal's ring begins half a mesh before the first point, which lies on the same edge in every one of them."""
+    coarse, fine = (Grid(shape, (1.0, 1.0), ends=(("periodic", "periodic"), OPEN)) for shape in (one, other))
+    start = -0.5 * np.array([coarse.spacing[0], fine.spacing[0]])
+    shift = start[1] - start[0]
+    there = np.cos(2 * np.pi * (np.broadcast_to(coarse.x, coarse.box) + start[0])).ravel()
+    here = np.cos(2 * np.pi * (np.broadcast_to(fine.x, fine.box) + start[1])).ravel()
+    transfer = Transfer(coarse, fine, ahead=shift)
+    found = transfer(there)
+    np.testing.assert_allclose(found, interpolated(coarse, fine, there, shift), rtol=0, atol=1e-13)
+    np.testing.assert_allclose(found, here, rtol=0, atol=0.5 * (np.pi * coarse.spacing[0]) ** 2 + 1e-12)
+    assert found[0] == there[0] and np.abs(interpolated(coarse, fine, there, shift + 1.0) - found).max() < 1e-12
+    assert np.abs(interpolated(coarse, fine, there) - here).max() > 2.0 * np.abs(found - here).max()
     for obj in (transfer, coarse, fine):
         obj.destroy()
 
