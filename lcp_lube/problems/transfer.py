@@ -27,7 +27,7 @@ class Transfer:
     Parameters
     ----------
     zero_boundary : the field is zero on the boundary: interpolate to that, but at ends through which nothing flows.
-    ahead : of rings along x, how far beyond the place that the coarse one counts x from the fine one does (`turning.ahead`), m.
+    ahead : of rings along x, how far the fine one's x = 0 lies beyond the coarse one's (`film.turning.ahead`), m.
 
     Attributes
     ----------

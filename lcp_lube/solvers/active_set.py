@@ -38,6 +38,7 @@ IN_VAIN = 6  # times that sweeps may take over without ||G|| ever falling below 
 # and no further (benchmarks/constants.py sweeps the three).
 FIRST, FORCING, LAST = 1e-2, 0.1, 0.4
 NONE = 1e-9  # of the largest flow that the wall brings to a cell or drags away: less is rounding
+DAM = 0.25  # part of all flows that the wall leaves over, and of the points, from which and up to which it counts as a dam
 LEAST = 1e-15  # p_unit: a largest pressure below this is rounding
 
 
@@ -86,10 +87,12 @@ class ActiveSet(Method):
         return self.form.fields(self.z)
 
     def _left_behind(self) -> NDArray[np.bool_]:
-        """Where the wall drags away more than it brings, in a film without given pressures: a step is saved. Collective."""
-        problem, c = self.problem, self.problem.c
+        """Where the wall drags away more than it brings, in a film without given pressures: a step is saved. Not where it brings
+        more than it drags away in all, and that at few points: a dam presses all that lies before it. Collective."""
+        problem, c, reduce = self.problem, self.problem.c, self.problem.reduce
         pressed = any(problem.p_sides) or problem.held is not None
-        return (c < -NONE * problem.reduce.largest(c)) & (not pressed)
+        dammed = reduce.sum(c) > DAM * reduce.sum(np.abs(c)) and reduce.sum((c > 0.0).astype(float)) < DAM * problem.size
+        return (c < -NONE * reduce.largest(c)) & (not pressed and not dammed)
 
     def _look(self) -> None:
         self.G = self.form.residual(self.z)

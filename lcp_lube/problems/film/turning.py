@@ -53,9 +53,9 @@ class Turning(Shaft):
 
 
 def ahead(problem: Any, other: Any) -> float:
-    """How far beyond the place that another ring's x is counted from this one's is, m; 0 of films that are no such rings.
+    """How far the place where this ring's x is 0 lies beyond the other's, m; 0 of films that are no rings round a shaft.
 
-    Rings of several sizes begin with a point on the same edge, half a mesh of their own behind their x = 0.
+    Each has a point on the same edge, half a mesh of its own behind x = 0 (`scenes.shaft`): rings of two sizes differ by that.
     """
     own, its = (getattr(one, "shaft", None) for one in (problem, other))
     return 0.0 if own is None or its is None or not problem.grid.periodic[0] else (own.start - its.start) * own.R
