@@ -87,8 +87,8 @@ class ActiveSet(Method):
         return self.form.fields(self.z)
 
     def _left_behind(self) -> NDArray[np.bool_]:
-        """Where the wall drags away more than it brings, in a film without given pressures: a step is saved. Not where it brings
-        more than it drags away in all, and that at few points: a dam presses all that lies before it. Collective."""
+        """Where the wall drags away more than it brings, in a film without given pressures: a step is saved. Not where it
+        brings more than it drags away in all, at few points: a dam presses all that lies before it. Collective."""
         problem, c, reduce = self.problem, self.problem.c, self.problem.reduce
         pressed = any(problem.p_sides) or problem.held is not None
         dammed = reduce.sum(c) > DAM * reduce.sum(np.abs(c)) and reduce.sum((c > 0.0).astype(float)) < DAM * problem.size
