@@ -24,7 +24,6 @@ from ..base.parallel import Array
 from ..linear.system import System, make_system
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Fields, Step
-from ..registry import SMALL
 from .job import Job
 from .method import Method
 from .method_options import MethodOptions, least, part, positive
@@ -38,6 +37,9 @@ IN_VAIN = 6  # times that sweeps may take over without ||G|| ever falling below 
 # and no further (benchmarks/constants.py sweeps the three).
 FIRST, FORCING, LAST = 1e-2, 0.1, 0.4
 NONE = 1e-9  # of the largest flow that the wall brings to a cell or drags away: less is rounding
+CHEAP = (
+    10_000  # points up to which direct steps cost no more than the sweeps that save them, whose compiler takes 0.5 s to load
+)
 DAM = 0.25  # part of all flows that the wall leaves over, and of the points, from which and up to which it counts as a dam
 LEAST = 1e-15  # p_unit: a largest pressure below this is rounding
 
@@ -76,7 +78,7 @@ class ActiveSet(Method):
         self.z = self.form.z(start) if start else np.where(self._left_behind(), -options.p0, options.p0)
         self._look()
         self._relaxation: Relaxation | None = relaxation(problem) if options.sweeps else None
-        cheap = self.system.direct and problem.grid.dim == 2 and problem.grid.size <= SMALL  # loading numba takes 0.5 s
+        cheap = self.system.direct and problem.grid.dim == 2 and problem.grid.size <= CHEAP
         fronts = bool(start) and problem.reduce.min(self.z) < 0.0
         self._sweeps = options.sweeps if fronts and not cheap else 0
         self._relax(self._sweeps)
