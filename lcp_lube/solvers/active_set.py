@@ -37,9 +37,7 @@ IN_VAIN = 6  # times that sweeps may take over without ||G|| ever falling below 
 # and no further (benchmarks/constants.py sweeps the three).
 FIRST, FORCING, LAST = 1e-2, 0.1, 0.4
 NONE = 1e-9  # of the largest flow that the wall brings to a cell or drags away: less is rounding
-CHEAP = (
-    10_000  # points up to which direct steps cost no more than the sweeps that save them, whose compiler takes 0.5 s to load
-)
+CHEAP = 10_000  # points up to which direct steps cost no more than sweeps that save them, whose compiler loads in 0.5 s
 DAM = 0.25  # part of all flows that the wall leaves over, and of the points, from which and up to which it counts as a dam
 LEAST = 1e-15  # p_unit: a largest pressure below this is rounding
 
@@ -79,8 +77,7 @@ class ActiveSet(Method):
         self._look()
         self._relaxation: Relaxation | None = relaxation(problem) if options.sweeps else None
         cheap = self.system.direct and problem.grid.dim == 2 and problem.grid.size <= CHEAP
-        fronts = bool(start) and problem.reduce.min(self.z) < 0.0
-        self._sweeps = options.sweeps if fronts and not cheap else 0
+        self._sweeps = options.sweeps if start and not cheap and problem.reduce.min(self.z) < 0.0 else 0
         self._relax(self._sweeps)
         self._best, self._stalled, self._rescue, self._vain, self._taken = self.norm, 0, RESCUE_SWEEPS, 0, 0
 
@@ -92,9 +89,10 @@ class ActiveSet(Method):
         """Where the wall drags away more than it brings, in a film without given pressures: a step is saved. Not where it
         brings more than it drags away in all, at few points: a dam presses all that lies before it. Collective."""
         problem, c, reduce = self.problem, self.problem.c, self.problem.reduce
-        pressed = any(problem.p_sides) or problem.held is not None
+        if any(problem.p_sides) or problem.held is not None:
+            return np.zeros(c.size, dtype=bool)
         dammed = reduce.sum(c) > DAM * reduce.sum(np.abs(c)) and reduce.sum((c > 0.0).astype(float)) < DAM * problem.size
-        return (c < -NONE * reduce.largest(c)) & (not pressed and not dammed)
+        return (c < -NONE * reduce.largest(c)) & (not dammed)
 
     def _look(self) -> None:
         self.G = self.form.residual(self.z)

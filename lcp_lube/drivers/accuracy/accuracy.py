@@ -113,11 +113,11 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     times: dict[str, float] = {}
     # A program that goes on loads multigrid's loops once; for one run they pay where its last grid will be one for multigrid
     # (second order: points as 1/error), and serve those before it too.
-    plane, sought_for = len(first) == 2, seeks(scene, replace(ask, accuracy=None))
+    plane, seeking = len(first) == 2, seeks(scene, ask)
     end, loops = "", ask.direct_below is None or (plane and tol < SOON)
     while not end:
         level_begin, before, earlier = perf_counter(), solution, before
-        near = ask.start if before is None else _start(before, prod(shape), sought_for) if ask.nested is not False else None
+        near = ask.start if before is None else _start(before, prod(shape), seeking) if ask.nested is not False else None
         stopping = _stopping(ask, tol, before) if before is not None or (pairs and not ring) else ask.stopping
         least = WHOLE[loops if before is None else before.asked == "fas"]
         halved = ask.reduction and (not plane or prod(shape) > (min(least, TWICE) if rims or corners else least))
@@ -233,11 +233,11 @@ def _stopping(ask: Ask, tol: float, before: Solution | None) -> Stopping | Mappi
     return {"eps1": float(np.clip(part * tol, 1e-12, 1e-4)), "eps2": inf, **(given or {})}
 
 
-def _start(before: Solution | None, points: int, sought_for: bool) -> Solution | None:
+def _start(before: Solution | None, points: int, seeking: bool) -> Solution | None:
     """What the next grid starts from, where that pays: a small film is solved as soon from nothing; a search goes on."""
     if before is None or before.outcome in (Outcome.NOT_FINITE, Outcome.LINEAR_SOLVER):
         return None
-    if sought_for and before.converged:
+    if seeking and before.converged:
         return before
     if before.problem.kind == "lubrication" and points <= SMALL:
         return None
