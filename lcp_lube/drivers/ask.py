@@ -34,6 +34,14 @@ class Start:
     made: Mapping[str, Any] | None = None
 
 
+@dataclass(frozen=True)
+class Built:
+    """The scene's problem, which a driver has built to look at; before : bytes that this process held until then."""
+
+    problem: Problem
+    before: int
+
+
 def light(problem: Any) -> Any:
     """A plain film's problem as a start from it needs it: without coefficients, which are most of its memory."""
     if type(problem) is not LubricationProblem or not problem.plain:
@@ -74,6 +82,7 @@ class Ask:
     stopping : tolerances and iteration limit; a dictionary gives some of them, the method's own (`MethodEntry.eps`) the rest.
     cavities : ||F|| to which a film with round edges is solved the first time, for its cavities (`rims`), beside a `stopping`
         that is no `Stopping`; default: as that.
+    digits : relative error of what is sought, attitudes and places in time, that may be left; default what each one has.
     options : the method's own parameters by name (p0, r0, mu, conditions, ... of `DinOptions`).
     nested : start from the answers on coarser grids; default: where it pays.
     certify : also prove a band around the answer (`Solution.enclosure`), for the price of one linear solve at most.
@@ -94,6 +103,7 @@ class Ask:
     watch : called after every time step of a march with its `time.Moment`; collective.
     judge : certifies the fields of the problem that is solved in that problem's place: a part's on the whole scene's data.
     times : when a march is to end a step, s, where an error estimate says how long these are.
+    built : the scene's problem, which the solve takes over.
     comm : communicator of petsc4py or mpi4py; default all ranks.
     """
 
@@ -105,6 +115,7 @@ class Ask:
     finest: tuple[int, ...] | None = None
     stopping: Stopping | Mapping[str, Any] | None = None
     cavities: float | None = None
+    digits: float = 0.0
     options: Mapping[str, Any] = field(default_factory=dict)
     nested: bool | None = None
     certify: bool = False
@@ -124,6 +135,7 @@ class Ask:
     watch: Callable[[Any], None] | None = None
     judge: Callable[[Problem, Fields, float], Certificate] | None = None
     times: tuple[float, ...] = ()
+    built: Built | None = None
     comm: PETSc.Comm | None = None
 
     def __post_init__(self) -> None:

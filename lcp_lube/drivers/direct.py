@@ -43,7 +43,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner | None = None) -> Solution:
     ------
     InputError : an unknown name, a value out of range, an option that does not fit, too little memory.
     """
-    begin, held = perf_counter(), memory.resident()
+    begin, held = perf_counter(), ask.built.before if ask.built else memory.resident()
     stages = Stages()
     facts = scene.facts(ask.comm)
     if ask.start is not None and ask.nested is None:
@@ -54,7 +54,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner | None = None) -> Solution:
     with stages("setup"):
         if ask.memory_check and ask.resume is None:
             memory.look_ahead(facts, chosen, ask.mpi)
-        problem = scene.build(ask.comm)
+        problem = ask.built.problem if ask.built else scene.build(ask.comm)
     keeper = Checkpointer(ask.checkpoint, ask.every, problem.grid.comm)
     if ask.resume is not None:
         saved = load(ask.resume, scene_record(scene), problem.grid.comm)

@@ -155,6 +155,9 @@ def promising(scene: Solvable) -> bool:
         return True
     if model.stored is not None and len(model.lengths) == 1:
         return False
+    south, north = model.sides[2:4]
+    if len(scene.shape) == 2 and south != north and len(_given_pressures(model)) > 1 and "open" in (south.kind, north.kind):
+        return False
     kinds = [tuple(side.kind for side in model.sides[k : k + 2]) for k in (0, 2)]
     xs, *ys = (some_places(*side) for side in zip(scene.shape, model.lengths, kinds, SAMPLE, strict=False))
     y = ys[0][:, None] if ys else np.zeros((1, 1))

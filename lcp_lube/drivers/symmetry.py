@@ -17,9 +17,9 @@ from ..problems.solution import Fields, Outcome, Problem, Solution
 from ..problems.transfer import Pick, numbers
 from ..scenes.scene import Solvable
 from . import film_part, rectangle_part
-from .ask import Ask, Start
+from .ask import Ask, Built, Start
 from .compose import Inner
-from .memory import LARGE, look_ahead
+from .memory import LARGE, look_ahead, resident
 from .plan import plan
 
 Part = film_part.Part | rectangle_part.Quarter
@@ -56,11 +56,10 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     if ask.memory_check and prod(scene.shape) >= LARGE:
         facts = scene.facts(ask.comm)
         look_ahead(facts, plan(facts, ask, scene.name), ask.mpi)
-    problem = scene.build(ask.comm)
+    before, problem = resident(), scene.build(ask.comm)
     part = family.part_of(scene, problem)
     if part is None:
-        problem.destroy()
-        return _whole(inner(scene, ask), family.NONE)
+        return _whole(inner(scene, replace(ask, built=Built(problem, before))), family.NONE)
     solution = solve_part(part, problem, ask, inner)
     if solution.outcome is not Outcome.WRONG_SOLUTION:
         return solution

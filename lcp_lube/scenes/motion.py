@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import BeforeValidator, Field
@@ -16,6 +16,7 @@ from .units import Measured, measured
 AtTime = Annotated[float | str, TimeText]
 Pair = tuple[AtTime, AtTime]
 Course = Callable[[float], tuple[float, ...]]  # [X, Y] of a journal, or a film's level, at the time t
+LEAST, MOST = 2e-9, 0.5  # tolerances of a finer and a coarser march
 TOL = 1e-3  # where neither steps, nor dt, nor tol is given
 
 
@@ -107,6 +108,13 @@ class MotionTable(Measured):
     @property
     def tolerance(self) -> float:
         return self.tol if self.tol is not None else TOL
+
+    def finer(self, times: float) -> Self:
+        """The same march in steps shorter by this factor; where an error estimate says how long they are, by its tolerance."""
+        if self.step is not None:
+            return self.model_copy(update={"steps": max(2, round(self.t_end / self.step * times)), "dt": None})
+        order = 2 if self.scheme == "bdf2" else 1
+        return self.model_copy(update={"tol": min(max(self.tolerance / times**order, LEAST), MOST)})
 
     def course(self, folder: Path | None, count: int = 2) -> Course | None:
         """Where the journal is at any time, if that is given; count : 1 without a journal.

@@ -17,7 +17,7 @@ from ...problems.film.model import Model
 from ...problems.grid import OFFSET
 from ...problems.solution import Outcome, Solution
 from ...registry import ELIMINATED, METHODS
-from ...scenes.moving import film_of
+from ...scenes.moving import film_of, motion_of
 from ...scenes.scene import Solvable
 from ...solvers.newton import Stopping
 from ..ask import Ask
@@ -32,6 +32,7 @@ from .values import Values, carried, sought
 
 FEW_KNOWN = 128  # points of the first grid of a line whose number is known: no coarser grid is cheaper
 FEW_PAIRS = 200  # of a film whose load is estimated from each two grids: these are solved by elimination
+SHARE = 0.2  # of the scene's points that the first grid of a march has at least: its steps, in proportion, see what moves it
 ALGEBRAIC = 1e-3  # ||F|| relative to the tolerance: with many small cavities it leaves up to 60 times itself in a load
 CAVITIES = 1e-2  # ||F|| at which cavities are known well enough for round edges: of 46 loads 9 in 10 move by 1e-6 at most
 ALLOWED = (1e-10, 0.5)  # tolerances
@@ -85,10 +86,12 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     begin = perf_counter()
     fewest = model.fewest_meshes() if (model := film_of(scene)) is not None else ()
     line = is_known(scene)
-    order = 1.0 if model is not None and (model.scheme == "upwind" or model.mean_cubes) else 2.0
+    in_time = motion_of(scene)
+    coarse = model is not None and (model.scheme == "upwind" or model.mean_cubes)
+    order = 1.0 if coarse or (in_time is not None and in_time.scheme == "euler") else 2.0
     # Of the load in the plane each two grids give an estimate (`estimate.of_pair`).
     pairs = quantity in (None, *INTEGRALS) and len(scene.shape) == 2 and order > 1.0 and given_film(scene) is not None
-    few = FEW_KNOWN if line else FEW_PAIRS if pairs else None
+    few = FEW_KNOWN if line else FEW_PAIRS if pairs else int(SHARE * prod(scene.shape)) if in_time is not None else None
     first = first_shape(scene.shape, fewest, finest, few)
     pairs = pairs and first == first_shape(scene.shape, (), finest, few)  # else its cells are as wide as what they show
     first, unit = round_ring(scene, first, finest)
@@ -122,7 +125,8 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         least = WHOLE[loops if before is None else before.asked == "fas"]
         halved = ask.reduction and (not plane or prod(shape) > (min(least, TWICE) if rims or corners else least))
         loose = CAVITIES if stopping is not ask.stopping else None
-        this = replace(ask, accuracy=None, stopping=stopping, cavities=loose, start=near, nested=False, reduction=halved)
+        enough = {"stopping": stopping, "cavities": loose, "digits": ALGEBRAIC * tol}
+        this = replace(ask, accuracy=None, start=near, nested=False, reduction=halved, **enough)  # type: ignore[arg-type]
         by_loops = loops and (plane or (line and shape[0] <= ELIMINATED))
         solution = inner(scene.with_shape(shape), replace(this, direct_below=0) if by_loops else this)
         problem = solution.problem
@@ -134,10 +138,10 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
             found = {**sought(solution), **solution.numbers}  # what is sought is the number where the load is given
             quantity = quantity or next((name for name in (*sought(solution), *DEFAULT_QUANTITY) if name in found), "")
             value = find_value(found, quantity, scene)
-        best = told.add(solution, before, earlier, prod(problem.grid.meshes) ** (1.0 / len(first)), quantity, value)
+        told.add(solution, before, earlier, prod(problem.grid.meshes) ** (1.0 / len(first)), quantity, value)
         if earlier is not None:
             earlier.destroy()
-        loops = loops or (plane and inf > best.relative > 3 * FEW / problem.grid.size * tol)
+        loops = loops or (plane and inf > told.relative > 3 * FEW / problem.grid.size * tol)
         levels.append(
             {
                 **dict(zip(("nx", "ny"), problem.grid.shape, strict=False)),
@@ -145,11 +149,11 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
                 "linear_iterations": solution.total("linear_iterations"),
                 "time_s": perf_counter() - level_begin,
                 "value": value if solution.converged else np.nan,
-                "estimate": best.relative,
+                "estimate": told.relative,
             }
         )
         values, estimates, seconds = ([level[name] for level in levels] for name in ("value", "estimate", "time_s"))
-        ask.tell("accuracy", f"{quantity} to {best.relative:.0e}", of_ladder(seconds, best.relative, tol, 2.0 ** len(shape)))
+        ask.tell("accuracy", f"{quantity} to {told.relative:.0e}", of_ladder(seconds, told.relative, tol, 2.0 ** len(shape)))
         times = added(times, solution.times)
         end = _end(estimates, values, tol, problem.grid.size)
         rounding = _rounding(solution) if problem.kind == "lubrication" and quantity in INTEGRALS else 0.0
@@ -159,21 +163,21 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         ups = 0 if end else rungs_up(estimates, tol, told.line is not None, len(first), pairs)
         for up in range(ups, 0, -1):
             shape = finer(first, meshes, rung + up, unit)
-            if not (end := _no_room(solution, shape, finest, best.relative, tol)):
+            if not (end := _no_room(solution, shape, finest, told.relative, tol)):
                 rung += up
                 break
     if before is not None:
         before.destroy()
     assert solution is not None and quantity is not None  # for the type checker: there is a first grid
-    if solution.converged and not best.relative <= tol:
+    if solution.converged and not told.relative <= tol:
         solution.outcome = Outcome.ACCURACY
-        known = f"{quantity} to {best.relative:.1e} only" if isfinite(best.relative) else f"{quantity}'s error is not known"
+        known = f"{quantity} to {told.relative:.1e} only" if isfinite(told.relative) else f"{quantity}'s error is not known"
         solution.message = f"{known}, {tol:g} was asked for: {end}"
     solution.settings |= {
         "accuracy": tol,
         "accuracy_quantity": quantity,
-        "accuracy_estimate": best.relative,
-        "accuracy_extrapolated": best.extrapolated,
+        "accuracy_estimate": told.relative,
+        "accuracy_extrapolated": told.best.extrapolated,
         "accuracy_grid_value": value if solution.converged or solution.outcome is Outcome.ACCURACY else None,
     }
     solution.told_by = told

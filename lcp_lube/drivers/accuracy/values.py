@@ -21,6 +21,7 @@ from .estimate import INTEGRALS, QUADRATURE, Estimate, estimate, follow, known_l
 APART = 1.8  # spacings of two grids over one another, at least, where two such are there: nearer ones tell little
 BLOCKS = 6  # parts of a side over which the change of the pressure is integrated
 CLOSE = 32  # points a side of a grid whose cells are looked at in some 500 places along each line
+SWINGING = ("load", "p_max", "friction", "cavitated_fraction")  # numbers that come and go in a march
 LARGE = 1_000_000  # points beyond which a grid is not kept until its numbers are asked for
 
 
@@ -52,11 +53,12 @@ class Values:
         self._other, self._change = -2, (inf, inf)  # of the pressure from that grid on: `_change`
         self._order, self._rims, self._corners = order, rims, corners
         self._full = False  # nothing is cavitated
+        self._largest = 0.0  # in a march
 
     def add(
         self, solution: Solution, before: Solution | None, earlier: Solution | None, size: float, quantity: str, value: float
-    ) -> Estimate:
-        """One grid more, so many meshes a side, and this value of the quantity there; its best value. Collective.
+    ) -> None:
+        """One grid more, so many meshes a side, and this value of the quantity there. Collective.
 
         before, earlier : the answers on the last grid, and on that before it.
         """
@@ -75,8 +77,14 @@ class Values:
         other = earlier if self._other == -3 else before
         self._change = _change(solution, other, quantity, self._own[self._other]) if other and self._pairs else (inf, inf)
         self._full = self._pairs and not problem.reduce.max(solution.fields["r"]) > 0.0
+        self._largest = max((abs(row[quantity]) for row in solution.history), default=0.0) if quantity in SWINGING else 0.0
         self.best = self._best(quantity, self._own)
-        return self.best
+
+    @property
+    def relative(self) -> float:
+        """The error of the quantity's best value over that value; in time over the largest it had, which may end as next to
+        nothing beside that."""
+        return replace(self.best, value=max(abs(self.best.value), self._largest)).relative
 
     def _best(self, name: str, values: list[float]) -> Estimate:
         """The best value of a number and its error: from what is known of a line, or from its values on all grids."""

@@ -40,7 +40,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     known = ask.start.settings.get("attitude_deg") if ask.start is not None else None
     attitude = math.radians(known) if known is not None else half_film_attitude(scene.eccentricity)
     chain = Chain(ask, inner)
-    slope, tol = 1.0, max(TOLERANCE, PART * ask.stopping_for((0.0, 0.0)).eps1)
+    slope, tol = 1.0, max(TOLERANCE, PART * ask.stopping_for((0.0, 0.0)).eps1, ask.digits)
 
     def off_at(attitude: float) -> tuple[Solution, float]:
         """The solution, and how far the force is from the load's line, rad; NaN without a film."""

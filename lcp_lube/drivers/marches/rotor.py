@@ -5,8 +5,8 @@ end of a time step.
 
 q : a journal's [X, Y] in parts of the clearance, or the film's level (m), and the pads' tilts (rad); Q : the film's forces on
 them, and its moments about the pivots, which without inertia are to be 0. The film is solved at every iterate; -dQ/dq of
-the step is exact (`linearised`: stiffness, and damping with what is stored, in one matrix), and is kept while iterates converge
-quickly.
+the step is exact (`linearised`: stiffness, and damping with what is stored, in one matrix); it is kept, with what each move
+tells of it (Broyden's formula), while iterates converge quickly.
 """
 
 from collections.abc import Callable
@@ -23,16 +23,18 @@ from .march import Formula
 from .march_coordinates import Coordinates
 
 MOST, TOL = 30, 1e-9  # iterates a step; forces left, in parts of the largest seen
-SLOW = 0.2  # fall of the forces left by an iterate above which the matrix is made anew
+SLOW, FIRST = 0.2, 2  # fall of the forces left by an iterate, from that one on, above which the matrix is made anew
+SAME = 1e-9  # relative: formulas' weights that differ by no more do so by the rounding of times
 NEAREST = 0.5  # of the thinnest film: the longest step
 SMALLEST = 1e-13  # of the thinnest film: a step that is none
 
 
 @dataclass
 class Rotor:
-    """Places and speeds of the last times, the newest first."""
+    """Places and speeds of the last times, the newest first. tol : of the forces that are left."""
 
     of: Coordinates
+    tol: float = TOL
     places: list[Array] = field(default_factory=list)
     speeds: list[Array] = field(default_factory=list)
     size: float = 0.0  # largest force so far, N
@@ -63,11 +65,12 @@ class Rotor:
         of, free = self.of, np.flatnonzero(self.of.free)
         loads, inertia = of.loads(t), of.mass * of.unit
         scale = of.unit / of.reach  # moments as forces
-        if self.K is not None and formula.weight != self.weight:
+        if abs(formula.weight - self.weight) > SAME * formula.weight:
             self.K = None
-        q, before = start, np.inf
+        inert = np.diag(of.mass * (scale * formula.weight) ** 2)
+        q, last, was, before = start, np.where(of.free, self.places[0], start), np.zeros(0), np.inf
         for k in range(MOST):
-            solution, q = (film_at(q), q) if k else self._first(q, film_at)
+            solution, q = _film_towards(q, last, film_at)
             if not solution.converged:
                 return solution, q, ""
             problem: Any = solution.problem
@@ -76,12 +79,13 @@ class Rotor:
             left = scale * (inertia * (formula.weight * speed - formula.old(self.speeds)) - force - loads)
             self.size = max(self.size, *(float(np.linalg.norm(scale * one)) for one in (force, loads)))
             now = float(np.linalg.norm(left[free])) / (self.size or 1.0)
-            if now <= TOL:
+            if now <= self.tol:
                 return solution, q, ""
-            if self.K is None or now > SLOW * before:
+            if self.K is None or (k >= FIRST and now > SLOW * before):
                 self.K, self.weight = stiffness(solution) * np.outer(scale, scale), formula.weight
-            before = now
-            matrix = np.diag(of.mass * (scale * formula.weight) ** 2) + self.K
+            elif k and (length := float((moved := of.reach * (q - last)) @ moved)):
+                self.K = self.K + np.outer(left - was - (inert + self.K) @ moved, moved) / length
+            matrix = inert + self.K
             if not (np.isfinite(left).all() and np.isfinite(matrix).all()):
                 return solution, q, "its forces are no numbers"
             move = np.zeros(q.size)
@@ -90,19 +94,11 @@ class Rotor:
             if size <= SMALLEST * thinnest:
                 return solution, q, ""
             longest = NEAREST * thinnest
+            last, was, before = q, left, now
             q = q + np.clip(move, -longest, longest) / of.reach
             solution.destroy()
         most = of.names[free[np.argmax(np.abs(left[free]))]]
         return solution, q, f"forces of {now:.1e} of the largest are left after {MOST} iterates, most of them on {most}"
-
-    def _first(self, q: Array, film_at: Callable[[Array], Solution]) -> tuple[Solution, Array]:
-        """The film at the place that is expected, or where it has room on the way there."""
-        last = np.where(self.of.free, self.places[0], q)
-        for part in (1.0, 0.5, 0.25):
-            with suppress(InputError):  # the wall would touch
-                place = last + part * (q - last)
-                return film_at(place), place
-        return film_at(last), last
 
     def accept(self, q: Array, formula: Formula) -> None:
         """Take a step over."""
@@ -114,3 +110,12 @@ class Rotor:
         if len(dts) < 2:
             return None
         return float(np.linalg.norm(self.of.reach * (q - self.guess(dt, dts)))) / thinnest / 3.0
+
+
+def _film_towards(q: Array, last: Array, film_at: Callable[[Array], Solution]) -> tuple[Solution, Array]:
+    """The film at a place, or where it has room on the way there from the last one; and that place. Collective."""
+    for part in (1.0, 0.5, 0.25):
+        with suppress(InputError):  # the wall would touch
+            place = last + part * (q - last)
+            return film_at(place), place
+    return film_at(last), last
