@@ -111,6 +111,8 @@ class MotionTable(Measured):
 
     def finer(self, times: float) -> Self:
         """The same march in steps shorter by this factor; where an error estimate says how long they are, by its tolerance."""
+        if times == 1.0:
+            return self
         if self.step is not None:
             return self.model_copy(update={"steps": max(2, round(self.t_end / self.step * times)), "dt": None})
         order = 2 if self.scheme == "bdf2" else 1

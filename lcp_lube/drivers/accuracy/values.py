@@ -37,6 +37,7 @@ class Values:
     Attributes
     ----------
     line : a problem and its fields that have the numbers of a line that is known; None of other films.
+    largest : the quantity had in the last grid's march, if it is one that comes and goes; else 0.
     """
 
     def __init__(self, line: bool, pairs: bool, least: float, rims: bool, corners: bool, order: float):
@@ -53,7 +54,7 @@ class Values:
         self._other, self._change = -2, (inf, inf)  # of the pressure from that grid on: `_change`
         self._order, self._rims, self._corners = order, rims, corners
         self._full = False  # nothing is cavitated
-        self._largest = 0.0  # in a march
+        self.largest = 0.0
 
     def add(
         self, solution: Solution, before: Solution | None, earlier: Solution | None, size: float, quantity: str, value: float
@@ -77,14 +78,15 @@ class Values:
         other = earlier if self._other == -3 else before
         self._change = _change(solution, other, quantity, self._own[self._other]) if other and self._pairs else (inf, inf)
         self._full = self._pairs and not problem.reduce.max(solution.fields["r"]) > 0.0
-        self._largest = max((abs(row[quantity]) for row in solution.history), default=0.0) if quantity in SWINGING else 0.0
+        self.largest = max((abs(row[quantity]) for row in solution.history), default=0.0) if quantity in SWINGING else 0.0
         self.best = self._best(quantity, self._own)
 
     @property
     def relative(self) -> float:
         """The error of the quantity's best value over that value; in time over the largest it had, which may end as next to
         nothing beside that."""
-        return replace(self.best, value=max(abs(self.best.value), self._largest)).relative
+        found = replace(self.best, value=max(abs(self.best.value), self.largest)).relative
+        return max(found, self._least) if self.largest else found
 
     def _best(self, name: str, values: list[float]) -> Estimate:
         """The best value of a number and its error: from what is known of a line, or from its values on all grids."""

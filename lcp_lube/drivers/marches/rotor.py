@@ -23,7 +23,8 @@ from .march import Formula
 from .march_coordinates import Coordinates
 
 MOST, TOL = 30, 1e-9  # iterates a step; forces left, in parts of the largest seen
-SLOW, FIRST = 0.2, 2  # fall of the forces left by an iterate, from that one on, above which the matrix is made anew
+SLOW = 0.2  # fall of the forces left by an iterate above which the matrix is made anew
+GROWN, HALVED = 2.0, 2  # rise of them by an exact matrix's move, of which half is then taken, and how often in turn
 SAME = 1e-9  # relative: formulas' weights that differ by no more do so by the rounding of times
 NEAREST = 0.5  # of the thinnest film: the longest step
 SMALLEST = 1e-13  # of the thinnest film: a step that is none
@@ -69,6 +70,7 @@ class Rotor:
             self.K = None
         inert = np.diag(of.mass * (scale * formula.weight) ** 2)
         q, last, was, before = start, np.where(of.free, self.places[0], start), np.zeros(0), np.inf
+        exact, halved = False, 0
         for k in range(MOST):
             solution, q = _film_towards(q, last, film_at)
             if not solution.converged:
@@ -81,7 +83,12 @@ class Rotor:
             now = float(np.linalg.norm(left[free])) / (self.size or 1.0)
             if now <= self.tol:
                 return solution, q, ""
-            if self.K is None or (k >= FIRST and now > SLOW * before):
+            if exact and now > GROWN * before and halved < HALVED:
+                q, halved = last + 0.5 * (q - last), halved + 1
+                solution.destroy()
+                continue
+            exact, halved = self.K is None or now > SLOW * before, 0
+            if exact:
                 self.K, self.weight = stiffness(solution) * np.outer(scale, scale), formula.weight
             elif k and (length := float((moved := of.reach * (q - last)) @ moved)):
                 self.K = self.K + np.outer(left - was - (inert + self.K) @ moved, moved) / length
