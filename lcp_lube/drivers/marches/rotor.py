@@ -87,12 +87,12 @@ class Rotor:
                 q, halved = last + 0.5 * (q - last), halved + 1
                 solution.destroy()
                 continue
-            exact, halved = self.K is None or now > SLOW * before, 0
-            if exact:
-                self.K, self.weight = stiffness(solution) * np.outer(scale, scale), formula.weight
+            K, exact, halved = self.K, self.K is None or now > SLOW * before, 0
+            if K is None or exact:
+                K, self.weight = stiffness(solution) * np.outer(scale, scale), formula.weight
             elif k and (length := float((moved := of.reach * (q - last)) @ moved)):
-                self.K = self.K + np.outer(left - was - (inert + self.K) @ moved, moved) / length
-            matrix = inert + self.K
+                K = K + np.outer(left - was - (inert + K) @ moved, moved) / length
+            self.K, matrix = K, inert + K
             if not (np.isfinite(left).all() and np.isfinite(matrix).all()):
                 return solution, q, "its forces are no numbers"
             move = np.zeros(q.size)
