@@ -96,7 +96,9 @@ class Values:
             return Estimate(value, above * abs(value - truth) + QUADRATURE * abs(value))
         by_load, by_all = self._change
         if not isfinite(by_load) or (name not in INTEGRALS and len(values) > 2):
-            return estimate(values, self._misplaced, self._sizes, name, self._order)
+            found = estimate(values, self._misplaced, self._sizes, name, self._order)
+            never = name in SWINGING and not np.nanmin(values) < 0.0  # below nothing
+            return replace(found, value=max(0.0, found.value)) if never else found
         grids, change = (self._misplaced, self._sizes), by_load if name in INTEGRALS else by_all
         pair = of_pair(values, *grids, change, name, self._other, self._full, self._rims, self._corners)
         return replace(pair, error=max(pair.error, self._least * abs(value)))
