@@ -7,6 +7,7 @@ import pytest
 
 from lcp_lube import load_scene, solve
 from lcp_lube.output.results import as_dict, summary
+from lcp_lube.problems.film.quantities import shaft_force
 
 D, B, C, E, MU, OMEGA = 0.1, 0.1, 5e-5, 0.5, 0.02, 100.0
 
@@ -64,6 +65,16 @@ def test_balance_finds_the_force():
     assert ours.settings["balance"]["value"] == pytest.approx(journal.settings["balance"]["value"], rel=1e-4)
     for solution in (ours, journal):
         solution.destroy()
+
+
+ROUND_SHAFTS = [(dimension, sense) for dimension in (1, 2) for sense in (1, -1)]
+
+
+@pytest.mark.parametrize("film", ["two_groove_journal", "mixed_journal", "hybrid_journal", *ROUND_SHAFTS], ids=str)
+def test_the_force_alone_is_the_force_told(film):
+    scene = load_scene(film) if isinstance(film, str) else bearing(dimension=film[0], U=film[1] * 0.5 * D * OMEGA)
+    with solve(scene) as solution:
+        assert [*shaft_force(solution.problem, solution.fields)] == solution.numbers["force"]
 
 
 def test_moments():

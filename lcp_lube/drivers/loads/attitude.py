@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable
 from itertools import pairwise
 
+from ...problems.film.quantities import shaft_force
 from ...problems.solution import Outcome, Solution
 from ...scenes.grooved import GroovedJournalScene
 from ...scenes.moving import motion_of
@@ -45,7 +46,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     def off_at(attitude: float) -> tuple[Solution, float]:
         """The solution, and how far the force is from the load's line, rad; NaN without a film."""
         solution = chain.solve(scene.model_copy(update={"attitude_deg": math.degrees(attitude)}))
-        fx, fy = solution.problem.quantities(solution.fields)["force"]
+        fx, fy = shaft_force(solution.problem, solution.fields)
         return solution, math.atan2(-fy, -fx) if solution.converged else math.nan
 
     before: tuple[float, float] | None = None

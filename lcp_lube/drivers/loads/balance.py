@@ -16,6 +16,7 @@ import numpy as np
 
 from ...errors import InputError, NotFound
 from ...problems.film.integrals import thinnest
+from ...problems.film.quantities import shaft_force
 from ...problems.solution import Outcome, Solution
 from ...scenes.balance import BalanceTable
 from ...scenes.moving import film_of
@@ -191,7 +192,7 @@ def exact_slope(scene: Any, solution: Solution, unknown: Variable, t: float, W: 
 
     key = unknown.key.rpartition(".")[2]
     if key == "eccentricity" and turning is not None and turning.widest is not None and model.U >= 0:
-        fx, fy = solution.problem.quantities(solution.fields)["force"]
+        fx, fy = shaft_force(solution.problem, solution.fields)
         e, along = unknown.to_value(t), atan2(-fy, -fx) - turning.widest
         move = turning.c * e * (1.0 - e) * np.array([-cos(along), sin(along)])  # away from the widest gap, in the load's axes
         with suppress(NotFound):

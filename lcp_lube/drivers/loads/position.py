@@ -17,6 +17,7 @@ import numpy as np
 
 from ...base.parallel import Array
 from ...errors import NotFound
+from ...problems.film.quantities import shaft_force
 from ...problems.film.turning import Turning
 from ...problems.solution import Outcome, Solution
 from ...scenes.effects.named import named, without
@@ -101,7 +102,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         def left_at(t: float, phi: float) -> complex:
             nonlocal solution
             solution = chain.solve(_moved(free.with_shape(shapes[0]), max(t, -WIDEST), phi))
-            fx, fy = solution.problem.quantities(solution.fields)["force"]
+            fx, fy = shaft_force(solution.problem, solution.fields)
             force = complex(-math.hypot(fx, fy), 0.0) if given else complex(fx, fy)
             return 1.0 + force / table.load if solution.converged else complex(math.nan, math.nan)
 
@@ -219,7 +220,7 @@ def _on_grid(
             # At first the film alone was taken to carry the load: asperities may, farther from the bore.
             q = q - RETREAT if before is None else before[0] + before[2]
             continue
-        force = np.array(solution.problem.quantities(solution.fields)["force"])
+        force: Array = np.array(shaft_force(solution.problem, solution.fields))
         best.add(q, force, load, given)
         W = float(np.hypot(*force))
         off = math.atan2(-force[1], -force[0])

@@ -105,7 +105,7 @@ class Coordinates:
     def forces(self, solution: Solution) -> Array:
         """What the film of a solved step does to each, N or N m. Collective."""
         problem: Any = solution.problem
-        found = totals(problem, solution.fields["p"] * problem.p_unit, solution.fields["r"])
+        found = totals(problem, solution.fields["p"] * problem.p_unit, solution.fields["r"], wanted=self.pushes)
         return np.array([found[name] for name in self.pushes])
 
     def stiffness(self, step: TimeStep, solution: Solution) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +15,7 @@ from ...base.parallel import Array
 from ..strips import Scaled, apart
 from .cavity import cavitated
 from .flows import friction, side_flows
-from .forces import ambient, flow_growth, forces, open_pressures
+from .forces import ambient, flow_growth, forces, open_pressures, totals
 from .fronts import cavitated_area, first_cavity, fronts, line_fronts
 from .peak import Window
 from .supplies import supply_flows
@@ -114,6 +115,18 @@ def quantities(problem: LubricationProblem, p: Array, r: Array) -> dict[str, Any
     out["power_loss"] = out["friction"] * problem.U
     out |= problem.more
     return out | (problem.extras(out) if problem.extras else {})
+
+
+def shaft_force(problem: Any, fields: Mapping[str, Array]) -> tuple[float, float]:
+    """F_X and F_Y of `quantities` on the shaft that a film is wrapped round, N (1D: N/m), without all the rest. Collective."""
+    film, own, known = problem.moving, problem.there(fields), None
+    if film.integrals is not None:
+        from .known import known_of  # here, as above
+
+        known = known_of(film)
+    p_pa: Any = Scaled(own["p"], film.p_unit)
+    found = totals(film, p_pa, own["r"], known, ("force_x", "force_y"))
+    return found["force_x"], found["force_y"]
 
 
 @dataclass(frozen=True)
