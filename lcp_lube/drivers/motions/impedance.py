@@ -46,9 +46,14 @@ def impedance(response: Response | CoupledResponse, frequencies: Sequence[float]
     return np.array(found)
 
 
-def stiffness(response: Response) -> Any:
-    """K, shape (motions, motions); the response is freed. Collective."""
+def stiffness(response: Response | CoupledResponse, rtol: float | None = None) -> Any:
+    """K, shape (motions, motions); the response is freed. Collective.
+
+    rtol : of GMRES for what effects make of it; default as for all its digits.
+    """
     try:
+        if rtol is not None and isinstance(response, CoupledResponse):
+            response.rtol = rtol
         return response.stiffness()
     finally:
         response.destroy()
