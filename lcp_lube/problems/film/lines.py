@@ -8,6 +8,7 @@ multigrid method, and the grids of a refinement by halves, then have lines on th
 
 import heapq
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from ...base.parallel import Array
 from ..grid import OFFSET
 
 SAME = 1e-9  # of the length: edges so near each other, or a side, are one
+REMEMBERED = 16  # lines
 UNEVEN = 1.1  # largest spacing over the mean, up to which a grid is made from a coarser one by halves
 
 
@@ -27,6 +29,13 @@ def on_edges(n: int, length: float, ends: Sequence[str], edges: Sequence[float])
     ends : kinds of the two ends (`grid.OFFSET`). edges : coordinates from the line's start, m; those off the line count for
         nothing.
     """
+    line = _on_edges(n, length, (*ends,), (*edges,))
+    return None if line is None else line.copy()
+
+
+@lru_cache(REMEMBERED)
+def _on_edges(n: int, length: float, ends: tuple[str, ...], edges: tuple[float, ...]) -> Array | None:
+    """`on_edges`, of searches for places and attitudes, whose films all have the same edges, once."""
     periodic = "periodic" in ends
     knots, lengths = stretches(length, ends, edges)
     if not lengths.size:
