@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any, Generic, NamedTuple, TypeVar
 
@@ -129,7 +130,9 @@ def films_of(scene: Solvable, ring: LubricationProblem, fields: Fields) -> Itera
     """The films between the grooves of a solved ring, side by side as `solve` has them. Collective."""
     comm, films = ring.grid.comm, pad_films(scene)
     groups, some, mine = _dealt(scene, films, comm)
-    taken = _taken(ring.grid, fields, films, mine, PETSc.Comm(some), comm)
+    with on_all_ranks(comm):
+        at = {k: films[k][1].build(PETSc.Comm(some)) for k in mine}
+    taken = _taken(ring.grid, fields, films, at, comm)
     yield SideBySide(
         comm, some, [SolvedFilm(at, films[k][1], own, float(films[k][0].around[0])) for k, (at, own) in taken.items()]
     )
@@ -150,14 +153,14 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     groups, some, mine = _dealt(scene, films, comm)
     ask, near, starts = replace(ask, comm=some) if groups > 1 else ask, ask.start, {}
     if near is not None and near.problem.grid.shape == ring.grid.shape:
-        taken = _taken(near.problem.grid, near.fields, films, mine, ask.comm, comm)
-        starts = {k: Start(*one, near.settings) for k, one in taken.items()}
+        at = {k: _bare(near.problem, films[k][1], ask.comm) for k in mine}
+        starts = {k: Start(*one, near.settings) for k, one in _taken(near.problem.grid, near.fields, films, at, comm).items()}
     done: dict[int, Solution] = {}
     with on_all_ranks(comm):
         for k in mine:
             done[k] = inner(films[k][1], replace(ask, start=starts.get(k)))
     for start in starts.values():
-        start.problem.destroy()
+        start.problem.grid.destroy()
     fields = _spread(ring, films, {k: (one.problem, one.fields) for k, one in done.items()}, comm)
     first = {k: (one.outcome, one.message, one.steps, one.settings, one.times) for k, one in done.items()}
     told = sorted({k: one for part in comm.allgather(first) for k, one in part.items()}.items())
@@ -211,12 +214,19 @@ def _group(films: PadFilms, groups: int) -> list[int]:
     return out
 
 
+def _bare(problem: Any, film: PadFilm, comm: PETSc.Comm | None) -> Any:
+    """One of a ring's films as a start from it needs it: a problem with the film's grid, and nothing else that is its own."""
+    other = copy(problem)
+    other.grid = film.model.grid(film.shape, comm)
+    other.reduce = other.grid.reduce
+    return other
+
+
 def _taken(
-    ring: Grid, fields: Fields, films: PadFilms, mine: list[int], group: PETSc.Comm | None, comm: MPI.Comm
+    ring: Grid, fields: Fields, films: PadFilms, at: dict[int, LubricationProblem], comm: MPI.Comm
 ) -> dict[int, tuple[LubricationProblem, Fields]]:
     """The problem of each of this rank's films, and its part of a ring's fields. Collective."""
-    with on_all_ranks(comm):
-        at = {k: films[k][1].build(group) for k in mine}
+    mine = [*at]
     boxes = {k: np.broadcast_arrays(*numbers(problem.grid)) for k, problem in at.items()}
     j = [boxes[k][0].ravel() for k in mine]
     i = [(films[k][0].first + boxes[k][1].ravel()) % ring.shape[0] for k in mine]

@@ -4,6 +4,7 @@ The points in a groove have its pressure and no void. They are Dirichlet points 
 solved one by one; this file has the whole: its certificate, what leaves the grooves, its quantities.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -87,7 +88,10 @@ class GroovedProblem(LubricationProblem):
         red, p, r = self.reduce, fields["p"], fields["r"]
         columns = self.columns
         free = ~np.logical_or.reduce(columns)
-        Ap, Br = (np.where(free, self.multiply(*pair), 0.0) for pair in ((self.A, p), (self.B, r)))
+        Ap, Br = (
+            np.where(free, self._product(*pair), 0.0)
+            for pair in ((self.scheme.pressure_entries(), p), (self.scheme.void_entries(), r))
+        )
         c = np.where(free, self.c, 0.0)
         F = Ap + Br - c
         scale = red.norm(Ap) + red.norm(Br) + red.norm(c)
@@ -109,6 +113,13 @@ class GroovedProblem(LubricationProblem):
             tol=certificate_tol(eps1),
             extremes={"min_p": red.min(p) * self.p_unit, "min_r": red.min(r)},
         )
+
+    def _product(self, entries: Sequence[tuple[int, int, Array]], values: Array) -> Array:
+        """A p or B r without a matrix, which nothing else here asks for. Collective."""
+        (ny, nx), framed = self.grid.box, self.grid.ghosted(values, 0.0)
+        parts = (value * framed[1 + dj : 1 + dj + ny, 1 + di : 1 + di + nx] for dj, di, value in entries)
+        out: Array = sum(parts, np.zeros((ny, nx)))
+        return out.ravel()
 
     def quantities(self, fields: Fields) -> dict[str, Any]:
         """Those of any film, and `groove_flow`: what each groove gives, m3/s. Collective."""
