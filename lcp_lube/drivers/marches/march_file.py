@@ -49,6 +49,8 @@ class MarchFile:
                 "places": [[*map(float, e)] for e in rotor.places],
                 "speeds": [[*map(float, e)] for e in rotor.speeds],
                 "size": rotor.size,
+                "K": None if rotor.K is None else rotor.K.tolist(),
+                "weight": rotor.weight,
             },
             "worst": [worst.measures, worst.tol, worst.extremes],
             "seen": seen,
@@ -80,7 +82,8 @@ class MarchFile:
         if run.rotor is not None:
             for name in ("places", "speeds"):
                 setattr(run.rotor, name, [np.array(e) for e in header["rotor"][name]])
-            run.rotor.size = header["rotor"]["size"]
+            run.rotor.size, run.rotor.weight = header["rotor"]["size"], header["rotor"].get("weight", 0.0)
+            run.rotor.K = None if (K := header["rotor"].get("K")) is None else np.array(K)
         if run.seen is not None:
             run.seen.restore(header["seen"], [a for name, a in arrays.items() if name.startswith("seen.")])
         run.certificates = [Certificate(*header["worst"])]
