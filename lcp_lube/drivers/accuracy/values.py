@@ -97,7 +97,7 @@ class Values:
         by_load, by_all = self._change
         if not isfinite(by_load) or (name not in INTEGRALS and len(values) > 2):
             found = estimate(values, self._misplaced, self._sizes, name, self._order)
-            never = name in SWINGING and not np.nanmin(values) < 0.0  # below nothing
+            never = name in SWINGING and not any(value < 0.0 for value in values)  # below nothing
             return replace(found, value=max(0.0, found.value)) if never else found
         grids, change = (self._misplaced, self._sizes), by_load if name in INTEGRALS else by_all
         pair = of_pair(values, *grids, change, name, self._other, self._full, self._rims, self._corners)
