@@ -475,3 +475,10 @@ def test_upwind_is_of_first_order():
     assert best.extrapolated and best.value == pytest.approx(3.0, abs=1e-12)
     with solve("textured_slider", accuracy=1e-2, finest=(500, 500)) as solution:
         assert solution.outcome == "accuracy_not_reached" and solution.settings["accuracy_estimate"] > 0.02
+
+
+def test_no_value_on_two_grids_is_no_nothing():
+    """A dam's pressure is far greater than what so small an eccentricity turns: there is no attitude on any of three grids."""
+    found = solve(load_scene("dam_journal", {"eccentricity": 0.2, "L_over_D": 0.3, "groove_deg": 34.6}), accuracy=1e-2)
+    assert found.outcome is Outcome.LOAD_NOT_CARRIED
+    assert len(found.levels) == 3
