@@ -65,4 +65,6 @@ def _solved(scene: Scene, solution: Solution) -> Scene:
     """The scene as it was solved: on the last grid, with the value that a balance found."""
     found, shape = solution.settings.get("balance"), solution.problem.grid.shape
     last = as_scene(scene, {found["vary"]: found["value"]}) if found else scene
+    if "accuracy" in solution.settings:
+        return last.refined(shape)
     return last.with_shape(shape) if shape != scene.shape else last

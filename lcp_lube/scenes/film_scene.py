@@ -103,6 +103,13 @@ class FilmScene(Scene):
         scene._t, scene._travel = t, travel
         return scene
 
+    def refined(self, shape: tuple[int, ...]) -> Self:
+        scene: Any = self.with_shape(shape)
+        if self.motion is None:
+            return scene  # type: ignore[no-any-return]
+        finer = math.prod((n + 1) / (own + 1) for n, own in zip(shape, self.shape, strict=True)) ** (1.0 / len(shape))
+        return scene.model_copy(update={"motion": self.motion.finer(finer)})  # type: ignore[no-any-return]
+
     def models(self) -> Models:
         """The film in time."""
         return models_of(self)
@@ -213,14 +220,8 @@ class RectangleScene(FilmScene):
         return (nx,) if self.dimension == 1 else (nx, self.ny or self.n)
 
     def with_shape(self, shape: tuple[int, ...]) -> Self:
-        """The same scene on another grid, and in time in steps in proportion, as both errors are of one order.
-
-        The film that has been made is that of any grid, unless its lines are graded.
-        """
+        """The film that has been made is that of any grid, unless its lines are graded."""
         scene: Any = super().with_shape(shape)
-        if self.motion is not None:
-            finer = math.prod((n + 1) / (own + 1) for n, own in zip(shape, self.shape, strict=True)) ** (1.0 / len(shape))
-            scene = scene.model_copy(update={"motion": self.motion.finer(finer)})
         made = self._made
         if made is not None and made[0] == vars(self) and made[2].places is None and not made[2].effects:
             scene._made = dict(vars(scene)), *made[1:]

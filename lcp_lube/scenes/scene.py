@@ -48,6 +48,10 @@ class Derived:
     def with_shape(self, shape: tuple[int, ...]) -> Self:
         return replace(self, whole=self.whole.with_shape(shape))
 
+    def refined(self, shape: tuple[int, ...]) -> Self:
+        """As `Scene.refined`: what is derived has no steps in time of its own."""
+        return self.with_shape(shape)
+
     def facts(self, comm: PETSc.Comm | None = None) -> Facts:
         return self.model.facts(self.shape, comm)  # type: ignore[attr-defined]
 
@@ -107,6 +111,10 @@ class Scene(Measured):
     def with_shape(self, shape: tuple[int, ...]) -> "Scene":
         """The same scene on another grid."""
         return self.model_copy(update=dict(zip(("nx", "ny"), shape, strict=False)))
+
+    def refined(self, shape: tuple[int, ...]) -> "Scene":
+        """On another grid, and in time in steps in proportion, as the errors of both are of one order."""
+        return self.with_shape(shape)
 
     def build(self, comm: PETSc.Comm | None = None) -> Problem:
         """The discrete problem on this scene's grid. Collective."""

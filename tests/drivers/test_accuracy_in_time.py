@@ -26,11 +26,12 @@ SMALL = {"nx": 24, "ny": 3, "motion.steps": 42, "motion.t_end": 0.014}  # of `dy
 def test_steps_go_with_the_grid(given, finer, coarser):
     scene = load_scene({**WEDGE, "n": 31, "motion": {"t_end": 0.02, **given}})
     for n, expected in ((63, finer), (15, coarser), (31, given)):
-        motion = scene.with_shape((n,)).motion
+        motion = scene.refined((n,)).motion
         assert {key: getattr(motion, key) for key in expected} == pytest.approx(expected)
     plane = load_scene({**WEDGE, "dimension": 2, "width_mm": 5, "nx": 31, "ny": 15, "motion": {"t_end": 0.02, "steps": 20}})
-    assert plane.with_shape((63, 31)).motion.steps == 40
-    assert plane.with_shape((63, 15)).motion.steps == 28  # 2^(1/2) of 20
+    assert plane.refined((63, 31)).motion.steps == 40
+    assert plane.with_shape((63, 31)).motion.steps == 20
+    assert plane.refined((63, 15)).motion.steps == 28  # 2^(1/2) of 20
 
 
 def test_no_tolerance_leaves_its_range():

@@ -128,7 +128,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         enough = {"stopping": stopping, "cavities": loose, "digits": ALGEBRAIC * tol}
         this = replace(ask, accuracy=None, start=near, nested=False, reduction=halved, **enough)  # type: ignore[arg-type]
         by_loops = loops and (plane or (line and shape[0] <= ELIMINATED))
-        solution = inner(scene.with_shape(shape), replace(this, direct_below=0) if by_loops else this)
+        solution = inner(scene.refined(shape), replace(this, direct_below=0) if by_loops else this)
         problem = solution.problem
         sure = quantity or (DEFAULT_QUANTITY[0] if pairs or line else "")
         value = carried(problem, solution.fields, sure)

@@ -23,7 +23,7 @@ from ..supplies import check_backflow
 from .march import March
 from .march_coordinates import Coordinates
 from .march_file import MarchFile
-from .rotor import TOL, Rotor
+from .rotor import Rotor
 from .step import TimeStep, carried, check_content, check_room, contents
 
 SOME = 0.37  # of t_end: when edges are compared with those at t = 0
@@ -70,7 +70,7 @@ class Run:
         if self.coordinates.any:
             steady = not self._fill and self.file.resume is None
             place, speed = self.coordinates.begin(self.course, replace(ask, nested=None), inner if steady else None)
-            self.rotor = Rotor(self.coordinates, max(TOL, ask.digits), [place], [speed])
+            self.rotor = Rotor(self.coordinates, ask.digits, [place], [speed])
         first = first_film(scene, self.models, self._given(0.0))
         problem = self._at(0.0, lambda: first.build(scene.shape, ask.comm))
         problem.shares_grid = True

@@ -32,10 +32,10 @@ SMALLEST = 1e-13  # of the thinnest film: a step that is none
 
 @dataclass
 class Rotor:
-    """Places and speeds of the last times, the newest first. tol : of the forces that are left."""
+    """Places and speeds of the last times, the newest first. digits : of the forces that may be left, if more than TOL."""
 
     of: Coordinates
-    tol: float = TOL
+    digits: float = 0.0
     places: list[Array] = field(default_factory=list)
     speeds: list[Array] = field(default_factory=list)
     size: float = 0.0  # largest force so far, N
@@ -81,7 +81,7 @@ class Rotor:
             left = scale * (inertia * (formula.weight * speed - formula.old(self.speeds)) - force - loads)
             self.size = max(self.size, *(float(np.linalg.norm(scale * one)) for one in (force, loads)))
             now = float(np.linalg.norm(left[free])) / (self.size or 1.0)
-            if now <= self.tol:
+            if now <= max(TOL, self.digits):
                 return solution, q, ""
             if exact and now > GROWN * before and halved < HALVED:
                 q, halved = last + 0.5 * (q - last), halved + 1
