@@ -157,7 +157,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         times = added(times, solution.times)
         end = _end(estimates, values, tol, problem.grid.size)
         rounding = _rounding(solution) if problem.kind == "lubrication" and quantity in INTEGRALS else 0.0
-        if not end and len(values) > 1 and max(*map(abs, values), told.largest) <= rounding:  # which NaN, where it comes first, is not
+        if not end and len(values) > 1 and max(*map(abs, values), told.largest) <= rounding:  # NaN is not
             noise = f"below {rounding:.0e} N, which is rounding beside what wall and sides could carry"
             end = f"it is {noise if rounding else 0}"
         ups = 0 if end else rungs_up(estimates, tol, told.line is not None, len(first), pairs)
