@@ -53,11 +53,24 @@ class Watching:
         self.frames = Frames() if self.picture is not None else None
         quiet = None if comm.rank == 0 else True
         self._bar: Any = tqdm(total=self.table.t_end, unit="s", disable=quiet, file=sys.stderr, bar_format=BAR)
+        self._done = self._last = 0  # of the times; the number of the last step
+
+    def _again(self, comm: MPI.Comm) -> None:
+        """A run to an accuracy marches anew on each grid: the last one's steps are kept. Collective."""
+        if self.history is not None:
+            self.history.again()
+        for series in self.series:
+            series.again(comm)
+        if self.frames is not None:
+            self.frames = type(self.frames)()
         self._done = 0
+        self._bar.reset()
 
     def __call__(self, moment: Any) -> None:
         """A step was taken."""
-        dt = moment.row["dt"]
+        if moment.count == 1 and self._last:
+            self._again(moment.problem.grid.comm)
+        self._last, dt = moment.count, moment.row["dt"]
         if self.history is not None:
             self.history.add(moment.row, dt)
         done = bisect_right(self.times, moment.t + 0.5 * dt)  # of the times, which ascend

@@ -59,6 +59,11 @@ class HistoryFile:
         os.replace(temporary, self.path)
         self._file = self.path.open("a", newline="")
 
+    def again(self) -> None:
+        """The march begins once more, on a finer grid."""
+        self.close()
+        self._file, self.resumed = None, False
+
     def close(self) -> None:
         if self._file is not None:
             self._file.close()
@@ -79,6 +84,13 @@ class Series:
         save(solution, target, self.boundary)
         self._files.append((float(f"{moment.t:.12g}"), target.name))
         write_collection(self.path, self._files, comm)
+
+    def again(self, comm: Any) -> None:
+        """The march begins once more, on a finer grid: what the one before has left is taken away."""
+        with on_all_ranks(comm, f"--output {self.path}"):
+            for _, name in self._files if comm.rank == 0 else ():
+                self.path.with_name(name).unlink(missing_ok=True)
+        self._files = []
 
 
 @dataclass

@@ -1,5 +1,7 @@
 """Marches to an accuracy: grid and steps in proportion, errors of both, relative to what came and went; and free places."""
 
+import csv
+
 import numpy as np
 import pytest
 from marches import WEDGE
@@ -130,3 +132,22 @@ def test_equal_steps_have_one_matrix():
         solution = solve(load_scene("dynamic_journal", quiet))
     assert solution.converged
     assert len(made) < 0.2 * len(solution.history)
+
+
+@pytest.mark.parametrize("ranks, picture", [(1, "run.gif"), (2, "run.png")])
+def test_what_is_kept_is_of_the_last_grid(cli, tmp_path, ranks, picture):
+    """History, fields and pictures: of the march that is the answer, and nothing of those before it."""
+    few = [f"--set={word}" for word in ("n=24", "motion.steps=8", "film.2.columns=2")]
+    words = ["solve", "moving_texture", *few, "--accuracy", "1e-3", "--n", "99", "--history", "h.csv", "--json"]
+    run = cli(*words, "--output", "run.pvd", "--times", "4", "--plot", picture, ranks=ranks)
+    assert len(run.json["levels"]) == 3, run.err
+    steps = run.json["time_steps"]
+    rows = list(csv.DictReader((tmp_path / "h.csv").read_text().splitlines()))
+    assert len(rows) == steps
+    assert np.all(np.diff([float(row["t"]) for row in rows]) > 0)
+    listed = (tmp_path / "run.pvd").read_text()
+    files = {path.name for path in tmp_path.glob("run_*.vts")}
+    assert len(files) == 4
+    assert all(name in listed for name in files)
+    assert f"run_{steps:06d}.vts" in files
+    assert (tmp_path / picture).stat().st_size > 0
