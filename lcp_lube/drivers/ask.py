@@ -16,6 +16,7 @@ from ..base.progress import Progress
 from ..errors import InputError, nearest
 from ..problems.certificate import Certificate
 from ..problems.film.lubrication import LubricationProblem
+from ..problems.grid import Grid
 from ..problems.solution import Fields, Problem, Solution
 from ..solvers.newton import Monitor, Stopping
 
@@ -49,6 +50,13 @@ def light(problem: Any) -> Any:
     problem.free_matrices()
     other = copy(problem)
     other.scheme = None  # type: ignore[assignment]
+    return other
+
+
+def bare(problem: Any, grid: Grid) -> Any:
+    """What a start on a part of a problem is asked for: the part's grid. Nothing else of it is the part's own."""
+    other = copy(problem)
+    other.grid, other.reduce = grid, grid.reduce
     return other
 
 

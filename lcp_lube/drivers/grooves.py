@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any, Generic, NamedTuple, TypeVar
 
@@ -25,7 +24,7 @@ from ..problems.transfer import fetch, numbers
 from ..scenes.moving import film_of
 from ..scenes.scene import Derived, Solvable
 from ..solvers.enclosure import bounds_of
-from .ask import Ask, Start
+from .ask import Ask, Start, bare
 from .chain import added
 from .compose import Inner
 
@@ -130,9 +129,7 @@ def films_of(scene: Solvable, ring: LubricationProblem, fields: Fields) -> Itera
     """The films between the grooves of a solved ring, side by side as `solve` has them. Collective."""
     comm, films = ring.grid.comm, pad_films(scene)
     groups, some, mine = _dealt(scene, films, comm)
-    with on_all_ranks(comm):
-        at = {k: films[k][1].build(PETSc.Comm(some)) for k in mine}
-    taken = _taken(ring.grid, fields, films, at, comm)
+    taken = _taken(ring.grid, fields, films, mine, lambda film: film.build(PETSc.Comm(some)), comm)
     yield SideBySide(
         comm, some, [SolvedFilm(at, films[k][1], own, float(films[k][0].around[0])) for k, (at, own) in taken.items()]
     )
@@ -153,8 +150,9 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     groups, some, mine = _dealt(scene, films, comm)
     ask, near, starts = replace(ask, comm=some) if groups > 1 else ask, ask.start, {}
     if near is not None and near.problem.grid.shape == ring.grid.shape:
-        at = {k: _bare(near.problem, films[k][1], ask.comm) for k in mine}
-        starts = {k: Start(*one, near.settings) for k, one in _taken(near.problem.grid, near.fields, films, at, comm).items()}
+        of = lambda film: bare(near.problem, film.model.grid(film.shape, ask.comm))  # noqa: E731
+        taken = _taken(near.problem.grid, near.fields, films, mine, of, comm)
+        starts = {k: Start(*one, near.settings) for k, one in taken.items()}
     done: dict[int, Solution] = {}
     with on_all_ranks(comm):
         for k in mine:
@@ -214,19 +212,12 @@ def _group(films: PadFilms, groups: int) -> list[int]:
     return out
 
 
-def _bare(problem: Any, film: PadFilm, comm: PETSc.Comm | None) -> Any:
-    """One of a ring's films as a start from it needs it: a problem with the film's grid, and nothing else that is its own."""
-    other = copy(problem)
-    other.grid = film.model.grid(film.shape, comm)
-    other.reduce = other.grid.reduce
-    return other
-
-
 def _taken(
-    ring: Grid, fields: Fields, films: PadFilms, at: dict[int, LubricationProblem], comm: MPI.Comm
+    ring: Grid, fields: Fields, films: PadFilms, mine: list[int], of: Callable[[PadFilm], Any], comm: MPI.Comm
 ) -> dict[int, tuple[LubricationProblem, Fields]]:
-    """The problem of each of this rank's films, and its part of a ring's fields. Collective."""
-    mine = [*at]
+    """The problem `of` each of this rank's films, and its part of a ring's fields. Collective."""
+    with on_all_ranks(comm):
+        at = {k: of(films[k][1]) for k in mine}
     boxes = {k: np.broadcast_arrays(*numbers(problem.grid)) for k, problem in at.items()}
     j = [boxes[k][0].ravel() for k in mine]
     i = [(films[k][0].first + boxes[k][1].ravel()) % ring.shape[0] for k in mine]

@@ -6,7 +6,6 @@ fails the whole problem is solved. (A film that does not cavitate needs no choic
 linear solve.)
 """
 
-from copy import copy
 from dataclasses import replace
 from math import prod
 from typing import Any
@@ -17,7 +16,7 @@ from ..problems.solution import Fields, Outcome, Problem, Solution
 from ..problems.transfer import Pick, numbers
 from ..scenes.scene import Solvable
 from . import film_part, rectangle_part
-from .ask import Ask, Built, Start
+from .ask import Ask, Built, Start, bare
 from .compose import Inner
 from .memory import LARGE, look_ahead, resident
 from .plan import plan
@@ -96,7 +95,7 @@ def solve_part(part: Part, problem: Problem, ask: Ask, inner: Inner) -> Solution
         return Solution(problem, known, Outcome.CONVERGED, "nothing to solve", certificate, [], settings).judged()
     start = None
     if ask.start is not None:
-        (small := copy(problem)).grid = part.grid(problem.grid.petsc_comm)  # all that a start is asked for
+        small = bare(problem, part.grid(problem.grid.petsc_comm))
         same = ask.start.problem.grid is problem.grid
         near = ask.start.fields if same else problem.prolong(ask.start.problem, ask.start.fields, False)
         take = Pick(problem.grid, small.grid, *numbers(small.grid))

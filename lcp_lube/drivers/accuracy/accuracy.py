@@ -87,8 +87,8 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     fewest = model.fewest_meshes() if (model := film_of(scene)) is not None else ()
     line = is_known(scene)
     in_time = motion_of(scene)
-    coarse = model is not None and (model.scheme == "upwind" or model.mean_cubes)
-    order = 1.0 if coarse or (in_time is not None and in_time.scheme == "euler") else 2.0
+    first_order = model is not None and (model.scheme == "upwind" or model.mean_cubes)
+    order = 1.0 if first_order or (in_time is not None and in_time.scheme == "euler") else 2.0
     # Of the load in the plane each two grids give an estimate (`estimate.of_pair`).
     pairs = quantity in (None, *INTEGRALS) and len(scene.shape) == 2 and order > 1.0 and given_film(scene) is not None
     few = FEW_KNOWN if line else FEW_PAIRS if pairs else int(SHARE * prod(scene.shape)) if in_time is not None else None
