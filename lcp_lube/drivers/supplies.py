@@ -29,7 +29,6 @@ from ..scenes.scene import Derived, Solvable
 from .ask import Ask
 from .chain import Chain
 from .compose import Inner
-from .motions.linearised import Feed, Linear
 
 MOST_SOLVES = 40  # ends a search that goes round in circles; random films with dense fluids took up to 11
 TOLERANCE = 1e-10  # of the largest flow: by how much what a source gives may differ from what the film takes
@@ -211,6 +210,8 @@ def _slopes(problem: LubricationProblem, fields: Any, free: Any) -> tuple[Array,
     held = problem.held
     assert held is not None  # as `applies` found
     cavity = (cavity_sign(problem.reduce, fields["p"], fields["r"]) < 0) & ~held.mask.ravel()
+    from .motions.linearised import Feed, Linear  # films without supplies, which ask for this module too, need none
+
     linear, feed = Linear(problem, cavity), Feed(problem, cavity, free)
     try:
         answers = linear.solve([feed.pushed(t) for t in feed.free])

@@ -25,6 +25,7 @@ from ..linear.system import System, make_system
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.solution import Fields, Step
 from .job import Job
+from .line_start import full_along
 from .method import Method
 from .method_options import MethodOptions, least, part, positive
 from .newton import StalledError
@@ -73,7 +74,7 @@ class ActiveSet(Method):
         problem, options, start = self.problem, self.options, job.start
         self.system = make_system(job.system, problem, self.stages)
         self.form = ZForm(problem)
-        self.z = self.form.z(start) if start else np.where(self._left_behind(), -options.p0, options.p0)
+        self.z = self.form.z(start) if start else options.p0 * np.where(self._full_at_first(), 1.0, -1.0)
         self._look()
         self._relaxation: Relaxation | None = relaxation(problem) if options.sweeps else None
         cheap = self.system.direct and problem.grid.dim == 2 and problem.grid.size <= CHEAP
@@ -85,14 +86,16 @@ class ActiveSet(Method):
     def fields(self) -> Fields:
         return self.form.fields(self.z)
 
-    def _left_behind(self) -> NDArray[np.bool_]:
-        """Where the wall drags away more than it brings, in a film without given pressures: a step is saved. Not where it
-        brings more than it drags away in all, at few points: a dam presses all that lies before it. Collective."""
+    def _full_at_first(self) -> NDArray[np.bool_]:
+        """But where the wall drags away more than it brings, in a film without given pressures: a step is saved. All of it if
+        it brings more than it drags away in all, at few points: a dam presses all that lies before it. Collective."""
         problem, c, reduce = self.problem, self.problem.c, self.problem.reduce
+        if (full := full_along(problem)) is not None:
+            return full
         if any(problem.p_sides) or problem.held is not None:
-            return np.zeros(c.size, dtype=bool)
+            return np.ones(c.size, dtype=bool)
         dammed = reduce.sum(c) > DAM * reduce.sum(np.abs(c)) and reduce.sum((c > 0.0).astype(float)) < DAM * problem.size
-        return (c < -NONE * reduce.largest(c)) & (not dammed)
+        return (c >= -NONE * reduce.largest(c)) | dammed
 
     def _look(self) -> None:
         self.G = self.form.residual(self.z)

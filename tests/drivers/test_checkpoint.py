@@ -152,12 +152,13 @@ def stopping_at(step):
     return monitor
 
 
+PRESSED = "problem4", {"n": 24, "p_a": 1e6, "p_b": 1e6, "p_side": 1e6}  # six steps of the active set
 CASES = {
     "din": ("problem1", {"n": 60}, {"method": "din"}),
     "din nested": ("problem2", {"n": 130}, {"method": "din", "nested": True}),
     "din-pc": ("problem4", {"n": 20}, {"method": "din-pc"}),
     "fbn-a": ("problem1", {"n": 60}, {"method": "fbn-a", "options": {"p0": 2.0}}),
-    "active-set": ("problem2", {"n": 60}, {}),
+    "active-set": (*PRESSED, {}),
     "iterative": ("problem1", {"n": 40}, {"method": "din", "system": "full", "recipe": "gmres_ilu"}),
     "fas": ("problem4", {"n": 40}, {"method": "fas", "stopping": {"eps1": 1e-10}}),
     "fas, obstacle": ("obstacle_bratu", {"n": 31}, {"method": "fas"}),
@@ -165,7 +166,7 @@ CASES = {
     "interior": ("obstacle_bratu", {"n": 15}, {"method": "interior"}),
     "semismooth": ("obstacle_bratu", {"n": 15}, {"method": "semismooth"}),
     "newton": ("bratu", {"n": 15}, {}),
-    "took over": ("problem2", {"n": 60}, {"stopping": {"max_it": 3}}),
+    "took over": (*PRESSED, {"stopping": {"max_it": 3}}),
 }
 
 
@@ -191,8 +192,8 @@ def test_every_method_takes_the_same_steps(tmp_path, case):
 @pytest.mark.parametrize("stopped_at, failed", [(4, 1), (6, 2)])
 def test_the_last_step_of_a_fallback(tmp_path, stopped_at, failed):
     """Stopped before the last step of the first or the second method that took over: that one goes on."""
-    scene, how = load_scene("problem3", {"n": 60}), {"stopping": {"max_it": 2}}
-    expected, seen = solve(scene, **how), []
+    scene, how = load_scene(*PRESSED), {"stopping": {"max_it": 2}}
+    expected, seen = solve(scene, **how, reduction=False), []
 
     def monitor(k, _):
         seen.append(k)

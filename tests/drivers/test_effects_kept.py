@@ -23,7 +23,7 @@ SCENES = {
     "hot": {**PAD, "fluid": LAWS, "temperature": WARM},
     "soft": {**PAD, "elastic": {"compliance": 2e-12}, "shear": {"law": "eyring", "tau_0": 1e5}},
     "wide": {**PAD, "dimension": 2, "width": 0.08, "nx": 79, "ny": 39, "fluid": LAWS, "temperature": WARM},
-    "barus": {**PAD, "fluid": {**FLUID, "barus": 2e-8}},
+    "barus": {**PAD, "dimension": 2, "width": 0.08, "nx": 39, "ny": 19, "fluid": {**FLUID, "barus": 2e-8}},
     "decided": {**PAD, "n": 999, "temperature": WARM, "shear": {"law": "eyring", "tau_0": 1e7}},
 }
 

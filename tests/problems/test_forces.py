@@ -170,7 +170,7 @@ def test_void_that_enters_has_no_rupture():
 
 def test_no_rescue(cli):
     """A flag forbids that another method's answer stands under the name of the one that was asked for."""
-    words = ("solve", "problem3", "--n", 60, "--method", "active-set", "--set", "active-set.give_up=1")
+    words = ("solve", "problem4", "--n", 24, "--set", "p_side=1e6", "--method", "active-set", "--set", "active-set.give_up=1")
     rescued, refused = cli(*words, "--json"), cli(*words, "--no-rescue", "--json")
     assert rescued.status == 0 and rescued.json["took_over"] == "pivoting" and rescued.json["method"] == "active-set"
     assert refused.status == 1 and refused.json["took_over"] is None and refused.json["outcome"] == "stalled"

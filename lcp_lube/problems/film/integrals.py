@@ -238,11 +238,15 @@ def check_film(grid: Grid, film: Callable[[Array, Array], Array]) -> None:
 def thinnest(grid: Grid, film: Callable[[Array, Array], Array]) -> tuple[float, float, float]:
     """The thinnest film on all nodes and faces, and its x and y, m. Collective."""
     x_nodes, x_faces = grid.nodes_and_faces(0)
-    y_nodes, y_faces = grid.nodes_and_faces(1) if grid.dim == 2 else (np.zeros(1), np.zeros(1))
+    places = [(np.concatenate([x_nodes, x_faces]), np.zeros(1))]
+    if grid.dim == 2:
+        y_nodes, y_faces = grid.nodes_and_faces(1)
+        places = [(x_nodes, y_nodes), (x_faces, y_nodes), (x_nodes, y_faces)]
     lowest = (np.inf, 0.0, 0.0)
-    for x, y in ((x_nodes, y_nodes), (x_faces, y_nodes), (x_nodes, y_faces)):
+    for x, y in places:
         x, y = x[None, :], y[:, None]
-        h = np.nan_to_num(np.broadcast_to(film(x, y), (y.size, x.size)), nan=-np.inf, posinf=np.inf, neginf=-np.inf)
+        h = np.broadcast_to(film(x, y), (y.size, x.size))
+        h = np.where(np.isfinite(h), h, -np.inf)
         j, i = np.unravel_index(np.argmin(h), h.shape)
         lowest = min(lowest, (float(h[j, i]), float(x[0, i]), float(y[j, 0])))
     return grid.comm.allreduce(lowest, MPI.MIN)
