@@ -40,6 +40,7 @@ FIRST, FORCING, LAST = 1e-2, 0.1, 0.4
 NONE = 1e-9  # of the largest flow that the wall brings to a cell or drags away: less is rounding
 CHEAP = 10_000  # points up to which direct steps cost no more than sweeps that save them, whose compiler loads in 0.5 s
 DAM = 0.25  # part of all flows that the wall leaves over, and of the points, from which and up to which it counts as a dam
+FALL = 0.9  # of ||G||: a step that leaves no more is no stall
 LEAST = 1e-15  # p_unit: a largest pressure below this is rounding
 
 
@@ -124,7 +125,7 @@ class ActiveSet(Method):
             why = "active-set.give_up" if self._vain <= IN_VAIN else f"{self._vain} times sweeps took over in vain"
             raise StalledError(f"||G|| is at {self.norm:.1e} of ||c|| after {self._taken} steps ({why}): they seem to cycle")
         self._taken += 1
-        full = self._branch()
+        before, full = self.norm, self._branch()
         cavity = (~full).astype(float)
         last = LAST * self.eps1 / self.norm if self.norm else 1.0
         rtol = max(self.options.rtol, min(FIRST, max(FORCING * self.norm, last)))
@@ -148,7 +149,10 @@ class ActiveSet(Method):
                 self._stalled, self._rescue, self._vain = 0, min(2 * self._rescue, MOST_SWEEPS), self._vain + 1
             else:
                 self._relax(self._sweeps)
-        self._stalled, self._vain = (0, 0) if self.norm <= 0.9 * self._best else (self._stalled + 1, self._vain)
+        if self.norm <= FALL * self._best:
+            self._stalled = self._vain = 0
+        elif not (self.problem.grid.periodic[0] and self.norm <= FALL * before):
+            self._stalled += 1
         self._best = min(self._best, self.norm)
         return Step(self.norm, step_norm, 1.0, linear_iterations, rtol=rtol)
 

@@ -110,6 +110,18 @@ def test_a_small_solve_imports_little(words):
     assert len(own) <= 150  # drivers of scenes that nobody loaded stay where they are; any film may name effects, one file each
 
 
+SMALL = ["pocketed_pad_2d", "two_groove_journal", "dam_journal", "ring_journal", "circumferential_groove_journal"]
+
+
+@pytest.mark.parametrize("scene", SMALL)
+def test_small_bearings_wait_for_no_compiler(scene):
+    """Half a second of a second: direct steps that come down by themselves are let do so."""
+    done = subprocess.run(
+        [sys.executable, "-c", ALL, "solve", scene], env=ENVIRONMENT, capture_output=True, text=True, timeout=60, check=True
+    )
+    assert "numba" not in done.stdout.splitlines()[-1].split()
+
+
 def test_the_package_alone_imports_nothing():
     code = "import sys; before = set(sys.modules); import lcp_lube; print(*set(sys.modules) - before)"
     done = subprocess.run([sys.executable, "-c", code], env=ENVIRONMENT, capture_output=True, text=True, timeout=60, check=True)
