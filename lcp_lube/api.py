@@ -16,7 +16,6 @@ from .problems.solution import Solution
 from .scenes.doubts import doubts
 from .scenes.scene import Scene, as_scene
 
-SMALL = 10_000  # points up to which one rank takes the numbers where they are asked for: a sixth of such a solve
 ASKED = tuple(field.name for field in fields(Ask))
 
 
@@ -55,7 +54,7 @@ def solve(scene: str | Path | dict[str, Any] | Scene, ask: Ask | None = None, **
         data.pop("n", None)  # which these have replaced
     solution.settings |= {"scene_data": data, "scene_units": last.data_units(), "warnings": doubts(scene)}
     solution.settings["memory_mb"] = solution.problem.grid.comm.allreduce(peak() / 2**20)
-    if solution.problem.grid.comm.size > 1 or solution.problem.grid.size > SMALL:
+    if solution.problem.grid.comm.size > 1:
         solution.numbers  # noqa: B018  (all that needs every rank is taken now: later look-ups are each rank's own)
     solution.times["total"] = perf_counter() - begin
     return solution

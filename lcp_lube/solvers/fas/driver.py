@@ -37,7 +37,7 @@ SETTLED = 1e-8  # of the largest pressure, or eps1 where that is more: what they
 CLOSE = 1e-6  # ||G|| below which a ring that is hardly fed is not what has stalled
 FEW = 0.05  # part of a ring's line that is full, below which it is hardly fed
 FED = 3e-5  # of the certificate's tolerance: the flow that a film with supplies may lose, 3e-12 in parts of what flows
-SLOW, EARLY = 0.15, 0.16  # a cycle whose iterates are mixed leaves more than that; two cycles, where coarse grids mislead
+SLOW, EARLY = 0.2, 0.16  # a cycle whose iterates are mixed leaves more than that; two cycles, where coarse grids mislead
 VAIN = 0.5  # and two cycles, where it is corrections that are cut off at fronts
 SLOWER, LEAST_FALL = 2.5, (0.07, 0.2)  # times what an F cycle leaves is what a V cycle does in its place; at least, in time too
 
