@@ -207,11 +207,11 @@ def check_backflow(solution: Solution) -> None:
 
 def _slopes(problem: LubricationProblem, fields: Any, free: Any) -> tuple[Array, list[Array]]:
     """dQ_s/dP_t of the film at its signs for the supplies that are free, m3/s/Pa, and what it answers to each. Collective."""
+    from .motions.linearised import Feed, Linear  # films without supplies, which ask for this module too, need none
+
     held = problem.held
     assert held is not None  # as `applies` found
     cavity = (cavity_sign(problem.reduce, fields["p"], fields["r"]) < 0) & ~held.mask.ravel()
-    from .motions.linearised import Feed, Linear  # films without supplies, which ask for this module too, need none
-
     linear, feed = Linear(problem, cavity), Feed(problem, cavity, free)
     try:
         answers = linear.solve([feed.pushed(t) for t in feed.free])

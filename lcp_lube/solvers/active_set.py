@@ -62,7 +62,8 @@ class ActiveSetOptions(MethodOptions):
 class ActiveSet(Method):
     """The iterates z; `newton.iterate` runs it. `norm` is ||G(z)|| / ||c||, see `zform.ZForm.norm`.
 
-    A start's cells count as cavitated where r > 0; without one those do that the wall empties, if nothing presses the film.
+    A start's cells count as cavitated where r > 0; without one those do that lines by themselves would have (`line_start`),
+    or, if these tell nothing and nothing presses the film, those that the wall empties.
     """
 
     Options = ActiveSetOptions
