@@ -4,9 +4,9 @@ A film along a line has just these fronts, but for rounding; one in the plane ha
 
 Steady, a line passes one flow q everywhere, none if an end is closed. Full up to point j the film has p_j = p_W + A_j - q B_j,
 with A and B the sums of couette/k and of 1/k over the faces up to j: that no pressure is below 0 means q <= (p_W + A_j)/B_j
-for all points and for the other end, where p_E stands beside p_W. The least of these is the flow, and its place the first that
-is not full. From the east end p_j is the larger of p_{j+1} + (q - couette)/k and 0: a film that ends where the wall carries q
-reaches back to where its pressure is gone, and before that lies a cavity.
+for all points and for the other end, where p_E stands beside p_W. The least of these is the flow. From the east end back p_j
+is the larger of p_{j+1} + (q - couette)/k and 0: a film that ends where the wall carries q reaches back to where its pressure
+is gone, and before that lies a cavity.
 """
 
 import numpy as np
@@ -16,11 +16,13 @@ from numpy.typing import NDArray
 from ..base.parallel import Array
 from ..problems.film.lubrication import LubricationProblem
 
+ROUNDING = 1e-12  # of the largest sum: pressures below that are none
 ALIKE = 0.05  # of the lines' mean flow: a standard deviation up to which they exchange little
 
 
 def full_along(problem: LubricationProblem) -> NDArray[np.bool_] | None:
-    """Owned points where the film is full; None if its lines end at no given pressures, or exchange much. Collective."""
+    """Owned points where the film is full; None if its lines end at no given pressures or exchange much, or if nothing presses
+    them. Collective."""
     s, grid = problem.scheme, problem.grid
     west, east = grid.ends[0]
     if {west, east} not in ({"open"}, {"open", "closed"}) or s.storage is not None or problem.held is not None:
@@ -32,27 +34,25 @@ def full_along(problem: LubricationProblem) -> NDArray[np.bool_] | None:
             return None
     if east == "closed":  # what the wall brings stays
         return np.ones(grid.local_size, dtype=bool)
-    ranks, number = grid.comm if shared else MPI.COMM_SELF, np.arange(grid.x_start, grid.x_end)
+    ranks, last = grid.comm if shared else MPI.COMM_SELF, grid.x_end == nx
     p_W, p_E = (side / problem.p_unit for side in problem.p_sides[:2])
-    q = rupture = np.zeros((grid.box[0], 1))
+    q = np.zeros((grid.box[0], 1))
     with np.errstate(all="ignore"):  # conductances that are no numbers are refused elsewhere
         if west == "open":
             A, B = (_sums(ranks, a) for a in (s.couette_W / s.k_W, 1.0 / s.k_W))
-            passed = (p_W + A) / B
             end = (p_W - p_E + A + s.couette_E / s.k_E) / (B + 1.0 / s.k_E)
-            least = np.minimum(passed.min(axis=1), np.where(number[-1] == nx - 1, end[:, -1], np.inf))
+            least = np.minimum(((p_W + A) / B).min(axis=1), end[:, -1] if last else np.inf)
             q = _of_all(ranks, least).min(axis=0)[:, None]
             if grid.dim == 2 and not _alike(problem, q):
                 return None
-            first = np.where(passed <= q, number, nx).min(axis=1)
-            rupture = _of_all(ranks, first).min(axis=0)[:, None]
         rises = (q - s.couette_E) / s.k_E
         up_to = _sums(ranks, rises)
-        p = p_E + _of_all(ranks, up_to[:, -1])[-1][:, None] - (up_to - rises)  # were all of it full to the east end
-        lowest = np.minimum.accumulate(p[:, ::-1], axis=1)[:, ::-1]
+        full = p_E + _of_all(ranks, up_to[:, -1])[-1][:, None] - (up_to - rises)  # p, were all of it full to the east end
+        lowest = np.minimum.accumulate(full[:, ::-1], axis=1)[:, ::-1]
         beyond = _of_all(ranks, lowest[:, 0])[ranks.rank + 1 :].min(axis=0, initial=0.0)[:, None]
-        full = (number < rupture) | (p > np.minimum(lowest, beyond))
-    return full.ravel()
+        p = full - np.minimum(lowest, beyond)
+        pressed = p > ROUNDING * problem.reduce.largest(full)
+    return pressed.ravel() if problem.reduce.max(pressed.astype(float)) else None
 
 
 def _alike(problem: LubricationProblem, q: Array) -> bool:

@@ -34,8 +34,11 @@ def line(ratio, pockets, waves, n, U, ends):
 def test_a_line_has_these_fronts(ratio, pockets, waves, n, U, ends):
     """One step, whatever the film: signs that are left to it are of pressures or voids that are rounding."""
     with solve(line(ratio, pockets, waves, n, U, ends), method="active-set", reduction=False, rescue=False) as s:
-        assert s.converged and s.iterations <= 2
         full, p, r = full_along(s.problem), s.fields["p"], s.fields["r"]
+        if full is None:  # nothing presses it
+            assert s.converged and p.max() <= 1e-9
+            return
+        assert s.converged and s.iterations <= 2
         assert np.all(p[~full] <= 1e-9 * max(p.max(), 1e-30)) and np.all(r[full] <= 1e-9)
 
 
@@ -61,7 +64,12 @@ def test_dimples_are_nearly_lines(name, steps):
 NARROW = {"width_over_diameter": 0.2}
 
 
-@pytest.mark.parametrize("name, changes", [("journal", NARROW), ("piston_skirt", {}), ("ring_journal", {})])
+FLAT = {"fluid.p_supply": 0.0}  # needs no pressure: what its sums leave is rounding
+
+
+@pytest.mark.parametrize(
+    "name, changes", [("journal", NARROW), ("piston_skirt", {}), ("ring_journal", {}), ("dimpled_pad", FLAT)]
+)
 def test_lines_that_exchange_much_tell_nothing(name, changes):
     problem = load_scene(name, {**changes, "nx": 40, "ny": 30}).build()
     assert full_along(problem) is None
