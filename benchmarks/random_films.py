@@ -92,7 +92,7 @@ def main() -> None:
         for seed in range(args.seed, args.seed + args.films):
             case = scene(seed)
             solution = solve(case, method=args.method, **choices)
-            took_over = solution.settings["took_over"] is not None
+            took_over = solution.took_over is not None
             steps.append(solution.iterations)
             outcomes[str(solution.outcome)] += 1
             helped += took_over

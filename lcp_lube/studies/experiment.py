@@ -107,7 +107,7 @@ def run(
     with solution:
         data = as_dict(solution)
         # 'auto' is all that it does; of a method that was asked for by name a rescue by another one is a failure.
-        rescued = solution.settings["took_over"] and choices.get("method", "auto") != "auto"
+        rescued = solution.took_over and choices.get("method", "auto") != "auto"
         outcome: dict[str, Any] = {"outcome": FELL_BACK} if rescued else {}
         if reference is not None:
             far = reference.distance(solution.problem, solution.fields)

@@ -8,6 +8,7 @@ import pytest
 from lcp_lube import InputError, load_scene, solve
 from lcp_lube.output.results import as_dict
 from lcp_lube.studies.compare import compare, exact_errors, table
+from lcp_lube.studies.experiment import run
 
 
 def test_rows_are_the_runs_that_solve_makes() -> None:
@@ -104,3 +105,8 @@ def test_command_nested(cli: Any) -> None:
     """--nested reaches the runs."""
     run = cli("compare", "problem1", "--n", 100, "--methods", "active-set", "--nested", "--json")
     assert len(run.json[0]["levels"]) > 1
+
+
+def test_a_film_without_anything_to_solve_is_a_run_too() -> None:
+    found = run(load_scene("problem4", {"n": 20, "U": 0.0}))
+    assert (found["outcome"], found["method"], found["iterations"]) == ("converged", "none", 0)
