@@ -136,7 +136,7 @@ def multigrid(n: int) -> Result:
     """The scene by nonlinear multigrid."""
     scene = load_scene("obstacle_bratu", {**SCENE, "n": n})
     solution = solve(scene, method="fas")
-    if not solution.converged or solution.settings["took_over"]:
+    if not solution.converged or solution.took_over:
         raise RuntimeError(solution.message)
     out = Result(solution.fields["v"], [level["iterations"] for level in solution.levels], [0])
     solution.destroy()

@@ -85,8 +85,8 @@ def plan(facts: Facts, ask: Ask, scene: str) -> Plan:
     _known(system, entry.systems, f"method {method}: --system")
     if nested is None:
         own_start = entry.interior and bool({"p0", "r0"} & set(options))  # one that someone chose is to be used
-        line = facts.dim == 1 and not (facts.periodic[0] or facts.held or facts.moving)
-        known = line and method == "active-set"  # the front: by sums
+        # The front of a steady line is known by sums (`line_start`).
+        known = method == "active-set" and facts.dim == 1 and not (facts.periodic[0] or facts.held or facts.moving)
         nested = entry.nested and facts.size > entry.nested_above and not own_start and not known
         if nested:
             why.append("nested: the front found on a coarser grid leaves a few steps on this one")

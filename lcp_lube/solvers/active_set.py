@@ -152,7 +152,7 @@ class ActiveSet(Method):
                 self._relax(self._sweeps)
         if self.norm <= FALL * self._best:
             self._stalled = self._vain = 0
-        elif not (self.problem.grid.periodic[0] and self.norm <= FALL * before):
+        elif not (self.problem.grid.periodic[0] and self.norm <= FALL * before):  # a ring's comes down by itself from a rise
             self._stalled += 1
         self._best = min(self._best, self.norm)
         return Step(self.norm, step_norm, 1.0, linear_iterations, rtol=rtol)

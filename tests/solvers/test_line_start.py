@@ -62,8 +62,6 @@ def test_dimples_are_nearly_lines(name, steps):
 
 
 NARROW = {"width_over_diameter": 0.2}
-
-
 FLAT = {"fluid.p_supply": 0.0}  # needs no pressure: what its sums leave is rounding
 
 

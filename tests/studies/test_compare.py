@@ -7,8 +7,8 @@ import pytest
 
 from lcp_lube import InputError, load_scene, solve
 from lcp_lube.output.results import as_dict
+from lcp_lube.studies import experiment
 from lcp_lube.studies.compare import compare, exact_errors, table
-from lcp_lube.studies.experiment import run
 
 
 def test_rows_are_the_runs_that_solve_makes() -> None:
@@ -108,5 +108,5 @@ def test_command_nested(cli: Any) -> None:
 
 
 def test_a_film_without_anything_to_solve_is_a_run_too() -> None:
-    found = run(load_scene("problem4", {"n": 20, "U": 0.0}))
+    found = experiment.run(load_scene("problem4", {"n": 20, "U": 0.0}))
     assert (found["outcome"], found["method"], found["iterations"]) == ("converged", "none", 0)

@@ -101,3 +101,10 @@ def ruptured(grid: Grid, state: Array | None, driven: complex = 0.0) -> Inlet | 
     if state is None or grid.dim == 1 or grid.ends[0][0] != "open" or grid.x_start > 0:
         return None
     return Inlet(np.reshape(state, grid.box)[:, :1] > 0.0, float(np.real(driven)))
+
+
+def followed(Z: Array, p_b: float) -> Array:
+    """p along lines (the last axis) followed upstream from p_b and stopped at zero; Z : up to a constant p of the full film."""
+    ends = -Z
+    ends[..., -1] += p_b
+    return Z + np.maximum.accumulate(ends[..., ::-1], axis=-1)[..., ::-1]

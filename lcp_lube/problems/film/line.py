@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.parallel import Array
-from .cavity import VOID
+from .cavity import VOID, followed
 from .exact import bisect
 from .fluid import Law
 from .integrals import SAME, LineIntegrals
@@ -251,7 +251,6 @@ def solve_points(
 
 
 def _followed(Z: Array, p_b: float) -> Array:
-    """p followed upstream from p_b and stopped at zero."""
-    best = np.maximum.accumulate(np.append(-Z[:-1], p_b - Z[-1])[::-1])[::-1]
-    p = Z + best
+    """As `cavity.followed`, without pressures that are rounding."""
+    p = followed(Z, p_b)
     return np.where(p > ROUNDING * np.max(np.abs(Z)), p, 0.0)
