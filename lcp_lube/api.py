@@ -13,7 +13,6 @@ from .drivers.memory import peak
 from .drivers.supplies import check_backflow
 from .errors import InputError
 from .problems.solution import Solution
-from .scenes.doubts import doubts
 from .scenes.scene import Scene, as_scene
 
 ASKED = tuple(field.name for field in fields(Ask))
@@ -48,11 +47,7 @@ def solve(scene: str | Path | dict[str, Any] | Scene, ask: Ask | None = None, **
     compose.check(scene, ask)
     solution = compose.solve(scene, ask)
     check_backflow(solution)
-    last = solution.solved_scene = _solved(scene, solution)
-    data = last.data_si()
-    if "nx" in data:
-        data.pop("n", None)  # which these have replaced
-    solution.settings |= {"scene_data": data, "scene_units": last.data_units(), "warnings": doubts(scene)}
+    solution.solved_scene = _solved(scene, solution)
     solution.settings["memory_mb"] = solution.problem.grid.comm.allreduce(peak() / 2**20)
     if solution.problem.grid.comm.size > 1:
         solution.numbers  # noqa: B018  (all that needs every rank is taken now: later look-ups are each rank's own)

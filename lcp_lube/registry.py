@@ -5,11 +5,13 @@ Imports no PETSc. A package from outside adds lines by an entry point of the gro
 
 import os
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
 from math import inf
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from .errors import InputError, nearest
@@ -311,7 +313,8 @@ def recipe_line(name: str) -> str:
     return (RECIPE_DIR / f"{name}.opts").read_text().partition("\n")[0].lstrip("# ")
 
 
-def read_recipe(name: str) -> dict[str, str]:
+@cache  # the package's own files
+def read_recipe(name: str) -> Mapping[str, str]:
     """Options of options/NAME.opts: lines '-name value', comments from '#'.
 
     Raises
@@ -325,7 +328,7 @@ def read_recipe(name: str) -> dict[str, str]:
         words = line.partition("#")[0].split(maxsplit=1)
         if words:
             options[words[0].lstrip("-")] = words[1].strip() if len(words) > 1 else ""
-    return options
+    return MappingProxyType(options)
 
 
 @cache

@@ -2,7 +2,7 @@
 
 import ctypes
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
 from petsc4py import PETSc
@@ -75,7 +75,7 @@ def recipe(name: str | None) -> Iterator[str | None]:
             options.delValue(key)
 
 
-def _renamed(options: dict[str, str]) -> dict[str, str]:
+def _renamed(options: Mapping[str, str]) -> dict[str, str]:
     """Options by their names in this release of PETSc."""
     version = PETSc.Sys.getVersion()
     later = {old: (new, value) for old, (since, new, value) in RENAMED.items() if version >= since}

@@ -12,7 +12,7 @@ from petsc4py import PETSc
 
 from .. import __version__
 from ..problems.solution import Solution
-from ..scenes.doubts import too_high
+from ..scenes.doubts import doubts, too_high
 from ..scenes.effects.named import sentence
 from .units import place, with_unit
 
@@ -50,12 +50,23 @@ def as_dict(solution: Solution) -> dict[str, Any]:
         **{key: settings[key] for key in ("balance", "model") if key in settings},
         **settings.get("details", {}),
         **({"levels": solution.levels} if solution.levels else {}),
-        "warnings": [*settings.get("warnings", []), *too_high(quantities)],
-        **{key: settings[key] for key in ("scene_data", "scene_units") if key in settings},
+        "warnings": [*doubts(solution.solved_scene), *too_high(quantities)],
+        **scene_of(solution),
         **{key: settings.get(key) for key in ("memory_mb", "memory_estimate_mb", "memory_base_mb")},
         "time_s": seconds(solution.times),
         "versions": versions(),
     }
+
+
+def scene_of(solution: Solution) -> dict[str, Any]:
+    """What was solved, in SI units, and the units of its keys."""
+    scene = solution.solved_scene
+    if scene is None:  # a part of somebody's solve
+        return {}
+    data = scene.data_si()
+    if "nx" in data:
+        data.pop("n", None)  # which these have replaced
+    return {"scene_data": data, "scene_units": scene.data_units()}
 
 
 def seconds(times: dict[str, float]) -> dict[str, float]:

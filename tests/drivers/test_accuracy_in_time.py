@@ -51,7 +51,7 @@ def test_the_estimate_is_of_grid_and_steps(scheme, tol):
     largest = max(row["load"] for row in truth.history)
     assert found.converged
     assert len(found.history) > 24
-    assert found.settings["scene_data"]["motion"]["steps"] == len(found.history)
+    assert found.solved_scene.motion.steps == len(found.history)
     assert abs(found.load - truth.load) <= found.settings["accuracy_estimate"] * largest <= tol * largest
     assert abs(coarse.load - truth.load) > tol * largest
     error = found.estimates["load"]["error"]

@@ -161,7 +161,7 @@ def test_an_oil_without_its_temperature():
     """The viscosity is that of T_in."""
     scene = load_scene("lined_pad", {"n": 60})
     with solve(scene, model="least") as s:
-        assert s.settings["scene_data"]["temperature"]["oil"] == "ISO VG 68"
+        assert s.solved_scene.data_si()["temperature"]["oil"] == "ISO VG 68"
         assert s.problem.mu == pytest.approx(scene.temperature.own_mu)
 
 

@@ -171,7 +171,9 @@ class LubricationProblem:
         return sides(self.grid)
 
     def sources(self, rows: slice, s: BoxScheme) -> Array:
-        """What c has beyond the flows of the wall and the sides' pressures on some lines: nothing in a steady film."""
+        """What c has beyond the flows of the wall and the sides' pressures on some lines; nothing in a steady film alone."""
+        if self.plain and s.held is None and s.storage is None:
+            return np.zeros((1, 1))
         c = s.couette_W - s.couette_E
         for k, at_side, p_side in zip((s.k_W, s.k_E, s.k_S, s.k_N), self._at_sides, self.p_sides, strict=True):
             c += np.where(at_side if len(at_side) == 1 else at_side[rows], k * (p_side / self.p_unit), 0.0) if p_side else 0.0
@@ -217,12 +219,8 @@ class LubricationProblem:
 
     def physical(self, fields: Fields) -> dict[str, tuple[Array, str]]:
         """Absolute pressure in Pa, void fraction, film in m."""
-        return {
-            "p": (fields["p"] * self.p_unit + self.p_c, "Pa"),
-            "r": (fields["r"], ""),
-            "h": (self.scheme.h.ravel(), "m"),
-            **self.more_fields,
-        }
+        p = fields["p"] * self.p_unit + self.p_c
+        return {"p": (p, "Pa"), "r": (fields["r"], ""), "h": (self.scheme.h.ravel(), "m"), **self.more_fields}
 
     @property
     def units(self) -> dict[str, str]:
