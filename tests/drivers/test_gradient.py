@@ -46,7 +46,7 @@ SMALL = {
     "misaligned_journal": {"nx": 36, "ny": 5},
     "hybrid_journal": {"nx": 37, "ny": 7} | RECESSES,
     "tapered_land": {"nx": 20, "ny": 7},
-    "dimpled_pad": {"nx": 25, "ny": 19},
+    "dimpled_pad": {"nx": 25, "ny": 11},
     "textured_slider": {"K": 1},
     "rough": {"n": 21},
     "pocketed_pad_2d": {"nx": 22, "ny": 11},
@@ -144,7 +144,7 @@ def compare(scene, solution, keys=None, step=STEP, switching=False):
 @pytest.mark.parametrize("name", SMALL)
 def test_every_number_by_every_number(name):
     scene, solution = solved(name)
-    few = ("clearance", "D", "speed_rpm", "supply.1.extent_deg", "supply.1.length", "supply.1.K", "supply.1.p_s")
+    few = ("clearance", "speed_rpm", "supply.1.extent_deg", "supply.1.K")
     found = compare(scene, solution, few if name == "hybrid_journal" else None)
     assert found[0].switching == 0
     values = solution.numbers

@@ -19,7 +19,7 @@ from ...problems.film.flows import drag, volume_unit
 from ...problems.film.forces import Weight, weights
 from ...problems.film.lubrication import LubricationProblem
 from ...problems.film.reynolds import BoxScheme, sides
-from ...problems.film.slopes import by_points, giving_points
+from ...problems.film.slopes import by_points, giving_points, slope
 from ...problems.film.strip import line_weights
 from ...problems.film.tangent import effective
 from ...problems.film.weighed import Weighed, can
@@ -113,6 +113,8 @@ class FilmGradient:
                 total.append(weight * (-1.0 if adjoint.equations.turned else 1.0) * self._friction(lever))
             elif part.startswith("flow_"):
                 total.append(weight * self._flow(part.removeprefix("flow_")))
+            elif part == "p_max":
+                total.append(weight * slope(self.problem, None, adjoint.p, adjoint.r, part).film)
             elif self.problem.cornered and (carried := weights(self.problem).get(part)) is not None:
                 total.append(weight * self._fronts(carried))
         return sum(total, self._balance(rows))

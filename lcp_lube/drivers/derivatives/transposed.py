@@ -86,9 +86,10 @@ class CoupledFilm:
             self._by_field(place)
         for k, value in enumerate(self.tape.known):
             (self._by_field if np.ndim(value) else self._by_sum)(("tape", k))
-        tops = slope(loop.base, None, gradient.p * loop.base.p_unit, gradient.r, "p_max").p
-        if "p_max" in self.names:  # not of the tape: it is that of a parabola through five points
-            self.numbers["p_max"] = {0: np.where(gradient.cavity, 0.0, tops)}
+        tops = slope(loop.base, None, gradient.p * loop.base.p_unit, gradient.r, "p_max")
+        if "p_max" in self.names and not self.reduce.comm.allreduce(bool(np.any(tops.film))):
+            # Of points, not at a rim: not of the tape, as that of a parabola through five points.
+            self.numbers["p_max"] = {0: np.where(gradient.cavity, 0.0, tops.p)}
 
     @property
     def _taken(self) -> list[str]:

@@ -278,6 +278,7 @@ def answer(
         from .oil_along import oil_of  # here: of lines alone
 
         film.oil = oil_of(base, law, cells, given.values, effects)
+    film.barus = law.barus
     if "lift" in cells:
         film = film.with_lift(cells["lift"])
     return Answer(film, p, r, cells, law, base, by.values)

@@ -49,6 +49,7 @@ class LubricationProblem:
     edged = True  # whether the coefficients know edges inside cells; not where mean_cubes
     cornered = False  # whether about corners of recesses faces are made for cavities, and integrals know fronts (`borne`)
     tops = False  # whether the largest pressure is looked for between the points (`peak`)
+    barus = 0.0  # of the law by which its coefficients were made for its pressures, 1/Pa
     factors: Any = None  # of its faces, that follow from `cells`
     tangent: Any = None  # dG/dp, where that is not A
     oil: Any = None  # `oil_along.Oil`, where nothing else acts but what it knows; rigid: its film in q, of a small one

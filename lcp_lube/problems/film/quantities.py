@@ -18,6 +18,7 @@ from .flows import friction, side_flows
 from .forces import ambient, flow_growth, forces, open_pressures, totals
 from .fronts import cavitated_area, first_cavity, fronts, line_fronts
 from .peak import Window
+from .rim_tops import rim_top
 from .supplies import supply_flows
 
 if TYPE_CHECKING:
@@ -178,6 +179,8 @@ def largest_pressure(problem: LubricationProblem, p_pa: Array) -> tuple[float, l
     largest *= unit
     if problem.tops and place is not None:
         largest, place = Window(grid, p_pa, place, problem.p_sides, problem.scheme.held).top()
+        if (top := rim_top(problem, p, unit, largest / unit)) is not None:
+            largest, place = top.value * unit, top.place
     low = [*grid.origin[: grid.dim]]
     middle = [a + 0.5 * length for a, length in zip(low, grid.lengths, strict=True)]
     for k, p_side in enumerate(open_pressures(problem)):

@@ -23,6 +23,7 @@ from .lubrication import LubricationProblem
 from .peak import Window
 from .quantities import largest_of, largest_pressure, thinnest
 from .reynolds import sides
+from .rim_tops import rim_top
 from .strip import line_weights, stream_weights
 from .supplies import supply_flows
 from .tangent import Tangent
@@ -34,13 +35,15 @@ TIE = 1e-9  # relative: pressures so near the largest one are as large
 class Slope:
     """dQ/dp, p in p_unit, flat or on the grid's box, and dQ/dr (0: at all) of a number at the owned points.
 
-    ties : points that could as well have it. value : the number itself, where one pass has both, else NaN.
+    ties : points that could as well have it. value : the number itself, where one pass has both, else NaN. film : of the
+    largest pressure, dQ/dh at the points, p and r held, per m.
     """
 
     p: Array
     r: Array | float
     ties: int = 0
     value: float = np.nan
+    film: Array | float = 0.0
 
 
 def numbers(problem: LubricationProblem, p_pa: Array, r: Array, wanted: Collection[str] | None = None) -> dict[str, float]:
@@ -163,15 +166,19 @@ def _largest(problem: LubricationProblem, p: Array, last: bool) -> Slope:
     way = 1.0 if last else -1.0
     chosen = way * reduce.max(np.where(near, way * index.astype(float), -np.inf))
     ties = int(reduce.sum(near.astype(float))) - 1
-    by_p = np.where(index == chosen, 1.0, 0.0)
+    by_p, by_film = np.where(index == chosen, 1.0, 0.0), np.zeros(p.size)
     if problem.tops:
         seen = np.where(near & (index != chosen), 0.0, p)
         place = largest_of(problem, seen.reshape(grid.box), grid.x[0], grid.y[:, 0])[1]
         assert place is not None  # a solution's pressures are numbers
         window = Window(grid, p, place, p_sides, problem.scheme.held)
         by_p, largest = window.slopes(p.size), window.top()[0]
+        if (top := rim_top(problem, p, problem.p_unit, largest)) is not None:
+            west, east = (np.where(index == one, 1.0, 0.0) for one in top.points)
+            by_p, by_film, largest = top.shares[0] * west + top.shares[1] * east, 0.5 * top.by_film * (west + east), top.value
     at_side = max((q / problem.p_unit for q in open_pressures(problem) if q), default=0.0) > largest
-    return Slope(by_p * (0.0 if at_side else problem.p_unit), 0.0, 0 if at_side else ties)
+    by = 0.0 if at_side else problem.p_unit
+    return Slope(by_p * by, 0.0, 0 if at_side else ties, film=(by_film * by).reshape(grid.box))
 
 
 def _flow(problem: LubricationProblem, tangent: Tangent, side: str) -> Slope:
