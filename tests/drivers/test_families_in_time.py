@@ -99,7 +99,7 @@ def test_a_free_level_comes_to_where_the_load_is_carried(name, mass):
 
 @pytest.mark.parametrize("name, load", [("tilting_pad_journal", [3000.0, 0.0]), ("tilting_pad_thrust", 10000.0)])
 def test_a_free_bearing_comes_to_the_place_of_its_balance(name, load):
-    small = {"nx": 36, "ny": 3} if name == "tilting_pad_journal" else {"nx": 24, "ny": 12}
+    small = {"nx": 48, "ny": 5} if name == "tilting_pad_journal" else {"nx": 24, "ny": 12}
     balanced = solve(load_scene(name, small | {"balance": {"load": np.max(load)}}))
     found = balanced.settings["coordinates"]
     motion = {"t_end": 0.2, "tol": 3e-2, "free": True, "load": load, "mass": 5.0}

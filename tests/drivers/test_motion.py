@@ -275,7 +275,7 @@ def test_the_family_journal_moves(round_):
 
 def test_a_journal_moves_in_pads_that_are_held():
     """A journal at rest has the steady film; a free one comes to where the pads, held, carry it."""
-    held = {"nx": 36, "ny": 3, "pivots_deg": [60.0, 180.0, 300.0], "tilts": [1e-4] * 3, "balance": None}
+    held = {"nx": 48, "ny": 5, "pivots_deg": [60.0, 180.0, 300.0], "tilts": [1e-4] * 3, "balance": None}
     steady = march("tilting_pad_journal", **held, eccentricity=0.3)
     still = march("tilting_pad_journal", **held, motion={"t_end": 0.01, "steps": 4, "journal": [0.3, 0.0]})
     assert still.load == pytest.approx(steady.load, rel=1e-9)

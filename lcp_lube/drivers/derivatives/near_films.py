@@ -82,8 +82,6 @@ class NearFilms:
         self.known = can(problem, self.model, SMALL, held=equations.law is None, rims=True) and self.wanted <= by_p.union(
             DRAGS, FLOWS, self.fed
         )
-        if "p_max" in self.wanted and self.model.cut and equations.law is not None:  # at a rim it hangs on the viscosity there
-            self.known = False
         self._shares = self._within(problem.grid, held) if held and self.known else None
         self.known = self.known and (held is None or self._shares is not None)
 
@@ -123,7 +121,7 @@ class NearFilms:
     @cached_property
     def _told(self) -> dict[str, float]:
         own = copy(self.equations.constant)
-        own.p_sides = self.equations._p_sides  # not as q of Barus' law
+        own.p_sides, own.barus = self.equations._p_sides, self._law.barus  # not as q of Barus' law
         return self._totals(own)
 
     def _totals(self, problem: LubricationProblem) -> dict[str, float]:
@@ -163,14 +161,15 @@ class NearFilms:
             numbers[name] = (-1.0 if eq.turned else 1.0) * (of[0] + of[2:] @ np.array(p_sides) + model.mu * shear)
         lean, near = copy(eq), copy(eq.constant)
         near.grid = grid
-        near.mu, near.U, near.p_c, near.p_sides = model.mu, model.U, model.p_c, p_sides
+        near.mu, near.U, near.p_c, near.p_sides, near.barus = model.mu, model.U, model.p_c, p_sides, law.barus
         near.shaft, near.extras, near.film, lean.constant = model.shaft, model.extras, model.film, near
         near.levers, own, pushed = model.levers, self.model, 0.0
         if near.held is not None:
             P = [new if one.open else one.p for one, new in zip(model.supplies, pressures or self.pressures, strict=True)]
             pushed = self._pushed @ (np.array(P) - [one.p for one in near.held.supplies])
             near.held = replace(near.held, supplies=tuple(replace(one, p=p) for one, p in zip(model.supplies, P, strict=True)))
-        held = (eq._p_sides, eq.constant.p_c) == (p_sides, near.p_c) and grid is eq.grid
+        at_rims = "p_max" in self.wanted and bool(own.cut)  # where it hangs on film, viscosity and speed (`rim_tops`)
+        held = not at_rims and (eq._p_sides, eq.constant.p_c) == (p_sides, near.p_c) and grid is eq.grid
         held = held and same((own.shaft, own.levers), (near.shaft, near.levers))
         report = lean.report((self._told if held else self._totals(near)) | {name: float(a) for name, a in numbers.items()})
         return np.array([report[name] for name in map(plain, self.lambdas)]) - G / eq.constant.scheme.flow_unit + pushed
