@@ -243,8 +243,7 @@ def scaled(
     for conductance, at_side, p_side in zip(k.values(), sides(grid), p_sides or problem.p_sides, strict=True):
         c = c + np.where(at_side, conductance * (p_side / problem.p_unit), 0.0)
     u: dict[str, Any] = {"b_C": carried, "b_W": s.b_W * f["u_W"], "couette_W": couette_W, "couette_E": couette_E}
-    held = held or problem.held
-    scheme = pressed(replace(s, **k, **u, **stored, c=c), held, problem.p_unit)
+    scheme = pressed(replace(s, **k, **u, **stored, c=c), held or problem.held, problem.p_unit)
     return problem.with_scheme(scheme, problem.mu * f["mu"], p_sides, held)
 
 

@@ -20,7 +20,7 @@ from ...base.parallel import Array
 from ..strips import each_strip, ghosted
 from .edges import Around
 from .fluid import Law
-from .rims import LOOKS
+from .rims import LOOKS, depth_of
 
 if TYPE_CHECKING:
     from .lubrication import LubricationProblem
@@ -51,7 +51,8 @@ def rim_top(problem: "LubricationProblem", p: Array, unit: float, largest: float
     p : owned points, and largest : in parts of `unit`, Pa.
     """
     grid, film = problem.grid, Around(problem.film, problem.grid)
-    if grid.dim == 1 or not film.rims:
+    rims = [rim for rim in film.rims if not depth_of(rim)]  # about slanted edges faces are more than what lies in series
+    if grid.dim == 1 or not rims:
         return None
     frame = ghosted(grid, p, 0.0)
 
@@ -66,7 +67,7 @@ def rim_top(problem: "LubricationProblem", p: Array, unit: float, largest: float
 
     j, i, first, last = map(np.concatenate, zip(*each_strip(grid, candidates), strict=True))
     x, d, y = grid.nodes_and_faces(0)[0][i + 1], grid.steps(0)[1:][i], grid.y[j, 0]
-    crossed = np.any([rim(x, y) * rim(x + d, y) <= 0.0 for rim in film.rims], axis=0) if j.size else np.zeros(0, dtype=bool)
+    crossed = np.any([rim(x, y) * rim(x + d, y) <= 0.0 for rim in rims], axis=0) if j.size else np.zeros(0, dtype=bool)
     j, i, first, last, x, d, y = (a[crossed] for a in (j, i, first, last, x, d, y))
     places = (np.arange(LOOKS) + 0.5)[:, None] / LOOKS
     h = np.broadcast_to(film(x + d * places, y), (LOOKS, x.size))
