@@ -75,12 +75,13 @@ class Run:
 
 
 def without_notices(text: str) -> list[str]:
-    """Lines that are not mpiexec's: neither in its boxes, which may come before or after ours, nor in its log."""
+    """Lines that are not mpiexec's: neither in its boxes, which may come before or after ours, nor in its log, nor libevent's
+    warnings of a rank's pipe that is gone."""
     lines, boxed = [], False
     for line in text.splitlines():
         if line.startswith("-" * 70):
             boxed = not boxed
-        elif line.strip() and (not boxed or line.startswith("lcp-lube: ")) and not re.match(r"\[\S+:\d+\]", line):
+        elif line.strip() and (not boxed or line.startswith("lcp-lube: ")) and not re.match(r"\[\S+:\d+\]|\[warn\] Epoll ", line):
             lines.append(line)
     return lines
 
