@@ -74,6 +74,9 @@ class Run:
         return without_notices(self.err)
 
 
+NOTICE = re.compile(r"\[\S+:\d+\]|\[warn\] Epoll ")
+
+
 def without_notices(text: str) -> list[str]:
     """Lines that are not mpiexec's: neither in its boxes, which may come before or after ours, nor in its log, nor libevent's
     warnings of a rank's pipe that is gone."""
@@ -81,7 +84,7 @@ def without_notices(text: str) -> list[str]:
     for line in text.splitlines():
         if line.startswith("-" * 70):
             boxed = not boxed
-        elif line.strip() and (not boxed or line.startswith("lcp-lube: ")) and not re.match(r"\[\S+:\d+\]|\[warn\] Epoll ", line):
+        elif line.strip() and (not boxed or line.startswith("lcp-lube: ")) and not NOTICE.match(line):
             lines.append(line)
     return lines
 
