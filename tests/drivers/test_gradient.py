@@ -144,7 +144,7 @@ def compare(scene, solution, keys=None, step=STEP, switching=False):
 @pytest.mark.parametrize("name", SMALL)
 def test_every_number_by_every_number(name):
     scene, solution = solved(name)
-    few = ("clearance", "speed_rpm", "supply.1.extent_deg", "supply.1.K")
+    few = ("clearance", "D", "speed_rpm", "supply.1.extent_deg", "supply.1.length", "supply.1.K", "supply.1.p_s")
     found = compare(scene, solution, few if name == "hybrid_journal" else None)
     assert found[0].switching == 0
     values = solution.numbers

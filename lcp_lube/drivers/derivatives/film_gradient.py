@@ -113,7 +113,7 @@ class FilmGradient:
                 total.append(weight * (-1.0 if adjoint.equations.turned else 1.0) * self._friction(lever))
             elif part.startswith("flow_"):
                 total.append(weight * self._flow(part.removeprefix("flow_")))
-            elif part == "p_max":
+            elif part == "p_max" and self.model.cut:
                 total.append(weight * slope(self.problem, None, adjoint.p, adjoint.r, part).film)
             elif self.problem.cornered and (carried := weights(self.problem).get(part)) is not None:
                 total.append(weight * self._fronts(carried))

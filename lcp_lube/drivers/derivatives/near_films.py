@@ -168,7 +168,7 @@ class NearFilms:
             P = [new if one.open else one.p for one, new in zip(model.supplies, pressures or self.pressures, strict=True)]
             pushed = self._pushed @ (np.array(P) - [one.p for one in near.held.supplies])
             near.held = replace(near.held, supplies=tuple(replace(one, p=p) for one, p in zip(model.supplies, P, strict=True)))
-        at_rims = "p_max" in self.wanted and bool(own.cut)  # where it hangs on film, viscosity and speed (`rim_tops`)
+        at_rims = "p_max" in self.wanted and own.cut  # where it hangs on film, viscosity and speed (`rim_tops`)
         held = not at_rims and (eq._p_sides, eq.constant.p_c) == (p_sides, near.p_c) and grid is eq.grid
         held = held and same((own.shaft, own.levers), (near.shaft, near.levers))
         report = lean.report((self._told if held else self._totals(near)) | {name: float(a) for name, a in numbers.items()})

@@ -86,10 +86,11 @@ class CoupledFilm:
             self._by_field(place)
         for k, value in enumerate(self.tape.known):
             (self._by_field if np.ndim(value) else self._by_sum)(("tape", k))
-        tops = slope(loop.base, None, gradient.p * loop.base.p_unit, gradient.r, "p_max")
-        if "p_max" in self.names and not self.reduce.comm.allreduce(bool(np.any(tops.film))):
-            # Of points, not at a rim: not of the tape, as that of a parabola through five points.
-            self.numbers["p_max"] = {0: np.where(gradient.cavity, 0.0, tops.p)}
+        if "p_max" in self.names:
+            top = slope(loop.base, None, gradient.p * loop.base.p_unit, gradient.r, "p_max")
+            # That of a parabola through five points is not of the tape; one at a rim is.
+            if not self.reduce.comm.allreduce(bool(np.any(top.film))):
+                self.numbers["p_max"] = {0: np.where(gradient.cavity, 0.0, top.p)}
 
     @property
     def _taken(self) -> list[str]:

@@ -72,12 +72,13 @@ def rim_top(problem: "LubricationProblem", p: Array, unit: float, largest: float
     places = (np.arange(LOOKS) + 0.5)[:, None] / LOOKS
     h = np.broadcast_to(film(x + d * places, y), (LOOKS, x.size))
     law, ends = Law(problem.barus), (first * unit, last * unit)
-    q_ends, dragged = [law.reduced(p) for p in ends], _dragged(problem, h, d, y, j, i) * law.mobility(*ends)
-    q, share = _between(q_ends[0], q_ends[1], h, h, dragged)
+    q_ends, pull = [law.reduced(p) for p in ends], _pull(problem, h, d, y, j, i) * law.mobility(*ends)
+    q, share = _between(q_ends[0], q_ends[1], h, pull)
     k, n = np.argmax(q, axis=0), np.arange(x.size)
     highest = np.nan_to_num(law.pressure(q[k, n]), posinf=0.0) / unit
     tops = np.zeros(grid.box)
     tops[j, i] = highest
+    # The same number, the first one as `drivers.derivatives.tape` follows it.
     value, most = problem.reduce.max(tops), grid.comm.allreduce(float(highest.max(initial=0.0)), MPI.MAX)
     if not most > largest:
         return None
@@ -85,7 +86,7 @@ def rim_top(problem: "LubricationProblem", p: Array, unit: float, largest: float
     if (near := np.flatnonzero(highest >= most - TIE * most)).size:
         n, at, number = near[0], near[:1], grid.neighbours()[1:-1]
         look, row, column, step = k[n], j[n], i[n], 1e-30 * h[0, n]
-        moved = _between(q_ends[0][at], q_ends[1][at], h[:, at] + 1j * step, h[:, at], dragged[at])[0][look, 0]
+        moved = _between(q_ends[0][at], q_ends[1][at], h[:, at] + 1j * step, pull[at])[0][look, 0]
         by_q = law.viscosity(highest[n] * unit)  # dp/dq
         shares = [
             by_q / law.viscosity(p[n]) * part for p, part in zip(ends, (1.0 - share[look, n], share[look, n]), strict=True)
@@ -97,17 +98,16 @@ def rim_top(problem: "LubricationProblem", p: Array, unit: float, largest: float
     return RimTop(value, place, points, shares, by_film)
 
 
-def _dragged(problem: "LubricationProblem", h: Array, d: Array, y: Array, j: Array, i: Array) -> Array:
-    """D of the faces to the east of some points, Pa; of a film with effects as its coefficients have it."""
+def _pull(problem: "LubricationProblem", h: Array, d: Array, y: Array, j: Array, i: Array) -> Array:
+    """D over the mean of h^-2, Pa m2, of the faces to the east of some points; with effects as the coefficients have it."""
     if not problem.plain:
         s = problem.scheme
-        return s.couette_E[j, i] / s.k_E[j, i] * problem.p_unit
-    return 6.0 * problem.mu * problem.U * d * problem.grid.stretch(y) ** 2 * np.mean(h**-2.0, axis=0)
+        return s.couette_E[j, i] / s.k_E[j, i] * problem.p_unit / np.mean(h**-2.0, axis=0)
+    return 6.0 * problem.mu * problem.U * d * problem.grid.stretch(y) ** 2
 
 
-def _between(first: Array, last: Array, h: Any, own: Array, dragged: Array) -> tuple[Any, Any]:
-    """p and g_3 behind each look of faces, shape (looks, faces). dragged : D of their own film, of which h may be a change."""
+def _between(first: Array, last: Array, h: Any, pull: Array) -> tuple[Any, Any]:
+    """p and g_3 behind each look of faces, shape (looks, faces), from the film at the looks. pull : `_pull`."""
     squares, cubes = np.cumsum(h**-2.0, axis=0), np.cumsum(h**-3.0, axis=0)
-    share = cubes / cubes[-1]
-    drag = dragged * squares[-1] / np.sum(own**-2.0, axis=0)
-    return first + (last - first) * share + drag * (squares / squares[-1] - share), share
+    share, dragged = cubes / cubes[-1], pull * squares[-1] / len(h)
+    return first + (last - first) * share + dragged * (squares / squares[-1] - share), share
