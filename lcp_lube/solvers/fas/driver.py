@@ -39,7 +39,7 @@ FEW = 0.05  # part of a ring's line that is full, below which it is hardly fed
 FED = 3e-5  # of the certificate's tolerance: the flow that a film with supplies may lose, 3e-12 in parts of what flows
 SLOW, EARLY = 0.2, 0.16  # a cycle whose iterates are mixed leaves more than that; two cycles, where coarse grids mislead
 VAIN = 0.5  # and two cycles, where it is corrections that are cut off at fronts
-SLOWER, LEAST_FALL = 2.5, (0.12, 0.2)  # times what an F cycle leaves is what a V cycle does in its place; at least, in time too
+SLOWER, LEAST_FALL = 2.5, (0.1, 0.2)  # times what an F cycle leaves is what a V cycle does in its place; at least, in time too
 
 
 @dataclass(frozen=True)
