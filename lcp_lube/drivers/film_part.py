@@ -24,9 +24,9 @@ from ..base.parallel import Array
 from ..problems.facts import Facts
 from ..problems.film.cavity import missing_flow
 from ..problems.film.edges import jumps_of
+from ..problems.film.halves import Lent, half
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model, Side
-from ..problems.film.strip import half
 from ..problems.grid import EVEN, Grid, some_places
 from ..problems.solution import Fields, Problem
 from ..problems.strips import STRIP
@@ -97,10 +97,18 @@ class Part(Derived):
         y = None if y is None else y[: (ny + 1) // 2]
         west, east, south, _ = model.sides
         south = south if south.kind == "open" else Side("closed")
-        half = (west, east, south, Side("mirror" if ny % 2 else "closed"))
+        sides = (west, east, south, Side("mirror" if ny % 2 else "closed"))
         lengths = (model.lengths[0], 0.5 * model.lengths[1])
         supplies = tuple(one.half for one in model.supplies)
-        return replace(model, lengths=lengths, sides=half, supplies=supplies, exact=None, places=(x, y)), (nx, (ny + 1) // 2)
+        return replace(model, lengths=lengths, sides=sides, supplies=supplies, exact=None, places=(x, y)), (nx, (ny + 1) // 2)
+
+    @cached_property
+    def lent(self) -> Lent:
+        """Half of the whole's coefficients, in its memory, if they are all here."""
+        whole = self.problem
+        if self.kind != "mirror" or whole is None or not whole.plain or whole.grid.comm.size > 1:
+            return Lent()
+        return half(whole.scheme, self.own[1][1], self.shape[1] % 2 == 1, whole.grid.periodic[1])
 
     def grid(self, comm: PETSc.Comm | None = None) -> Grid:
         """The part's points."""
@@ -109,16 +117,16 @@ class Part(Derived):
 
     def facts(self, comm: PETSc.Comm | None = None) -> Facts:
         model, shape = self.own
-        return replace(model.facts(shape, comm), spread=prod(self.whole.shape))
+        return replace(model.facts(shape, comm), spread=prod(self.whole.shape), lent=self.lent.scheme is not None)
 
     def build(self, comm: PETSc.Comm | None = None) -> LubricationProblem:
         """The discrete problem of the part. Collective."""
         model, shape = self.own
-        whole = self.problem
-        if self.kind == "mirror" and whole is not None and whole.plain and whole.grid.comm.size == 1:
-            scheme = half(whole.scheme, shape[1], self.shape[1] % 2 == 1, whole.grid.periodic[1])
-            held = whole.held and replace(whole.held, supplies=model.supplies, owner=whole.held.owner[: shape[1]])
-            return model.build(shape, comm, made=(scheme, held))
+        if self.problem is not None and self.lent.scheme is not None:
+            self.lent.take()
+            held = self.problem.held
+            held = held and replace(held, supplies=model.supplies, owner=held.owner[: shape[1]])
+            return model.build(shape, comm, made=(self.lent.scheme, held))
         problem = model.build(shape, comm)
         return self.factored(problem, *numbers(problem.grid))
 
@@ -253,10 +261,10 @@ def _is_symmetric(problem: LubricationProblem, faces: bool) -> bool:
     if not _all_close(problem, [(problem.scheme.h[some], problem.film(grid.x, mirror - grid.y[some]))]):
         return False
     if grid.comm.size == 1:  # what is solved is all here
-        s, half = problem.scheme, grid.box[0] // 2  # k_E and couette_E are k_W and couette_W but for the last ones
+        s, middle = problem.scheme, grid.box[0] // 2  # k_E and couette_E are k_W and couette_W but for the last ones
         differ = [a for a in (s.k_W, s.k_E[:, -1:], s.couette_W, s.couette_E[:, -1:], s.h) if a.strides[0]]  # from line to line
         pairs = [(s.k_S, s.k_N), *zip(differ, differ, strict=True)]
-        return _all_close(problem, [(a[:half], b[::-1][:half]) for a, b in pairs], CUBED * SAME)
+        return _all_close(problem, [(a[:middle], b[::-1][:middle]) for a, b in pairs], CUBED * SAME)
     pairs = list(zip(_films(problem), _films(problem, mirror), strict=True))
     if (by := problem.factors) is not None:  # of effects
         j, i = numbers(grid)

@@ -60,6 +60,7 @@ MEASURED: dict[tuple[str, str, str], tuple[float, float]] = {
     ("equations 2D", "jacobian", "umfpack"): (1310, 0),
 }
 SPREAD = 16, 56  # bytes for each point of the film that a part is of: its fields; of a march those that are kept too
+LENT = 40, 24  # of these bytes a point the coefficients; of films alike along y
 LITTLE = 32 * MB  # a run that needs no more starts without a look at what is free
 LARGE = 1_000_000  # points from which building the problem is itself worth a look ahead
 MULTIGRID = ("hypre", "ml", "gamg", "mg")
@@ -178,6 +179,8 @@ def bytes_needed(facts: Facts, plan: Plan) -> float | None:
         unknowns = 2 if plan.system == "full" else 1
         given = options.get("ksp_gmres_restart", "")  # PETSc's default where it is no whole number, which PETSc itself refuses
         each += 8 * unknowns * min(int(given) if given.isdecimal() else 30, 200)
+    if facts.lent and not plan.system and not facts.moving:
+        each -= LENT[facts.alike]
     return each * points + SPREAD[facts.moving] * facts.spread
 
 

@@ -13,6 +13,7 @@ from petsc4py import PETSc
 
 from ..base.parallel import Array
 from ..problems.facts import Facts
+from ..problems.film.halves import Lent
 from ..problems.fold import part_grid, part_shape
 from ..problems.grid import OPEN, Grid, some_places
 from ..problems.solution import Fields, Problem
@@ -45,6 +46,11 @@ class Quarter(Derived):
         what, how = ("a quarter", "in x and y") if all(self.axes) else ("a half", f"in {'x' if self.axes[0] else 'y'}")
         part, whole = (int(np.prod(shape)) for shape in (part_shape(self.shape, self.axes), self.shape))
         return f"{what} is solved, {part} of {whole} points: all data are symmetric about the middle {how}"
+
+    @property
+    def lent(self) -> Lent:
+        """What it has of the whole's memory: nothing."""
+        return Lent()
 
     def facts(self, comm: PETSc.Comm | None = None) -> Facts:
         return replace(self.whole.facts(comm), shape=part_shape(self.shape, self.axes))

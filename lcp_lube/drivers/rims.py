@@ -17,11 +17,11 @@ from petsc4py import PETSc
 from ..base.parallel import Array
 from ..problems.facts import Facts
 from ..problems.film.cavity import cavitated
+from ..problems.film.halves import doubled
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.rims import state_of
 from ..problems.film.stored import Dry
-from ..problems.film.strip import doubled
 from ..problems.solution import Fields, Solution
 from ..scenes.moving import film_of, motion_of
 from ..scenes.scene import Derived, Scene, Solvable

@@ -107,6 +107,7 @@ def solve_part(part: Part, problem: Problem, ask: Ask, inner: Inner) -> Solution
         start.problem.grid.destroy()
     certificate = whole.certify(solution.problem, solution.fields, solution.settings["eps1"])
     solution.problem.destroy()
+    part.lent.give_back()
     settings = {
         **solution.settings,
         "why": [part.sentence, *solution.settings["why"]],
@@ -128,14 +129,18 @@ class _Whole:
     def certify(self, small: Any, fields: Fields, eps1: float) -> Certificate:
         """Of the part's fields by the whole problem's data, once for the same ones. Collective."""
         if self._seen is not fields:
-            spread = Pick(small.grid, self.problem.grid, *self._part.places(self.problem.grid))
-            self._seen, self.fields = fields, {name: spread(values) for name, values in fields.items()}
-            if (held := getattr(small, "held", None)) is not None:  # pressures of supplies may have followed
-                self.problem.hold_at(self.problem.held.supplies, [one.p for one in held.supplies])
-            if (by := getattr(small, "factors", None)) is not None and by.at is not None:
-                renew(self.problem, spread(by.at))
-            spread.destroy()
-            if hasattr(small, "many"):
-                self.problem.many = small.many
-            self._found = self.problem.certify(self.fields, eps1)
+            with self._part.lent.returned():
+                self._certify(small, fields, eps1)
         return self._found
+
+    def _certify(self, small: Any, fields: Fields, eps1: float) -> None:
+        spread = Pick(small.grid, self.problem.grid, *self._part.places(self.problem.grid))
+        self._seen, self.fields = fields, {name: spread(values) for name, values in fields.items()}
+        if (held := getattr(small, "held", None)) is not None:  # pressures of supplies may have followed
+            self.problem.hold_at(self.problem.held.supplies, [one.p for one in held.supplies])
+        if (by := getattr(small, "factors", None)) is not None and by.at is not None:
+            renew(self.problem, spread(by.at))
+        spread.destroy()
+        if hasattr(small, "many"):
+            self.problem.many = small.many
+        self._found = self.problem.certify(self.fields, eps1)

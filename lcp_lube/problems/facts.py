@@ -19,6 +19,7 @@ class Facts:
     moving : whether cells store liquid: a time step. free : whether what moves answers to the film by its stiffness.
     alike : whether all lines along x have the same film and width: what it drags is stored once.
     spread : points of the whole film whose fields a part's answer becomes; 0: it is the whole one.
+    lent : whether a part's coefficients lie in the whole's memory.
     """
 
     kind: str
@@ -31,6 +32,7 @@ class Facts:
     free: bool = False
     alike: bool = False
     spread: int = 0
+    lent: bool = False
 
     @property
     def dim(self) -> int:

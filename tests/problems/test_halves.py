@@ -7,9 +7,10 @@ import pytest
 
 import lcp_lube.drivers.film_part as film_part
 from lcp_lube import load_scene, solve
+from lcp_lube.problems.film.halves import doubled
 from lcp_lube.problems.film.rims import state_of
 from lcp_lube.problems.film.stored import Dry
-from lcp_lube.problems.film.strip import doubled
+from lcp_lube.problems.film.strip import frames
 
 POCKET = [
     {"shape": "linear", "h_start_um": 2.4, "h_end_um": 2.0},
@@ -36,14 +37,29 @@ def alike(own, other):
         np.testing.assert_allclose(a, b, rtol=0, atol=1e-11 * np.abs(b).max(), err_msg=name)
 
 
+def frames_of(s):
+    return frames(s.k_W, s.k_E, s.k_S, s.k_N, s.c)
+
+
 @pytest.mark.parametrize("ny", [14, 15, 3])
 @pytest.mark.parametrize("name", FILMS)
 def test_a_half_is_what_it_would_be_by_itself(name, ny):
     scene = load_scene(*FILMS[name]).with_shape((24 if name == "supply" else 17, ny))
     problem = scene.build()
     part = film_part.Part(scene, "mirror", problem)
+    before = {name: getattr(problem.scheme, name).copy() for name in problem.scheme.arrays}
     taken, built = part.build(), film_part.Part(scene, "mirror").build()
     alike(taken.scheme, built.scheme)
+    for own, whole in zip(frames_of(taken.scheme), frames_of(problem.scheme), strict=True):
+        assert own.base is not None and np.shares_memory(own, whole)
+    assert np.shares_memory(taken.scheme.h, problem.scheme.h)
+    for _ in range(2):
+        with part.lent.returned():
+            for name, values in before.items():
+                np.testing.assert_array_equal(getattr(problem.scheme, name), values, err_msg=name)
+        alike(taken.scheme, built.scheme)
+    part.lent.give_back()
+    np.testing.assert_array_equal(problem.scheme.k_N, before["k_N"])
     assert (taken.held is None) == (built.held is None)
     if taken.held is not None:
         np.testing.assert_array_equal(taken.held.owner, built.held.owner)

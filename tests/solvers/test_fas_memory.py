@@ -39,6 +39,22 @@ def test_bytes_a_point(name, changes, most):
     assert 0.9 * peak < foreseen < 1.2 * peak
 
 
+@pytest.mark.parametrize("name", ["problem4", "journal"])
+@pytest.mark.parametrize("n", [598, 599])
+def test_bytes_a_point_of_halves(name, n):
+    """Half of a film has no coefficients of its own; the whole's fields are made while the half's are there. 67 once."""
+    solve(load_scene(name, {"nx": 511, "ny": 510})).destroy()
+    tracemalloc.start()
+    try:
+        with solve(load_scene(name, {"nx": n, "ny": n}), memory_check=False) as solution:
+            assert solution.converged and solution.settings["details"]["reduction"] == "mirror"
+            assert tracemalloc.get_traced_memory()[1] < 53 * n**2
+            foreseen = (solution.settings["memory_estimate_mb"] - solution.settings["memory_base_mb"]) * 2**20 / n**2
+    finally:
+        tracemalloc.stop()
+    assert 51 < foreseen + 24 < 60  # the whole film's coefficients are in the base
+
+
 def test_bytes_a_point_in_time():
     """Of a march: what is kept of earlier steps, a step's coefficients once and not those of the step before, multigrid's."""
     scene, ask = load_scene("piston_skirt", {"motion.t_end": 4e-3, "motion.steps": 5}), {"method": "fas", "memory_check": False}

@@ -96,6 +96,7 @@ def _film(scene: Solvable, ask: Ask) -> Solution:
     if part is not None:
         z = _taken(film.grid, whole.grid, part.places(whole.grid), z)
         film.destroy()
+        part.lent.give_back()
     film = whole
     film.hold_at(sources.held(P))
     film.free_matrices()

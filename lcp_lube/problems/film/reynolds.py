@@ -61,9 +61,9 @@ class BoxScheme:
     k_S: Array
     k_N: Array
     c: Array
-    couette_W: Array  # U h at the west and east face of a cell without void: the flux balance that c holds
-    couette_E: Array
     h: Array  # film at the points, m
+    couette_W: Made = Made()  # U h at the west and east face of a cell without void: the flux balance that c holds
+    couette_E: Made = Made()
     b_C: Made = Made()
     b_W: Made = Made()
     flow_unit: float = 1.0  # of all of them but h, m2/s: a power of 2
@@ -269,7 +269,7 @@ def coefficients(
         c[points] += conductance[points] * (p_side / p_unit)
     enters = grid.x_start > 0 or (grid.periodic[0] and U != 0.0)  # or else what does is in c
     b_C, b_W = partial(strip.leaving, void, last, weight, U), partial(strip.entering, void, enters, weight, U)
-    box = BoxScheme(k_W, k_E, k_S, k_N, c, couette_W, couette_E, h, b_C, b_W)
+    box = BoxScheme(k_W, k_E, k_S, k_N, c, h, couette_W, couette_E, b_C, b_W)
     if stored is None:
         return box
     area = 2.0 * grid.spacing[0] * grid.widths(0) * strip.line_weights(grid) * grid.stretch(grid.y)  # twice a cell's, over dy

@@ -1,5 +1,4 @@
-"""The box scheme's coefficients on some lines of a grid, or on half of them, and those of the void, which are not stored
-(`reynolds`)."""
+"""The box scheme's coefficients on some lines of a grid, and those of the void, which are not stored (`reynolds`)."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -198,56 +197,3 @@ def most_leaving(scheme: Any) -> Array:
     inside = void[:, shift : shift + scheme.h.shape[1] - 1]
     most = np.maximum(inside.max(axis=1, initial=0.0), -inside.min(axis=1, initial=0.0))
     return np.maximum(np.abs(lines) * most, np.abs(last))
-
-
-def half(whole: Any, lines: int, on_line: bool, ring: bool) -> Any:
-    """Of a film that mirrors itself about the middle of its width: a scheme's first lines, with a closed side behind them, on
-    the last one, of which half cells are left, or past it.
-
-    ring : the lines before the first are the last ones, which are left out.
-    """
-    scheme = whole.rows(slice(0, lines))
-    kx, ky, c = frames(scheme.k_W, scheme.k_E, scheme.k_S, scheme.k_N, scheme.c)  # copies: the whole's frames hold more lines
-    ky[-2] = 0.0
-    if ring:
-        ky[1] = 0.0
-    if on_line:
-        kx[-2], c[-2] = 0.5 * kx[-2], 0.5 * c[-2]
-    return _assembled(scheme, kx, ky, c, lambda a, kept=False: _last_line(np.array(a), 0.5) if on_line and not kept else a)
-
-
-def doubled(part: Any) -> Any:
-    """The whole film's scheme from its half's, which ends on the middle one of an odd number of lines."""
-
-    def mirrored(a: Array, kept: bool = False) -> Array:
-        own = _last_line(np.array(a), 1.0 if kept else 2.0)
-        return np.concatenate([own, own[-2::-1]])
-
-    across = np.concatenate([part.k_S, part.k_S[::-1]])
-    k_W, k_E, c = (mirrored(a) for a in (part.k_W, part.k_E, part.c))
-    return _assembled(part, *frames(k_W, k_E, across[:-1], across[1:], c), mirrored)
-
-
-def _last_line(a: Array, times: float) -> Array:
-    a[-1] *= times
-    return a
-
-
-def _assembled(scheme: Any, kx: Array, ky: Array, c: Array, of: Any) -> Any:
-    """With these conductances and c, in their frames; what else there is by `of`, a film, which is no flow, as it is kept."""
-    wall = of(np.concatenate([scheme.couette_W, scheme.couette_E[:, -1:]], axis=1))
-    h = of(scheme.h, True)
-
-    def made(name: str) -> Any:
-        own = vars(scheme)[name]
-        if not isinstance(own, partial):
-            return of(own)
-        void, other, weight, U = own.args
-        void = wall if void.ctypes.data == scheme.couette_W.ctypes.data else of(void, weight is not None)
-        weight = None if weight is None else of(weight)
-        return partial(own.func, void, of(other) if isinstance(other, np.ndarray) else other, weight, U)
-
-    more = {name: of(getattr(scheme, name)) for name in ("storage", "kept", "gives") if getattr(scheme, name) is not None}
-    k = {"k_W": kx[1:-1, 1:-2], "k_E": kx[1:-1, 2:-1], "k_S": ky[1:-2, 1:-1], "k_N": ky[2:-1, 1:-1], "c": c[1:-1, 1:-1]}
-    drag = {"couette_W": wall[:, :-1], "couette_E": wall[:, 1:], "b_C": made("b_C"), "b_W": made("b_W")}
-    return scheme.changed(**k, **drag, h=h, **more)
