@@ -9,7 +9,7 @@ import numpy as np
 from numpy.lib.stride_tricks import as_strided
 
 from ...base.parallel import Array
-from .strip import frames
+from .strip import faces_of, frame_of, frames, in_frame
 
 
 class Lent:
@@ -53,28 +53,25 @@ class Lent:
 def half(whole: Any, lines: int, on_line: bool, ring: bool) -> Lent:
     """A scheme's first lines, with a closed side behind them: on the last one, of which half cells are left, or past it.
 
-    They lie in the whole's own memory, in which a few lines differ: those are to be taken before the half is used.
+    They lie in the whole's own memory, in which a few lines differ: those are to be taken before the half is used. (A strided
+    view is the base of its own views, as `strip.frame_of` looks for it.)
 
     Parameters
     ----------
     lines : so many. ring : the lines before the first are the last ones, which are left out.
     """
-    kx, ky, c = frames(whole.k_W, whole.k_E, whole.k_S, whole.k_N, whole.c)
+    some = whole.rows(slice(0, lines))
+    given, own = (faces_of(one.k_W, one.k_E, one.k_S, one.k_N, one.c) for one in (whole, some))
+    found = [frame_of(*one) for one in given]  # none of some in films with supplies, and in time
+    kx, ky, c = (in_frame(*one) if a is None else as_strided(a, one[0]) for a, one in zip(found, own, strict=True))
     changes: list[tuple[Array, Any]] = [(ky[lines + 1 : lines + 3], 0.0), (kx[lines + 1], 0.0), (c[lines + 1], 0.0)]
     if ring:
         changes.append((ky[1], 0.0))
     if on_line:
         changes += [(kx[lines], 0.5 * kx[lines]), (c[lines], 0.5 * c[lines])]
-    kx, ky, c = (_first_rows(a, lines + more) for a, more in ((kx, 2), (ky, 3), (c, 2)))
-    some = whole.rows(slice(0, lines))
     share = np.ones((lines, 1))
     share[-1] = 0.5
     return Lent(changes, some.changed(**_inside(kx, ky, c), **(_shared(some, share) if on_line else {})))
-
-
-def _first_rows(a: Array, rows: int) -> Array:
-    """A view of them that is the base of its own views, as `strip.frames` knows a frame by."""
-    return as_strided(a, (rows, a.shape[1]))
 
 
 def _inside(kx: Array, ky: Array, c: Array) -> dict[str, Array]:
@@ -93,9 +90,8 @@ def _shared(scheme: Any, share: Array) -> dict[str, Any]:
             return own * share
         void, other, weight, U = own.args
         other = share[:, 0] * other if isinstance(other, np.ndarray) else other
-        return (
-            partial(own.func, void, other, share, 1.0) if weight is None else partial(own.func, void, other, weight * share, U)
-        )
+        weight, U = (share, 1.0) if weight is None else (weight * share, U)
+        return partial(own.func, void, other, weight, U)
 
     walls = {name: partial(np.multiply, getattr(scheme, name), share) for name in ("couette_W", "couette_E")}
     stored = {name: a * share for name in ("storage", "kept", "gives") if (a := getattr(scheme, name)) is not None}

@@ -13,6 +13,7 @@ from .edges import Around, face_film, pairs
 from .integrals import LineIntegrals
 
 Line = tuple[Array, Array]
+Faces = tuple[tuple[int, int], Array, Array | None]
 
 
 def coefficients_of(
@@ -121,24 +122,31 @@ def dragged(void: Array, weight: Array | None, U: float) -> Array:
     return void if weight is None else (weight * U) * void
 
 
-def frames(k_W: Array, k_E: Array, k_S: Array, k_N: Array, c: Array) -> tuple[Array, Array, Array]:
-    """Conductances of all x faces, of all y faces, and c, each in a frame: as `reynolds` made them, or made here."""
+def frames(*coefficients: Array) -> tuple[Array, ...]:
+    """Conductances of all x faces, of all y faces, and c, each in a frame: as `reynolds` made them, or made here.
+
+    coefficients : k_W, k_E, k_S, k_N, c.
+    """
+    return tuple(in_frame(*one) if (found := frame_of(*one)) is None else found for one in faces_of(*coefficients))
+
+
+def faces_of(k_W: Array, k_E: Array, k_S: Array, k_N: Array, c: Array) -> tuple[Faces, ...]:
+    """Of all x faces, all y faces and c: the shape of their frame, an array, and that of what lies one face further."""
     ny, nx = k_W.shape
-    kx, ky, own = _frame((ny + 2, nx + 3), k_W, k_E), _frame((ny + 3, nx + 2), k_S, k_N), _frame((ny + 2, nx + 2), c)
-    if kx is None:
-        kx = np.zeros((ny + 2, nx + 3))
-        kx[1:-1, 1 : nx + 1], kx[1:-1, nx + 1] = k_W, k_E[:, -1]
-    if ky is None:
-        ky = np.zeros((ny + 3, nx + 2))
-        ky[1 : ny + 1, 1:-1], ky[ny + 1, 1:-1] = k_S, k_N[-1]
-    if own is None:
-        own = np.zeros((ny + 2, nx + 2))
-        own[1:-1, 1:-1] = c
-    return kx, ky, own
+    return ((ny + 2, nx + 3), k_W, k_E), ((ny + 3, nx + 2), k_S, k_N), ((ny + 2, nx + 2), c, None)
 
 
-def _frame(shape: tuple[int, int], a: Array, behind: Array | None = None) -> Array | None:
-    """The array with a frame whose inside is a, and b one face further; None if there is none."""
+def in_frame(shape: tuple[int, int], a: Array, behind: Array | None) -> Array:
+    """A copy of them in a frame of zeros."""
+    (ny, nx), out = a.shape, np.zeros(shape)
+    if behind is not None:
+        out[shape[0] - ny - 1 : -1, shape[1] - nx - 1 : -1] = behind
+    out[1 : ny + 1, 1 : nx + 1] = a
+    return out
+
+
+def frame_of(shape: tuple[int, int], a: Array, behind: Array | None) -> Array | None:
+    """The array with a frame of which they are parts; None if there is none."""
     base = a.base
     if not isinstance(base, np.ndarray) or base.shape != shape or base.dtype != float or not base.flags.c_contiguous:
         return None
