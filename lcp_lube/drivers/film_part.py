@@ -27,6 +27,7 @@ from ..problems.film.edges import jumps_of
 from ..problems.film.halves import Lent, half
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model, Side
+from ..problems.film.supplies import pressed
 from ..problems.grid import EVEN, Grid, some_places
 from ..problems.solution import Fields, Problem
 from ..problems.strips import STRIP
@@ -126,7 +127,7 @@ class Part(Derived):
             self.lent.take()
             held = self.problem.held
             held = held and replace(held, supplies=model.supplies, owner=held.owner[: shape[1]])
-            return model.build(shape, comm, made=(self.lent.scheme, held))
+            return model.build(shape, comm, made=(pressed(self.lent.scheme, held, self.problem.p_unit), held))
         problem = model.build(shape, comm)
         return self.factored(problem, *numbers(problem.grid))
 

@@ -103,3 +103,18 @@ def test_faces_made_for_cavities_are_as_symmetric_as_the_film(form, monkeypatch)
     assert half.numbers["pressure_integral"] == pytest.approx(whole.numbers["pressure_integral"], rel=1e-6)
     half.destroy()
     whole.destroy()
+
+
+@pytest.mark.parametrize("method", ["auto", "fas"])
+@pytest.mark.parametrize("ny", [22, 23])
+def test_films_with_a_supply_across_their_middle_are_halved(ny, method, monkeypatch):
+    """The cells that it holds on the middle line of an even number have no neighbour there."""
+    monkeypatch.setattr("lcp_lube.drivers.symmetry.why_not", lambda ask: "" if ask.reduction else "no reduction was asked for")
+    scene = load_scene(*FILMS["supply"]).with_shape((31, ny))
+    half, whole = solve(scene, method=method), solve(scene, method=method, reduction=False)
+    assert half.converged and half.settings["details"]["reduction"] == "mirror"
+    for name, value in whole.numbers.items():
+        if isinstance(value, float):
+            assert half.numbers[name] == pytest.approx(value, rel=1e-8, abs=1e-12), name
+    half.destroy()
+    whole.destroy()
