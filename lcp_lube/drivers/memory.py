@@ -60,6 +60,7 @@ MEASURED: dict[tuple[str, str, str], tuple[float, float]] = {
     ("equations 2D", "jacobian", "umfpack"): (1310, 0),
 }
 SPREAD = 16, 56  # bytes for each point of the film that a part is of: its fields; of a march those that are kept too
+TWICE = 76, 46  # for each point of a film what is kept of a first solve while it is solved once more; of one by its half
 LENT = 40, 24  # of these bytes a point the coefficients; of films alike along y
 LITTLE = 32 * MB  # a run that needs no more starts without a look at what is free
 LARGE = 1_000_000  # points from which building the problem is itself worth a look ahead
@@ -181,7 +182,9 @@ def bytes_needed(facts: Facts, plan: Plan) -> float | None:
         each += 8 * unknowns * min(int(given) if given.isdecimal() else 30, 200)
     if facts.lent and not plan.system and not facts.moving:
         each -= LENT[facts.alike]
-    return each * points + SPREAD[facts.moving] * facts.spread
+    return (
+        each * points + SPREAD[facts.moving] * facts.spread + TWICE[facts.spread > 0] * facts.twice * (facts.spread or points)
+    )
 
 
 def _libraries(facts: Facts, plan: Plan) -> int:

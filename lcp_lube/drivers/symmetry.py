@@ -96,8 +96,7 @@ def solve_part(part: Part, problem: Problem, ask: Ask, inner: Inner) -> Solution
     start = None
     if ask.start is not None:
         small = bare(problem, part.grid(problem.grid.petsc_comm))
-        same = ask.start.problem.grid is problem.grid
-        near = ask.start.fields if same else problem.prolong(ask.start.problem, ask.start.fields, False)
+        near = problem.prolong(ask.start.problem, ask.start.fields, False)
         take = Pick(problem.grid, small.grid, *numbers(small.grid))
         start = Start(small, {name: take(values) for name, values in near.items()}, ask.start.settings)
         take.destroy()

@@ -18,6 +18,7 @@ class Facts:
     held : whether supplies hold cells inside at their pressures.
     moving : whether cells store liquid: a time step. free : whether what moves answers to the film by its stiffness.
     alike : whether all lines along x have the same film and width: what it drags is stored once.
+    twice : whether a film is solved once more, with faces made for its cavities.
     spread : points of the whole film whose fields a part's answer becomes; 0: it is the whole one.
     lent : whether a part's coefficients lie in the whole's memory.
     """
@@ -31,6 +32,7 @@ class Facts:
     moving: bool = False
     free: bool = False
     alike: bool = False
+    twice: bool = False
     spread: int = 0
     lent: bool = False
 

@@ -74,7 +74,7 @@ class Transfer:
 
 def interpolated(coarse: Grid, fine: Grid, field: Array, ahead: float = 0.0) -> Array:
     """A field of `coarse` on `fine`; ahead : as in `Transfer`. Collective."""
-    if _alike(coarse, fine) and not ahead:
+    if alike(coarse, fine) and not ahead:
         return field.copy()
     if coarse.comm.size == 1:  # no matrix is needed for one field
         values = field.reshape(coarse.box)
@@ -90,13 +90,17 @@ def interpolated(coarse: Grid, fine: Grid, field: Array, ahead: float = 0.0) -> 
     return values
 
 
-def _alike(one: Grid, other: Grid) -> bool:
+def alike(one: Grid, other: Grid) -> bool:
     """Whether two grids have the same points in units of their sides, dealt out alike."""
     return (
         (one.shape, one.ends, one.comm.size) == (other.shape, other.ends, other.comm.size)
-        and all(a is None and b is None for a, b in zip(one.places, other.places, strict=True))
+        and all(_same_places(*both) for both in zip(one.places, other.places, one.lengths, other.lengths, strict=False))
         and one.starts.tolist() == other.starts.tolist()
     )
+
+
+def _same_places(a: Array | None, b: Array | None, of: float, other: float) -> bool:
+    return a is b if a is None or b is None else of == other and np.array_equal(a, b)
 
 
 def _weights(points: np.ndarray, coarse: Grid, fine: Grid, side: int, zero_boundary: bool, ahead: float) -> "csr_matrix":

@@ -55,6 +55,26 @@ def test_bytes_a_point_of_halves(name, n):
     assert 51 < foreseen + 24 < 60  # the whole film's coefficients are in the base
 
 
+@pytest.mark.parametrize("form, south, most", [("square", 1e5, 127), ("round", 1e5, 132), ("dome", 3e5, 165)])
+def test_bytes_a_point_of_films_that_are_solved_twice(form, south, most):
+    """Of the first solve fields and states are kept, no coefficients. The second one starts from its fields, not from copies.
+
+    187 once, by halves; of it 51 were foreseen.
+    """
+    scene, n = load_scene("dimpled_pad", {"film.dimples.form": form, "sides.south": south}), 559
+    solve(scene.with_shape((511, 511))).destroy()
+    tracemalloc.start()
+    try:
+        with solve(scene.with_shape((n, n)), memory_check=False) as solution:
+            assert solution.converged and "revised" in solution.settings["details"]
+            assert (solution.settings["details"].get("reduction") == "mirror") == (south == 1e5)
+            assert tracemalloc.get_traced_memory()[1] < most * n**2
+            foreseen = (solution.settings["memory_estimate_mb"] - solution.settings["memory_base_mb"]) * 2**20 / n**2
+    finally:
+        tracemalloc.stop()
+    assert 0.8 * most < foreseen + 40 * (south == 1e5) < 1.1 * most  # the whole film's coefficients are in the base
+
+
 def test_bytes_a_point_in_time():
     """Of a march: what is kept of earlier steps, a step's coefficients once and not those of the step before, multigrid's."""
     scene, ask = load_scene("piston_skirt", {"motion.t_end": 4e-3, "motion.steps": 5}), {"method": "fas", "memory_check": False}

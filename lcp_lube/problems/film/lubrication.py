@@ -15,7 +15,7 @@ from ..certificate import Certificate
 from ..grid import Grid
 from ..solution import Fields
 from ..strips import MANY, ghosted
-from ..transfer import interpolated
+from ..transfer import alike, interpolated
 from .assembly import assemble
 from .certify import certify
 from .exact import ExactSolution
@@ -243,8 +243,7 @@ class LubricationProblem:
             p_sides = total / count  # NaN where no side has a pressure
         if name == "p":
             return p_sides + self.p_c
-        enters = (x == grid.origin[0]) & (grid.ends[0][0] == "open")
-        return np.where(enters, self.r_in, np.where(p_sides > 0, 0.0, np.nan))
+        return np.where((x == grid.origin[0]) & (grid.ends[0][0] == "open"), self.r_in, np.where(p_sides > 0, 0.0, np.nan))
 
     def prolong(self, coarse: "LubricationProblem", fields: Fields, interior: bool) -> Fields:
         """p and r on this grid from a coarser one, by interpolating z = p/P - r/R bilinearly (P, R: largest p and r).
@@ -252,10 +251,12 @@ class LubricationProblem:
         interior: p, r = (+-z + sqrt(z^2 + 4 m))/2, off the boundary with products p r = m P R. The front is known to a mesh
         H of the coarse grid, where p ~ (H/L)^2 and r ~ H/L: m = 10 (H/L)^3, at most 1e-3. Collective.
         """
+        shift = ahead(self, coarse)
+        if not (interior or shift) and alike(coarse.grid, self.grid):
+            return fields
         P, R = (coarse.reduce.max(fields[name]) or 1.0 for name in "pr")
-        z = interpolated(coarse.grid, self.grid, fields["p"] / P - fields["r"] / R, ahead(self, coarse))
-        m = min(1e-3, 10.0 / max(coarse.grid.shape) ** 3)
-        root = np.sqrt(z * z + 4.0 * m) if interior else np.abs(z)
+        z = interpolated(coarse.grid, self.grid, fields["p"] / P - fields["r"] / R, shift)
+        root = np.sqrt(z * z + 4.0 * min(1e-3, 10.0 / max(coarse.grid.shape) ** 3)) if interior else np.abs(z)
         return {"p": 0.5 * P * (root + z), "r": 0.5 * R * (root - z)}
 
     def revised(self, dry: Array | None) -> "LubricationProblem":

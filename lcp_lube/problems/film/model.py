@@ -151,7 +151,8 @@ class Model:
         told = {"held": held, "moving": self.stored is not None, "free": self.stored is not None and self.stored.exact}
         plane = len(shape) == 2 and self.polar is None
         alike = plane and one_line(self.film) and self.lines(shape, (False, True))[1] is None
-        return Facts("lubrication", tuple(shape), ranks, periodic, **told, alike=alike)
+        twice = plane and (self.cut or self.cornered) and self.dry is None
+        return Facts("lubrication", tuple(shape), ranks, periodic, **told, alike=alike, twice=twice)
 
     @property
     def mirrored(self) -> "Model":

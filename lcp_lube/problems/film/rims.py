@@ -32,6 +32,7 @@ TOGETHER = 2000  # faces that are looked at together, in cache
 REACH, FAR = 1.5, 4.0  # cells from a slanted edge to where it changes faces; that far, by both widths, it is looked for
 CROSSED = 0.6  # that far an edge may lie where it crosses a face; beyond there is one film
 STEP, STEEP = 1e-3, 0.1  # of a cell, for the distance's slopes; the least 2 a b of the edge's normal (a, b) in cells
+TOUCH = 1e-9  # of a face: rims that are that near to its ends touch them, in a mirror image too
 SAME = 1e-9  # of a flow: least flows that differ by less are one
 THIN = 1 / 3  # of the way from the thinnest to the thickest film of a face: what is below is the film outside a recess
 
@@ -70,7 +71,7 @@ def cut_faces(
             by_rim, across = away < REACH, away < CROSSED
         else:
             away = rim(middle[None, :], lines[:, None])
-            across = by_rim = np.abs(away) <= 0.5 * d
+            across = by_rim = np.abs(away) <= (0.5 + TOUCH) * d
             if not _jumps(rim):
                 if along_flow:
                     by_rim = across | ((away < 0.0) & (state[:, :-1] <= 0.0) & (state[:, 1:] <= 0.0))
