@@ -97,6 +97,21 @@ def test_limit_of_fine_grids_is_the_exact_solution() -> None:
         assert off < max(10 * float(str(limit[f"{name}_unsure"])), 1e-13) < 1e-3  # problem 3's p_max is exact on every grid
 
 
+@pytest.mark.parametrize("second, most", [(2.0, 250.0), (1.5, 15.0)])
+def test_limit_of_many_grids_is_as_near_as_it_says(second: float, most: float) -> None:
+    """Values with errors a h + b h^p and a scatter, as large as those of a pad with round dimples: nine of ten draws."""
+    rng = np.random.default_rng(7)
+    sides = np.geomspace(700, 8450, 72).round()
+    h = 1.0 / (sides + 1.0)
+    right = []
+    for _ in range(200):
+        errors = rng.uniform(-1, 1) * h + rng.uniform(-most, most) * h**second + 0.7 * rng.standard_normal(72) * h**1.3
+        limit, doubt = known.fitted(sides, 3.0 * (1.0 + errors))
+        right.append(abs(limit - 3.0) <= doubt)
+        assert 0.0 < doubt < 3.0 * 1e-4
+    assert np.mean(right) > 0.9
+
+
 @pytest.mark.hypre
 def test_second_time_nothing_is_run(quick: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     def no_run(*_: Any, **__: Any) -> None:
