@@ -21,8 +21,9 @@ from typing import Any
 import numpy as np
 
 from lcp_lube import InputError, load_scene, solve
-from lcp_lube.drivers.accuracy.estimate import Estimate, estimate, misplaced_film
+from lcp_lube.drivers.accuracy.estimate import Estimate, estimate
 from lcp_lube.drivers.accuracy.rungs import finer
+from lcp_lube.drivers.accuracy.unseen import misplaced_film
 
 FINEST, TOLD = 300, 140  # points a side
 NAMES = ("load", "p_max", "friction", "cavitated_area")

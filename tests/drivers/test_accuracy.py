@@ -8,8 +8,9 @@ import pytest
 from films import FilmScene, L, Pieces, random_films
 
 from lcp_lube.api import solve
-from lcp_lube.drivers.accuracy.estimate import estimate, is_known, known_line, misplaced_film, of_pair
+from lcp_lube.drivers.accuracy.estimate import estimate, is_known, known_line, of_pair
 from lcp_lube.drivers.accuracy.rungs import finer, first_rung, first_shape, round_ring, rungs_up
+from lcp_lube.drivers.accuracy.unseen import misplaced_film
 from lcp_lube.drivers.loads import attitude
 from lcp_lube.errors import InputError
 from lcp_lube.problems.solution import Outcome

@@ -117,16 +117,18 @@ def narrow_grooves(mu, omega, film, depth, angle, ratio, inner, outer, seal):
     return 2 * math.pi * np.mean(p * r) * (outer - inner), math.pi * slope / (6 * mu)
 
 
-def test_many_spirals_are_the_narrow_groove_theory():
-    """An error of first order in one over the number of grooves, extrapolated: 0.5 %, that of the grid with it."""
+@pytest.mark.parametrize("shape", [0.37, 1.0, 2.2])
+def test_many_spirals_are_the_narrow_groove_theory(shape):
+    """An error of first order in one over the number of grooves, extrapolated: 0.6 %, that of the grid with it, whatever the
+    shape of its cells: an edge moves on by `shape` rows a column."""
     found = {}
     for grooves in (30, 60):
         nx = 24
-        ny = round(nx * grooves * 0.015 / (2 * math.pi * 0.0225 * math.tan(math.radians(16))))
+        ny = round(shape * nx * grooves * 0.015 / (2 * math.pi * 0.0225 * math.tan(math.radians(16))))
         values = numbers("spiral_groove", pads=grooves, p_inner=1e6, p_outer=1e6, nx=nx, ny=ny)
         found[grooves] = np.array([values["load"], values["inner_flow"]])
     theory = np.array(narrow_grooves(0.01, 200 * math.pi, 1e-5, 2e-5, math.radians(16), 0.6, 0.015, 0.03, 0.004))
-    assert 2 * found[60] - found[30] == pytest.approx(np.abs(theory), rel=5e-3)
+    assert 2 * found[60] - found[30] == pytest.approx(np.abs(theory), rel=6e-3)
 
 
 @pytest.mark.parametrize("rows", [0.87, 1.15])

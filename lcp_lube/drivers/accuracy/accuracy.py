@@ -3,17 +3,16 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import count
-from math import ceil, inf, isfinite, prod
+from math import inf, isfinite, prod
 from time import perf_counter
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
-from petsc4py import PETSc
 
 from ...base.progress import of_ladder
 from ...errors import InputError, nearest
 from ...problems.film.model import Model
+from ...problems.film.rims import depth_of
 from ...problems.grid import OFFSET
 from ...problems.solution import Outcome, Solution
 from ...registry import ELIMINATED, METHODS
@@ -23,15 +22,16 @@ from ...solvers.newton import Stopping
 from ..ask import Ask
 from ..chain import added
 from ..compose import Inner
-from ..memory import DENSE, available
 from ..plan import FEW, SMALL
 from ..warm import seeks
 from .estimate import INTEGRALS, given_film, is_known, scalars
+from .room import no_room
 from .rungs import ASYMPTOTIC, finer, first_rung, first_shape, round_ring, rungs_up
 from .values import Values, carried, sought
 
 FEW_KNOWN = 128  # points of the first grid of a line whose number is known: no coarser grid is cheaper
 FEW_PAIRS = 200  # of a film whose load is estimated from each two grids: these are solved by elimination
+FEW_SLANTED = 1000  # of one with edges across the lines: coarser grids have strips of a cell or two
 SHARE = 0.2  # of the scene's points that the first grid of a march has at least: its steps, in proportion, see what moves it
 ALGEBRAIC = 1e-3  # ||F|| relative to the tolerance: with many small cavities it leaves up to 60 times itself in a load
 CAVITIES = 1e-2  # ||F|| at which cavities are known well enough for round edges: of 46 loads 9 in 10 move by 1e-6 at most
@@ -43,8 +43,6 @@ TWICE = 20_000  # the same by multigrid of a film that is solved twice
 HOPELESS = 1_000_000  # points on which an estimate that has not come down is taken to stay up
 PATIENCE = 6  # grids without a better estimate: rounding dominates
 BLANK = 3  # grids without a value: a finer one is not expected to have it
-BYTES, BYTES_FAS = {1: 900, 2: 1200}, 300  # memory of a point (`memory.MEASURED`)
-SMALL_CHANGE = 1e8  # bytes that every machine has
 RELATIVE_NORM = ("active-set", "fas")  # methods that measure ||F|| relative to the data
 DEFAULT_QUANTITY = ("load", "sum_v", "k", "sigma")
 
@@ -91,7 +89,20 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     order = 1.0 if first_order or (in_time is not None and in_time.scheme == "euler") else 2.0
     # Of the load in the plane each two grids give an estimate (`estimate.of_pair`).
     pairs = quantity in (None, *INTEGRALS) and len(scene.shape) == 2 and order > 1.0 and given_film(scene) is not None
-    few = FEW_KNOWN if line else FEW_PAIRS if pairs else int(SHARE * prod(scene.shape)) if in_time is not None else None
+    rims, corners = (model.cut, model.cornered) if model is not None else (False, False)
+    if slanted := rims and any(map(depth_of, model.gap.rims)):  # type: ignore[union-attr]
+        pairs = False  # two grids that agree on where edges lie say nothing of others
+    few = (
+        FEW_SLANTED
+        if slanted
+        else FEW_KNOWN
+        if line
+        else FEW_PAIRS
+        if pairs
+        else int(SHARE * prod(scene.shape))
+        if in_time is not None
+        else None
+    )
     first = first_shape(scene.shape, fewest, finest, few)
     pairs = pairs and first == first_shape(scene.shape, (), finest, few)  # else its cells are as wide as what they show
     first, unit = round_ring(scene, first, finest)
@@ -110,8 +121,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     shape = finer(first, meshes, rung, unit)
     solution: Solution | None = None
     before: Solution | None = None
-    rims, corners = (model.cut, model.cornered) if model is not None else (False, False)
-    told = Values(line, pairs, ALGEBRAIC * tol, rims, corners, order)
+    told = Values(line, pairs, ALGEBRAIC * tol, rims, corners, slanted, order)
     levels: list[dict[str, Any]] = []
     times: dict[str, float] = {}
     # A program that goes on loads multigrid's loops once; for one run they pay where its last grid will be one for multigrid
@@ -163,7 +173,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         ups = 0 if end else rungs_up(estimates, tol, told.line is not None, len(first), pairs)
         for up in range(ups, 0, -1):
             shape = finer(first, meshes, rung + up, unit)
-            if not (end := _no_room(solution, shape, finest, told.relative, tol)):
+            if not (end := no_room(solution, shape, finest, told.relative, tol)):
                 rung += up
                 break
     if before is not None:
@@ -258,39 +268,3 @@ def find_value(found: dict[str, Any], quantity: str, scene: Solvable) -> float:
             f"--quantity {quantity}: scene {scene.name} has no such number{near}; allowed are {', '.join(numbers)}"
         )
     return np.nan if found[quantity] is None else float(found[quantity])
-
-
-def _no_room(solution: Solution, shape: tuple[int, ...], finest: tuple[int, ...] | None, estimate: float, tol: float) -> str:
-    """Why the next grid cannot be; empty if it can. Collective.
-
-    Raises
-    ------
-    InputError : even with second order from here on, the tolerance is out of memory's reach.
-    """
-    problem, name = solution.problem, " x ".join(map(str, shape))
-    if finest and any(n > most for n, most in zip(shape, finest, strict=True)):
-        return f"a finer grid than {' x '.join(map(str, finest))} is not allowed"
-    each = BYTES_FAS if solution.asked == "fas" else BYTES[len(shape)]
-    dense = bool(getattr(problem, "dense", False))
-
-    def needed(points: float) -> float:
-        """Bytes of all ranks."""
-        return DENSE * points**2 if dense else each * points
-
-    factor = 0.7 * (estimate / tol) ** 0.5 if estimate < ASYMPTOTIC else 0.0
-    points = max(prod(shape), prod(factor * n for n in problem.grid.shape))
-    if needed(points) < SMALL_CHANGE:
-        return ""
-    comm = problem.grid.comm
-    machine = comm.Split_type(MPI.COMM_TYPE_SHARED)
-    share = comm.allreduce(machine.size / comm.size, MPI.MAX)  # of the points, on the machine that has the most ranks
-    machine.Free()
-    left = comm.allreduce(available(), MPI.MIN) / share
-    if points > prod(shape) and not finest and (needed(points) > left or points > np.iinfo(PETSc.IntType).max // 2):
-        raise InputError(
-            f"--accuracy {tol:g}: takes some {ceil(factor * problem.grid.shape[0])} points along x (with "
-            f"{problem.grid.shape[0]} it is {estimate:.1e}), {needed(points) / 1e9:.0f} GB; {left / 1e9:.0f} GB are available"
-        )
-    if needed(prod(shape)) > left:
-        return f"a grid of {name} needs {needed(prod(shape)) / 1e9:.0f} GB, {left / 1e9:.0f} GB are available"
-    return ""

@@ -16,7 +16,8 @@ from ...problems.film.turned import TurnedProblem
 from ...problems.film.turning import ahead
 from ...problems.solution import Fields, Problem, Solution
 from ...problems.transfer import interpolated
-from .estimate import INTEGRALS, QUADRATURE, Estimate, estimate, follow, known_line, misplaced_film, of_pair, scalars
+from .estimate import INTEGRALS, QUADRATURE, Estimate, estimate, follow, known_line, of_pair, scalars
+from .unseen import misplaced_film
 
 APART = 1.8  # spacings of two grids over one another, at least, where two such are there: nearer ones tell little
 BLOCKS = 6  # parts of a side over which the change of the pressure is integrated
@@ -32,7 +33,8 @@ class Values:
     ----------
     line : whether the film is known by quadrature (`estimate.is_known`). pairs : whether an integral of the pressure is
         estimated from each two grids (`estimate.of_pair`). least : relative error that the solves may leave on any grid.
-    rims, corners : whether rims cut faces, and corners of recesses are in them. order : of the scheme.
+    rims, corners, slanted : whether rims cut faces; there are corners of recesses; edges run across the lines. order : of the
+        scheme.
 
     Attributes
     ----------
@@ -40,7 +42,7 @@ class Values:
     largest : the quantity had in the last grid's march, if it is one that comes and goes; else 0.
     """
 
-    def __init__(self, line: bool, pairs: bool, least: float, rims: bool, corners: bool, order: float):
+    def __init__(self, line: bool, pairs: bool, least: float, rims: bool, corners: bool, slanted: bool, order: float):
         self.line: tuple[LubricationProblem, Fields] | None = None
         self._known: Mapping[str, float] | None = None  # all numbers of it
         self.quantity, self.best = "", Estimate(np.nan, inf)
@@ -52,7 +54,7 @@ class Values:
         self._misplaced: list[float] = []
         self._converged = False  # on the last grid
         self._other, self._change = -2, (inf, inf)  # of the pressure from that grid on: `_change`
-        self._order, self._rims, self._corners = order, rims, corners
+        self._order, self._rims, self._corners, self._slanted = order, rims, corners, slanted
         self._full = False  # nothing is cavitated
         self.largest = 0.0
 
@@ -96,7 +98,7 @@ class Values:
             return Estimate(value, above * abs(value - truth) + QUADRATURE * abs(value))
         by_load, by_all = self._change
         if not isfinite(by_load) or (name not in INTEGRALS and len(values) > 2):
-            found = estimate(values, self._misplaced, self._sizes, name, self._order)
+            found = estimate(values, self._misplaced, self._sizes, name, self._order, self._slanted)
             never = name in SWINGING and not any(value < 0.0 for value in values)  # below nothing
             return replace(found, value=max(0.0, found.value)) if never else found
         grids, change = (self._misplaced, self._sizes), by_load if name in INTEGRALS else by_all

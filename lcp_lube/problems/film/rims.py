@@ -12,7 +12,7 @@ of others the whole. Either problem is of the one form, with positive conductanc
 that leave one cell and enter the next: its solution is unique, certificate and bands hold as ever (docs/accuracy.md).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -22,16 +22,14 @@ from numpy.typing import NDArray
 from ...base.parallel import Array
 from ..grid import Grid
 from .cavity import cavitated
+from .edge_layers import REACH, Shape, beside_edge, layer, normal_of
 from .edges import pairs
 
 Flags = NDArray[np.bool_]
-Shape = Callable[[Array, Array], Array]
 LOOKS, FEW = 32, 8  # between the two points of a face, and where the film is smooth
 WIDE = 8, 16  # lines side by side across the width of a face across the flow beside a cavity, and looks along each
 TOGETHER = 2000  # faces that are looked at together, in cache
-REACH, FAR = 1.5, 4.0  # cells from a slanted edge to where it changes faces; that far, by both widths, it is looked for
 CROSSED = 0.6  # that far an edge may lie where it crosses a face; beyond there is one film
-STEP, STEEP = 1e-3, 0.1  # of a cell, for the distance's slopes; the least 2 a b of the edge's normal (a, b) in cells
 TOUCH = 1e-9  # of a face: rims that are that near to its ends touch them, in a mirror image too
 SAME = 1e-9  # of a flow: least flows that differ by less are one
 THIN = 1 / 3  # of the way from the thinnest to the thickest film of a face: what is below is the film outside a recess
@@ -66,7 +64,7 @@ def cut_faces(
     beside = []
     for rim in rims:
         if depth := depth_of(rim):
-            beside.append((depth, *_beside(rim, middle, d, lines, widths, along_flow)))
+            beside.append((depth, *beside_edge(rim, middle, d, lines, widths, along_flow)))
             away = np.abs(beside[-1][1])
             by_rim, across = away < REACH, away < CROSSED
         else:
@@ -83,7 +81,7 @@ def cut_faces(
         jump[across] = np.maximum(jump[across], jump_of(rim))
         if not along_flow:
             j, i = np.nonzero(by_rim & reforms & (d > 0.0))
-            oblique[j, i] = _normal(rim, middle[i], d[i], lines[j], widths[j], False)[1]
+            oblique[j, i] = normal_of(rim, middle[i], d[i], lines[j], widths[j], False)[1]
     cut, domed = cut & (d > 0.0), domed & (jump == 0.0)
     kind = np.asarray(film(nodes[:1], lines[:1])).dtype  # complex, where a derivative is asked for
     cubes, films = np.zeros((2, np.count_nonzero(cut)), dtype=kind)
@@ -99,7 +97,7 @@ def cut_faces(
             parts = [_looked(film, a[at], d[at], line, looks, *edges, *ends, along_flow) for line in places]
             cubes[k], films[k] = np.mean(parts, axis=0)
     for depth, away, length in beside:
-        more, slope = _layer(depth, away[j, i], length[j, i], film(middle[i], lines[j]))
+        more, slope = layer(depth, away[j, i], length[j, i], film(middle[i], lines[j]))
         cubes, films = cubes + more, films + slope * more
     return cut, cubes, films
 
@@ -144,24 +142,6 @@ def _beside_cavities(cavity: Flags) -> tuple[Flags, Flags]:
     return dry[:-1] & ~dry[1:], dry[:-1] | dry[1:]
 
 
-def _normal(rim: Shape, t: Array, d: Array, s: Array, w: Array, along_flow: bool) -> tuple[Array, Array, Array, Array]:
-    """Squares of a rim's normal along t and along s; and by how much the distance grows over a cell each way, without sign.
-
-    Where the rim has a fold the slopes are those of either side, not the mean of both.
-    """
-    here = rim(t, s)
-
-    def grows(t_step: Any, s_step: Any) -> Array:
-        ways = [np.abs(rim(t + way * t_step, s + way * s_step) - here) / STEP for way in (-1.0, 1.0)]
-        return np.maximum(*(np.nan_to_num(one, nan=0.0, posinf=0.0) for one in ways))
-
-    with np.errstate(invalid="ignore"):
-        by_t, by_s = grows(STEP * d, 0.0), grows(0.0, STEP * w)
-    # y is a length, x in a sector is not: the normal's parts by the former.
-    n_y = np.minimum((by_s / w if along_flow else by_t / d) ** 2, 1.0)
-    return (1.0 - n_y, n_y, by_t, by_s) if along_flow else (n_y, 1.0 - n_y, by_t, by_s)
-
-
 def depth_of(rim: Any) -> float:
     """By how much the film jumps at a slanted edge, m; 0 at other rims, and where a film has any depth there."""
     return float(getattr(_own(rim), "depth", 0.0))
@@ -186,36 +166,6 @@ def _dimples_of(rim: Any) -> Any:
 def _own(rim: Any) -> Any:
     rim = rim.args[0] if isinstance(rim, partial) else rim
     return _own(rim.film) if hasattr(rim, "film") else rim
-
-
-def _beside(rim: Shape, t: Array, d: Array, lines: Array, widths: Array, along_flow: bool) -> tuple[Array, Array]:
-    """How far faces lie from a slanted edge, in cells, negative inside; and the length by which `_layer` conducts, in cells."""
-    t, s = np.broadcast_arrays(t[None, :], lines[:, None])
-    away, length = np.full(t.shape, np.inf), np.zeros(t.shape)
-    found = rim(t, s)
-    j, i = np.nonzero(np.abs(found) < FAR * (d[None, :] + widths[:, None]))
-    t, s, d, w = t[j, i], s[j, i], d[i], widths[j]
-    n_t, n_s, by_t, by_s = _normal(rim, t, d, s, w, along_flow)
-    cell = np.hypot(by_t, by_s)
-    cell = np.where(cell > 0.0, cell, np.inf)
-    steep = np.maximum(2.0 * by_t * by_s / cell**2, STEEP)
-    away[j, i], length[j, i] = found[j, i] / cell, (n_s * by_t + n_t * by_s) / cell * steep**-0.6
-    return away, length
-
-
-def _layer(depth: float, away: Array, length: Array, h: Array) -> tuple[Array, Array]:
-    """What a slanted edge adds to C of the faces about a cell away from it, and dH/dC.
-
-    Resistances in series on the lines of points are exact for what flows across an edge, and lead too little along it: by
-    as much, to 3 % of a cell of the thick side on square cells, as networks of such faces were found to (docs/accuracy.md).
-    The thick side gains it, and the thin one loses what leaves the flow across as it was. H is linear in C.
-    """
-    other = np.where(away < 0.0, h - depth, h + depth)
-    K, K_other = h**3, other**3
-    jump = (K - K_other) / (K + K_other)
-    part = 0.715 * length * jump * (0.46 + 0.22 * np.where(away < 0.0, jump, -jump) ** 3)
-    hat = np.maximum(0.0, 2.0 - 4.0 * np.abs(np.abs(away) - 1.0))
-    return part * hat * K * K / (K + K_other), 1.0 / (h * h + h * other + other * other)
 
 
 def _resists(h: Array, jump: Array, dry_first: Flags, dry_last: Flags, along_flow: bool) -> Flags:
