@@ -5,8 +5,8 @@ python benchmarks/slanted_edges.py herringbone 300 24
 python benchmarks/slanted_edges.py theory               # many spirals against the theory of narrow grooves
 
 Of each film the load, the largest pressure and friction on grids of twice the points, up to 130,000, against the mean of three
-finer ones of other proportions; then runs to 1 and 0.3 %. Cells are as long for their width as chance has it: a scene's own grid
-with another number of grooves.
+finer ones of other proportions; then runs to 1 and 0.3 %. Cells are as long for their width as chance has it: a scene's own
+grid with another number of grooves.
 """
 
 import math
@@ -88,22 +88,19 @@ def told(kind: str, seed: int, count: int) -> None:
     print("error, %, median and root mean square, on the grids of the first film")
     for name, by_rung in errors.items():
         for rung, off in by_rung.items():
-            print(
-                f"{name:9} {' x '.join(map(str, shapes[rung])):>10}  {100 * np.median(off):8.2g} {100 * np.sqrt(np.mean(np.square(off))):8.2g}"
-            )
+            both = 100 * np.median(off), 100 * np.sqrt(np.mean(np.square(off)))
+            print(f"{name:9} {' x '.join(map(str, shapes[rung])):>10}  {both[0]:8.2g} {both[1]:8.2g}")
     for tol, ended in runs.items():
         right = sum(off <= estimate for estimate, off in ended)
         wide = np.median([estimate / max(off, 1e-9) for estimate, off in ended]) if ended else np.nan
-        print(
-            f"to {tol:g}: {len(ended)} of {count} reach it, {right} of them right, estimates {wide:.1f} times the error in the median"
-        )
+        print(f"to {tol:g}: {len(ended)} of {count} reach it, {right} of them right, estimates {wide:.1f} times the error")
 
 
 def narrow_grooves(
     film: float, depth: float, angle: float, ratio: float, radii: tuple[float, float, float]
 ) -> tuple[float, float]:
-    """Load and inner flow of a full film with infinitely many spirals, between equal pressures (Muijderman 1966, Whipple), of
-    600 rad/s/3 and 0.01 Pa s. radii : inner, of the seal, outer."""
+    """Load and inner flow of a full film with infinitely many spirals, between equal pressures (Muijderman 1966, Whipple), at
+    200 pi rad/s in 0.01 Pa s. radii : inner, of the seal, outer."""
     mu, omega, (inner, edge, outer) = 0.01, 200 * math.pi, radii
     H, gamma, cot = film / (film + depth), (1 - ratio) / ratio, 1 / math.tan(angle)
     across = (1 + gamma * H**3) * (gamma + H**3) + H**3 * (cot * (1 + gamma)) ** 2
