@@ -87,7 +87,7 @@ def test_lattices_lack_nothing_along_an_edge(thick, dy, slope):
 
 def test_gain_is_1_on_a_diagonal_and_does_not_know_the_axes():
     rng = np.random.default_rng(1)
-    slant, dx, dy = rng.uniform(0.01, 1.56, 500), *np.exp(rng.uniform(-3, 3, (2, 500)))
+    slant, (dx, dy) = rng.uniform(0.01, 1.56, 500), np.exp(rng.uniform(-3, 3, (2, 500)))
     n_x, n_y = np.cos(slant), np.sin(slant)
     one, other = gain(n_x**2, n_y**2, n_x * dx, n_y * dy), gain(n_y**2, n_x**2, n_y * dy, n_x * dx)
     np.testing.assert_allclose(one, other, rtol=1e-10)

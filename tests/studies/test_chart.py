@@ -106,7 +106,7 @@ def test_limit_of_many_grids_is_as_near_as_it_says(second: float, most: float) -
     right = []
     for _ in range(200):
         errors = rng.uniform(-1, 1) * h + rng.uniform(-most, most) * h**second + 0.7 * rng.standard_normal(72) * h**1.3
-        limit, doubt = known.fitted(sides, 3.0 * (1.0 + errors))
+        limit, doubt = known.fitted(sides.tolist(), (3.0 * (1.0 + errors)).tolist())
         right.append(abs(limit - 3.0) <= doubt)
         assert 0.0 < doubt < 3.0 * 1e-4
     assert np.mean(right) > 0.9
