@@ -67,9 +67,9 @@ class Lattice:
         ) * by_length
 
 
-@pytest.mark.parametrize("thick", [1.2, 2.0, 3.0])
-@pytest.mark.parametrize("dy", [0.08, 0.3, 1.0, 2.5])
-@pytest.mark.parametrize("slope", [0.13, 0.4, 0.9, 1.8, 6.7])
+@pytest.mark.parametrize("thick", [1.2, 3.0])
+@pytest.mark.parametrize("dy", [0.08, 0.4, 1.5])
+@pytest.mark.parametrize("slope", [0.13, 0.4, 1.8, 6.7])
 def test_lattices_lack_nothing_along_an_edge(thick, dy, slope):
     """In series alone they lack up to a cell of the mean film; resistance across is exact, and stays within half a hundredth
     of a cell."""
