@@ -17,7 +17,6 @@ import numpy as np
 
 from lcp_lube import InputError, load_scene, solve
 from lcp_lube.drivers.accuracy.rungs import finer, first_shape, round_ring
-from lcp_lube.problems.grid import OFFSET
 from lcp_lube.scenes.moving import film_of
 
 NAMES = ("load", "p_max", "friction")
@@ -53,8 +52,9 @@ def ladder(scene: Any) -> list[tuple[int, ...]]:
     model = film_of(scene)
     assert model is not None
     first, unit = round_ring(scene, first_shape(scene.shape, model.fewest_meshes(), None, 200))
-    kinds = [model.sides[2 * k : 2 * k + 2] for k in range(2)]
-    meshes = [n + 1.0 - sum(1.0 - OFFSET[side.kind] for side in ends) for n, ends in zip(first, kinds, strict=True)]
+    grid = model.grid(first)
+    meshes = grid.meshes
+    grid.destroy()
     shapes = [finer(first, meshes, k, unit) for k in range(20)]
     return [shape for shape in shapes if math.prod(shape) <= MOST]
 

@@ -131,13 +131,12 @@ def _solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution | None:
     count = int(problem.reduce.sum((state > 0.0).astype(float)))
     made = (bool(model.cut or behind) and count > 0) or (model.cornered and bool(ask.cavities or _has_corners(problem, state)))
     again = replace(ask, start=first, nested=False, monitor=None, checkpoint=None, resume=None)
-    mirror = _mirror(scene, model, first)
     spared = made and problem.plain and problem.held is None and problem.coefficients_for is not None
     if spared:
         problem.free_matrices()
         del problem.scheme  # of what was solved its fields alone are needed, unless this is all there will be
     second = (
-        inner(Revised(scene, Dry(state, problem.grid), mirror) if made else scene, again)
+        inner(Revised(scene, Dry(state, problem.grid), _mirror(scene, model, first)) if made else scene, again)
         if made or ask.certify or ask.cavities
         else first
     )

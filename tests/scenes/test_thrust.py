@@ -117,10 +117,10 @@ def narrow_grooves(mu, omega, film, depth, angle, ratio, inner, outer, seal):
     return 2 * math.pi * np.mean(p * r) * (outer - inner), math.pi * slope / (6 * mu)
 
 
-@pytest.mark.parametrize("shape", [0.37, 1.0, 2.2])
-def test_many_spirals_are_the_narrow_groove_theory(shape):
-    """An error of first order in one over the number of grooves, extrapolated: 0.6 %, that of the grid with it, whatever the
-    shape of its cells: an edge moves on by `shape` rows a column."""
+@pytest.mark.parametrize("shape, off", [(0.37, 5e-3), (1.0, 6e-3), (2.2, 5e-3)])
+def test_many_spirals_are_the_narrow_groove_theory(shape, off):
+    """An error of first order in one over the number of grooves, extrapolated: 0.5 %, that of the grid with it, on cells of any
+    shape. An edge moves on by `shape` rows a column: by just one it lies everywhere alike, which a mean over places is not."""
     found = {}
     for grooves in (30, 60):
         nx = 24
@@ -128,7 +128,7 @@ def test_many_spirals_are_the_narrow_groove_theory(shape):
         values = numbers("spiral_groove", pads=grooves, p_inner=1e6, p_outer=1e6, nx=nx, ny=ny)
         found[grooves] = np.array([values["load"], values["inner_flow"]])
     theory = np.array(narrow_grooves(0.01, 200 * math.pi, 1e-5, 2e-5, math.radians(16), 0.6, 0.015, 0.03, 0.004))
-    assert 2 * found[60] - found[30] == pytest.approx(np.abs(theory), rel=6e-3)
+    assert 2 * found[60] - found[30] == pytest.approx(np.abs(theory), rel=off)
 
 
 @pytest.mark.parametrize("rows", [0.87, 1.15])

@@ -73,17 +73,10 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     rims, corners = (model.cut, model.cornered) if model is not None else (False, False)
     if slanted := rims and any(map(depth_of, model.gap.rims)):  # type: ignore[union-attr]
         pairs = False  # two grids that agree on where edges lie say nothing of others
-    few = (
-        FEW_SLANTED
-        if slanted
-        else FEW_KNOWN
-        if line
-        else FEW_PAIRS
-        if pairs
-        else int(SHARE * prod(scene.shape))
-        if in_time is not None
-        else None
-    )
+    if line or pairs:
+        few: int | None = FEW_KNOWN if line else FEW_PAIRS
+    else:
+        few = int(SHARE * prod(scene.shape)) if in_time is not None else FEW_SLANTED if slanted else None
     first = first_shape(scene.shape, fewest, finest, few)
     pairs = pairs and first == first_shape(scene.shape, (), finest, few)  # else its cells are as wide as what they show
     first, unit = round_ring(scene, first, finest)
