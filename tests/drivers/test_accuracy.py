@@ -8,7 +8,7 @@ import pytest
 from films import FilmScene, L, Pieces, random_films
 
 from lcp_lube.api import solve
-from lcp_lube.drivers.accuracy.estimate import estimate, is_known, known_line, of_pair
+from lcp_lube.drivers.accuracy.estimate import Traits, estimate, is_known, known_line, of_pair
 from lcp_lube.drivers.accuracy.rungs import finer, first_rung, first_shape, round_ring, rungs_up
 from lcp_lube.drivers.accuracy.unseen import misplaced_film
 from lcp_lube.drivers.loads import attitude
@@ -291,9 +291,15 @@ def test_estimate_of_two_grids():
     assert found.value == pytest.approx(1.375) and found.error == pytest.approx(1.4 * 0.3 / 3) and found.extrapolated
     assert of_pair([1.0, 1.0], [0.0, 0.0], [16.0, 32.0], 0.1, "load").error == pytest.approx(1.4 * 0.1 / 3)
     assert of_pair([1.0, 1.3], [0.0, 0.0], [16.0, 32.0], 0.1, "load", full=True).error == pytest.approx(0.7 * 0.3 / 3)
-    assert of_pair([1.0, 1.3], [0.0, 0.0], [16.0, 32.0], 0.1, "load", rims=True).error == pytest.approx(1.7 * 1.4 * 0.3 / 3)
-    assert of_pair([1.0, 1.3], [0.0, 0.0], [16.0, 32.0], 0.1, "load", corners=True).error == pytest.approx(1.2 * 1.4 * 0.3 / 3)
-    assert of_pair([1.0, 1.3], [0.0, 0.0], [16.0, 32.0], 0.1, "p_max", corners=True).error == pytest.approx(3 * 0.3 / 3)
+    assert of_pair([1.0, 1.3], [0.0, 0.0], [16.0, 32.0], 0.1, "load", film=Traits(rims=True)).error == pytest.approx(
+        1.7 * 1.4 * 0.3 / 3
+    )
+    assert of_pair([1.0, 1.3], [0.0, 0.0], [16.0, 32.0], 0.1, "load", film=Traits(corners=True)).error == pytest.approx(
+        1.2 * 1.4 * 0.3 / 3
+    )
+    assert of_pair([1.0, 1.3], [0.0, 0.0], [16.0, 32.0], 0.1, "p_max", film=Traits(corners=True)).error == pytest.approx(
+        3 * 0.3 / 3
+    )
     assert of_pair([1.0, 1.0], [0.0, 0.0], [16.0, 32.0], 0.1, "friction").error == pytest.approx(3 * 0.03 / 3)
     assert of_pair([1.0], [0.0], [16.0], 0.1, "load").error == math.inf
     assert of_pair([1.0, 1.1], [0.0, 0.0], [16.0, 32.0], 0.1, "cavitated_area").error == math.inf
@@ -472,7 +478,7 @@ def test_a_line_in_which_nothing_happens_ends_early_and_says_so(more):
 def test_upwind_is_of_first_order():
     """Its textures' loads go up and down by per cents from grid to grid: two that agree by chance once told 0.6 % of 5."""
     sizes = [10.0, 20.0, 40.0, 80.0]
-    best = estimate([3.0 + 1.0 / size for size in sizes], [0.0] * 4, sizes, order=1.0)
+    best = estimate([3.0 + 1.0 / size for size in sizes], [0.0] * 4, sizes, film=Traits(order=1.0))
     assert best.extrapolated and best.value == pytest.approx(3.0, abs=1e-12)
     with solve("textured_slider", accuracy=1e-2, finest=(500, 500)) as solution:
         assert solution.outcome == "accuracy_not_reached" and solution.settings["accuracy_estimate"] > 0.02

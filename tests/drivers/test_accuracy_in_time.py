@@ -7,6 +7,7 @@ import pytest
 from marches import WEDGE
 
 from lcp_lube import load_scene, solve
+from lcp_lube.drivers.accuracy.estimate import Traits
 from lcp_lube.drivers.accuracy.values import Values
 from lcp_lube.drivers.marches import rotor
 from lcp_lube.errors import InputError
@@ -69,7 +70,7 @@ def test_a_load_that_has_gone_is_measured_by_the_largest():
 
 
 def test_no_load_that_is_nowhere_below_nothing_is_extrapolated_to_less():
-    told = Values(False, False, 0.0, False, False, False, 2.0)
+    told = Values(Traits(), 0.0)
     told._sizes, told._misplaced = [1.0, 2.0**0.5, 2.0], [0.0] * 3
     assert told._best("load", [30.0, 20.0, 5.0]).value == 0.0
     assert told._best("load", [30.0, -20.0, 5.0]).value > 5.0

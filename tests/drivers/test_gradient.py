@@ -10,7 +10,7 @@ import pytest
 from lcp_lube import InputError, load_scene, registry, solve
 from lcp_lube.cli.arguments import parse
 from lcp_lube.cli.main import run
-from lcp_lube.drivers import supplies
+from lcp_lube.drivers import supply_search
 from lcp_lube.drivers.derivatives import adjoint as adjoint_module
 from lcp_lube.drivers.derivatives import near_films
 from lcp_lube.drivers.derivatives.adjoint import Adjoint
@@ -57,7 +57,7 @@ FEW = ("mu", "fluid.mu", "U", "L", "D", "h_min", "film.pocket.depth", "film.dimp
 
 @pytest.fixture(autouse=True)
 def exact_attitudes(monkeypatch):
-    monkeypatch.setattr(supplies, "TOLERANCE", 1e-13)
+    monkeypatch.setattr(supply_search, "TOLERANCE", 1e-13)
     monkeypatch.setattr(attitude, "TOLERANCE", 1e-12)  # differences of solves are to be good to many digits
     monkeypatch.setattr(attitude, "PART", 1e-4)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lcp_lube import solve
-from lcp_lube.drivers import supplies
+from lcp_lube.drivers import supply_search
 from lcp_lube.drivers.derivatives import march_films
 from lcp_lube.drivers.derivatives.gradient import check, film_fields, gradients
 from lcp_lube.drivers.derivatives.march_gradient import MarchGradient, means
@@ -142,7 +142,7 @@ def marched(scene, names):
 @pytest.mark.parametrize("case", CASES)
 def test_against_differences_of_marches(case, monkeypatch):
     monkeypatch.setattr(rotor, "TOL", 1e-11)
-    monkeypatch.setattr(supplies, "TOLERANCE", 1e-13)
+    monkeypatch.setattr(supply_search, "TOLERANCE", 1e-13)
     name, changes, keys = CASES[case]
     scene, names = load_scene(name, **changes), ["load", "mean_load", "friction", "mean_friction", "p_max"]
     trace = Trace()
@@ -194,7 +194,7 @@ def test_films_of_all_steps_at_once_are_those_step_by_step(U, monkeypatch):
 def test_the_films_own_derivative(case, monkeypatch):
     """In a drawn direction, by differences of marches whose film is another at all times; in sum that by its level."""
     monkeypatch.setattr(rotor, "TOL", 1e-11)
-    monkeypatch.setattr(supplies, "TOLERANCE", 1e-13)
+    monkeypatch.setattr(supply_search, "TOLERANCE", 1e-13)
     name, changes, _ = CASES[case]
     scene = load_scene(name, **{**changes, "motion": {**changes["motion"], "start": "full"}})
     names, trace, models = ["load", "mean_friction"], Trace(), type(scene).models

@@ -83,13 +83,25 @@ class Estimate:
         return self.error / abs(self.value) if self.value and isfinite(self.value) else inf
 
 
+@dataclass(frozen=True)
+class Traits:
+    """What a film's estimates hang on.
+
+    line : whether the film is known by quadrature (`is_known`). pairs : whether an integral of the pressure is estimated from
+    each two grids (`of_pair`). rims, corners : whether rims cut faces, and corners of recesses are in them. slanted : whether
+    edges run across the lines of points, and errors hang on where. order : of the scheme.
+    """
+
+    line: bool = False
+    pairs: bool = False
+    rims: bool = False
+    corners: bool = False
+    slanted: bool = False
+    order: float = 2.0
+
+
 def estimate(
-    values: Sequence[float],
-    misplaced: Sequence[float],
-    finer: Sequence[float],
-    name: str = "",
-    order: float = 2.0,
-    slanted: bool = False,
+    values: Sequence[float], misplaced: Sequence[float], finer: Sequence[float], name: str = "", film: Traits = Traits()
 ) -> Estimate:
     """The best value of a quantity and its error, from its values on grids from coarse to fine.
 
@@ -98,8 +110,8 @@ def estimate(
     values : NaN where a grid gave none.
     misplaced : `misplaced_film` on the same grids.
     finer : how fine they are: meshes a side, over any number.
-    name : of the quantity, which may be one of NOISY. order : of the scheme: of `upwind` the first, in the place of two above.
-    slanted : whether edges run across the lines of points, and errors hang on where: no less than by first order remains.
+    name : of the quantity, which may be one of NOISY. film : its order stands in the place of two above (`upwind` has the
+        first); where it is slanted no less than by first order remains.
     """
     v, m = np.array(values, dtype=float), np.array(finer, dtype=float)
     usable = np.flatnonzero(np.isnan(v))
@@ -111,25 +123,25 @@ def estimate(
     if len(v) < 3:
         return Estimate(last, inf)
     steps = np.diff(v)
-    corrections = steps / ((m[1:] / m[:-1]) ** order - 1.0)
+    corrections = steps / ((m[1:] / m[:-1]) ** film.order - 1.0)
     w = v[1:] + corrections
-    shrink = ((m[1:-1] / m[-1]) ** order)[-2:]  # of the two grids before the last
+    shrink = ((m[1:-1] / m[-1]) ** film.order)[-2:]  # of the two grids before the last
     if name in NOISY:
         moves = (steps * (m[1:] / m[-1]) ** NOISY[name] / ((m[1:] / m[:-1]) ** NOISY[name] - 1.0))[-LAST:]
         error = SPREAD * float(np.sqrt(np.mean(moves * moves)))
         return Estimate(max(0.0, last + HALF * float(moves[-1])), max(error, _of_film(np.abs(steps), misplaced, last)), True)
     few = max(1.0, SPAN * (m[0] / m[-1]) ** 2)
-    left = few * float(np.max(np.abs(w[-1] - w[:-1][-2:]) * np.minimum(1.0, 2.0**order * shrink)))
+    left = few * float(np.max(np.abs(w[-1] - w[:-1][-2:]) * np.minimum(1.0, 2.0**film.order * shrink)))
     noise = max(left, few * EXPECTED * float(np.max(np.abs(corrections[:-1][-2:]) * shrink)))
     correction = float(corrections[-1])
-    whole, film = abs(correction), _of_film(np.abs(steps), misplaced, last)
-    if slanted:
-        film = max(film, float(np.max(np.abs(v[-1] - v[:-1][-2:]) / (m[-1] / m[:-1][-2:] - 1.0))))
+    whole, unseen = abs(correction), _of_film(np.abs(steps), misplaced, last)
+    if film.slanted:
+        unseen = max(unseen, float(np.max(np.abs(v[-1] - v[:-1][-2:]) / (m[-1] / m[:-1][-2:] - 1.0))))
     clean = left < CLEAN * whole
     of_grid, of_limit = whole + MOVED * noise, left if clean else MOVED * noise + (1.0 - PART) * whole
     if of_limit < of_grid:
-        return Estimate(last + (1.0 if clean else PART) * correction, max(of_limit, film), True)
-    return Estimate(last, max(of_grid, film))
+        return Estimate(last + (1.0 if clean else PART) * correction, max(of_limit, unseen), True)
+    return Estimate(last, max(of_grid, unseen))
 
 
 def of_pair(
@@ -140,8 +152,7 @@ def of_pair(
     name: str,
     other: int = -2,
     full: bool = False,
-    rims: bool = False,
-    corners: bool = False,
+    film: Traits = Traits(),
 ) -> Estimate:
     """The best value and its error from two grids, and from how far the pressure changed between them.
 
@@ -154,7 +165,7 @@ def of_pair(
     ----------
     values, misplaced, finer : as in `estimate`. change : that sum over the quantity, or for a quantity that is no integral of p
         the integral of |p_k - p_j| over that of p. other : number of the grid j that the last one is compared with.
-    full : whether nothing is cavitated. rims, corners : whether rims cut faces, and corners of recesses are in them.
+    full : whether nothing is cavitated. film : what makes errors of its own is its rims and corners.
     """
     if name in NOISY or len(values) < 2:
         return Estimate(values[-1], inf)
@@ -164,11 +175,11 @@ def of_pair(
     if told and isfinite(moved := _moved(values, finer)) and error:
         error *= MORE * max(moved / error, STEADY) ** PART_MOVED
     at_corners, at_rims = (CORNERS, RIMS) if told else (1.0, RIMS_BESIDE)
-    error *= (PAIR[full] if told else BESIDE) * (at_rims if rims else at_corners if corners else 1.0)
-    film = _of_film(np.abs(np.diff(values)), misplaced, values[-1])
-    return (
-        Estimate(values[-1] + PART * to_come * step, max(error, film), True) if isfinite(error) else Estimate(values[-1], inf)
-    )
+    error *= (PAIR[full] if told else BESIDE) * (at_rims if film.rims else at_corners if film.corners else 1.0)
+    if not isfinite(error):
+        return Estimate(values[-1], inf)
+    unseen = _of_film(np.abs(np.diff(values)), misplaced, values[-1])
+    return Estimate(values[-1] + PART * to_come * step, max(error, unseen), True)
 
 
 def _moved(values: Sequence[float], finer: Sequence[float]) -> float:

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import count
 from math import inf, isfinite, prod
 from time import perf_counter
 from typing import Any
@@ -10,12 +9,8 @@ from typing import Any
 import numpy as np
 
 from ...base.progress import of_ladder
-from ...problems.film.model import Model
-from ...problems.film.rims import depth_of
-from ...problems.grid import OFFSET
 from ...problems.solution import Outcome, Solution
 from ...registry import ELIMINATED, METHODS
-from ...scenes.moving import film_of, motion_of
 from ...scenes.scene import Solvable
 from ...solvers.newton import Stopping
 from ..ask import Ask
@@ -24,15 +19,12 @@ from ..compose import Inner
 from ..plan import FEW, SMALL
 from ..warm import seeks
 from .accuracy import DEFAULT_QUANTITY, WHOLE, find_value
-from .estimate import INTEGRALS, given_film, is_known
+from .course import Course, course_of
+from .estimate import INTEGRALS
 from .room import no_room
-from .rungs import ASYMPTOTIC, finer, first_rung, first_shape, round_ring, rungs_up
+from .rungs import ASYMPTOTIC, rungs_up
 from .values import Values, carried, sought
 
-FEW_KNOWN = 128  # points of the first grid of a line whose number is known: no coarser grid is cheaper
-FEW_PAIRS = 200  # of a film whose load is estimated from each two grids: these are solved by elimination
-FEW_SLANTED = 1000  # of one with edges across the lines: coarser grids have strips of a cell or two
-SHARE = 0.2  # of the scene's points that the first grid of a march has at least: its steps, in proportion, see what moves it
 ALGEBRAIC = 1e-3  # ||F|| relative to the tolerance: with many small cavities it leaves up to 60 times itself in a load
 CAVITIES = 1e-2  # ||F|| at which cavities are known well enough for round edges: of 46 loads 9 in 10 move by 1e-6 at most
 FIRST = 1e-2  # the same of a first grid that tells nothing by itself
@@ -60,94 +52,34 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     ------
     InputError : no such quantity, a tolerance that no memory can hold; and what the inner solves raise.
     """
-    tol, quantity, finest = ask.accuracy, ask.quantity, ask.finest
+    tol, begin = ask.accuracy, perf_counter()
     assert tol is not None
-    begin = perf_counter()
-    fewest = model.fewest_meshes() if (model := film_of(scene)) is not None else ()
-    line = is_known(scene)
-    in_time = motion_of(scene)
-    first_order = model is not None and (model.scheme == "upwind" or model.mean_cubes)
-    order = 1.0 if first_order or (in_time is not None and in_time.scheme == "euler") else 2.0
-    # Of the load in the plane each two grids give an estimate (`estimate.of_pair`).
-    pairs = quantity in (None, *INTEGRALS) and len(scene.shape) == 2 and order > 1.0 and given_film(scene) is not None
-    rims, corners = (model.cut, model.cornered) if model is not None else (False, False)
-    if slanted := rims and any(map(depth_of, model.gap.rims)):  # type: ignore[union-attr]
-        pairs = False  # two grids that agree on where edges lie say nothing of others
-    if line or pairs:
-        few: int | None = FEW_KNOWN if line else FEW_PAIRS
-    else:
-        few = int(SHARE * prod(scene.shape)) if in_time is not None else FEW_SLANTED if slanted else None
-    first = first_shape(scene.shape, fewest, finest, few)
-    pairs = pairs and first == first_shape(scene.shape, (), finest, few)  # else its cells are as wide as what they show
-    first, unit = round_ring(scene, first, finest)
-    kinds = [model.sides[2 * k : 2 * k + 2] if isinstance(model, Model) else () for k in range(len(first))]
-    meshes = [n + 1.0 - sum(1.0 - OFFSET[side.kind] for side in ends) for n, ends in zip(first, kinds, strict=True)]
-    ring = any(side.kind == "periodic" for ends in kinds for side in ends)
-    ranks = ask.mpi.size
-    rung = next(k for k in count() if ranks == 1 or finer(first, meshes, k, unit)[-1] >= 2 * ranks)
-    if line and first[0] < FEW_KNOWN and (finest is None or finer(first, meshes, rung + 1, unit)[0] <= finest[0]):
-        rung += 1
-    narrow = any(n + 1 < 2 * least for n, least in zip(first, fewest, strict=False))
-    later = first_rung(tol, narrow) if pairs else 0
-    most = finest or (inf,) * len(first)
-    if all(n <= end for n, end in zip(finer(first, meshes, rung + later + 2, unit), most, strict=True)):
-        rung += later
-    shape = finer(first, meshes, rung, unit)
+    course = course_of(scene, ask)
+    told, quantity, rung, end = Values(course.film, ALGEBRAIC * tol), ask.quantity, course.begin, ""
     solution: Solution | None = None
     before: Solution | None = None
-    told = Values(line, pairs, ALGEBRAIC * tol, rims, corners, slanted, order)
     levels: list[dict[str, Any]] = []
     times: dict[str, float] = {}
     # A program that goes on loads multigrid's loops once; for one run they pay where its last grid will be one for multigrid
     # (second order: points as 1/error), and serve those before it too.
-    plane, seeking = len(first) == 2, seeks(scene, ask)
-    end, loops = "", ask.direct_below is None or (plane and tol < SOON)
+    loops = ask.direct_below is None or (course.plane and tol < SOON)
     while not end:
         level_begin, before, earlier = perf_counter(), solution, before
-        near = ask.start if before is None else _start(before, prod(shape), seeking) if ask.nested is not False else None
-        stopping = _stopping(ask, tol, before) if before is not None or (pairs and not ring) else ask.stopping
-        least = WHOLE[loops if before is None else before.asked == "fas"]
-        halved = ask.reduction and (not plane or prod(shape) > (min(least, TWICE) if rims or corners else least))
-        loose = CAVITIES if stopping is not ask.stopping else None
-        enough = {"stopping": stopping, "cavities": loose, "digits": ALGEBRAIC * tol}
-        this = replace(ask, accuracy=None, start=near, nested=False, reduction=halved, **enough)  # type: ignore[arg-type]
-        by_loops = loops and (plane or (line and shape[0] <= ELIMINATED))
-        solution = inner(scene.refined(shape), replace(this, direct_below=0) if by_loops else this)
-        problem = solution.problem
-        sure = quantity or (DEFAULT_QUANTITY[0] if pairs or line else "")
-        value = carried(problem, solution.fields, sure)
-        if value is not None:
-            quantity = sure
-        else:
-            found = {**sought(solution), **solution.numbers}  # what is sought is the number where the load is given
-            quantity = quantity or next((name for name in (*sought(solution), *DEFAULT_QUANTITY) if name in found), "")
-            value = find_value(found, quantity, scene)
-        told.add(solution, before, earlier, prod(problem.grid.meshes) ** (1.0 / len(first)), quantity, value)
+        shape = course.shape(rung)
+        solution = inner(scene.refined(shape), _ask(scene, ask, course, shape, before, loops))
+        problem, times = solution.problem, added(times, solution.times)
+        quantity, value = _value(solution, quantity, course, scene)
+        told.add(solution, before, earlier, prod(problem.grid.meshes) ** (1.0 / problem.grid.dim), quantity, value)
         if earlier is not None:
             earlier.destroy()
-        loops = loops or (plane and inf > told.relative > 3 * FEW / problem.grid.size * tol)
-        levels.append(
-            {
-                **dict(zip(("nx", "ny"), problem.grid.shape, strict=False)),
-                "iterations": solution.iterations,
-                "linear_iterations": solution.total("linear_iterations"),
-                "time_s": perf_counter() - level_begin,
-                "value": value if solution.converged else np.nan,
-                "estimate": told.relative,
-            }
-        )
+        loops = loops or (course.plane and inf > told.relative > 3 * FEW / problem.grid.size * tol)
+        levels.append(_level(solution, value, told.relative, perf_counter() - level_begin))
         values, estimates, seconds = ([level[name] for level in levels] for name in ("value", "estimate", "time_s"))
         ask.tell("accuracy", f"{quantity} to {told.relative:.0e}", of_ladder(seconds, told.relative, tol, 2.0 ** len(shape)))
-        times = added(times, solution.times)
-        end = _end(estimates, values, tol, problem.grid.size)
-        rounding = _rounding(solution) if problem.kind == "lubrication" and quantity in INTEGRALS else 0.0
-        if not end and len(values) > 1 and max(*map(abs, values), told.largest) <= rounding:  # NaN is not
-            noise = f"below {rounding:.0e} N, which is rounding beside what wall and sides could carry"
-            end = f"it is {noise if rounding else 0}"
-        ups = 0 if end else rungs_up(estimates, tol, told.line is not None, len(first), pairs)
+        end = _end(estimates, values, tol, problem.grid.size) or _lost(solution, quantity, values, told.largest)
+        ups = 0 if end else rungs_up(estimates, tol, told.line is not None, len(shape), course.film.pairs)
         for up in range(ups, 0, -1):
-            shape = finer(first, meshes, rung + up, unit)
-            if not (end := no_room(solution, shape, finest, told.relative, tol)):
+            if not (end := no_room(solution, course.shape(rung + up), ask.finest, told.relative, tol)):
                 rung += up
                 break
     if before is not None:
@@ -173,6 +105,42 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     return solution
 
 
+def _ask(scene: Solvable, ask: Ask, course: Course, shape: tuple[int, ...], before: Solution | None, loops: bool) -> Ask:
+    """What the grid of this shape is asked for; before : the last one's answer. loops : whether multigrid's are loaded."""
+    tol, film = ask.accuracy or 0.0, course.film
+    near = ask.start if before is None else _start(before, prod(shape), seeks(scene, ask)) if ask.nested is not False else None
+    told_soon = film.pairs and not course.ring  # the first grid is not the last, and need not be solved far
+    stopping = _stopping(ask, tol, before) if before is not None or told_soon else ask.stopping
+    least = WHOLE[loops if before is None else before.asked == "fas"]
+    halved = ask.reduction and not (course.plane and prod(shape) <= (min(least, TWICE) if film.rims or film.corners else least))
+    this = replace(ask, accuracy=None, start=near, nested=False, reduction=halved, stopping=stopping)
+    this = replace(this, cavities=CAVITIES if stopping is not ask.stopping else None, digits=ALGEBRAIC * tol)
+    by_loops = loops and (course.plane or (film.line and shape[0] <= ELIMINATED))
+    return replace(this, direct_below=0) if by_loops else this
+
+
+def _value(solution: Solution, quantity: str | None, course: Course, scene: Solvable) -> tuple[str, float]:
+    """The quantity's name, and its value on this grid. Collective."""
+    sure = quantity or (DEFAULT_QUANTITY[0] if course.film.pairs or course.film.line else "")
+    if (value := carried(solution.problem, solution.fields, sure)) is not None:
+        return sure, value
+    found = {**sought(solution), **solution.numbers}  # what is sought is the number where the load is given
+    name = quantity or next((name for name in (*sought(solution), *DEFAULT_QUANTITY) if name in found), "")
+    return name, find_value(found, name, scene)
+
+
+def _level(solution: Solution, value: float, estimate: float, seconds: float) -> dict[str, Any]:
+    """One of `Solution.levels`."""
+    return {
+        **dict(zip(("nx", "ny"), solution.problem.grid.shape, strict=False)),
+        "iterations": solution.iterations,
+        "linear_iterations": solution.total("linear_iterations"),
+        "time_s": seconds,
+        "value": value if solution.converged else np.nan,
+        "estimate": estimate,
+    }
+
+
 def ladder(levels: list[dict[str, Any]], quantity: str, tol: float) -> list[str]:
     """The grids as lines of text: grid, value, estimate, seconds."""
     lines = [f"accuracy: {quantity} to {tol:g}", f"{'grid':>12}  {quantity:>16}  estimate  seconds"]
@@ -195,6 +163,14 @@ def _end(estimates: Sequence[float], values: Sequence[float], tol: float, points
     if settled and len(estimates) - best > PATIENCE:
         return f"{PATIENCE} finer grids gave no better estimate than {estimates[best]:.1e}"
     return ""
+
+
+def _lost(solution: Solution, quantity: str, values: Sequence[float], largest: float) -> str:
+    """Why no grid will tell more of a load: it is rounding. Empty where it is not. Collective."""
+    rounding = _rounding(solution) if solution.problem.kind == "lubrication" and quantity in INTEGRALS else 0.0
+    if len(values) < 2 or not max(*map(abs, values), largest) <= rounding:  # NaN is not
+        return ""
+    return f"it is {f'below {rounding:.0e} N, which is rounding beside what wall and sides could carry' if rounding else 0}"
 
 
 def _rounding(solution: Solution) -> float:

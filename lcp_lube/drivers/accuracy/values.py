@@ -16,7 +16,7 @@ from ...problems.film.turned import TurnedProblem
 from ...problems.film.turning import ahead
 from ...problems.solution import Fields, Problem, Solution
 from ...problems.transfer import interpolated
-from .estimate import INTEGRALS, QUADRATURE, Estimate, estimate, follow, known_line, of_pair, scalars
+from .estimate import INTEGRALS, QUADRATURE, Estimate, Traits, estimate, follow, known_line, of_pair, scalars
 from .unseen import misplaced_film
 
 APART = 1.8  # spacings of two grids over one another, at least, where two such are there: nearer ones tell little
@@ -31,10 +31,7 @@ class Values:
 
     Parameters
     ----------
-    line : whether the film is known by quadrature (`estimate.is_known`). pairs : whether an integral of the pressure is
-        estimated from each two grids (`estimate.of_pair`). least : relative error that the solves may leave on any grid.
-    rims, corners, slanted : whether rims cut faces; there are corners of recesses; edges run across the lines. order : of the
-        scheme.
+    film : what its estimates hang on. least : relative error that the solves may leave on any grid.
 
     Attributes
     ----------
@@ -42,11 +39,11 @@ class Values:
     largest : the quantity had in the last grid's march, if it is one that comes and goes; else 0.
     """
 
-    def __init__(self, line: bool, pairs: bool, least: float, rims: bool, corners: bool, slanted: bool, order: float):
+    def __init__(self, film: Traits, least: float):
         self.line: tuple[LubricationProblem, Fields] | None = None
         self._known: Mapping[str, float] | None = None  # all numbers of it
         self.quantity, self.best = "", Estimate(np.nan, inf)
-        self._is_line, self._pairs, self._least = line, pairs, least
+        self._film, self._least = film, least
         self._grids: list[Solution | Mapping[str, float]] = []  # those before the last, or their numbers
         self._last: Mapping[str, float] = {}  # numbers of the last one, once they are told
         self._own: list[float] = []  # of the quantity
@@ -54,7 +51,6 @@ class Values:
         self._misplaced: list[float] = []
         self._converged = False  # on the last grid
         self._other, self._change = -2, (inf, inf)  # of the pressure from that grid on: `_change`
-        self._order, self._rims, self._corners, self._slanted = order, rims, corners, slanted
         self._full = False  # nothing is cavitated
         self.largest = 0.0
 
@@ -66,7 +62,7 @@ class Values:
         before, earlier : the answers on the last grid, and on that before it.
         """
         problem = solution.problem
-        if self._is_line and before is None:
+        if self._film.line and before is None:
             self.line = known_line(problem)
         if before is not None:
             self._grids.append(before if "numbers" not in vars(before) else _numbers(before))
@@ -78,8 +74,8 @@ class Values:
         self._misplaced.append(inf if self.line is not None else 0.0 if seen else misplaced_film(problem))
         self._other = -3 if earlier is not None and size < APART * self._sizes[-2] else -2
         other = earlier if self._other == -3 else before
-        self._change = _change(solution, other, quantity, self._own[self._other]) if other and self._pairs else (inf, inf)
-        self._full = self._pairs and not problem.reduce.max(solution.fields["r"]) > 0.0
+        self._change = _change(solution, other, quantity, self._own[self._other]) if other and self._film.pairs else (inf, inf)
+        self._full = self._film.pairs and not problem.reduce.max(solution.fields["r"]) > 0.0
         self.largest = max((abs(row[quantity]) for row in solution.history), default=0.0) if quantity in SWINGING else 0.0
         self.best = self._best(quantity, self._own)
 
@@ -98,11 +94,11 @@ class Values:
             return Estimate(value, above * abs(value - truth) + QUADRATURE * abs(value))
         by_load, by_all = self._change
         if not isfinite(by_load) or (name not in INTEGRALS and len(values) > 2):
-            found = estimate(values, self._misplaced, self._sizes, name, self._order, self._slanted)
+            found = estimate(values, self._misplaced, self._sizes, name, self._film)
             never = name in SWINGING and not any(value < 0.0 for value in values)  # below nothing
             return replace(found, value=max(0.0, found.value)) if never else found
         grids, change = (self._misplaced, self._sizes), by_load if name in INTEGRALS else by_all
-        pair = of_pair(values, *grids, change, name, self._other, self._full, self._rims, self._corners)
+        pair = of_pair(values, *grids, change, name, self._other, self._full, self._film)
         return replace(pair, error=max(pair.error, self._least * abs(value)))
 
     def _truth(self, name: str) -> float:
