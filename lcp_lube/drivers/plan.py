@@ -102,10 +102,7 @@ def _suits_multigrid(facts: Facts, lines: bool) -> bool:
     """Whether nonlinear multigrid is the fastest: in 2D, or on lines where that is said, its loops compiled, nobody having
     asked for an inner solver."""
     plane = facts.kind == "lubrication" and (facts.dim == 2 or lines)
-    # A ring's coarser grids need even numbers of points; one that is hardly fed stalls at once and is handed over.
-    ring = facts.periodic == (True, False) and facts.shape[0] % 8 == 0
-    suits = plane and (ring or not any(facts.periodic))
-    return suits and has_numba() and not wants_ksp()
+    return plane and has_numba() and not wants_ksp()
 
 
 def default_recipe(facts: Facts, system: str, large: bool) -> tuple[str, str]:

@@ -11,7 +11,7 @@ from lcp_lube.base.stages import Stages
 from lcp_lube.problems.film.lubrication import LubricationProblem
 from lcp_lube.problems.film.reynolds import box_scheme
 from lcp_lube.problems.grid import Grid
-from lcp_lube.solvers.fas import steps
+from lcp_lube.solvers.fas import steps, transfer
 from lcp_lube.solvers.fas.levels import Level, _coarser, restrict
 from lcp_lube.solvers.job import Job
 from lcp_lube.solvers.newton import Stopping
@@ -49,8 +49,11 @@ def operator(level):
 def transfers(fine, coarse):
     def interpolated(new):
         z = fine.share(np.pad(np.ones((fine.ny, fine.nx)), 1))
-        given = (new, np.zeros_like(new), fine.kx, fine.ky, fine.ways, 0, 0, fine.periodic[0], 1, fine.ny + 1)
-        steps.correct(z, *given)
+        grids = (new, np.zeros_like(new), fine.kx, fine.ky)
+        if fine.ways is None:
+            transfer.correct(z, *grids, 0, fine.by_x, fine.by_y, True, 0, fine.periodic[0])
+        else:
+            steps.correct(z, *grids, fine.ways, 0, 0, fine.periodic[0], 1, fine.ny + 1)
         return z[1:-1, 1:-1] - 1.0
 
     def restricted(c):
@@ -62,7 +65,7 @@ def transfers(fine, coarse):
     return columns(fine, coarse, interpolated), columns(coarse, fine, restricted)
 
 
-# Between periodic sides an odd number of points is not coarsened.
+# Round a ring an odd number of points is coarsened without what is tested here, between periodic sides of y not at all.
 COARSENED = [
     (nx, ny, ring)
     for nx, ny in ((15, 15), (14, 15), (15, 14), (14, 12))
@@ -84,6 +87,28 @@ def test_no_correction_costs_less_than_half_of_what_it_should(nx, ny, ring):
     np.testing.assert_allclose(A_H, A_H.T, rtol=0, atol=1e-12 * A_H.max())
     excess = np.linalg.eigvalsh(2.0 * A_H - R @ A @ P)
     assert excess.min() > -1e-10 * excess.max()
+
+
+@pytest.mark.parametrize("nx, ny", [(7, 9), (15, 12), (17, 31), (31, 8), (63, 63)])
+def test_round_a_ring_of_an_odd_number_of_points(nx, ny):
+    """Three meshes lie between the last coarse point and the first: transfers are transposed, a balance keeps what goes round,
+    and what is smooth costs what it should."""
+    rng = np.random.default_rng(nx)
+    along = lambda shape: rng.uniform(1.0, 1.2, shape) if shape == (ny, nx + 1) else np.full(shape, (ny / nx) ** 2)  # noqa: E731
+    fine = level_of(nx, ny, (True, False), along)
+    coarse = _coarser(fine, True)
+    assert coarse.nx == nx // 2 and fine.by_x and fine.ways is None
+    P, R = transfers(fine, coarse)
+    np.testing.assert_allclose(R, (0.5 if fine.by_y else 1.0) * P.T, rtol=0, atol=1e-15)
+    A, A_H = operator(fine), operator(coarse)
+    np.testing.assert_allclose(A_H, A_H.T, rtol=0, atol=1e-14 * A_H.max())
+    inner = (P @ np.ones(P.shape[1])).reshape(ny, nx)[1:-1]  # beside open sides it falls to nothing
+    np.testing.assert_allclose(inner, 1.0, rtol=0, atol=1e-14)
+    x = np.concatenate(([0.0], np.cumsum(1.0 / fine.kx[1, 2:-1])))  # what one flow makes of every mesh
+    turn = 2.0 * np.pi * x[1:nx:2] / (x[-1] + 1.0 / fine.kx[1, 1])
+    for wave in (np.sin, np.cos):
+        p = (wave(turn[: coarse.nx]) * np.sin(np.pi * np.arange(1, coarse.ny + 1)[:, None] / (coarse.ny + 1))).ravel()
+        assert p @ A_H @ p == pytest.approx(p @ R @ A @ P @ p, rel=0.15 if nx > 15 else 0.5)
 
 
 def test_smooth_corrections_cost_what_they_should():

@@ -23,14 +23,18 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
+from ...base.compiled import has_numba
 from ...base.parallel import Array
-from .assembly import assemble
+from ..grid import Grid
+from .assembly import Entry, csr, matrix
 from .carried import Carried, holders
+from .downstream import downstream
 from .effects import Answer, around, framed_by
 from .reynolds import sides
 
 RTOL = 1e-13  # of the linear solves
 FEW, MOST = 60, 2000  # its steps, and where whole factors would take too much
+ORDERED = 4000  # points from which one rank's cells are put in the order of the flow
 WHOLE = 500_000  # points, at most, of which one rank makes whole factors
 STILL = 1e-11  # of the largest flow out of a cell: what is less is rounding
 EMPTY = 1e-9  # of a cell's liquid: less is rounding
@@ -81,7 +85,7 @@ def heated(
     entries = [(0, 0, diagonal)]
     for (dj, di), a, near in list(zip(offsets, enters, flow.inside, strict=True))[: 2 * grid.dim]:
         entries.append((dj, di, np.where(still, 0.0, -rho_c * a * near)))
-    solver = reduce.through(transport := _Transport(assemble(grid, entries), at.memory))
+    solver = reduce.through(transport := _Transport(grid, entries, at.memory))
     heat = np.where(still, 0.0, flow.dissipation + np.where(free, more, 0.0) + H * wall + rho_c * flow.kept).ravel()
     arises = np.abs(flow.sheared if at.problem.U else flow.dissipation)  # by a wall everywhere, however thin the oil gets
     nowhere = reduce.sum(np.where(free & still & ~dry, arises, 0.0)) > STILL * reduce.sum(arises)  # no liquid carries it away
@@ -154,11 +158,20 @@ def _to_and_from(flow: Carried, faces: Sequence[Any]) -> tuple[Array, Array]:
 
 
 class _Transport:
-    """The upwind matrix and its inner solver: incomplete factors follow the flow, so that few steps do; whole ones where they
-    do not, as in grooves that pump oil round and round (known : what was found so of this answer)."""
+    """The upwind matrix and its inner solver: incomplete factors in the order of the flow, so that few steps do; whole ones
+    where they do not, as in grooves that pump oil round and round (known : what was found so of this answer)."""
 
-    def __init__(self, mat: PETSc.Mat, known: dict[Any, Any]):
-        self.mat, self.known = mat, known
+    def __init__(self, grid: Grid, entries: Sequence[Entry], known: dict[Any, Any]):
+        pointers, columns, values = csr(grid, entries)
+        mat, self.known = matrix(grid, pointers, columns, values), known
+        self.order: Any = slice(None)
+        if grid.comm.size == 1 and grid.size >= ORDERED and has_numba():
+            self.order = downstream(pointers, columns, values, grid.shape[0] - 1 if grid.periodic[0] else 0)
+            rows = PETSc.IS().createGeneral(self.order, comm=mat.comm)
+            natural, mat = mat, mat.permute(rows, rows)
+            for obj in (natural, rows):
+                obj.destroy()
+        self.mat = mat
         self.ksp = PETSc.KSP().create(mat.comm)
         self.ksp.setOptionsPrefix("energy_")
         self.ksp.setOperators(mat)
@@ -189,13 +202,14 @@ class _Transport:
     def __call__(self, heat: Array, transposed: bool = False) -> tuple[Array, float]:
         """The solution, and its residual in parts of the right-hand side; transposed : that up the flow. Collective."""
         x, b = self.mat.createVecs()
-        b.setArray(heat)
+        b.setArray(heat[self.order])
         size = b.norm()
         (self.ksp.solveTranspose if transposed else self.ksp.solve)(b, x)
         if self.ksp.getConvergedReason() == PETSc.KSP.ConvergedReason.DIVERGED_MAX_IT and self._factors:
             self._whole()
             (self.ksp.solveTranspose if transposed else self.ksp.solve)(b, x)
-        values = x.array_r.copy()
+        values = np.empty(heat.size)
+        values[self.order] = x.array_r
         b.aypx(-1.0, self.mat * x)
         residual = b.norm() / size if size > 0 else 0.0
         for obj in (x, b):

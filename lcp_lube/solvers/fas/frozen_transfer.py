@@ -39,7 +39,7 @@ def correct(
     for m in range(1, z.shape[0] - 1):
         row, last = coarse_rows(y0 + m - 1, y0, m, by_y)
         if by_x:
-            west_shares(kx, m, True, w)
+            west_shares(kx, m, True, ring, w)
         interpolate_row(coarse[row], w, by_x, south)
         if last > row:
             interpolate_row(coarse[last], w, by_x, north)
@@ -74,7 +74,7 @@ def restrict(
         for i in range(1, nx + 1):
             fronts += full[m, i] > full[m, i - 1]
         if by_x:
-            west_shares(kx, m, True, w)
+            west_shares(kx, m, True, ring, w)
             for i in range(1, nx if fronts else 1, 2):
                 if full[m, i] and not full[m, i - 1] and full[m, i + 1]:
                     here[i + 1] += here[i]
@@ -121,10 +121,13 @@ def deal(r: Array, v: Array, w: Array, by_x: bool, ring: bool, south: Array, nor
         part = v[2 * k] * (half * r[2 * k]) + (v[2 * k - 1] * west + v[2 * k + 1] * east)
         south[k] += part
         north[k] += half * r[2 * k] + (west + east) - part
-    if ring:  # what goes to the frame belongs to the last point
+    if ring:  # what goes to the frame belongs to the last point, and to the first
         first = half * w[0] * r[1]
         south[-2] += v[1] * first
         north[-2] += (one - v[1]) * first
+        last, at = half * (one - w[-1]) * r[2 * w.size - 1], 2 * w.size - 1
+        south[1] += v[at] * last
+        north[1] += (one - v[at]) * last
 
 
 @piece
@@ -138,3 +141,4 @@ def deal_to_one(r: Array, w: Array, by_x: bool, ring: bool, part: float, out: Ar
         out[k] += some * (r[2 * k] + ((one - w[k - 1]) * r[2 * k - 1] + w[k] * r[2 * k + 1]))
     if ring:
         out[-2] += some * w[0] * r[1]
+        out[1] += some * (one - w[-1]) * r[2 * w.size - 1]

@@ -218,8 +218,8 @@ def settled(levels: list[Level]) -> list[Level]:
 
 def _coarser(fine: Level, harmonic: bool) -> Level | None:
     """The grid of every second point, in the directions whose coupling is not much the weaker one. Collective."""
-    # Without a point in between, the two ends of a period would be neighbours on the coarse grid and not on the fine one.
-    can_x = fine.nx // 2 >= FEWEST and not (fine.periodic[0] and fine.nx % 2)
+    can_x = fine.nx // 2 >= FEWEST
+    # Without a line in between, the two ends of a period would be neighbours on the coarse grid and not on the fine one.
     can_y = fine.ny // 2 >= FEWEST and not (fine.periodic[1] and fine.ny % 2)
     mean_x, mean_y, steps = looked(fine)
     by_x = can_x and (mean_y <= STRONG * mean_x or not can_y)
@@ -237,8 +237,9 @@ def _coarser(fine: Level, harmonic: bool) -> Level | None:
     last = fine.comm is None or fine.whole or fine.y1 == fine.ny
     beyond_x = by_x and fine.nx % 2 == 0 and not fine.periodic[0]
     beyond_y = by_y and fine.ny % 2 == 0 and not fine.periodic[1] and last
+    seam = by_x and fine.periodic[0] and fine.nx % 2 == 1
     into_x, into_y = coarse.part(coarse.kx), coarse.part(coarse.ky)
-    if harmonic and fine.held is None and by_x and by_y and steps:
+    if not seam and harmonic and fine.held is None and by_x and by_y and steps:
         fine.ways = np.full((fine.kx.shape[0], fine.ky.shape[1]), 0.5, dtype=np.float32)
         loops.make_ways(fine.kx, fine.ky, fine.ways, fine.first)
         fine.share(fine.ways)
@@ -249,7 +250,7 @@ def _coarser(fine: Level, harmonic: bool) -> Level | None:
     else:
         marked = (fine.kx, fine.ky) if fine.held is None else held.marked(fine)
         of_x, of_y = (marked[0], fine.ky, into_x, beyond_x), (fine.kx, marked[1], into_y, beyond_y)
-        loops.coarsen(of_x, of_y, fine.first, by_x, by_y, harmonic)
+        loops.coarsen(of_x, of_y, fine.first, by_x, by_y, harmonic, seam)
         for a in (coarse.kx, coarse.ky):
             coarse.gather(a)
     if fine.held is not None:

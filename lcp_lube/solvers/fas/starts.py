@@ -36,7 +36,7 @@ def interpolate(
     for m in range(start, end):
         row, last = coarse_rows(y0 + m - 1, y0, m, by_y)
         if by_x:
-            west_shares(kx, m, harmonic, w)
+            west_shares(kx, m, harmonic, not sides[0], w)
         for s in (1, 0):  # p last: its rows are used below
             sign = 1.0 - 2.0 * s
             for n in range(1 + last - row):
@@ -45,7 +45,7 @@ def interpolate(
                     part[k] = max(sign * coarse[row + n, k], 0.0)
                 interpolate_row(part, w, by_x, out)
                 if by_x and s == 0 and is_smooth:
-                    smooth_row(part, kx, m, sides[0], sides[1], out)
+                    smooth_row(part, kx, m, sides, out)
             if last > row:
                 mix(south, north, ky, m, harmonic, flows[s])
             else:
@@ -86,17 +86,18 @@ def cubic(k: int, n: int) -> tuple[int, float, float, float, float]:
 
 
 @piece
-def smooth_row(coarse: Array, kx: Array, m: int, west: bool, east: bool, out: Array) -> None:
-    """The pressures of a line between two coarse points where the film is full and smooth. west, east : as `sides`."""
+def smooth_row(coarse: Array, kx: Array, m: int, sides: tuple[bool, bool, bool, bool], out: Array) -> None:
+    """The pressures of a line between two coarse points where the film is full and smooth."""
     n, last = coarse.size, kx.shape[1] - 2
-    west, east = west and kx[m, 1] > 0.0, east and kx[m, last] > 0.0
+    west, east = sides[0] and kx[m, 1] > 0.0, sides[1] and kx[m, last] > 0.0
+    beside = 2 if not sides[0] and out.size % 2 else 0  # where coarse points round a ring are three meshes apart
     count = min(out.size // 2, n - 1) if n >= 4 else 0
     for k in range(np.uint32(2), np.uint32(max(min(n - 3, count), 2))):
         a, b, c, d = coarse[k - 1], coarse[k], coarse[k + 1], coarse[k + 2]
         p = (-0.0625 * a + 0.5625 * b) + (0.5625 * c - 0.0625 * d)
         out[2 * k + 1] = p if min(min(a, b), min(min(c, d), p)) > 0.0 else out[2 * k + 1]
     for k in range(count):
-        if 2 <= k < n - 3:
+        if 2 <= k < n - 3 or k < beside or k >= count - beside:
             continue
         r, wa, wb, wc, wd = cubic(k, n)
         a, b, c, d = coarse[r], coarse[r + 1], coarse[r + 2], coarse[r + 3]

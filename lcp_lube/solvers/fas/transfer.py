@@ -18,12 +18,27 @@ def share(a: float, b: float, harmonic: bool) -> float:
 
 
 @piece
-def west_shares(kx: Array, m: int, harmonic: bool, out: Array) -> None:
-    """Weights of the west neighbours of the points of row m between two coarse ones, and behind the last one."""
+def series(a: float, b: float) -> float:
+    """Conductance of two faces one behind the other; one that lies in a supply, -1, resists nothing (`held.marked`)."""
+    total = a + b
+    both = a * b / total if total > 0.0 else 0.0
+    return max(a, b, 0.0) if min(a, b) < 0.0 else both
+
+
+@piece
+def west_shares(kx: Array, m: int, harmonic: bool, ring: bool, out: Array) -> None:
+    """Weights of the west neighbours of the points of row m between two coarse ones, and behind the last one.
+
+    Round a ring of an odd number of points the last one and the first lie between the same two coarse ones.
+    """
     n = min(out.size, (kx.shape[1] - 1) // 2)
     for k in range(n):
         out[k] = share(kx[m, 2 * k + 1], kx[m, 2 * k + 2], harmonic)
     out[n:] = 0.5
+    if ring and kx.shape[1] % 2 == 0:
+        before, seam, behind = kx[m, 2 * n - 1], kx[m, 1], kx[m, 2]
+        out[0] = share(series(before, seam), behind, harmonic)
+        out[n - 1] = share(before, series(seam, behind), harmonic)
 
 
 @piece
@@ -89,7 +104,7 @@ def restrict(
         if ways is not None:
             stored_shares(ways, m, w)
         elif by_x:
-            west_shares(kx, m, harmonic, w)
+            west_shares(kx, m, harmonic, wrap, w)
         restrict_row(r, w, by_x, wrap, coarse)
         if not by_y:
             for k in range(1, n_coarse + 1):
@@ -139,8 +154,9 @@ def restrict_row(r: Array, w: Array, by_x: bool, wrap: bool, out: Array) -> None
     n = out.size - 2
     for k in range(1, n + 1):
         out[k] = r[2 * k] + ((1.0 - w[k - 1]) * r[2 * k - 1] + w[k] * r[2 * k + 1])
-    if wrap:  # periodic in x: what goes to the frame belongs to the last point
+    if wrap:  # periodic in x: what goes to the frame belongs to the last point, and of an odd number to the first
         out[n] += w[0] * r[1]
+        out[1] += (1.0 - w[n]) * r[2 * n + 1]
 
 
 @kernel
@@ -187,7 +203,7 @@ def correct(
     for m in range(start, end if end else z.shape[0] - 1):
         row, last = coarse_rows(y0 + m - 1, y0, m, by_y)
         if by_x:
-            west_shares(kx, m, harmonic, w)
+            west_shares(kx, m, harmonic, ring, w)
         for k in range(size):
             d[k] = alike(new[row, k], unit) - alike(old[row, k], unit)
         interpolate_row(d, w, by_x, south)
@@ -229,7 +245,7 @@ def follow_along(z: Array, m: int, e: Array) -> None:
     """The same of points behind a cavitated one, by the next point to the east."""
     for i in range(1, z.shape[1] - 1, 2):
         if z[m, i] > 0.0 and z[m, i - 1] <= 0.0 and z[m, i + 1] > 0.0:
-            e[i] = e[i + 1]
+            e[i] = e[i + 1 if i + 1 < z.shape[1] - 1 else 1]
 
 
 @piece
