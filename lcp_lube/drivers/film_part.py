@@ -36,7 +36,7 @@ from ..scenes.moving import film_of
 from ..scenes.scene import Derived, Solvable
 
 SAME = 1e-12  # relative difference that coordinates' rounding leaves between two values of one film
-CUBED = 16.0  # the same of conductances, in multiples of SAME; where rims cut faces they were found to differ by 8
+CUBED = 1000.0  # the same of conductances, in multiples of SAME; where rims cut faces they were found to differ by 50
 
 SAMPLE = (65, 5)  # columns and lines that are compared first, before anything is built
 
