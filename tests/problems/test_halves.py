@@ -106,7 +106,9 @@ def test_faces_made_for_cavities_are_as_symmetric_as_the_film(form, monkeypatch)
 
 
 @pytest.mark.parametrize("shape", [(120, 39), (240, 79), (250, 61), (181, 40)])
-@pytest.mark.parametrize("grooves", [{}, {"angle_deg": 12.0, "depth_um": 60.0, "count": 7}, {"angle_deg": 62.0, "depth_um": 4.0}])
+@pytest.mark.parametrize(
+    "grooves", [{}, {"angle_deg": 12.0, "depth_um": 60.0, "count": 7}, {"angle_deg": 62.0, "depth_um": 4.0}]
+)
 def test_herringbones_are_as_symmetric_as_their_film(shape, grooves):
     """What faces lead beside slanted edges differs from its mirror image by 5e-11: one rank had not found them symmetric."""
     keys = {f"film.herringbone.{name}": value for name, value in grooves.items()}
