@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from lcp_lube import load_scene, solve
+from lcp_lube.drivers.derivatives.gradient import gradients
 from lcp_lube.problems.film import energy
 from lcp_lube.problems.film.downstream import downstream
 
@@ -65,3 +66,17 @@ def test_heat_is_carried_in_one_step(monkeypatch, scene, keys):
         assert max(steps) <= 2 if ordered == 1 else max(steps) > 4
     for name in ("temperature_max", "load", "friction"):
         assert found[0][name] == pytest.approx(found[1][name], rel=1e-8)
+
+
+def test_derivatives_go_up_the_flow(monkeypatch):
+    """The transposed equations in that order: the same slopes."""
+    found = []
+    scene = load_scene("adiabatic_journal", {"nx": 60, "ny": 7})
+    for ordered in (1, 10**9):
+        monkeypatch.setattr(energy, "ORDERED", ordered)
+        with solve(scene, stopping={"eps1": 1e-11, "max_it": 200}) as solution:
+            found.append(gradients(scene, solution, ["temperature_max", "eccentricity"], ["temperature.T_in", "balance.load"]))
+    for one, other in zip(*found, strict=True):
+        assert all(one.gradient.values())
+        for key, slope in one.gradient.items():
+            assert slope == pytest.approx(other.gradient[key], rel=1e-6)

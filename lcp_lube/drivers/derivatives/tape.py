@@ -84,7 +84,7 @@ class Tape(Reduce):
         if not hasattr(field, "mat"):  # symmetric
             return lambda a: self._next(lambda: field(a), a, field)
         if self.first:
-            self._kept.append(type(field)(field.mat.copy(), field.known))
+            self._kept.append(field.copy())
         kept = self._kept[-1]
 
         def solved(heat: Array) -> tuple[Array, float]:

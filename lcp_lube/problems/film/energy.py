@@ -25,8 +25,7 @@ from petsc4py import PETSc
 
 from ...base.compiled import has_numba
 from ...base.parallel import Array
-from ..grid import Grid
-from .assembly import Entry, csr, matrix
+from .assembly import assemble
 from .carried import Carried, holders
 from .downstream import downstream
 from .effects import Answer, around, framed_by
@@ -85,7 +84,8 @@ def heated(
     entries = [(0, 0, diagonal)]
     for (dj, di), a, near in list(zip(offsets, enters, flow.inside, strict=True))[: 2 * grid.dim]:
         entries.append((dj, di, np.where(still, 0.0, -rho_c * a * near)))
-    solver = reduce.through(transport := _Transport(grid, entries, at.memory))
+    around = grid.shape[0] - 1 if grid.periodic[0] else 0
+    solver = reduce.through(transport := _Transport(assemble(grid, entries), at.memory, around))
     heat = np.where(still, 0.0, flow.dissipation + np.where(free, more, 0.0) + H * wall + rho_c * flow.kept).ravel()
     arises = np.abs(flow.sheared if at.problem.U else flow.dissipation)  # by a wall everywhere, however thin the oil gets
     nowhere = reduce.sum(np.where(free & still & ~dry, arises, 0.0)) > STILL * reduce.sum(arises)  # no liquid carries it away
@@ -161,20 +161,20 @@ class _Transport:
     """The upwind matrix and its inner solver: incomplete factors in the order of the flow, so that few steps do; whole ones
     where they do not, as in grooves that pump oil round and round (known : what was found so of this answer)."""
 
-    def __init__(self, grid: Grid, entries: Sequence[Entry], known: dict[Any, Any]):
-        pointers, columns, values = csr(grid, entries)
-        mat, self.known = matrix(grid, pointers, columns, values), known
-        self.order: Any = slice(None)
-        if grid.comm.size == 1 and grid.size >= ORDERED and has_numba():
-            self.order = downstream(pointers, columns, values, grid.shape[0] - 1 if grid.periodic[0] else 0)
-            rows = PETSc.IS().createGeneral(self.order, comm=mat.comm)
-            natural, mat = mat, mat.permute(rows, rows)
-            for obj in (natural, rows):
-                obj.destroy()
-        self.mat = mat
+    def __init__(self, mat: PETSc.Mat, known: dict[Any, Any], around: int):
+        """mat : taken over. around : what `downstream` does not wait for."""
+        self.mat, self.known, self._around = mat, known, around
+        self._order: Any = slice(None)
+        self._ordered = mat
+        if mat.comm.getSize() == 1 and mat.getSize()[0] >= ORDERED and has_numba():
+            pointers, columns, values = mat.getValuesCSR()
+            self._order = downstream(pointers, columns, values, around)
+            rows = PETSc.IS().createGeneral(self._order, comm=mat.comm)
+            self._ordered = mat.permute(rows, rows)
+            rows.destroy()
         self.ksp = PETSc.KSP().create(mat.comm)
         self.ksp.setOptionsPrefix("energy_")
-        self.ksp.setOperators(mat)
+        self.ksp.setOperators(self._ordered)
         self.ksp.setType("gmres")
         self.ksp.setGMRESRestart(FEW)
         self.ksp.getPC().setType("ilu" if mat.comm.getSize() == 1 else "bjacobi")
@@ -182,6 +182,9 @@ class _Transport:
         self.ksp.setFromOptions()
         if known.get("turns"):
             self._whole()
+
+    def copy(self) -> "_Transport":
+        return _Transport(self.mat.copy(), self.known, self._around)
 
     @property
     def _factors(self) -> str | None:
@@ -201,16 +204,16 @@ class _Transport:
 
     def __call__(self, heat: Array, transposed: bool = False) -> tuple[Array, float]:
         """The solution, and its residual in parts of the right-hand side; transposed : that up the flow. Collective."""
-        x, b = self.mat.createVecs()
-        b.setArray(heat[self.order])
+        x, b = self._ordered.createVecs()
+        b.setArray(heat[self._order])
         size = b.norm()
         (self.ksp.solveTranspose if transposed else self.ksp.solve)(b, x)
         if self.ksp.getConvergedReason() == PETSc.KSP.ConvergedReason.DIVERGED_MAX_IT and self._factors:
             self._whole()
             (self.ksp.solveTranspose if transposed else self.ksp.solve)(b, x)
         values = np.empty(heat.size)
-        values[self.order] = x.array_r
-        b.aypx(-1.0, self.mat * x)
+        values[self._order] = x.array_r
+        b.aypx(-1.0, self._ordered * x)
         residual = b.norm() / size if size > 0 else 0.0
         for obj in (x, b):
             obj.destroy()
@@ -218,4 +221,5 @@ class _Transport:
 
     def destroy(self) -> None:
         self.ksp.destroy()
+        self._ordered.destroy()
         self.mat.destroy()

@@ -7,7 +7,8 @@ import numpy as np
 
 from ...base.compiled import kernel, piece
 from ...base.parallel import Array
-from .transfer import restrict_row, series, share, west_shares
+from .transfer import restrict_row
+from .weights import series, share, west_shares
 
 
 @kernel

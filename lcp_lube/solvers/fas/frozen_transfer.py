@@ -7,7 +7,8 @@ from ...base.compiled import kernel, piece
 from ...base.parallel import Array
 from .fronts import reforms
 from .frozen_kernels import Mask, transposed_row
-from .transfer import coarse_rows, interpolate_row, mix, share, west_shares
+from .transfer import coarse_rows, interpolate_row, mix
+from .weights import share, west_shares
 
 
 @piece

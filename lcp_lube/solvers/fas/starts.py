@@ -4,7 +4,8 @@ import numpy as np
 
 from ...base.compiled import kernel, piece
 from ...base.parallel import Array
-from .transfer import coarse_rows, interpolate_row, mix, west_shares
+from .transfer import coarse_rows, interpolate_row, mix
+from .weights import west_shares
 
 SMOOTH = 1.5  # by so much at most conductances of neighbouring faces differ where a film is smooth
 

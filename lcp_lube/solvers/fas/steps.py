@@ -12,18 +12,8 @@ import numpy as np
 
 from ...base.compiled import kernel, piece
 from ...base.parallel import Array
-from .transfer import (
-    Ways,
-    centre,
-    coarse_rows,
-    drop,
-    follow_across,
-    follow_along,
-    interpolate_row,
-    moved,
-    share,
-    stored_shares,
-)
+from .transfer import coarse_rows, drop, follow_across, follow_along, interpolate_row, moved
+from .weights import Ways, centre, share, stored_shares
 
 
 @piece
