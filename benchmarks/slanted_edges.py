@@ -96,19 +96,27 @@ def told(kind: str, seed: int, count: int) -> None:
         print(f"to {tol:g}: {len(ended)} of {count} reach it, {right} of them right, estimates {wide:.1f} times the error")
 
 
+def muijderman(H: float, angle: float, ratio: float) -> float:
+    """g of the narrow-groove theory (Muijderman 1966, Whipple): dp/ds = 6 mu U g/film^2 across the motion, with no flow."""
+    gamma, cot = (1 - ratio) / ratio, 1 / math.tan(angle)
+    across = (1 + gamma * H**3) * (gamma + H**3) + H**3 * (cot * (1 + gamma)) ** 2
+    return gamma * H**2 * cot * (1 - H) * (1 - H**3) / across
+
+
 def narrow_grooves(
     film: float, depth: float, angle: float, ratio: float, radii: tuple[float, float, float]
 ) -> tuple[float, float]:
-    """Load and inner flow of a full film with infinitely many spirals, between equal pressures (Muijderman 1966, Whipple), at
-    200 pi rad/s in 0.01 Pa s. radii : inner, of the seal, outer."""
+    """Load and inner flow of a full film with infinitely many spirals, between equal pressures, at 200 pi rad/s in 0.01 Pa s.
+
+    What flows through is held back by the grooves, in series and side by side, and by the seal's film. radii : inner, of the
+    seal, outer.
+    """
     mu, omega, (inner, edge, outer) = 0.01, 200 * math.pi, radii
-    H, gamma, cot = film / (film + depth), (1 - ratio) / ratio, 1 / math.tan(angle)
-    across = (1 + gamma * H**3) * (gamma + H**3) + H**3 * (cot * (1 + gamma)) ** 2
-    g = gamma * H**2 * cot * (1 - H) * (1 - H**3) / across
+    g = muijderman(film / (film + depth), angle, ratio)
     cubes = [ratio * (film + depth) ** k + (1 - ratio) * film**k for k in (-3, 3)]
     conducts = math.cos(angle) ** 2 / cubes[0] + math.sin(angle) ** 2 * cubes[1]
     pumped = 3 * mu * omega * g / film**2 * (outer**2 - edge**2)
-    slope = pumped / (math.log(outer / edge) / conducts + math.log(edge / inner) / film**3)
+    slope = pumped / (math.log(outer / edge) / conducts + math.log(edge / inner) / film**3)  # 6 mu Q/pi
     r = np.linspace(inner, outer, 100001)
     in_seal, beyond = slope * np.log(np.minimum(r, edge) / inner) / film**3, np.maximum(r, edge)
     p = in_seal + slope * np.log(beyond / edge) / conducts - 3 * mu * omega * g / film**2 * (beyond**2 - edge**2)

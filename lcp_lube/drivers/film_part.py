@@ -25,10 +25,11 @@ from ..problems.facts import Facts
 from ..problems.film.cavity import missing_flow
 from ..problems.film.edges import jumps_of
 from ..problems.film.halves import Lent, half
+from ..problems.film.lines import some_places
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model, Side
 from ..problems.film.supplies import pressed
-from ..problems.grid import EVEN, Grid, some_places
+from ..problems.grid import EVEN, Grid
 from ..problems.solution import Fields, Problem
 from ..problems.strips import STRIP
 from ..problems.transfer import numbers
@@ -37,7 +38,6 @@ from ..scenes.scene import Derived, Solvable
 
 SAME = 1e-12  # relative difference that coordinates' rounding leaves between two values of one film
 CUBED = 1000.0  # the same of conductances, in multiples of SAME; where rims cut faces they were found to differ by 50
-
 SAMPLE = (65, 5)  # columns and lines that are compared first, before anything is built
 
 SENTENCES = {

@@ -101,8 +101,7 @@ def plan(facts: Facts, ask: Ask, scene: str) -> Plan:
 def _suits_multigrid(facts: Facts, lines: bool) -> bool:
     """Whether nonlinear multigrid is the fastest: in 2D, or on lines where that is said, its loops compiled, nobody having
     asked for an inner solver."""
-    plane = facts.kind == "lubrication" and (facts.dim == 2 or lines)
-    return plane and has_numba() and not wants_ksp()
+    return facts.kind == "lubrication" and (facts.dim == 2 or lines) and has_numba() and not wants_ksp()
 
 
 def default_recipe(facts: Facts, system: str, large: bool) -> tuple[str, str]:

@@ -14,8 +14,9 @@ from petsc4py import PETSc
 from ..base.parallel import Array
 from ..problems.facts import Facts
 from ..problems.film.halves import Lent
+from ..problems.film.lines import some_places
 from ..problems.fold import part_grid, part_shape
-from ..problems.grid import OPEN, Grid, some_places
+from ..problems.grid import OPEN, Grid
 from ..problems.solution import Fields, Problem
 from ..problems.transfer import numbers
 from ..scenes.scene import Derived, Solvable

@@ -78,7 +78,8 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     shut = not model.grooves and not any(side.kind == "open" for side in model.sides[: 2 * len(scene.shape)])
     if shut and all(one.flow is not None for one in supplies):
         raise InputError(f"{scene.name}: supply.1.flow: no side has a pressure, and no supply one or a restrictor: no way out")
-    from .supply_search import Search, Sources  # here: of such films alone
+    from .sources import Sources  # here: of such films alone
+    from .supply_search import Search
 
     sources = Sources(supplies)
     # Nothing flows in a steady film that is shut, through its restrictor neither, whatever rounding says.

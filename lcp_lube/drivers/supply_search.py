@@ -5,11 +5,13 @@ from typing import Any
 import numpy as np
 
 from ..base.parallel import Array
+from ..problems.film.cavity import cavity_sign
 from ..problems.film.certify import supply_defects
 from ..problems.film.lubrication import LubricationProblem
 from ..problems.film.model import Model
 from ..problems.film.supplies import supply_flows
 from ..problems.solution import Fields, Outcome, Solution
+from .motions.linearised import Feed, Linear
 from .sources import Sources
 
 TOLERANCE = 1e-10  # of the largest flow: by how much what a source gives may differ from what the film takes
@@ -127,9 +129,6 @@ class Search:
 
 def _own_slopes(problem: LubricationProblem, fields: Any, free: Any) -> tuple[Array, list[Array]]:
     """dQ_s/dP_t of the film at its signs for the supplies that are free, m3/s/Pa, and what it answers to each. Collective."""
-    from ..problems.film.cavity import cavity_sign
-    from .motions.linearised import Feed, Linear
-
     held = problem.held
     assert held is not None  # as `supplies.applies` found
     cavity = (cavity_sign(problem.reduce, fields["p"], fields["r"]) < 0) & ~held.mask.ravel()

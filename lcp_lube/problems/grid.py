@@ -27,10 +27,9 @@ EVEN: Places = (None, None)
 Polar = tuple[float, float]  # radius at y = 0, and the radius on which x is measured, m
 
 
-def some_places(n: int, length: float, ends: Sequence[str], most: int) -> Array:
-    """Coordinates of at most so many of the n points of a line between two ends, its first and last among them, m."""
-    meshes = n + OFFSET[ends[0]] + OFFSET[ends[1]] - 1.0
-    return (np.linspace(0, n - 1, min(n, most)).round() + OFFSET[ends[0]]) * (length / meshes)
+def meshes_of(n: int, ends: Sequence[str]) -> float:
+    """Spacings from side to side of n points between two ends."""
+    return n + OFFSET[ends[0]] + OFFSET[ends[1]] - 1.0
 
 
 class Grid:
@@ -77,8 +76,7 @@ class Grid:
         if any(periodic and n < 3 for periodic, n in zip(self.periodic, self.shape, strict=True)):
             raise InputError(f"grid {'x'.join(map(str, shape))}: at least 3 points between periodic sides are needed")
         self.offset = tuple(OFFSET[first] for first, _ in self.ends)
-        # Spacings from side to side.
-        self.meshes = tuple(n + OFFSET[a] + OFFSET[b] - 1.0 for n, (a, b) in zip(self.shape, self.ends, strict=True))
+        self.meshes = tuple(meshes_of(n, pair) for n, pair in zip(self.shape, self.ends, strict=True))
         self.spacing = tuple(length / meshes for length, meshes in zip(self.lengths, self.meshes, strict=True))
         self.origin, self.places, self.polar = origin, places, polar
         self._around = tuple(self._with_neighbours(side) for side in range(self.dim))

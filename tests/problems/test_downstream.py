@@ -18,6 +18,20 @@ OIL = {
 }
 
 
+@pytest.fixture
+def carried(monkeypatch):
+    """Of each call of the energy equation's solver: its inner steps, and whether it went up the flow."""
+    calls, carry = [], energy._Transport.__call__
+
+    def noted(self, heat, transposed=False):
+        found = carry(self, heat, transposed)
+        calls.append((self.ksp.getIterationNumber(), transposed))
+        return found
+
+    monkeypatch.setattr(energy._Transport, "__call__", noted)
+    return calls
+
+
 def csr_of(dense, kept):
     """CSR arrays with the entries that are kept, zeros among them."""
     rows, columns = np.nonzero(kept)
@@ -45,46 +59,32 @@ def test_a_ring_is_cut_where_it_is_said():
 
 
 @pytest.mark.parametrize(("scene", "keys"), [("journal", {"nx": 61, "ny": 15}), ("adiabatic_journal", {"nx": 90, "ny": 11})])
-def test_heat_is_carried_in_one_step(monkeypatch, scene, keys):
+def test_heat_is_carried_in_one_step(monkeypatch, carried, scene, keys):
     """In the order of the grid it takes 6 to 9, and more on finer ones; the temperatures are the same."""
-    steps, found = [], []
-    carry = energy._Transport.__call__
-
-    def counted(self, *given):
-        out = carry(self, *given)
-        steps.append(self.ksp.getIterationNumber())
-        return out
-
-    monkeypatch.setattr(energy._Transport, "__call__", counted)
+    found = []
     for ordered in (1, 10**9):
         monkeypatch.setattr(energy, "ORDERED", ordered)
-        steps.clear()
+        carried.clear()
         more = {} if scene == "adiabatic_journal" else {"temperature": OIL}
         with solve(load_scene(scene, keys | more)) as solution:
             assert solution.converged
             found.append(solution.numbers)
+        steps = [one for one, _ in carried]
         assert max(steps) <= 2 if ordered == 1 else max(steps) > 4
     for name in ("temperature_max", "load", "friction"):
         assert found[0][name] == pytest.approx(found[1][name], rel=1e-8)
 
 
 @pytest.mark.parametrize(("scene", "keys"), [("journal", {"nx": 41, "ny": 9, "temperature": OIL}), ("lined_pad", {"n": 40})])
-def test_derivatives_go_up_the_flow(monkeypatch, scene, keys):
+def test_derivatives_go_up_the_flow(monkeypatch, carried, scene, keys):
     """By the film at every point, with the transposed equations in that order: the same."""
-    found, up, names = [], [], ["temperature_max", "load"]
-    carry = energy._Transport.__call__
-
-    def noted(self, heat, transposed=False):
-        up.append(transposed)
-        return carry(self, heat, transposed)
-
-    monkeypatch.setattr(energy._Transport, "__call__", noted)
+    found, names = [], ["temperature_max", "load"]
     film = load_scene(scene, keys)
     for ordered in (1, 10**9):
         monkeypatch.setattr(energy, "ORDERED", ordered)
         with solve(film, stopping={"eps1": 1e-11, "max_it": 200}) as solution:
             found.append(film_fields(film, solution, names))
-    assert any(up)
+    assert any(up for _, up in carried)
     for name in names:
         one, other = (fields[name] for fields in found)
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-6 * np.abs(other).max())

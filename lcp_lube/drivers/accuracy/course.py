@@ -7,10 +7,11 @@ from math import inf, prod
 
 from ...problems.film.model import Model
 from ...problems.film.rims import depth_of
-from ...problems.grid import OFFSET
+from ...problems.grid import OPEN, meshes_of
 from ...scenes.moving import film_of, motion_of
 from ...scenes.scene import Solvable
 from ..ask import Ask
+from ..warm import seeks
 from .estimate import INTEGRALS, Traits, given_film, is_known
 from .rungs import finer, first_rung, first_shape, round_ring
 
@@ -27,7 +28,8 @@ class Course:
     Attributes
     ----------
     film : what its estimates hang on. first : shape of rung 0. meshes : its meshes a side. unit : of which the meshes along x
-        are a multiple. begin : the rung to begin with. ring : whether a pair of sides is periodic.
+        are a multiple. begin : the rung to begin with. ring : whether a pair of sides is periodic. seeking : whether a place, a
+        value or an attitude is sought.
     """
 
     film: Traits
@@ -36,6 +38,7 @@ class Course:
     unit: int
     begin: int
     ring: bool
+    seeking: bool
 
     @property
     def plane(self) -> bool:
@@ -56,10 +59,10 @@ def course_of(scene: Solvable, ask: Ask) -> Course:
     if traits.pairs and first != first_shape(scene.shape, (), finest, few):
         traits = replace(traits, pairs=False)  # its cells are as wide as what they show
     first, unit = round_ring(scene, first, finest)
-    kinds = [model.sides[2 * k : 2 * k + 2] if isinstance(model, Model) else () for k in range(len(first))]
-    meshes = [n + 1.0 - sum(1.0 - OFFSET[side.kind] for side in ends) for n, ends in zip(first, kinds, strict=True)]
-    ring = any(side.kind == "periodic" for ends in kinds for side in ends)
-    course = Course(traits, first, meshes, unit, 0, ring)
+    sides = model.sides if isinstance(model, Model) else ()
+    ends = [tuple(side.kind for side in sides[2 * k : 2 * k + 2]) or OPEN for k in range(len(first))]
+    meshes = [meshes_of(n, pair) for n, pair in zip(first, ends, strict=True)]
+    course = Course(traits, first, meshes, unit, 0, any("periodic" in pair for pair in ends), seeks(scene, ask))
     return replace(course, begin=_begin(course, ask, fewest))
 
 

@@ -17,7 +17,6 @@ from ..ask import Ask
 from ..chain import added
 from ..compose import Inner
 from ..plan import FEW, SMALL
-from ..warm import seeks
 from .accuracy import DEFAULT_QUANTITY, WHOLE, find_value
 from .course import Course, course_of
 from .estimate import INTEGRALS
@@ -66,7 +65,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     while not end:
         level_begin, before, earlier = perf_counter(), solution, before
         shape = course.shape(rung)
-        solution = inner(scene.refined(shape), _ask(scene, ask, course, shape, before, loops))
+        solution = inner(scene.refined(shape), _ask(ask, course, shape, before, loops))
         problem, times = solution.problem, added(times, solution.times)
         quantity, value = _value(solution, quantity, course, scene)
         told.add(solution, before, earlier, prod(problem.grid.meshes) ** (1.0 / problem.grid.dim), quantity, value)
@@ -105,10 +104,10 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     return solution
 
 
-def _ask(scene: Solvable, ask: Ask, course: Course, shape: tuple[int, ...], before: Solution | None, loops: bool) -> Ask:
+def _ask(ask: Ask, course: Course, shape: tuple[int, ...], before: Solution | None, loops: bool) -> Ask:
     """What the grid of this shape is asked for; before : the last one's answer. loops : whether multigrid's are loaded."""
     tol, film = ask.accuracy or 0.0, course.film
-    near = ask.start if before is None else _start(before, prod(shape), seeks(scene, ask)) if ask.nested is not False else None
+    near = ask.start if before is None else _start(before, prod(shape), course.seeking) if ask.nested is not False else None
     told_soon = film.pairs and not course.ring  # the first grid is not the last, and need not be solved far
     stopping = _stopping(ask, tol, before) if before is not None or told_soon else ask.stopping
     least = WHOLE[loops if before is None else before.asked == "fas"]

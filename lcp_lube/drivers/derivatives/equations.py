@@ -20,10 +20,11 @@ from ...problems.film.cavity import states
 from ...problems.film.forces import attitude, totals, weights
 from ...problems.film.grooves import GroovedProblem
 from ...problems.film.known import known_fields, known_of
+from ...problems.film.lines import some_places
 from ...problems.film.lubrication import LubricationProblem
 from ...problems.film.model import Model
 from ...problems.film.tangent import Tangent, effective, tangent
-from ...problems.grid import Grid, Places, some_places
+from ...problems.grid import Grid, Places
 from ...problems.solution import Solution
 from ...registry import DRIVERS
 from ...scenes.moving import film_of, motion_of

@@ -8,8 +8,8 @@ import numpy as np
 
 from ...base.parallel import Array
 from ...errors import InputError
+from ...problems.film.lines import some_places
 from ...problems.film.model import Model
-from ...problems.grid import some_places
 from .equations import knots
 
 OTHERWISE = 0.1  # of a mean spacing

@@ -10,24 +10,24 @@ from numpy.typing import NDArray
 from ...base.compiled import compiled
 
 
-def downstream(pointers: NDArray, columns: NDArray, values: NDArray, around: int) -> NDArray:
+def downstream(pointers: NDArray, columns: NDArray, values: NDArray, cut: int) -> NDArray:
     """The rows of a matrix of symmetric structure, in CSR, in the order in which they can be eliminated.
 
-    around : entries so far from the diagonal are not waited for: a ring is cut there. Where liquid goes round elsewhere the
+    cut : entries so far from the diagonal are not waited for: a ring is cut there. Where liquid goes round elsewhere the
     next row by number is taken.
     """
     order = np.empty(pointers.size - 1, dtype=columns.dtype)
-    compiled(_order)(pointers, columns, values, around, order)
+    compiled(_order)(pointers, columns, values, cut, order)
     return order
 
 
-def _order(pointers: NDArray, columns: NDArray, values: NDArray, around: int, order: NDArray) -> None:
+def _order(pointers: NDArray, columns: NDArray, values: NDArray, cut: int, order: NDArray) -> None:
     n = order.size
     waits, placed = np.zeros(n, dtype=np.int32), np.zeros(n, dtype=np.bool_)
     for i in range(n):
         for k in range(pointers[i], pointers[i + 1]):
             j = columns[k]
-            waits[i] += j != i and values[k] != 0.0 and abs(i - j) != around
+            waits[i] += j != i and values[k] != 0.0 and abs(i - j) != cut
     head, tail, by_number = 0, 0, 0
     for i in range(n):
         if waits[i] == 0:
@@ -43,7 +43,7 @@ def _order(pointers: NDArray, columns: NDArray, values: NDArray, around: int, or
         head += 1
         for k in range(pointers[i], pointers[i + 1]):
             j = columns[k]
-            if j == i or placed[j] or abs(i - j) == around:
+            if j == i or placed[j] or abs(i - j) == cut:
                 continue
             for m in range(pointers[j], pointers[j + 1]):
                 if columns[m] == i and values[m] != 0.0:

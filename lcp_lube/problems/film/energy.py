@@ -84,8 +84,8 @@ def heated(
     entries = [(0, 0, diagonal)]
     for (dj, di), a, near in list(zip(offsets, enters, flow.inside, strict=True))[: 2 * grid.dim]:
         entries.append((dj, di, np.where(still, 0.0, -rho_c * a * near)))
-    around = grid.shape[0] - 1 if grid.periodic[0] else 0
-    solver = reduce.through(transport := _Transport(assemble(grid, entries), at.memory, around))
+    cut = grid.shape[0] - 1 if grid.periodic[0] else 0
+    solver = reduce.through(transport := _Transport(assemble(grid, entries), at.memory, cut))
     heat = np.where(still, 0.0, flow.dissipation + np.where(free, more, 0.0) + H * wall + rho_c * flow.kept).ravel()
     arises = np.abs(flow.sheared if at.problem.U else flow.dissipation)  # by a wall everywhere, however thin the oil gets
     nowhere = reduce.sum(np.where(free & still & ~dry, arises, 0.0)) > STILL * reduce.sum(arises)  # no liquid carries it away
@@ -161,14 +161,14 @@ class _Transport:
     """The upwind matrix and its inner solver: incomplete factors in the order of the flow, so that few steps do; whole ones
     where they do not, as in grooves that pump oil round and round (known : what was found so of this answer)."""
 
-    def __init__(self, mat: PETSc.Mat, known: dict[Any, Any], around: int):
-        """mat : taken over. around : what `downstream` does not wait for."""
-        self.mat, self.known, self._around = mat, known, around
+    def __init__(self, mat: PETSc.Mat, known: dict[Any, Any], cut: int):
+        """mat : taken over. cut : as of `downstream`."""
+        self.mat, self.known, self._cut = mat, known, cut
         self._order: Any = slice(None)
         self._ordered = mat
         if mat.comm.getSize() == 1 and mat.getSize()[0] >= ORDERED and has_numba():
             pointers, columns, values = mat.getValuesCSR()
-            self._order = downstream(pointers, columns, values, around)
+            self._order = downstream(pointers, columns, values, cut)
             rows = PETSc.IS().createGeneral(self._order, comm=mat.comm)
             self._ordered = mat.permute(rows, rows)
             rows.destroy()
@@ -184,7 +184,7 @@ class _Transport:
             self._whole()
 
     def copy(self) -> "_Transport":
-        return _Transport(self.mat.copy(), self.known, self._around)
+        return _Transport(self.mat.copy(), self.known, self._cut)
 
     @property
     def _factors(self) -> str | None:

@@ -14,11 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.parallel import Array
-from ..grid import OFFSET
+from ..grid import OFFSET, meshes_of
 
 SAME = 1e-9  # of the length: edges so near each other, or a side, are one
 REMEMBERED = 16  # lines
 UNEVEN = 1.1  # largest spacing over the mean, up to which a grid is made from a coarser one by halves
+
+
+def some_places(n: int, length: float, ends: Sequence[str], most: int) -> Array:
+    """Coordinates of at most so many of the n points of a line between two ends, its first and last among them, m."""
+    return (np.linspace(0, n - 1, min(n, most)).round() + OFFSET[ends[0]]) * (length / meshes_of(n, ends))
 
 
 def on_edges(n: int, length: float, ends: Sequence[str], edges: Sequence[float]) -> Array | None:
@@ -45,7 +50,7 @@ def _on_edges(n: int, length: float, ends: tuple[str, ...], edges: tuple[float, 
     if not periodic:
         cut[0] += 0.5 * (ends[0] == "closed")
         cut[-1] += 0.5 * (ends[1] == "closed")
-    meshes = n if periodic else n + OFFSET[ends[0]] + OFFSET[ends[1]] - 1.0
+    meshes = meshes_of(n, ends)
     counts = _counts(lengths, cut, round(meshes + cut.sum()))
     if counts is None:
         return None

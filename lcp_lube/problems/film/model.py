@@ -11,14 +11,14 @@ from petsc4py import PETSc
 from ...base.parallel import Array
 from ...errors import InputError
 from ..facts import Facts
-from ..grid import EVEN, Grid, Places, Polar, some_places
+from ..grid import EVEN, Grid, Places, Polar
 from .edges import corners_of, jumps_of, kinks_of, one_line
 from .effects import Effect
 from .exact import ExactSolution
 from .fluid import Law
 from .grooves import Groove, GroovedProblem
 from .integrals import LineIntegrals, line_integrals
-from .lines import on_edges, stretches
+from .lines import on_edges, some_places, stretches
 from .lubrication import LubricationProblem
 from .reynolds import BoxScheme, Film, box_scheme, coefficients
 from .stored import Dry, Stored

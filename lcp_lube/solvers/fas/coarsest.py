@@ -14,7 +14,7 @@ MOST_ENTRIES = 9_000_000  # of a banded matrix that is eliminated
 def solve(level: Level) -> bool:
     """Newton's method on a level, on every rank if it is dealt to several; whether it settled. Collective."""
     comm, nx, n = level.comm, level.nx, level.ny
-    if nx * n * (4 * min(nx, n) + 1) > MOST_ENTRIES:  # odd numbers of points between periodic sides
+    if nx * n * (4 * min(nx, n) + 1) > MOST_ENTRIES:  # an odd number of lines between periodic sides of y
         return False
     if level.factors is None:
         room = np.empty((nx * n, exact.entries(nx, n, *level.periodic)))

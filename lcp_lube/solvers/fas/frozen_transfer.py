@@ -126,7 +126,8 @@ def deal(r: Array, v: Array, w: Array, by_x: bool, ring: bool, south: Array, nor
         first = half * w[0] * r[1]
         south[-2] += v[1] * first
         north[-2] += (one - v[1]) * first
-        last, at = half * (one - w[-1]) * r[2 * w.size - 1], 2 * w.size - 1
+        at = 2 * w.size - 1
+        last = half * (one - w[-1]) * r[at]
         south[1] += v[at] * last
         north[1] += (one - v[at]) * last
 
