@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lcp_lube import solve
-from lcp_lube.drivers.effects import loop, nonlinear
+from lcp_lube.drivers.effects import loop, nonlinear, settling
 from lcp_lube.drivers.effects.coupled_newton import CoupledNewton
 from lcp_lube.linear.krylov import LinearSolverError
 
@@ -16,10 +16,10 @@ SOFT["elastic"] = {"compliance": 3e-10}  # it drags more than pressure drives th
 @pytest.mark.parametrize("how", ["for film and effects as one", "with films"])
 def test_newton_goes_on_between_soft_walls(how, monkeypatch):
     """With the walls in the same steps no film is needed for them; by films alone it takes many."""
-    monkeypatch.setattr(loop, "MOST_SOLVES", 30)
-    monkeypatch.setattr(loop, "PATIENCE", 0)
+    monkeypatch.setattr(settling, "MOST_SOLVES", 30)
+    monkeypatch.setattr(settling, "PATIENCE", 0)
     if how == "with films":
-        monkeypatch.setattr(loop, "FIRST", np.inf)
+        monkeypatch.setattr(settling, "FIRST", np.inf)
     with solve(SOFT, model="full") as s:
         assert s.converged and s.certificate.holds and s.certificate.measures["coupling"] < 1e-8
         assert any(f"Newton's method {how}" in one for one in s.settings["why"])
@@ -33,7 +33,7 @@ def test_newton_goes_on_in_a_time_step(monkeypatch):
     march = {**SOFT, "motion": {"t_end": 0.02, "steps": 2, "start": "full"}}
     with solve(march, model="full") as s:
         load = s.load
-    monkeypatch.setattr(loop, "PATIENCE", 0)
+    monkeypatch.setattr(settling, "PATIENCE", 0)
     with solve(march, model="full") as s:
         assert s.converged and s.load == pytest.approx(load, rel=1e-7)
 
@@ -45,8 +45,8 @@ def test_a_step_of_newtons_method_that_overflows_is_halved(monkeypatch):
         calls.append(len(calls))
         return own(self, p, r, x) * (np.inf if len(calls) == 2 else 1.0)
 
-    monkeypatch.setattr(loop, "MOST_SOLVES", 30)
-    monkeypatch.setattr(loop, "PATIENCE", 0)
+    monkeypatch.setattr(settling, "MOST_SOLVES", 30)
+    monkeypatch.setattr(settling, "PATIENCE", 0)
     monkeypatch.setattr(CoupledNewton, "_left", left)
     with np.errstate(invalid="ignore"), solve(SOFT, model="full") as s:
         assert s.converged and len(calls) > 2
@@ -61,9 +61,9 @@ def test_what_does_not_settle_ends_at_its_best(monkeypatch):
         changes.append(np.max(np.abs(x - made)))
         return made
 
-    monkeypatch.setattr(loop, "MOST_SOLVES", 30)
-    monkeypatch.setattr(loop, "PATIENCE", 0)
-    monkeypatch.setattr(loop, "FIRST", np.inf)
+    monkeypatch.setattr(settling, "MOST_SOLVES", 30)
+    monkeypatch.setattr(settling, "PATIENCE", 0)
+    monkeypatch.setattr(settling, "FIRST", np.inf)
     monkeypatch.setattr(nonlinear, "VAIN", -1)
     monkeypatch.setattr(loop.Loop, "_found", recorded)
     with solve(SOFT, model="full") as s:
@@ -77,7 +77,7 @@ def test_a_matrix_without_factors_ends_newtons_method_for_film_and_effects(monke
     def fails(self, R):
         raise LinearSolverError("no factors")
 
-    monkeypatch.setattr(loop, "PATIENCE", 0)
+    monkeypatch.setattr(settling, "PATIENCE", 0)
     monkeypatch.setattr(CoupledNewton, "_size_of", fails)
     with solve(SOFT, model="full") as s:
         assert s.converged and any("Newton's method for film and effects as one" in one for one in s.settings["why"])

@@ -75,6 +75,8 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
 def _settled_on(scene: Solvable, ask: Ask, inner: Inner, file: CouplingFile) -> Solution:
     """The solution on this grid, from that on coarser ones, or from where the file has it."""
     inside = replace(ask, certify=False)
+    from .settling import settle  # here: Barus' law alone has no loop
+
     loop, coarse = Loop(scene, _reduced(inside, scene.model.law), inner), None  # type: ignore[union-attr]
     if file.holds(loop):
         begin = file.restore(loop)
@@ -86,7 +88,7 @@ def _settled_on(scene: Solvable, ask: Ask, inner: Inner, file: CouplingFile) -> 
             coarse = _coarser(scene, inside, inner, loop, file)
             known = _taken(loop, coarse.problem) if coarse is not None else None
         begin = loop.vector(known or neutral(loop.effects, loop.h.size))
-    loop.settle(begin, lambda: file.save(loop))
+    settle(loop, begin, lambda: file.save(loop))
     if loop.solution is None or (ask.certify and loop.answer is not None):  # all of its films were taken from the file
         loop.again(ask.certify)
     if coarse is not None:

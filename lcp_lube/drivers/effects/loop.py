@@ -1,11 +1,10 @@
-"""The loop of `coupling`: a film with its coefficients held, and Anderson's method for the fields that these come from."""
+"""The loop of `coupling`: films with their coefficients held, and what effects make of their answers."""
 
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from petsc4py import PETSc
 
 from ...base.parallel import Array
 from ...errors import InputError
@@ -20,13 +19,7 @@ from ..chain import added
 from ..compose import Inner
 from .frozen import Frozen, lent, settled
 
-MOST_SOLVES, LONG = 100, 300  # films; and while the least change has fallen to a tenth within as many as
-PATIENCE = 50  # these; two cycles
-MEMORY = 30  # answers that Anderson's method combines; -coupling_snes_anderson_m changes it
-CYCLE = 25  # steps after which it begins anew: its least squares see no changes 1e-8 of the largest that they remember
-FEW, NEAR, AWAY = 1, 0.3, 30.0  # answers combined while a coefficient changes by more than NEAR; AWAY: times the least change
-FIRST = 8  # films from which on films between soft walls that are not NEAR yet are solved with their walls at once
-LONGEST = 1.0  # relative change of a coefficient in one step, before answers are combined
+LOOKED, FAR = (8, 24), 0.3  # films, also between soft walls, after which a law's end is first looked for if fields change so
 LEAST_LIFT = -0.9  # of the rigid film, of an iterate
 STEEPEST = 0.9  # of q, over 1/b, where the pressure is without bound: of an iterate, whose viscosity is then 10 times mu
 
@@ -64,6 +57,7 @@ class Loop:
         self.solves, self.work, self.change = 0, 0, np.inf
         # How far a time step is expected to change the fields, as a vector; and how far they are then from having no effect.
         self.moved, self.reach = 0.0, np.inf
+        self.still = False  # whether it falls no further
         self.answer: Answer | None = None
         self.own: Array | None = None  # the vector that the last film has taken in place of that it was given
         self.left: dict[str, float] = {}  # of a film's balances, where that went into what its cells store
@@ -163,8 +157,9 @@ class Loop:
 
     @property
     def found(self) -> bool:
-        """Whether the coefficients count as found."""
-        return self.change <= settled(self.ask, self.model.stored, self.moved, self.reach)
+        """Whether the coefficients count as found; films are solved to eps1 themselves, and may leave them no stiller."""
+        left = settled(self.ask, self.model.stored, self.moved, self.reach)
+        return self.change <= (max(left, self.ask.stopping_for((1e-8, 1e-8)).eps1) if self.still else left)
 
     def made(self) -> Cells:
         """The fields that the effects make of the last answer."""
@@ -174,106 +169,11 @@ class Loop:
             effect.apply(self.answer, out)
         return out
 
-    def settle(self, begin: Array, watch: Callable[[], None]) -> None:
-        """Anderson's method from these fields on, until they are `found` or no film can be solved.
-
-        Far from the answer old steps mislead: there it combines two answers alone, and many once coefficients change by less
-        than `NEAR`. Where steps lead away from the best fields so far, or a cycle ends, it begins anew from these; where that
-        leads no further, once from thinner oil: what hardly moves against a supply gets hot, and then flows back from it. Soft
-        walls, whose film drags what it has, go on by Newton's methods from the best fields. What is left in the end are these.
-        watch : called after every film.
-        """
-        from .nonlinear import (  # here, and below: films without effects have no loop
-            beyond,
-            by_films,
-            by_half_steps,
-            steps,
-            warmer,
-        )
-
-        x = PETSc.Vec().createMPI((len(self.names) * self.h.size, None), comm=self.base.grid.petsc_comm)
-        x.setArray(begin)
-        self.begun = begin
-        best, last, near, idle = (np.inf, begin), (begin + 1.0, begin), False, 0  # idle: cycles without better fields
-        least = best  # of both starts
-        mark = (np.inf, 0)  # a least change, and the films after which it was found
-        steady = self.model.stored is None
-        wait = FIRST if steady and "lift" in self.names else np.inf
-        warm = warmer(self, begin) if steady and "warmth" in self.names else None
-
-        def ends() -> bool:
-            return bool(self.endless) or self.solves >= (LONG if self.solves - mark[1] < PATIENCE else MOST_SOLVES)
-
-        def residual(snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
-            nonlocal best, last, least, mark
-            before = x.array_r.copy()
-            if self.base.reduce.max(np.abs(before - last[0])) > 0.0:  # not those that the cycle before has ended with
-                self.last = before
-                found = self._found(before, watch)
-                with np.errstate(all="ignore"):
-                    after = (before if self.own is None else self.own) - found
-                last, self.change = (before, after), self.base.reduce.max(np.abs(after))
-                if self.change < best[0]:
-                    best = self.change, before
-                least = min(least, best, key=lambda one: one[0])
-                if best[0] <= 0.1 * mark[0]:
-                    mark = best[0], self.solves
-            f.setArray(np.clip(last[1], -LONGEST, LONGEST))
-
-        def ended(snes: PETSc.SNES, it: int, norms: tuple[float, float, float]) -> int:
-            if not np.isfinite(self.change):
-                return int(PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN)
-            if self.change > AWAY * best[0] or ends() or (self.solves >= wait and self.change > NEAR):
-                return int(PETSc.SNES.ConvergedReason.DIVERGED_DTOL)
-            done = self.found if near or idle else self.change <= NEAR
-            return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS) if done else 0
-
-        def at_once(*places: Array) -> tuple[float, Array]:
-            from .coupled_newton import newton
-
-            found = least
-            for one in places:
-                found = found if self.found else min(found, newton(self, one, watch), key=lambda one: one[0])
-            self.change = np.nan_to_num(self.change, nan=np.inf)
-            return found
-
-        while not (ends() or self.found or np.isnan(self.change)):  # NaN: no film
-            before = best[0]
-            steps(x, "anderson", residual, ended, CYCLE, {"snes_anderson_m": MEMORY if near else FEW})
-            near, idle = not near, idle + 1 if best[0] >= before else 0
-            if self.solves >= wait and NEAR < self.change < np.inf:
-                wait = 2 * self.solves
-                best = least = at_once(*((best[1], last[0]) if best[0] < self.change else (best[1],)))
-                if self.found:
-                    break
-                x.setArray(best[1])
-            if best[0] < self.change < np.inf:
-                x.setArray(best[1])
-            if idle == 2:  # both kinds of cycle would take the same steps again
-                if warm is None:
-                    break
-                x.setArray(warm)
-                self.told.append(f"from film {self.solves + 1} on from oil of 1/e of the viscosity")
-                best, warm, near, idle, mark = (np.inf, warm), None, False, 0, (np.inf, self.solves)
-        if steady and not (self.found or self.endless) and "warmth" in self.names and np.isfinite(least[0]):
-            least = at_once(least[1])
-            least = least if self.found or "lift" in self.names else by_half_steps(self, least, watch)
-        if steady and not (self.found or self.endless) and "lift" in self.names and np.isfinite(self.change):
-            x.setArray(least[1])
-            self.told.append(f"from film {self.solves + 1} on by Newton's method with films for its products")
-            least = by_films(self, x, least, watch)
-            self.change = np.nan_to_num(self.change, nan=np.inf)
-        if not self.found and least[0] < self.change:
-            self.change = self.off(least[1], watch)[0]
-        if steady and not (self.found or self.endless) and np.isfinite(self.change):
-            self.endless = beyond(self)
-        x.destroy()
-
     def off(self, x: Array, watch: Callable[[], None]) -> tuple[float, Array]:
-        """By how much the effects change these fields at most, and the change."""
+        """By how much the effects change these fields at most, or those taken in their place, and the change; NaN: no film."""
         self.last, found = x, self._found(x, watch)
         with np.errstate(all="ignore"):
-            off = x - found
+            off = (x if self.own is None else self.own) - found
         return self.base.reduce.max(np.abs(off)), off
 
     def _found(self, x: Array, watch: Callable[[], None]) -> Array:
@@ -287,11 +187,11 @@ class Loop:
             self.log.append(self.vector(self.made()) if has else np.full_like(x, np.nan))
         plain = not self.base.reduce.max(np.abs(x - self.vector(neutral(self.effects, self.h.size))))
         # Others may change it yet, soft walls longest; alone, it is sure after a film with all else as it is without effects.
-        after = 1 if self.alone else 3 * FIRST if "lift" in self.names else FIRST
-        far = self.base.reduce.max(np.abs(x - self.log[-1])) > NEAR and (plain or not self.alone)
+        after = 1 if self.alone else LOOKED["lift" in self.names]
+        far = self.base.reduce.max(np.abs(x - self.log[-1])) > FAR and (plain or not self.alone)
         due = any(abs(self.solves - after * 2 ** (k / 2)) < 0.5 for k in range(11))  # again and again: an iterate may hide it
         if has and far and due:
-            from .nonlinear import beyond  # here, as above
+            from .nonlinear import beyond  # here: films without effects have no loop
 
             solves, own = self.solves, self.own
             self.endless = beyond(self)

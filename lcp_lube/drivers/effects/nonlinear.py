@@ -8,8 +8,8 @@ from petsc4py import PETSc
 
 from ...base.parallel import Array
 from ...problems.film.effects import neutral
-from .loop import LONG
 
+LONG = 300  # films, at most
 PATIENT = 150  # half steps in which the least change has to halve
 WARMER = 1.0  # of log(viscosity): where a second start is
 LONGER, LONGEST = 1.2, 0.5  # of steps, while a change keeps its sign: as in Rprop (Riedmiller and Braun 1993), to a half

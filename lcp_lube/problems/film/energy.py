@@ -75,7 +75,9 @@ def heated(
     grid, reduce, free = at.grid, at.problem.reduce, flow.free
     leaves, enters = flow.both_ways
     H, falls = exchange * flow.area, np.where(free, falls, 0.0)
-    diagonal = np.where(free, rho_c * (sum(leaves) + flow.held) + H, 0.0)
+    # What enters leaves, but for what a solve leaves of that: as heat it would count once for each turn that oil takes.
+    through = sum(enters) if at.problem.stored is None else sum(leaves) + flow.held
+    diagonal = np.where(free, rho_c * through + H, 0.0)
     still = diagonal <= STILL * reduce.max(diagonal)  # grooves, and cells whose liquid does not go on
     dry = free & (at.r > 1.0 - EMPTY).reshape(grid.box) & (H <= 0.0)  # behind a closed side, say: no oil, no temperature
     still |= dry
