@@ -5,7 +5,7 @@ import pytest
 
 from lcp_lube import load_scene, solve
 from lcp_lube.drivers.derivatives.gradient import film_fields
-from lcp_lube.problems.film import energy
+from lcp_lube.problems.film import transport
 from lcp_lube.problems.film.downstream import downstream
 
 OIL = {
@@ -21,14 +21,14 @@ OIL = {
 @pytest.fixture
 def carried(monkeypatch):
     """Of each call of the energy equation's solver: its inner steps, and whether it went up the flow."""
-    calls, carry = [], energy._Transport.__call__
+    calls, carry = [], transport.Transport.__call__
 
     def noted(self, heat, transposed=False):
         found = carry(self, heat, transposed)
         calls.append((self.ksp.getIterationNumber(), transposed))
         return found
 
-    monkeypatch.setattr(energy._Transport, "__call__", noted)
+    monkeypatch.setattr(transport.Transport, "__call__", noted)
     return calls
 
 
@@ -63,7 +63,7 @@ def test_heat_is_carried_in_one_step(monkeypatch, carried, scene, keys):
     """In the order of the grid it takes 6 to 9, and more on finer ones; the temperatures are the same."""
     found = []
     for ordered in (1, 10**9):
-        monkeypatch.setattr(energy, "ORDERED", ordered)
+        monkeypatch.setattr(transport, "ORDERED", ordered)
         carried.clear()
         more = {} if scene == "adiabatic_journal" else {"temperature": OIL}
         with solve(load_scene(scene, keys | more)) as solution:
@@ -81,7 +81,7 @@ def test_derivatives_go_up_the_flow(monkeypatch, carried, scene, keys):
     found, names = [], ["temperature_max", "load"]
     film = load_scene(scene, keys)
     for ordered in (1, 10**9):
-        monkeypatch.setattr(energy, "ORDERED", ordered)
+        monkeypatch.setattr(transport, "ORDERED", ordered)
         with solve(film, stopping={"eps1": 1e-11, "max_it": 200}) as solution:
             found.append(film_fields(film, solution, names))
     assert any(up for _, up in carried)

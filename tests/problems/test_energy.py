@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lcp_lube import InputError, load_scene, solve
-from lcp_lube.problems.film import energy, oils
+from lcp_lube.problems.film import oils, transport
 
 MU, U, H, L, RHO, C = 0.05, 10.0, 5e-5, 0.1, 870.0, 2000.0
 SLOPE = 2.0 * MU * U / (RHO * C * H**2)  # K/m, of a film between parallel plates
@@ -205,16 +205,17 @@ def test_hot_oil_carries_what_cold_oil_cannot():
 
 
 def test_oil_that_grooves_pump_round_and_round(monkeypatch):
-    """Incomplete factors take hundreds of steps there, whole ones one."""
-    steps, call = [], energy._Transport.__call__
+    """Incomplete factors take hundreds of steps there, whole ones one, or with those of an answer before a few."""
+    steps, call = [], transport.Transport.__call__
 
     def counted(self, *args):
         found = call(self, *args)
         steps.append(self.ksp.getIterationNumber())
         return found
 
-    monkeypatch.setattr(energy._Transport, "__call__", counted)
+    monkeypatch.setattr(transport.Transport, "__call__", counted)
     scene = load_scene("spiral_groove", {"nx": 30, "ny": 79, "temperature": {"beta": 0.03, "T_in": 320.0}})
     with solve(scene, model="full") as s:
         assert s.converged and s.certificate.measures["heat_defect"] < 1e-8
-        assert s.certificate.measures["energy_residual"] < 1e-10 and max(steps) == 1
+        assert s.certificate.measures["energy_residual"] < 1e-10
+        assert 1 in steps and max(steps) <= 2 * transport.STALE and np.mean(steps) < 0.5 * transport.STALE

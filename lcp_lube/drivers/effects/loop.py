@@ -59,6 +59,7 @@ class Loop:
         self.moved, self.reach = 0.0, np.inf
         self.still = False  # whether it falls no further
         self.answer: Answer | None = None
+        self.lasting: dict[Any, Any] = {}  # of answers, for those that follow
         self.own: Array | None = None  # the vector that the last film has taken in place of that it was given
         self.left: dict[str, float] = {}  # of a film's balances, where that went into what its cells store
         self.beyond = False  # whether no pressure carries the last film's flow
@@ -139,6 +140,7 @@ class Loop:
             self.left = {"residual": new.certificate.measures["residual"]}
         with np.errstate(all="ignore"):
             self.answer = answer(self.base, self.law, cells, by, p, new.fields["r"], self.p_sides, self.effects)
+        self.answer.lasting = self.lasting
         return bool(np.isfinite(self.base.reduce.max(p)))
 
     def foreseen(self, known: Cells | None, near: Any) -> Cells:

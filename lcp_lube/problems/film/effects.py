@@ -108,6 +108,7 @@ class Answer:
     base: LubricationProblem
     factors: dict[str, Array] = field(default_factory=dict)
     memory: dict[Any, Any] = field(default_factory=dict)  # what an effect found, by its id
+    lasting: dict[Any, Any] = field(default_factory=dict)  # what serves for the answers that follow too
     rough: bool = False  # whether three digits of what effects make of it will do
     once: bool = False  # whether one step of Newton's method will, from what its coefficients stand for
 

@@ -21,20 +21,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from petsc4py import PETSc
 
-from ...base.compiled import has_numba
 from ...base.parallel import Array
 from .assembly import assemble
 from .carried import Carried, holders
-from .downstream import downstream
 from .effects import Answer, around, framed_by
 from .reynolds import sides
+from .transport import Transport
 
-RTOL = 1e-13  # of the linear solves
-FEW, MOST = 60, 2000  # its steps, and where whole factors would take too much
-ORDERED = 4000  # points from which one rank's cells are put in the order of the flow
-WHOLE = 500_000  # points, at most, of which one rank makes whole factors
 STILL = 1e-11  # of the largest flow out of a cell: what is less is rounding
 EMPTY = 1e-9  # of a cell's liquid: less is rounding
 SAME = 1e-300  # what stands for 0 in a quotient
@@ -87,7 +81,7 @@ def heated(
     for (dj, di), a, near in list(zip(offsets, enters, flow.inside, strict=True))[: 2 * grid.dim]:
         entries.append((dj, di, np.where(still, 0.0, -rho_c * a * near)))
     cut = grid.shape[0] - 1 if grid.periodic[0] else 0
-    solver = reduce.through(transport := _Transport(assemble(grid, entries), at.memory, cut))
+    solver = reduce.through(transport := Transport(assemble(grid, entries), at.lasting, cut))
     heat = np.where(still, 0.0, flow.dissipation + np.where(free, more, 0.0) + H * wall + rho_c * flow.kept).ravel()
     arises = np.abs(flow.sheared if at.problem.U else flow.dissipation)  # by a wall everywhere, however thin the oil gets
     nowhere = reduce.sum(np.where(free & still & ~dry, arises, 0.0)) > STILL * reduce.sum(arises)  # no liquid carries it away
@@ -157,71 +151,3 @@ def _to_and_from(flow: Carried, faces: Sequence[Any]) -> tuple[Array, Array]:
     """What leaves and enters each cell through some of its faces, which are told west, east, south, north, m3/s."""
     away, into = (sum(np.where(face, a, 0.0) for face, a in zip(faces, way, strict=False)) for way in flow.both_ways)
     return away, into  # type: ignore[return-value]
-
-
-class _Transport:
-    """The upwind matrix and its inner solver: incomplete factors in the order of the flow, so that few steps do; whole ones
-    where they do not, as in grooves that pump oil round and round (known : what was found so of this answer)."""
-
-    def __init__(self, mat: PETSc.Mat, known: dict[Any, Any], cut: int):
-        """mat : taken over. cut : as of `downstream`."""
-        self.mat, self.known, self._cut = mat, known, cut
-        self._order: Any = slice(None)
-        self._ordered = mat
-        if mat.comm.getSize() == 1 and mat.getSize()[0] >= ORDERED and has_numba():
-            pointers, columns, values = mat.getValuesCSR()
-            self._order = downstream(pointers, columns, values, cut)
-            rows = PETSc.IS().createGeneral(self._order, comm=mat.comm)
-            self._ordered = mat.permute(rows, rows)
-            rows.destroy()
-        self.ksp = PETSc.KSP().create(mat.comm)
-        self.ksp.setOptionsPrefix("energy_")
-        self.ksp.setOperators(self._ordered)
-        self.ksp.setType("gmres")
-        self.ksp.setGMRESRestart(FEW)
-        self.ksp.getPC().setType("ilu" if mat.comm.getSize() == 1 else "bjacobi")
-        self.ksp.setTolerances(rtol=RTOL, atol=0.0, max_it=FEW if self._factors else MOST)
-        self.ksp.setFromOptions()
-        if known.get("turns"):
-            self._whole()
-
-    def copy(self) -> "_Transport":
-        return _Transport(self.mat.copy(), self.known, self._cut)
-
-    @property
-    def _factors(self) -> str | None:
-        """What makes whole factors of the matrix; None where it has too many points or PETSc has nothing for it."""
-        if self.mat.comm.getSize() == 1:
-            return "petsc" if self.mat.getSize()[0] <= WHOLE else None
-        return "mumps" if PETSc.Sys.hasExternalPackage("mumps") else None
-
-    def _whole(self) -> None:
-        self.known["turns"] = True
-        self.ksp.setType("preonly")
-        pc = self.ksp.getPC()
-        pc.setType("lu")
-        pc.setFactorSolverType(self._factors)
-        if self._factors == "petsc":
-            pc.setFactorOrdering("nd")
-
-    def __call__(self, heat: Array, transposed: bool = False) -> tuple[Array, float]:
-        """The solution, and its residual in parts of the right-hand side; transposed : that up the flow. Collective."""
-        x, b = self._ordered.createVecs()
-        b.setArray(heat[self._order])
-        size = b.norm()
-        (self.ksp.solveTranspose if transposed else self.ksp.solve)(b, x)
-        if self.ksp.getConvergedReason() == PETSc.KSP.ConvergedReason.DIVERGED_MAX_IT and self._factors:
-            self._whole()
-            (self.ksp.solveTranspose if transposed else self.ksp.solve)(b, x)
-        values = np.empty(heat.size)
-        values[self._order] = x.array_r
-        b.aypx(-1.0, self._ordered * x)
-        residual = b.norm() / size if size > 0 else 0.0
-        for obj in (x, b):
-            obj.destroy()
-        return values, float(residual)
-
-    def destroy(self) -> None:
-        self.ksp.destroy()
-        self._ordered.destroy()
-        self.mat.destroy()
