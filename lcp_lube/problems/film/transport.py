@@ -21,20 +21,20 @@ class Transport:
     """The upwind matrix and its inner solver: incomplete factors in the order of the flow, so that few steps do; whole ones
     where they do not, as in rings and in grooves that pump oil round and round, which do for the matrices of later answers too.
 
-    known : those factors, if any, which a loop keeps from answer to answer.
+    known : those factors, which a loop keeps from answer to answer, if such have been needed; None where they serve no more.
     """
 
     def __init__(self, mat: PETSc.Mat, known: dict[Any, Any], cut: int):
         """mat : taken over. cut : as of `downstream`."""
         self.mat, self.known, self._cut = mat, known, cut
         self._order: Any = slice(None)
-        self._ordered = mat
+        self._ordered, self._own = mat, False  # whether the factors are this matrix's own
         self.ksp = PETSc.KSP().create(mat.comm)
         self.ksp.setOptionsPrefix("energy_")
         self.ksp.setType("gmres")
         self.ksp.setGMRESRestart(FEW)
         if "factors" in known:
-            self._by_factors()
+            self._by_factors(anew=known["factors"] is None)
             return
         if mat.comm.getSize() == 1 and mat.getSize()[0] >= ORDERED and has_numba():
             pointers, columns, values = mat.getValuesCSR()
@@ -57,7 +57,7 @@ class Transport:
             return "petsc" if self.mat.getSize()[0] <= WHOLE else None
         return "mumps" if PETSc.Sys.hasExternalPackage("mumps") else None
 
-    def _by_factors(self, anew: bool = False) -> None:
+    def _by_factors(self, anew: bool) -> None:
         """Krylov's steps with the factors that are known, or with those of this matrix."""
         if anew:
             factors = PETSc.PC().create(self.mat.comm)
@@ -69,6 +69,7 @@ class Transport:
             self.known["factors"] = factors
         if self._ordered is not self.mat:
             self._ordered.destroy()
+        self._own = anew
         self._order, self._ordered = slice(None), self.mat
         self.ksp.setOperators(self.mat)
         self.ksp.getPC().setType("python")
@@ -78,11 +79,12 @@ class Transport:
     def __call__(self, heat: Array, transposed: bool = False) -> tuple[Array, float]:
         """The solution, and its residual in parts of the right-hand side; transposed : that up the flow. Collective."""
         values, residual = self._solved(heat, transposed)
-        if self.ksp.getConvergedReason() == PETSc.KSP.ConvergedReason.DIVERGED_MAX_IT and self._solver:
+        failed = self.ksp.getConvergedReason() == PETSc.KSP.ConvergedReason.DIVERGED_MAX_IT
+        if failed and self._solver and not self._own:
             self._by_factors(anew=True)
             values, residual = self._solved(heat, transposed)
         elif "factors" in self.known and self.ksp.getIterationNumber() > STALE:
-            del self.known["factors"]
+            self.known["factors"] = None
         return values, residual
 
     def _solved(self, heat: Array, transposed: bool) -> tuple[Array, float]:
