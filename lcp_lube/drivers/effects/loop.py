@@ -173,7 +173,8 @@ class Loop:
 
     def off(self, x: Array, watch: Callable[[], None]) -> tuple[float, Array]:
         """By how much the effects change these fields at most, or those taken in their place, and the change; NaN: no film."""
-        self.last, found = x, self._found(x, watch)
+        self.last = x  # before `watch` may keep it
+        found = self._found(x, watch)
         with np.errstate(all="ignore"):
             off = (x if self.own is None else self.own) - found
         return self.base.reduce.max(np.abs(off)), off
