@@ -179,7 +179,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         fields,
         outcome,
         f"{len(films)} films between grooves; {message}",
-        ring.certify(fields, settings["eps1"]),
+        ask.certify_by(ring, fields, settings["eps1"]),
         [step if k == longest else replace(step, beside=True) for k, one in told for step in one[2]],
         enclosure=band,
         settings=settings,

@@ -100,7 +100,7 @@ def solve_part(part: Part, problem: Problem, ask: Ask, inner: Inner) -> Solution
         take = Pick(problem.grid, small.grid, *numbers(small.grid))
         start = Start(small, {name: take(values) for name, values in near.items()}, ask.start.settings)
         take.destroy()
-    whole = _Whole(part, problem)
+    whole = _Whole(part, problem, ask)
     solution = inner(part, replace(ask, start=start, judge=whole.certify))
     if start is not None:
         start.problem.grid.destroy()
@@ -119,8 +119,8 @@ def solve_part(part: Part, problem: Problem, ask: Ask, inner: Inner) -> Solution
 class _Whole:
     """The whole problem, and the fields that a part's answer spreads out to; for several answers, the last one's."""
 
-    def __init__(self, part: Part, problem: Any):
-        self.problem, self._part = problem, part
+    def __init__(self, part: Part, problem: Any, ask: Ask):
+        self.problem, self._part, self._ask = problem, part, ask
         self.fields: Fields = {}
         self._seen: Fields = {}
         self._found: Certificate
@@ -142,4 +142,4 @@ class _Whole:
         spread.destroy()
         if hasattr(small, "many"):
             self.problem.many = small.many
-        self._found = self.problem.certify(self.fields, eps1)
+        self._found = self._ask.certify_by(self.problem, self.fields, eps1)
