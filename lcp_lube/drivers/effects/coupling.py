@@ -192,7 +192,7 @@ def _told(ask: Ask, loop: Loop) -> Solution:
     problem.cells = at.cells | {"stored": at.stored}
     problem.oil = problem.oil if loop.found else None  # numbers of what has not settled are those of the fields
     problem.rigid = None if loop.effects or nests(problem.grid.shape) else loop.base
-    certificate = problem.certify(fields, eps1)
+    certificate = ask.certify_by(problem, fields, eps1)
     enclosure = _band(loop, solution.enclosure, fields) if ask.certify else None
     solution.destroy()
     count = f"{loop.solves} film{'s' * (loop.solves > 1)} solved"

@@ -8,12 +8,12 @@ import numpy as np
 
 from ...base.parallel import Array
 from ...errors import InputError
-from ...problems.certificate import Certificate
+from ...problems.certificate import glance
 from ...problems.film.effects import Answer, Cells, Compressible, Effect, FaceFactors, answer, factors, neutral
 from ...problems.film.fluid import Law
 from ...problems.film.model import Model
 from ...problems.film.tangent import WIDEST, Giving, closed, filled, lift_of, logarithm, renewed
-from ...problems.solution import Fields, Solution
+from ...problems.solution import Solution
 from ...scenes.scene import Solvable
 from ..ask import Ask, Start
 from ..chain import added
@@ -23,12 +23,6 @@ from .frozen import Frozen, lent, settled
 LOOKED, FAR = (8, 24), 0.3  # films, also between soft walls, after which a law's end is first looked for if fields change so
 LEAST_LIFT = -0.9  # of the rigid film, of an iterate
 STEEPEST = 0.9  # of q, over 1/b, where the pressure is without bound: of an iterate, whose viscosity is then 10 times mu
-
-
-def glance(problem: Any, fields: Fields, eps1: float) -> Certificate:
-    """The certificate of a film on the way, but for the closer look at p, which takes longer than the film. Collective."""
-    seen = problem.certify(fields, eps1, closely=False)
-    return replace(seen, measures={name: value for name, value in seen.measures.items() if name != "p_error"})
 
 
 class Loop:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ...problems.certificate import Certificate
+from ...problems.certificate import Certificate, glance
 from ...problems.film.lubrication import LubricationProblem
 from ...problems.film.model import Model
 from ...problems.grid import EVEN
@@ -208,7 +208,7 @@ class Run:
         term, near = replace(march.term(formula), exact=self.rotor is not None), march.guess(dt)
         solves, newest = list[list[Step]](), near  # of ten films that a free journal solves for a step one alone is kept
 
-        def film_at(e: Any) -> Solution:
+        def film_at(e: Any, judge: Any = None) -> Solution:
             nonlocal newest
             model = self.models(t, None if e is None else [float(one) for one in e])
             self.model = replace(model, stored=term, places=march.grid.places)
@@ -218,7 +218,7 @@ class Run:
             problem, known = (last.problem, last.settings) if last is not None else (None, self.settings or self.begun)
             own = None if problem is not None or newest is None else self._at(t, lambda: step.build(self.ask.comm))
             start = None if newest is None else Start(problem or own, newest, known)  # type: ignore[arg-type]
-            solution = self._at(t, lambda: self.inner(step, replace(self.ask, start=start)))
+            solution = self._at(t, lambda: self.inner(step, replace(self.ask, start=start, judge=judge)))
             if own is not None:
                 own.destroy()
             solves.append(solution.steps)
@@ -235,7 +235,13 @@ class Run:
         if self.course is not None:
             given = self._at(t, lambda: self.course(t))  # type: ignore[misc]
             guess[: len(given)] = given
-        return *self.rotor.settle(t, formula, guess, film_at, stiffness), solves
+        solution, place, why = self.rotor.settle(t, formula, guess, lambda e: film_at(e, glance), stiffness)
+        if solution.converged:
+            solution.certificate = solution.problem.certify(solution.fields, solution.settings["eps1"])
+            if not solution.certificate.holds:
+                solution.destroy()
+                solution = film_at(place)
+        return solution, place, why, solves
 
     def _keep(self, solution: Solution, solves: list[list[Step]]) -> None:
         """Note what a step was, and hold it in place of the one before."""
