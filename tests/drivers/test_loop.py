@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from lcp_lube import solve
+from lcp_lube import load_scene, solve
 from lcp_lube.drivers.effects import loop, nonlinear, settling
 from lcp_lube.drivers.effects.coupled_newton import CoupledNewton
 from lcp_lube.linear.krylov import LinearSolverError
+from lcp_lube.problems.film import certify
 
 FILM = [{"shape": "linear", "h_start": 4e-5, "h_end": 2e-5}]
 SOFT = {"family": "bearing", "L": 0.1, "U": 5.0, "n": 24, "fluid": {"mu": 0.02, "p_supply": 1e5}, "film": FILM}
@@ -213,3 +214,45 @@ def test_a_load_for_which_the_film_gets_too_hot():
     with solve(pad, model="full") as s:
         assert s.outcome.value == "load_not_carried"
         assert "has no answer: no steady temperature" in s.message.partition("balance.range was")[2]
+
+
+@pytest.fixture
+def looks(monkeypatch):
+    """How often p was looked at closely."""
+    calls, look = [], certify.p_error
+
+    def counted(problem, p, r):
+        calls.append(problem)
+        return look(problem, p, r)
+
+    monkeypatch.setattr(certify, "p_error", counted)
+    return calls
+
+
+def test_heat_that_goes_round_settles():
+    """What films leave of cells' balances is no heat that oil takes round and round; with it the loop took 35 films."""
+    heat = {"beta": 0.03, "T_in": 323.0, "rho": 855.0, "specific_heat": 1950.0}
+    with solve(load_scene("ring_journal", {"nx": 180, "ny": 61, "attitude_deg": 50.0, "temperature": heat}), model="full") as s:
+        assert s.converged and s.certificate.measures["heat_defect"] < 1e-8 and s.certificate.measures["coupling"] < 1e-8
+        assert s.settings["details"]["fluid_solves"] <= 20 and not any("from film" in why for why in s.settings["why"])
+
+
+def test_films_on_the_way_are_not_looked_at_closely(looks):
+    """The first of each coupling and its answer alone."""
+    with solve(load_scene("mixed_journal")) as s:
+        assert s.converged and "p_error" in s.certificate.measures
+        assert 2 <= len(looks) < 3 * s.settings["balance"]["solves"]
+
+
+def test_of_a_free_journals_step_its_answer_is_looked_at_closely(looks, monkeypatch):
+    monkeypatch.setattr(certify, "FINE", 0.0)
+    with solve(load_scene("dynamic_journal", {"motion.t_end": 0.0008, "motion.steps": 4})) as s:
+        solves = [row["solves"] for row in s.history]
+        assert s.converged and sum(solves) > 8 and len(looks) <= 4 + 3
+
+
+def test_heat_turns_round_as_far_as_cells_are_empty():
+    """With all of it at the least void fields had no answer where a cell fills: the loop swung between two for 290 films."""
+    scene = load_scene("herringbone_journal", {"nx": 48, "ny": 21, "temperature": {"beta": 0.0493253, "T_in": 323.0}})
+    with solve(scene, model="full", method="active-set") as s:
+        assert s.converged and s.settings["details"]["fluid_solves"] < 40

@@ -5,6 +5,7 @@ import math
 import pytest
 
 from lcp_lube import load_scene, solve
+from lcp_lube.drivers.loads import attitude
 from lcp_lube.drivers.loads.position import touching
 from lcp_lube.problems.solution import Outcome
 
@@ -142,3 +143,19 @@ def test_mixed_lubrication_from_the_film_alone(rpm, asperities):
         assert solution.settings["balance"]["solves"] <= 20
         carried = solution.problem.quantities(solution.fields)["asperity_load"]
         assert carried / 8200.0 == pytest.approx(asperities, abs=0.05)
+
+
+@pytest.mark.parametrize(("jump", "found"), [(2e-4, True), (5e-3, False)])
+def test_an_attitude_at_which_the_force_jumps_past_the_load(monkeypatch, jump, found):
+    """By little it is the place, which is said; by more there is none."""
+    force_of = attitude.shaft_force
+
+    def jumps(problem, fields):
+        fx, fy = force_of(problem, fields)
+        off = math.atan2(-fy, -fx)
+        return tuple(-math.hypot(fx, fy) * part(off + math.copysign(jump, off)) for part in (math.cos, math.sin))
+
+    monkeypatch.setattr(attitude, "shaft_force", jumps)
+    with solve(load_scene("two_groove_journal", nx=60, ny=5, attitude_deg=None)) as s:
+        said = any("but for a jump of its angle" in why for why in s.settings["why"])
+        assert s.converged == found and said == found

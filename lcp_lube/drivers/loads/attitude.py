@@ -21,6 +21,7 @@ from .root import Search
 MOST_SOLVES, MOST_BETWEEN = 12, 20  # ends of searches that go round; by secants, then within a bracket
 AROUND = 12  # attitudes, all round
 TOLERANCE, PART = 1e-9, 0.1  # rad: the force across the load is then 1e-9 of it; of an eps1 that was given
+JUMP = 1e-3  # rad: as cells fill and empty the force's angle may jump past the load's line; by so little it is there
 STEEPEST, FLATTEST = 2.0, 0.3  # slope of the force's angle over the attitude; without grooves it is 1
 
 
@@ -60,14 +61,15 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
         attitude -= off / slope
     if abs(off) > tol:
         solution, attitude, off = _around(off_at, attitude, tol)
-    if solution.converged and abs(off) > tol:
+    jumps = f", but for a jump of its angle, {math.degrees(abs(off)):.1g} degrees off" if tol < abs(off) <= JUMP else ""
+    if solution.converged and abs(off) > max(tol, JUMP):
         solution.outcome = Outcome.LOAD_NOT_CARRIED
         solution.message = (
             f"at eccentricity {scene.eccentricity:g} no attitude was found at which the film pushes against the load: the last "
             f"force, at {math.degrees(attitude) % 360.0:.4g} degrees, is {math.degrees(abs(off)):.3g} degrees off"
         )
     solution.settings |= {"attitude_deg": math.degrees(attitude)}
-    solution.because(f"attitude {math.degrees(attitude):.6g} degrees, at which the film's force is opposite to the load")
+    solution.because(f"attitude {math.degrees(attitude):.6g} degrees, at which the film's force is opposite to the load{jumps}")
     return solution
 
 

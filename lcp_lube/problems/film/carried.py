@@ -29,7 +29,7 @@ class Carried:
     power : what drag and pumps put in, as the film's own numbers have it; NaN where it was not asked for.
     area : of the cells, m2 (1D: m).
     turns : through the west and east face both ways: what the wall drags out of a part of a cell that is full, and pressure
-        drives back into it, m3/s.
+        drives back into it, as far as it or the cell to the west is empty, m3/s: none all at once as the last void goes.
     held, kept : of a time step: liquid of a cell over the step's length, m3/s, and what it held before times T, K m3/s.
     rounding : of all that pressure drives, m3/s.
     """
@@ -82,10 +82,10 @@ def carried(at: Answer, told: bool = True) -> Carried:
     # Whether the neighbour (west, east, south, north) is a cell whose temperature is unknown.
     other_free = [a > 0.5 for a in around(framed_by(grid, free.astype(float), (0.0,) * 4))]
     empty = cavitated(problem.reduce, at.p, at.r)  # some methods leave a rounding of void in full cells
-    empty_W = grid.ghosted(empty.astype(float), outside=0.0)[1:-1, :-2] > 0.5
-    front = free & (empty.reshape(box) | empty_W)
+    void = np.where(empty, at.r, 0.0)
+    part = np.where(free, np.maximum(void.reshape(box), grid.ghosted(void, outside=0.0)[1:-1, :-2]), 0.0)
     back = np.minimum(dragged[1], -pushed[1]) - np.maximum(pushed[0], 0.0)
-    turn = np.where(front, np.maximum(back, 0.0), 0.0)
+    turn = part * np.maximum(back, 0.0)
     turns = (grid.ghosted(turn.ravel(), outside=0.0)[1:-1, :-2], turn)
     heat = np.zeros(box)
     for flow, near, is_free in zip(pushed, beside, other_free, strict=True):

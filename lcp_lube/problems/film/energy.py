@@ -10,7 +10,8 @@ sum is the power that goes in, drag U plus the pumping at the sides, because liq
 the heat that goes out. Both are told, and their difference is in the certificate. In the cavity the liquid carries heat.
 
 Where a cavity ends, the wall drags liquid out of a cell that is partly full, and pressure drives some of it back through the
-same face: heat goes both ways there, not with the net flow alone, which may be nothing. Cells without oil have no temperature.
+same face: heat goes both ways there, not with the net flow alone, which may be nothing, as far as cells are empty (what came
+all at once with the first void would leave films without an answer). Cells without oil have no temperature.
 
 In time cells hold heat, rho c_p d/dt [area h (1 - r) T] by the step's formula (`stored`) and the film's own contents, and what
 walls that approach do to the film goes in too. What is in minus what is out is stored.
