@@ -71,6 +71,7 @@ class _Anderson:
         self.x.setArray(begin)
 
     def run(self) -> None:
+        """Until the fields are found, there is no film, or both kinds of cycle lead no further."""
         loop, x = self.loop, self.x
         while not (self._ends() or loop.found or np.isnan(loop.change)):  # NaN: no film
             before = self.best[0]
