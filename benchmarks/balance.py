@@ -18,7 +18,7 @@ from typing import Any
 
 from lcp_lube import load_scene, solve
 from lcp_lube.base.resumable import ResumableCsv
-from lcp_lube.drivers.loads.position import touching
+from lcp_lube.drivers.loads.place import touching
 
 PARTS = (0.1, 0.3, 0.5, 0.7, 0.9, 0.97)
 RATIOS = (0.25, 0.5, 1.0, 2.0)

@@ -6,7 +6,7 @@ import pytest
 
 from lcp_lube import load_scene, solve
 from lcp_lube.drivers.loads import attitude
-from lcp_lube.drivers.loads.position import touching
+from lcp_lube.drivers.loads.place import touching
 from lcp_lube.problems.solution import Outcome
 
 SMALL = {"nx": 144, "ny": 11}

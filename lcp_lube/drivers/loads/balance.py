@@ -80,7 +80,7 @@ def variable(scene: Scene, table: BalanceTable, begin: float | None, shapes: Seq
         to_t, to_value, upper = (lambda e: log(e / (1.0 - e))), (lambda t: 1.0 / (1.0 + exp(-t))), 1.0
         turning = getattr(scene, "turning", None)
         if turning is not None and begin is None:
-            from .position import half_film_eccentricity  # here: with it come stiffness, and families of scenes
+            from .place import half_film_eccentricity  # here: with it come families of scenes
 
             value = half_film_eccentricity(turning, scene.mu_0, table.load, len(scene.shape) == 1)  # type: ignore[attr-defined]
         value = 0.5 if value is None else min(max(value, 1e-3), 0.999)

@@ -19,7 +19,6 @@ import numpy as np
 from ...base.parallel import Array
 from ...errors import NotFound
 from ...problems.film.quantities import shaft_force
-from ...problems.film.turning import Turning
 from ...problems.solution import Outcome, Solution
 from ...scenes.effects.named import named, without
 from ...scenes.grooved import GroovedJournalScene
@@ -31,6 +30,7 @@ from ..levels import halved
 from ..motions.coefficients import by_film, motions_of, placed
 from ..motions.impedance import stiffness
 from .attitude import half_film_attitude
+from .place import WIDEST, eccentricity, half_film_eccentricity, moved, moves_of, place_of, touching
 from .winding import places
 
 MOST_SOLVES = 25  # on a grid
@@ -42,11 +42,9 @@ LONGEST = (2.0, 0.4)  # of a step in t and in the attitude (rad)
 MOST_FAILED = 4  # solves without an answer on a grid, from each of which half of the step is taken
 RETREAT = np.array([0.7, 0.0])  # from a first place without an answer: some twice the thinnest film
 SHORTEST = 1e-4  # of a step that was halved
-WIDEST = 14.0  # of t: s from 1e-6 to 1 - 1e-6
 AWRY = 0.7  # rad off the load's line, beyond which the force is extrapolated linearly, not its logarithm
 ACROSS = 0.4  # longest such step, clearances
 HELD = 0.5  # part of the force that is there without eccentricity: from that on likewise
-DIRECTIONS = np.linspace(-0.5, 0.5, 2881)[1:-1] * math.pi  # from the attitude, in which the bore may be touched
 
 
 def applies(scene: Solvable, ask: Ask) -> bool:
@@ -61,84 +59,106 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     -------
     Solution : settings['balance'] as of any balance; where no place carries the load, outcome LOAD_NOT_CARRIED.
     """
-    ask = replace(ask, alone=False)
-    assert isinstance(scene, GroovedJournalScene) and scene.balance is not None  # as `applies` found
-    table, known = scene.balance, ask.start.settings if ask.start is not None else {}
-    guess = half_film_eccentricity(scene.turning, scene.mu_0, table.load)
-    phi = math.radians(known.get("attitude_deg", scene.attitude_deg or 0.0))
-    if scene.attitude_deg is None and "attitude_deg" not in known:
-        phi = half_film_attitude(guess)
-    value = known.get("balance", {}).get("value")
-    s = guess if value is None else value / touching(scene, phi)
-    free = scene.model_copy(update={"balance": None})
-    shapes = [scene.shape]
-    if ask.nested is not False and (not known or "foretold" in known.get("balance", {})):
-        shapes = _coarse(scene, s)
-    t = math.log(max(s, 1e-3) / max(1.0 - s, 1e-6))
-    counts, best = np.zeros(len(shapes), dtype=int), _Best()
-    given = scene.attitude_deg is not None
-    elsewhere = not known and scene.shape[0] >= _fewest(scene, s)
+    assert isinstance(scene, GroovedJournalScene)  # as `applies` found
+    search = _Search(scene, replace(ask, alone=False), inner)
+    search.through(search.begin)
+    if not search.found and search.elsewhere:
+        search.look_around()
+    if not search.found and search.best.q is not None:
+        search.at_best()
+    return search.told()
 
-    def through(q: Array) -> tuple[Solution, Array, bool]:
+
+class _Search:
+    """A place sought on grids from coarse to fine: where it has got to (solution, q = t and attitude), and whether found.
+
+    best : of the last grid. elsewhere : whether other places may be tried. counts : solves on each grid.
+    """
+
+    solution: Solution
+    found = False
+
+    def __init__(self, scene: GroovedJournalScene, ask: Ask, inner: Inner):
+        assert scene.balance is not None  # as `applies` found
+        self.scene, self.ask, self.inner, self.table = scene, ask, inner, scene.balance
+        self.free = scene.model_copy(update={"balance": None})
+        known, load = ask.start.settings if ask.start is not None else {}, self.table.load
+        guess = half_film_eccentricity(scene.turning, scene.mu_0, load)
+        phi = math.radians(known.get("attitude_deg", scene.attitude_deg or 0.0))
+        if scene.attitude_deg is None and "attitude_deg" not in known:
+            phi = half_film_attitude(guess)
+        value = known.get("balance", {}).get("value")
+        s = guess if value is None else value / touching(scene, phi)
+        self.begin = self.q = np.array([math.log(max(s, 1e-3) / max(1.0 - s, 1e-6)), phi])
+        nested = ask.nested is not False and (not known or "foretold" in known.get("balance", {}))
+        self.shapes = _coarse(scene, s) if nested else [scene.shape]
+        self.counts, self.best = np.zeros(len(self.shapes), dtype=int), _Best()
+        self.elsewhere = not known and scene.shape[0] >= _fewest(scene, s)
+
+    def through(self, q: Array) -> None:
         """From a place on the coarsest grid through all, or to the first where none is found if others may be tried."""
-        near = ask.start
-        for k, shape in enumerate(shapes):
-            last = shape == shapes[-1]
-            tol, most, seen = (table.tol, MOST_SOLVES, best) if last else (max(table.tol, COARSE_TOL), MOST_COARSE, _Best())
-            at, here = free.with_shape(shape), replace(ask, start=near)
-            solution, q, count, found = _on_grid(at, here, inner, q, table.load, tol, most, seen)
-            counts[k] += count
-            if near is not None and near is not ask.start:
+        near = self.ask.start
+        for k, shape in enumerate(self.shapes):
+            tol, most, seen = self.table.tol, MOST_SOLVES, self.best
+            if shape != self.shapes[-1]:
+                tol, most, seen = max(tol, COARSE_TOL), MOST_COARSE, _Best()
+            at, ask = self.free.with_shape(shape), replace(self.ask, start=near)
+            self.solution, q, count, self.found = _on_grid(at, ask, self.inner, q, self.table.load, tol, most, seen)
+            self.counts[k] += count
+            if near is not None and near is not self.ask.start:
                 near.destroy()  # type: ignore[union-attr]
-            near = solution
-            if not found and elsewhere:
+            near, self.q = self.solution, q
+            if not self.found and self.elsewhere:
                 break
-        return solution, q, found
 
-    begin = np.array([t, phi])
-    solution, q, found = through(begin)
-    if not found and elsewhere:
-        solution.destroy()
-        chain = Chain(replace(ask, start=None), inner)
+    def look_around(self) -> None:
+        """From the likeliest of places all round on the coarsest grid, one after another until one leads to the end."""
+        self.solution.destroy()
+        chain, given = Chain(replace(self.ask, start=None), self.inner), self.scene.attitude_deg is not None
 
         def left_at(t: float, phi: float) -> complex:
-            nonlocal solution
-            solution = chain.solve(_moved(free.with_shape(shapes[0]), max(t, -WIDEST), phi))
-            fx, fy = shaft_force(solution.problem, solution.fields)
+            self.solution = chain.solve(moved(self.free.with_shape(self.shapes[0]), max(t, -WIDEST), phi))
+            fx, fy = shaft_force(self.solution.problem, self.solution.fields)
             force = complex(-math.hypot(fx, fy), 0.0) if given else complex(fx, fy)
-            return 1.0 + force / table.load if solution.converged else complex(math.nan, math.nan)
+            return 1.0 + force / self.table.load if self.solution.converged else complex(math.nan, math.nan)
 
-        likely, count = places(left_at, t, phi if given else None)
-        counts[0] += count
+        likely, count = places(left_at, self.begin[0], self.begin[1] if given else None)
+        self.counts[0] += count
         for q in likely:
-            solution.destroy()
-            solution, q, found = through(q)
-            if found:
+            self.solution.destroy()
+            self.through(q)
+            if self.found:
                 break
-        elsewhere = False
-        if not found and best.q is None:  # the last grid was not met
-            solution.destroy()
-            solution, q, found = through(likely[0] if likely else begin)
-    if not found and best.q is not None:
-        q = best.q
-        solution.destroy()
-        solution = inner(_moved(free, *q), ask)
-        counts[-1] += 1
-    (t, phi), count, solves = q, int(counts[-1]), int(counts.sum())
-    work = sum(n * math.prod(s) for n, s in zip(counts.tolist(), shapes, strict=True)) / math.prod(shapes[-1])
-    carried = solution.problem.quantities(solution.fields)["load"]
-    value = eccentricity(scene, t, phi)
-    answer = f"eccentricity = {value:.8g} at {math.degrees(phi):.6g} degrees carries {carried:.8g}"
-    if solution.converged and not found:
-        solution.outcome = Outcome.LOAD_NOT_CARRIED
-        solution.message = f"{table.load:g} asked for; the nearest: {answer}, |F + W| = {best.miss:.3g} W"
-    record = {"vary": "eccentricity", "value": value, "load": table.load, "carried": carried}
-    solution.settings |= {
-        "balance": record | {"iterations": count, "solves": solves, "work": work},
-        "attitude_deg": math.degrees(phi),
-    }
-    solution.because(f"balance: {answer}, found in {count} solves on this grid, {solves} in all", after=True)
-    return solution
+        self.elsewhere = False
+        if not self.found and self.best.q is None:  # the last grid was not met
+            self.solution.destroy()
+            self.through(likely[0] if likely else self.begin)
+
+    def at_best(self) -> None:
+        """To the place at which least of the load is left."""
+        assert self.best.q is not None  # as the caller found
+        self.q = self.best.q
+        self.solution.destroy()
+        self.solution = self.inner(moved(self.free, *self.q), self.ask)
+        self.counts[-1] += 1
+
+    def told(self) -> Solution:
+        """The solution, with what was found of the load."""
+        (t, phi), solution, load, counts = self.q, self.solution, self.table.load, self.counts.tolist()
+        work = sum(n * math.prod(s) for n, s in zip(counts, self.shapes, strict=True)) / math.prod(self.shapes[-1])
+        carried = solution.problem.quantities(solution.fields)["load"]
+        value = eccentricity(self.scene, t, phi)
+        answer = f"eccentricity = {value:.8g} at {math.degrees(phi):.6g} degrees carries {carried:.8g}"
+        if solution.converged and not self.found:
+            solution.outcome = Outcome.LOAD_NOT_CARRIED
+            solution.message = f"{load:g} asked for; the nearest: {answer}, |F + W| = {self.best.miss:.3g} W"
+        record = {"vary": "eccentricity", "value": value, "load": load, "carried": carried}
+        solution.settings |= {
+            "balance": record | {"iterations": counts[-1], "solves": sum(counts), "work": work},
+            "attitude_deg": math.degrees(phi),
+        }
+        solution.because(f"balance: {answer}, found in {counts[-1]} solves on this grid, {sum(counts)} in all", after=True)
+        return solution
 
 
 @dataclass
@@ -167,37 +187,6 @@ def _coarse(scene: GroovedJournalScene, s: float) -> list[tuple[int, ...]]:
     return shapes
 
 
-def touching(scene: GroovedJournalScene, phi: float) -> float:
-    """The eccentricity at which a journal displaced towards phi touches its bore, at most 1."""
-    bore, turning = scene.model_copy(update={"eccentricity": 0.0}).gap, scene.turning
-    x = (phi + DIRECTIONS - turning.start) * turning.R
-    room = bore(x[None, :], np.linspace(0.0, turning.B, 5)[:, None]) / (turning.c * np.cos(DIRECTIONS))
-    return float(min(1.0, max(room.min(), 1e-6)))
-
-
-def eccentricity(scene: GroovedJournalScene, t: float, phi: float) -> float:
-    return touching(scene, phi) / (1.0 + math.exp(-t))
-
-
-def _moved(scene: Any, t: float, phi: float) -> Any:
-    """The scene with its journal there."""
-    return scene.model_copy(update={"eccentricity": eccentricity(scene, t, phi), "attitude_deg": math.degrees(phi)})
-
-
-def half_film_eccentricity(turning: Turning, mu: float, load: float, long: bool = False) -> float:
-    """The eccentricity at which a journal with half a film carries the load, as a start.
-
-    1/W = 1/W_short + 1/W_long, of Ocvirk's short and Sommerfeld's long bearing: between them for every L/D, and near both.
-    long : the long one alone, load in N/m.
-    """
-    e = 1.0 / (1.0 + np.exp(-np.linspace(-0.5 * WIDEST, 0.5 * WIDEST, 561)))
-    round_, ratio = 1.0 - e * e, math.inf if long else (turning.B / turning.R) ** 2
-    over_short = 1.0 / (0.25 * ratio * e / round_**2 * np.sqrt(16.0 * e * e + np.pi**2 * round_))
-    over_long = (2.0 + e * e) * round_ / (6.0 * e * np.sqrt(4.0 * e * e + np.pi**2 * round_))
-    unit = mu * turning.omega * turning.R * turning.B * (turning.R / turning.c) ** 2
-    return float(np.interp(math.log(load / unit), -np.log(over_short + over_long), e))
-
-
 def _on_grid(
     scene: Any, ask: Ask, inner: Inner, q: Array, load: float, tol: float, most: int, best: _Best
 ) -> tuple[Solution, Array, int, bool]:
@@ -209,7 +198,7 @@ def _on_grid(
     before, failed = None, 0  # before : place, residual and step
     for count in range(1, most + 1):
         t, phi = map(float, q)
-        at = _moved(scene, t, phi)
+        at = moved(scene, t, phi)
         solution = chain.solve(at)
         if not solution.converged:
             failed += 1
@@ -239,12 +228,12 @@ def _on_grid(
                 return solution, q + 2.0 * step, count, False
         else:
             K = _stiffness(at, solution)
-            still = force + K @ _place(scene, t, phi)  # that of the supplies alone
+            still = force + K @ place_of(scene, t, phi)  # that of the supplies alone
             supplied = not given and not at.model.effects and t < 0 and np.hypot(*still) > HELD * W
             if abs(left[1]) > AWRY or supplied:
                 q, before = _across(scene, t, phi, K, np.array([force[0] + load, force[1]])), None
                 continue
-            change = -K @ _moves(scene, t, phi)
+            change = -K @ moves_of(scene, t, phi)
             jacobian = np.stack([force @ change, force[0] * change[1] - force[1] * change[0]]) / W**2
             if given:
                 jacobian[:, 1], jacobian[1] = 0.0, [0.0, 1.0]
@@ -270,18 +259,6 @@ def _across(scene: Any, t: float, phi: float, K: Array, left: Array) -> Array:
     phi, s = math.atan2(at[1], at[0]), 1.0 / (1.0 + math.exp(-t))
     s = min(max(float(np.hypot(*at)) / touching(scene, phi), 1e-6), 0.5 * (s + 1.0))  # at most half the way to the bore
     return np.array([math.log(s / (1.0 - s)), phi])
-
-
-def _place(scene: Any, t: float, phi: float) -> Array:
-    """The journal's, m."""
-    return scene.clearance * eccentricity(scene, t, phi) * np.array([math.cos(phi), math.sin(phi)])
-
-
-def _moves(scene: Any, t: float, phi: float) -> Array:
-    """How the journal moves (m) with t and with the attitude: columns."""
-    d = 1e-5
-    ends = _place(scene, t + d, phi) - _place(scene, t - d, phi), _place(scene, t, phi + d) - _place(scene, t, phi - d)
-    return np.stack(ends, axis=1) / (2.0 * d)
 
 
 def _stiffness(at: Any, solution: Solution) -> Array:
