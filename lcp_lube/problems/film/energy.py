@@ -17,7 +17,7 @@ In time cells hold heat, rho c_p d/dt [area h (1 - r) T] by the step's formula (
 walls that approach do to the film goes in too. What is in minus what is out is stored.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -90,20 +90,7 @@ def heated(
         theta, residual = solver(heat)
         theta = np.full_like(theta, np.inf) if nowhere else theta
         mixers = _mixers(at, flow, carry_over)
-        if mixers:
-            responses = [solver(rho_c * (into * free).ravel())[0] for _, into, _ in mixers]
-            hot = [lambda T, a=away: reduce.sum(a.ravel() * T) / max(reduce.sum(a), SAME) for away, _, _ in mixers]
-            share = np.array([one[2] for one in mixers])
-            start = share * [find(theta) for find in hot]
-            M = share[:, None] * np.array([[find(response) for response in responses] for find in hot])
-            try:
-                mixed = np.linalg.solve(np.eye(len(mixers)) - M, start)
-            except np.linalg.LinAlgError:
-                mixed = np.full(len(mixers), np.inf)
-            with np.errstate(invalid="ignore"):
-                theta = theta + sum(T * response for T, response in zip(mixed, responses, strict=True))
-        else:
-            mixed = np.zeros(0)
+        theta, mixed = _mixed(at, theta, mixers, lambda into: solver(rho_c * (into * free).ravel())[0])
     finally:
         transport.destroy()
     T = theta.reshape(grid.box)
@@ -132,6 +119,29 @@ def _mixers(at: Answer, flow: Carried, carry_over: float | None) -> list[tuple[A
         goes_on = share * (arriving if arriving > flow.rounding else 0.0)
         out.append((away, into, goes_on / max(goes_on, going, SAME)))  # all where nothing leaves, but for rounding
     return out
+
+
+def _mixed(
+    at: Answer, theta: Array, mixers: list[tuple[Array, Array, float]], response: Callable[[Array], Array]
+) -> tuple[Array, Array]:
+    """Temperatures with what mixers send on, and the oil's in each of these; theta : where all of that is at T_in.
+
+    response : temperatures by oil that flows to the cells so and is 1 K warmer. Collective.
+    """
+    if not mixers:
+        return theta, np.zeros(0)
+    reduce = at.problem.reduce
+    responses = [response(into) for _, into, _ in mixers]
+    hot = [lambda T, a=away: reduce.sum(a.ravel() * T) / max(reduce.sum(a), SAME) for away, _, _ in mixers]
+    share = np.array([one[2] for one in mixers])
+    start = share * [find(theta) for find in hot]
+    M = share[:, None] * np.array([[find(one) for one in responses] for find in hot])
+    try:
+        mixed = np.linalg.solve(np.eye(len(mixers)) - M, start)
+    except np.linalg.LinAlgError:
+        mixed = np.full(len(mixers), np.inf)
+    with np.errstate(invalid="ignore"):
+        return theta + sum(T * one for T, one in zip(mixed, responses, strict=True)), mixed
 
 
 def fresh_flow(at: Answer, flow: Carried, carry_over: float | None) -> float:
