@@ -6,8 +6,9 @@ again, so that a run that was stopped goes on where it was.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from hashlib import sha256
 from math import isfinite
 from pathlib import Path
@@ -187,6 +188,53 @@ class Designs:
             self._near.destroy()
 
 
+@dataclass
+class _Task:
+    """What an optimiser asks of designs: their goal, in parts of its size at the start, and what exceeds their limits."""
+
+    designs: Designs
+    goal: str
+    sign: float
+    limits: Sequence[Limit]
+    size: float
+
+    def worst(self, design: Design) -> float:
+        """By how much a limit is exceeded at most."""
+        return max((one.excess(design.results[one.quantity]) for one in self.limits), default=0.0)
+
+    def over(self, t: Array, limit: Limit) -> tuple[float, Array]:
+        """By how much a limit is exceeded."""
+        design = self.designs.at(t)
+        if design.message:
+            return WORSE, np.zeros(t.size)
+        slope = limit.sign * self.designs.slopes(design, limit.quantity) / (abs(limit.bound) or 1.0)
+        return limit.excess(design.results[limit.quantity]), slope
+
+    def excess(self, t: Array) -> tuple[float, Array]:
+        """Sum of the squares of what exceeds the limits."""
+        if self.designs.at(t).message:
+            return WORSE, np.zeros(t.size)
+        found = [(max(far, 0.0), slope) for far, slope in (self.over(t, one) for one in self.limits)]
+        return sum(far**2 for far, _ in found), sum((2.0 * far * slope for far, slope in found), np.zeros(t.size))
+
+    def cost(self, t: Array) -> tuple[float, Array]:
+        """The goal, to be made least."""
+        design = self.designs.at(t)
+        if design.message:
+            return WORSE, np.zeros(t.size)
+        slope = self.designs.slopes(design, self.goal)
+        return -self.sign * design.results[self.goal] / self.size, -self.sign * slope / self.size
+
+    def rule(self, limit: Limit) -> dict[str, Any]:
+        """A limit as scipy has them."""
+        return {"type": "ineq", "fun": lambda t: -self.over(t, limit)[0], "jac": lambda t: -self.over(t, limit)[1]}
+
+    def best(self) -> Design | None:
+        """Of the designs tried, of those within the limits; None: there is none."""
+        feasible = [one for one in self.designs.known.values() if not one.message and self.worst(one) <= INSIDE]
+        return max(feasible, key=lambda one: self.sign * one.results[self.goal], default=None)
+
+
 def optimise(
     scene: Scene,
     goal: str,
@@ -218,57 +266,26 @@ def optimise(
     designs = Designs(scene, ranges, [goal, *(one.quantity for one in limits)], ask or Ask(), history, most)
     known = values_of(scene)
     x = np.array([min(max((known[one.key] - one.low) / (one.high - one.low), 0.0), 1.0) for one in ranges])
+    find: Callable[..., Any] = partial(minimize, jac=True, bounds=[(0.0, 1.0)] * len(ranges))
     try:
         start = designs.at(x)
         if start.message:
             raise InputError(f"no start: {', '.join(f'{k} = {v:g}' for k, v in start.values.items())}: {start.message}")
-        size = abs(start.results[goal]) or 1.0
-        bounds = [(0.0, 1.0)] * len(ranges)
-
-        def worst(design: Design) -> float:
-            return max((one.excess(design.results[one.quantity]) for one in limits), default=0.0)
-
-        def over(t: Array, limit: Limit) -> tuple[float, Array]:
-            """By how much a limit is exceeded."""
-            design = designs.at(t)
-            if design.message:
-                return WORSE, np.zeros(t.size)
-            slope = limit.sign * designs.slopes(design, limit.quantity) / (abs(limit.bound) or 1.0)
-            return limit.excess(design.results[limit.quantity]), slope
-
-        def excess(t: Array) -> tuple[float, Array]:
-            """Sum of the squares of what exceeds the limits."""
-            if designs.at(t).message:
-                return WORSE, np.zeros(t.size)
-            found = [(max(far, 0.0), slope) for far, slope in (over(t, one) for one in limits)]
-            return sum(far**2 for far, _ in found), sum((2.0 * far * slope for far, slope in found), np.zeros(t.size))
-
-        if worst(start) > INSIDE:  # first into the limits
-            x = np.clip(minimize(excess, x, jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": most}).x, 0.0, 1.0)
+        task = _Task(designs, goal, sign, limits, abs(start.results[goal]) or 1.0)
+        if task.worst(start) > INSIDE:  # first into the limits
+            x = np.clip(find(task.excess, x, method="L-BFGS-B", options={"maxiter": most}).x, 0.0, 1.0)
             design = designs.at(x)
-            if design.message or worst(design) > 1e-3:
+            if design.message or task.worst(design) > 1e-3:
                 off = [f"{one} ({design.results.get(one.quantity, np.nan):.6g})" for one in limits]
                 raise InputError(f"no feasible start: no design within the ranges was found that keeps {', '.join(off)}")
-
-        def cost(t: Array) -> tuple[float, Array]:
-            design = designs.at(t)
-            if design.message:
-                return WORSE, np.zeros(t.size)
-            return -sign * design.results[goal] / size, -sign * designs.slopes(design, goal) / size
-
-        def kept(limit: Limit) -> dict[str, Any]:
-            return {"type": "ineq", "fun": lambda t: -over(t, limit)[0], "jac": lambda t: -over(t, limit)[1]}
-
-        rules = [kept(one) for one in limits]
+        rules = [task.rule(one) for one in limits]
         how: dict[str, Any] = {"method": "SLSQP", "constraints": rules} if rules else {"method": "L-BFGS-B"}
-        options = {"maxiter": most, "ftol": REST}
-        done = minimize(cost, x, jac=True, bounds=bounds, options=options, **how)
-        feasible = [one for one in designs.known.values() if not one.message and worst(one) <= INSIDE]
-        if not feasible:
+        done = find(task.cost, x, options={"maxiter": most, "ftol": REST}, **how)
+        best = task.best()
+        if best is None:
             return Result(start, designs.at(done.x), int(done.nit), len(designs.known), False, "the limits are not kept")
-        best = max(feasible, key=lambda one: sign * one.results[goal])
         converged, message = bool(done.success), str(done.message)
-        if not converged and designs.stuck(best, goal, size):
+        if not converged and designs.stuck(best, goal, task.size):
             converged, message = True, "at a kink: no step improves it"
         return Result(start, best, int(done.nit), len(designs.known), converged, message)
     finally:
