@@ -9,7 +9,8 @@ import numpy as np
 from ...base.parallel import Array
 from ...errors import InputError
 from ...problems.certificate import glance
-from ...problems.film.effects import Answer, Cells, Compressible, Effect, FaceFactors, answer, factors, neutral
+from ...problems.film.compressible import Compressible
+from ...problems.film.effects import Answer, Cells, Effect, FaceFactors, answer, factors, neutral
 from ...problems.film.fluid import Law
 from ...problems.film.model import Model
 from ...problems.film.tangent import WIDEST, Giving, closed, filled, lift_of, logarithm, renewed

@@ -288,14 +288,3 @@ def neutral(effects: Sequence[Effect], size: int) -> Cells:
     """The fields of a film without effects, of those that the effects may change."""
     used = {name for effect in effects for name in effect.channels}
     return {name: np.full(size, value) for name, value in CHANNELS.items() if name in used}
-
-
-@dataclass(frozen=True)
-class Compressible(Effect):
-    """Dowson and Higginson's density, from the pressure."""
-
-    law: Law
-    channels: ClassVar[tuple[str, ...]] = ("density",)
-
-    def apply(self, at: Answer, out: Cells) -> None:
-        out["density"] *= self.law.density(at.p)
