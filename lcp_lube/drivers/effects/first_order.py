@@ -16,11 +16,11 @@ import numpy as np
 
 from ...base.parallel import Array
 from ...errors import InputError
+from ...problems.film.compressible import Compressible
 from ...problems.film.effects import (
     CHANNELS,
     Answer,
     Cells,
-    Compressible,
     Effect,
     FaceFactors,
     answer,
