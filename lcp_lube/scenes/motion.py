@@ -1,6 +1,7 @@
 """[motion] of a scene file: how long and in which steps the film goes on in time, what moves and how."""
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -160,9 +161,14 @@ class MotionTable(Measured):
         return _values("motion.load", self.load if isinstance(self.load, tuple) else [self.load], t)
 
 
+@lru_cache(maxsize=64)  # a march asks for the same few in every step
+def _of_time(text: float | str) -> Formula:
+    return Formula(text, ("t",))
+
+
 def _values(name: str, texts: Sequence[float | str], t: float) -> tuple[float, ...]:
     nowhere = np.zeros(())
-    found = tuple(float(Formula(text, ("t",))(nowhere, nowhere, t)) for text in texts)
+    found = tuple(float(_of_time(text)(nowhere, nowhere, t)) for text in texts)
     if not np.all(np.isfinite(found)):
         raise InputError(f"{name} = {', '.join(map(str, texts))}: no number at t = {t:g} s")
     return found

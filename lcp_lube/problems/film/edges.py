@@ -117,6 +117,13 @@ class Around:
 
     def edges(self, side: int) -> Sequence[float]:
         """Its edges in x (side 0) or y, m; round a ring the seam is one too where the film's ends differ."""
+        return self._edges[side]
+
+    @cached_property
+    def _edges(self) -> list[Sequence[float]]:
+        return [self._edges_of(side) for side in range(2)]
+
+    def _edges_of(self, side: int) -> Sequence[float]:
         found = self.jumps("xy"[side])
         if not (turn := self.period(side)):
             return found

@@ -104,7 +104,7 @@ def mean_film(grid: Grid, film: Any) -> Array:
 
     Else a pocket that travels would fill a whole cell at the moment when its edge passes the point.
     """
-    film = Around(film, grid)
+    film = film if isinstance(film, Around) else Around(film, grid)
     h = np.array(np.broadcast_to(film(grid.x, grid.y), grid.box), dtype=float)
     jumps = [film.edges(side) for side in range(grid.dim)]
     if not any(jumps):
