@@ -9,7 +9,6 @@ import numpy as np
 from ...base.parallel import Array
 from ...errors import InputError
 from ...problems.certificate import glance
-from ...problems.film.compressible import Compressible
 from ...problems.film.effects import Answer, Cells, Effect, FaceFactors, answer, factors, neutral
 from ...problems.film.fluid import Law
 from ...problems.film.model import Model
@@ -33,8 +32,11 @@ class Loop:
         self.scene, self.ask, self.inner = scene, ask, inner
         self.model: Model = scene.model  # type: ignore[union-attr]
         self.law = self.model.law or Law()
-        more = (Compressible(self.law),) if self.law.dowson_higginson else ()
-        self.effects: tuple[Effect, ...] = (*more, *self.model.effects)
+        self.effects: tuple[Effect, ...] = self.model.effects
+        if self.law.dowson_higginson:
+            from ...problems.film.compressible import Compressible  # here: of few films
+
+            self.effects = (Compressible(self.law), *self.effects)
         moving = {"density", "lift", "drag_flow"} & {name for effect in self.effects for name in effect.channels}
         if moving and self.model.scheme != "face":
             what = "fluid.density = dowson-higginson" if moving == {"density"} else f"an effect on {', '.join(sorted(moving))}"
