@@ -15,6 +15,7 @@ from .forces import ambient
 from .reynolds import sides
 from .strip import line_weights
 
+STILL = 1e-11  # of the largest flow out of a cell: what is less is rounding
 NOTHING = 1e-18  # of what pressures could turn into heat: the square of what a solve may leave of them
 LEVEL = 1e-15  # of the largest pressure: a drop by less is rounding where no wall moves, and what it drives anywhere
 
@@ -29,7 +30,8 @@ class Carried:
     power : what drag and pumps put in, as the film's own numbers have it; NaN where it was not asked for.
     area : of the cells, m2 (1D: m).
     turns : through the west and east face both ways: what the wall drags out of a part of a cell that is full, and pressure
-        drives back into it, as far as it or the cell to the west is empty, m3/s: none all at once as the last void goes.
+        drives back into it, as far as it or the cell to the west is empty, m3/s: none all at once as the last void goes;
+        beyond the film only where nothing else flows.
     held, kept : of a time step: liquid of a cell over the step's length, m3/s, and what it held before times T, K m3/s.
     rounding : of all that pressure drives, m3/s.
     """
@@ -86,6 +88,11 @@ def carried(at: Answer, told: bool = True) -> Carried:
     part = np.where(free, np.maximum(void.reshape(box), grid.ghosted(void, outside=0.0)[1:-1, :-2]), 0.0)
     back = np.minimum(dragged[1], -pushed[1]) - np.maximum(pushed[0], 0.0)
     turn = part * np.maximum(back, 0.0)
+    # What turns round at a side or groove takes no heat of the film along, however large it is on grids that do not tell its
+    # stretch from the rest of the film; but where all else stands still nothing else does.
+    west, east, south, north = (np.maximum(a, 0.0) for a in q)
+    goes = west + east + south + north
+    turn = np.where(other_free[1] | (goes <= STILL * problem.reduce.max(goes)), turn, 0.0)
     turns = (grid.ghosted(turn.ravel(), outside=0.0)[1:-1, :-2], turn)
     heat = np.zeros(box)
     for flow, near, is_free in zip(pushed, beside, other_free, strict=True):

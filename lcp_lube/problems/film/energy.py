@@ -25,12 +25,11 @@ import numpy as np
 
 from ...base.parallel import Array
 from .assembly import assemble
-from .carried import Carried, holders
+from .carried import STILL, Carried, holders
 from .effects import Answer, around, framed_by
 from .reynolds import sides
 from .transport import Transport
 
-STILL = 1e-11  # of the largest flow out of a cell: what is less is rounding
 EMPTY = 1e-9  # of a cell's liquid: less is rounding
 SAME = 1e-300  # what stands for 0 in a quotient
 
