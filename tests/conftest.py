@@ -229,3 +229,19 @@ def mpi_job(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int], dict[st
             return {**json.loads((folder / "record.json").read_text()), "fields": dict(fields)}
 
     return run
+
+
+@pytest.fixture
+def carried(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, bool]]:
+    """Of each call of the energy equation's solver: its inner steps, and whether it went up the flow."""
+    from lcp_lube.problems.film.transport import Transport
+
+    calls, carry = list[tuple[int, bool]](), Transport.__call__
+
+    def noted(self: Any, heat: Any, transposed: bool = False) -> Any:
+        found = carry(self, heat, transposed)
+        calls.append((self.ksp.getIterationNumber(), transposed))
+        return found
+
+    monkeypatch.setattr(Transport, "__call__", noted)
+    return calls

@@ -111,7 +111,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
     search.judge(solution, count)
     solution.steps = chain.steps
     problem.hold_at(supplies, search.P)
-    solution.certificate = problem.certify(solution.fields, solution.settings["eps1"])
+    solution.certificate = ask.certify_by(problem, solution.fields, solution.settings["eps1"])
     if ask.certify:
         from .supply_band import enclose_fed  # here: seldom asked for
 

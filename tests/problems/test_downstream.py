@@ -18,20 +18,6 @@ OIL = {
 }
 
 
-@pytest.fixture
-def carried(monkeypatch):
-    """Of each call of the energy equation's solver: its inner steps, and whether it went up the flow."""
-    calls, carry = [], transport.Transport.__call__
-
-    def noted(self, heat, transposed=False):
-        found = carry(self, heat, transposed)
-        calls.append((self.ksp.getIterationNumber(), transposed))
-        return found
-
-    monkeypatch.setattr(transport.Transport, "__call__", noted)
-    return calls
-
-
 def csr_of(dense, kept):
     """CSR arrays with the entries that are kept, zeros among them."""
     rows, columns = np.nonzero(kept)

@@ -74,9 +74,9 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution:
 
 def _settled_on(scene: Solvable, ask: Ask, inner: Inner, file: CouplingFile) -> Solution:
     """The solution on this grid, from that on coarser ones, or from where the file has it."""
-    inside = replace(ask, certify=False)
     from .settling import settle  # here: Barus' law alone has no loop
 
+    inside = replace(ask, certify=False)
     loop, coarse = Loop(scene, _reduced(inside, scene.model.law), inner), None  # type: ignore[union-attr]
     if file.holds(loop):
         begin = file.restore(loop)

@@ -66,7 +66,7 @@ def solve(scene: Any, ask: Ask) -> Solution | None:
         steps.append(Step(at.size, reduce.max(np.abs(found[0])), 1.0, 1))
     fields, problem = at.fields, film.closed(at)
     problem.more_measures["coupling"] = at.size
-    certificate = problem.certify(fields, near.settings["eps1"])
+    certificate = ask.certify_by(problem, fields, near.settings["eps1"])
     times = {"setup": 0.0, "assembly": 0.0, "linear": 0.0, "total": perf_counter() - begun}
     why = [WHY, *(one for one in near.settings["why"] if not one.startswith(("coupling", WHY)))]
     details = {key: value for key, value in near.settings["details"].items() if key not in ("fluid_solves", "coupling_work")}

@@ -69,19 +69,21 @@ class Frozen(Derived):
         return problem if self.by is None else self.by.on(problem.grid, j, i).film(problem)
 
 
-def settled(ask: Ask, stored: Stored | None, moved: float, reach: float = np.inf) -> float:
+def settled(ask: Ask, stored: Stored | None, moved: float, reach: float = np.inf, still: bool = False) -> float:
     """Relative change of the coefficients at which they count as found: by the eps1 asked for, not by a method's own.
 
     In a time step, which is expected to change effects of a size `reach` by `moved`, as far as its formula's error makes sense
     of it: a part of that change, or where effects are small, of the square of moved/reach, which is that error's size. Nothing
     is lost by it, as what cells store has the very density that flows.
+    still : whether it falls no further: films are solved to eps1 themselves, and may leave no less.
     """
     eps1 = ask.stopping_for((1e-8, 1e-8)).eps1
+    least = eps1 if still else SETTLED * eps1
     given = ask.stopping is not None and not ask.options.get("rest")
     if stored is None or stored.exact or given:
-        return SETTLED * eps1
+        return least
     part = max(IN_TIME[0] * moved, IN_TIME[1] * (moved / reach) ** 2 if reach else 0.0)
-    return max(SETTLED * eps1, min(part, IN_TIME[2], certificate_tol(eps1)))
+    return max(least, min(part, IN_TIME[2], certificate_tol(eps1)))
 
 
 def lent(near: Any, shape: tuple[int, ...]) -> LubricationProblem | None:

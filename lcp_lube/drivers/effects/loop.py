@@ -20,7 +20,8 @@ from ..chain import added
 from ..compose import Inner
 from .frozen import Frozen, lent, settled
 
-LOOKED, FAR = (8, 24), 0.3  # films, also between soft walls, after which a law's end is first looked for if fields change so
+NEAR = 0.3  # change of a coefficient, relative, from which on fields are near the answer
+FIRST = 8  # films after which those that are not NEAR yet are looked at otherwise
 LEAST_LIFT = -0.9  # of the rigid film, of an iterate
 STEEPEST = 0.9  # of q, over 1/b, where the pressure is without bound: of an iterate, whose viscosity is then 10 times mu
 
@@ -165,9 +166,8 @@ class Loop:
 
     @property
     def found(self) -> bool:
-        """Whether the coefficients count as found; films are solved to eps1 themselves, and may leave them no stiller."""
-        left = settled(self.ask, self.model.stored, self.moved, self.reach)
-        return self.change <= (max(left, self.ask.stopping_for((1e-8, 1e-8)).eps1) if self.still else left)
+        """Whether the coefficients count as found."""
+        return self.change <= settled(self.ask, self.model.stored, self.moved, self.reach, self.still)
 
     def made(self) -> Cells:
         """The fields that the effects make of the last answer."""
@@ -196,8 +196,8 @@ class Loop:
             self.log.append(self.vector(self.made()) if has else np.full_like(x, np.nan))
         plain = not self.base.reduce.max(np.abs(x - self.vector(neutral(self.effects, self.h.size))))
         # Others may change it yet, soft walls longest; alone, it is sure after a film with all else as it is without effects.
-        after = 1 if self.alone else LOOKED["lift" in self.names]
-        far = self.base.reduce.max(np.abs(x - self.log[-1])) > FAR and (plain or not self.alone)
+        after = 1 if self.alone else 3 * FIRST if "lift" in self.names else FIRST
+        far = self.base.reduce.max(np.abs(x - self.log[-1])) > NEAR and (plain or not self.alone)
         due = any(abs(self.solves - after * 2 ** (k / 2)) < 0.5 for k in range(11))  # again and again: an iterate may hide it
         if has and far and due:
             from .nonlinear import beyond  # here: films without effects have no loop

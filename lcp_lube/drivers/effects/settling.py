@@ -7,15 +7,14 @@ from petsc4py import PETSc
 
 from ...base.parallel import Array
 from .coupled_newton import newton
-from .loop import Loop
+from .loop import FIRST, NEAR, Loop
 from .nonlinear import LONG, beyond, by_films, by_half_steps, steps, warmer
 
 MOST_SOLVES = 100  # films; LONG while the least change has fallen to a tenth within as many as
 PATIENCE = 50  # these; two cycles
 MEMORY = 30  # answers that Anderson's method combines; -coupling_snes_anderson_m changes it
 CYCLE = 25  # steps after which it begins anew: its least squares see no changes 1e-8 of the largest that they remember
-FEW, NEAR, AWAY = 1, 0.3, 30.0  # answers combined while a coefficient changes by more than NEAR; AWAY: times the least change
-FIRST = 8  # films from which on films between soft walls that are not NEAR yet are solved with their walls at once
+FEW, AWAY = 1, 30.0  # answers combined while a coefficient changes by more than NEAR; AWAY: times the least change
 LONGEST = 1.0  # relative change of a coefficient in one step, before answers are combined
 STILL = 3  # films in which the least change has not fallen to a half, where it is films' own error
 
@@ -65,6 +64,7 @@ class _Anderson:
         self.least, self.last, self.near, self.idle = self.best, (begin + 1.0, begin), False, 0
         self.mark = self.halved = (np.inf, 0)
         steady = loop.model.stored is None
+        # Films between soft walls that are not near after so many are solved with their walls at once.
         self.wait = FIRST if steady and "lift" in loop.names else np.inf
         self.warm = warmer(loop, begin) if steady and "warmth" in loop.names else None
         self.x = PETSc.Vec().createMPI((len(loop.names) * loop.h.size, None), comm=loop.base.grid.petsc_comm)

@@ -51,7 +51,7 @@ def solve(scene: Solvable, ask: Ask, inner: Inner) -> Solution | None:
         solution.destroy()
         return None
     problem.hold_at(model.supplies, P)
-    solution.certificate = problem.certify(solution.fields, solution.settings["eps1"])
+    solution.certificate = ask.certify_by(problem, solution.fields, solution.settings["eps1"])
     why = [WHY, *(one for one in solution.settings["why"] if not one.startswith("supplies"))]
     solution.settings |= {"supply_pressures": P, "why": why}
     return solution.judged()
@@ -101,7 +101,7 @@ def _film(scene: Solvable, ask: Ask) -> Solution:
     film.hold_at(sources.held(P))
     film.free_matrices()
     fields = {"p": np.maximum(z, 0.0), "r": np.maximum(-z, 0.0)}
-    certificate = film.certify(fields, near.settings["eps1"])
+    certificate = ask.certify_by(film, fields, near.settings["eps1"])
     why = [one for one in near.settings["why"] if not one.startswith("coupling")]
     times = {"setup": 0.0, "assembly": 0.0, "linear": 0.0, "total": perf_counter() - begun}
     message = f"no sign changes any more after {len(steps)} steps"

@@ -34,6 +34,7 @@ class Transport:
         self.ksp.setType("gmres")
         self.ksp.setGMRESRestart(FEW)
         if "factors" in known:
+            self.ksp.setFromOptions()  # as below: monitors, say
             self._by_factors(anew=known["factors"] is None)
             return
         if mat.comm.getSize() == 1 and mat.getSize()[0] >= ORDERED and has_numba():
